@@ -15,6 +15,7 @@ static constexpr uint32_t BANK_REGISTERS[] = {0, 0x14, 0x24, 0x34};
 void Ebi::reset() {
     Peripheral::reset();
     busy_until = 0;
+    set_up();
 }
 
 uint32_t Ebi::peek(uint32_t offset) const {
@@ -27,6 +28,7 @@ uint32_t Ebi::read(uint32_t offset) { return Ebi::peek(offset); }
 
 void Ebi::write(uint32_t offset, uint32_t value) {
     Peripheral::write(offset, value);
+    set_up();
     const bool rd = offset == RDTIMING || offset == RDTIMING1 || offset == RDTIMING2 ||
                     offset == RDTIMING3;
     if (rd && value & (RDTIMING_PREFETCH | RDTIMING_PAGEMODE))
@@ -83,41 +85,79 @@ bool Ebi::pins_out(int bank) const {
     return (reg(ROUTE) & wanted) == wanted;
 }
 
+void Ebi::set_up() {
+    for (int n = 0; n < 4; n++) {
+        const uint32_t mode = bank_mode(n);
+        banks[n] = {part.enabled(instance) && reg(CTRL) & CTRL_BANK0EN << n, pins_out(n),
+                    n == 0 && part.memories.external && part.memories.external_size,
+                    !(timing(WRTIMING, n) & WRTIMING_WBUFDIS),
+                    mode == D16 || mode == D16A16ALE ? 2 : 1, cycles(n, false), cycles(n, true),
+                    reach(n)};
+    }
+}
+
+bool Ebi::report(int bank) {
+    part.log_once("EBI: access to bank %d, which is not enabled", bank);
+    return false;
+}
+
+// A whole access in memory, of a constant size: detection reads whole pictures by bytes.
+template <class Word> static uint32_t move(uint8_t *cell, uint32_t value, bool write) {
+    Word word = (Word)value;
+    if (write)
+        std::memcpy(cell, &word, sizeof word);
+    else
+        std::memcpy(&word, cell, sizeof word);
+    return word;
+}
+
+uint32_t Ebi::memory_access(const Bank &bank, uint32_t offset, int size, uint32_t value,
+                            bool write) {
+    const uint32_t limit = part.memories.external_size, at = offset & bank.reach;
+    uint8_t *memory = part.memories.external;
+    if (at + (uint32_t)size <= limit && at + (uint32_t)size - 1 <= bank.reach) {
+        if (size == 1)
+            return move<uint8_t>(memory + at, value, write);
+        return size == 2 ? move<uint16_t>(memory + at, value, write)
+                         : move<uint32_t>(memory + at, value, write);
+    }
+    for (int n = 0; n < size; n++) {
+        uint8_t &cell = memory[((offset + (uint32_t)n) & bank.reach) % limit];
+        if (write)
+            cell = (uint8_t)(value >> 8 * n);
+        else
+            value |= (uint32_t)cell << 8 * n;
+    }
+    return value;
+}
+
 bool Ebi::access(uint32_t address, int size, uint32_t &value, bool write, int64_t &wait) {
     uint32_t offset;
-    const int bank = bank_of(address, offset);
-    if (bank > 3 || !part.enabled(instance) || !(reg(CTRL) & CTRL_BANK0EN << bank)) {
-        part.log_once("EBI: access to bank %d, which is not enabled", bank);
-        return false;
-    }
-    if (!pins_out(bank))
-        part.log_once("EBI: access to bank %d without its pins (ROUTE)", bank);
-    const uint32_t mode = bank_mode(bank);
-    const int bytes = mode == D16 || mode == D16A16ALE ? 2 : 1;
-    const int64_t each = cycles(bank, write), transactions = (size + bytes - 1) / bytes;
+    const int number = bank_of(address, offset);
+    if (number > 3 || !banks[number].enabled)
+        return report(number);
+    const Bank &bank = banks[number];
+    const int64_t each = write ? bank.write_cycles : bank.read_cycles;
+    const int64_t transactions = bank.bytes == 1 ? size : (size + 1) / 2;
     const int64_t now = part.cpu.cycles;
     const int64_t begin = std::max(now, busy_until), end = begin + each * transactions;
-    const bool buffered = write && !(timing(WRTIMING, bank) & WRTIMING_WBUFDIS);
+    const bool buffered = write && bank.buffered;
     wait += (buffered ? begin : end) - now;
     busy_until = buffered ? end : 0;
-
-    const bool memory = bank == 0 && part.memories.external && part.memories.external_size;
+    if (bank.connected && bank.memory) {
+        value = memory_access(bank, offset, size, value, write);
+        return true;
+    }
+    if (!bank.connected)
+        part.log_once("EBI: access to bank %d without its pins (ROUTE)", number);
     for (int n = 0; n < size; n++) {
-        const uint32_t at = (offset + (uint32_t)n) & reach(bank);
         uint8_t byte = write ? (uint8_t)(value >> 8 * n) : 0xFF;
-        if (!pins_out(bank)) {
-            // Nothing is selected.
-        } else if (memory) {
-            uint8_t &cell = part.memories.external[at % part.memories.external_size];
-            if (write)
-                cell = byte;
-            else
-                byte = cell;
-        } else if (part.outside) {
-            const int64_t cycle = begin + each * (n / bytes) - now;
-            const int64_t time = part.now() + part.rate(Clock::HFCORE).span(cycle);
-            if (!part.outside->external(bank, at, byte, write, time))
-                part.log_once("EBI: nothing answers on bank %d", bank);
+        if (bank.connected && part.outside) {
+            const int64_t time = part.now() + part.rate(Clock::HFCORE)
+                                                  .span(begin + each * (n / bank.bytes) - now);
+            const uint32_t at = (offset + (uint32_t)n) & bank.reach;
+            if (!part.outside->external(number, at, byte, write, time))
+                part.log_once("EBI: nothing answers on bank %d", number);
         }
         if (!write)
             value |= (uint32_t)byte << 8 * n;

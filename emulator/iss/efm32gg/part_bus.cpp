@@ -62,6 +62,8 @@ static bool writable_memory(uint32_t address) { return address >= Part::RAM_CODE
 bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
     uint32_t left;
     value = 0;
+    if (address >= Ebi::BASE)
+        return ebi->covers(address) && ebi->access(address, size, value, false, wait);
     if (const uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
         if (left < (uint32_t)size)
             return false;
@@ -86,6 +88,8 @@ bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
 
 bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
     uint32_t left;
+    if (address >= Ebi::BASE)
+        return ebi->covers(address) && ebi->access(address, size, value, true, wait);
     if (uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
         if (!writable_memory(address))
             return msc->ignores_bus_writes();
