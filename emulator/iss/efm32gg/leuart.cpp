@@ -97,6 +97,12 @@ void Leuart::apply(uint32_t offset, uint32_t value) {
     follow();
 }
 
+// Enabling and disabling are neighbours in CMD: the newer one counts.
+uint32_t Leuart::both(uint32_t older, uint32_t newer) const {
+    const uint32_t pairs = newer & 0x3F;
+    return (older & ~((pairs & 0x15) << 1 | (pairs & 0x2A) >> 1)) | newer;
+}
+
 void Leuart::command(uint32_t value) {
     uint32_t &status = reg(STATUS);
     const auto change = [&](uint32_t on, uint32_t off, uint32_t bit) {

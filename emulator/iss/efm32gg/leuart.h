@@ -33,6 +33,7 @@ private:
 
     uint32_t busy_bit(uint32_t offset) const override;
     void apply(uint32_t offset, uint32_t value) override;
+    uint32_t both(uint32_t older, uint32_t newer) const override;
     int data_bits() const { return reg(leuart::CTRL) & leuart::CTRL_DATABITS ? 9 : 8; }
     int pin(int signal, uint32_t enable) const;
     void command(uint32_t value);

@@ -30,9 +30,9 @@ void LowEnergy::write(uint32_t offset, uint32_t value) {
         return;
     if (place == late_count)
         late[late_count++] = {offset, 0, false};
-    // Commands that follow each other too quickly are not lost; of values the last one counts.
+    // Of values the last one counts.
     const bool gathers = offset == commands && !late[place].applied;
-    late[place] = {offset, gathers ? late[place].value | value : value, at_once};
+    late[place] = {offset, gathers ? both(late[place].value, value) : value, at_once};
     if (at_once)
         apply(offset, value);
     start();

@@ -23,6 +23,8 @@ protected:
     // Of units with immediate synchronization (RTC, LETIMER) a write arrives at once, and SYNCBUSY
     // shows that it happened.
     virtual bool immediate() const { return false; }
+    // Commands that follow each other before they have arrived are not lost.
+    virtual uint32_t both(uint32_t older, uint32_t newer) const { return older | newer; }
     // The clock that a write has to wait for.
     virtual Rate synchronizer() const { return part.unit_rate(instance); }
 

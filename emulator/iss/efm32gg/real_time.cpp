@@ -6,6 +6,7 @@
 #include "rmu.h"
 
 #include <algorithm>
+#include <array>
 
 namespace efm32gg {
 
@@ -173,6 +174,8 @@ bool Rtc::watched(int compare) const { return started && started->awaits(compare
 
 using namespace burtc;
 
+static constexpr uint32_t RETAINED = 128;
+
 Burtc::Burtc(Part &part, const Instance &instance)
     : CompareCounter(part, instance,
                      {CNT, {COMP0, NONE}, 0xFFFFFFFF, IF_OF, {IF_COMP0, 0}, 55}, FREEZE, SYNCBUSY) {}
@@ -180,7 +183,14 @@ Burtc::Burtc(Part &part, const Instance &instance)
 void Burtc::reset() {
     if (!(part.reset_cause & rmu::RSTCAUSE_PORST) && !part.rmu->backup_domain_resets())
         return update_interrupts();
+    // The retention registers are memory: they keep what they have as long as there is power.
+    std::array<uint32_t, RETAINED> retained = {};
+    if (!(part.reset_cause & rmu::RSTCAUSE_PORST))
+        for (uint32_t n = 0; n < RETAINED; n++)
+            retained[n] = reg(RET0_REG + 4 * n);
     LowEnergy::reset();
+    for (uint32_t n = 0; n < RETAINED; n++)
+        reg(RET0_REG + 4 * n) = retained[n];
     clear_count();
     oscillator_hertz = 0;
 }

@@ -28,6 +28,10 @@ public:
         if (offset == rmu::CMD && value & rmu::CMD_RCCLR)
             reg(rmu::RSTCAUSE) &= BACKUP;
         Peripheral::write(offset, value);
+        if (offset == rmu::CTRL && backup_domain_resets()) {
+            part.reset_cause = 0;  // no power-on
+            part.find("BURTC")->reset();
+        }
     }
 
     // The causes that RCCLR leaves to EMU_AUXCTRL.HRCCLR.

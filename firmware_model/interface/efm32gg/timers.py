@@ -93,7 +93,7 @@ BURTC = peripheral(
     """
     000   CTRL           rw 00000008  MODE:0:2 DEBUGRUN:2 RSTEN:3 COMP0TOP:4 LPCOMP:5:3 PRESC:8:3
     +   CLKSEL:12:2 BUMODETSEN:14
-    004   LPMODE         rw 00000000  LPMODE:0:2
+    004   LPMODE         rw 00000000  LPMODE:0:2 - kept
     008   CNT            r  00000000  *
     00C   COMP0          rw 00000000  *
     010   TIMESTAMP      r  00000000  *

@@ -273,6 +273,15 @@ def test_commands_arrive_two_to_three_clocks_later() -> None:
     assert not bench.is_set("LEUART0.STATUS.RXENS")
 
 
+def test_of_opposite_commands_the_later_one_counts() -> None:
+    bench = leuart()
+    bench["LEUART0.CMD"] = mask_of("LEUART.CMD.RXDIS")
+    bench["LEUART0.CMD"] = mask_of("LEUART.CMD.RXEN") | mask_of("LEUART.CMD.TXDIS")
+    bench.run_for(4 * TICK)
+    assert bench.is_set("LEUART0.STATUS.RXENS")
+    assert not bench.is_set("LEUART0.STATUS.TXENS")
+
+
 def test_a_received_character_wakes_from_em2() -> None:
     bench = leuart(interrupts=True)
     bench["LEUART0.IEN"] = 4
@@ -361,6 +370,15 @@ def test_512_bytes_survive_every_reset_but_power_on() -> None:
     bench.reset(POWER_ON)
     bench.clock("LE")
     assert bench["BURTC.RET5_REG"] == 0
+
+
+def test_the_reset_of_the_backup_domain_leaves_the_memory() -> None:
+    bench = burtc(ULFRCO)
+    bench["BURTC.RET7_REG"] = 77
+    bench["RMU.CTRL"] = mask_of("RMU.CTRL.BURSTEN")
+    bench["RMU.CTRL"] = 0
+    assert bench["BURTC.CTRL"] == mask_of("BURTC.CTRL.RSTEN")
+    assert bench["BURTC.RET7_REG"] == 77
 
 
 def test_the_burtc_counts_on_over_a_reset() -> None:
