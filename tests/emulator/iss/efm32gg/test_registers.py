@@ -23,8 +23,19 @@ MODELLED = [(layout, instance) for layout, instance in UNITS if layout.modelled]
 LIVE = {"RMU.RSTCAUSE": 1}
 """Registers that do not have their reset value after power-on, with what they have."""
 
-PLAIN_UNITS = ("CMU", "GPIO", "EBI", "PRS", "EMU")
-SPECIAL = {"LOCK", "FREEZE", "AUXCTRL", "HFRCOCTRL", "OSCENCMD", "EM4CONF", "HFCORECLKDIV", "CTRL"}
+PLAIN_UNITS = ("CMU", "GPIO", "EBI", "PRS", "EMU", "USART1", "I2C1", "TIMER2", "ADC0", "DAC0",
+               "ACMP1", "VCMP")  # fmt: skip
+SPECIAL = {
+    "LOCK",
+    "DTLOCK",
+    "FREEZE",
+    "AUXCTRL",
+    "HFRCOCTRL",
+    "OSCENCMD",
+    "EM4CONF",
+    "HFCORECLKDIV",
+    "CTRL",
+}
 """Registers whose write does something, in these units."""
 
 
