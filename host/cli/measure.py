@@ -142,10 +142,10 @@ def _report(
 ) -> None:
     """Show a table of the first results, and what all are together; ``runs`` as ``running``."""
     if experiment.columns:
-        profile = f"; profile {runs['profile']}" if runs else ""
+        ran = "".join(f"; {what} {runs[what]}" for what in ("profile", "firmware") if what in runs)
         for name, value in runs.get("switches", {}).items():
-            profile += f", {name}={value}"
-        table = Table(title=experiment.title + profile)
+            ran += f", {name}={value}"
+        table = Table(title=experiment.title + ran)
         for column in experiment.columns[:-1]:
             table.add_column(column, justify="right")
         table.add_column(experiment.columns[-1], overflow="fold")
