@@ -132,13 +132,16 @@ void iss_reset(IssMachine *machine, int32_t cause) {
     machine->system.reset(cause & 1);
 }
 
-int32_t iss_run(IssMachine *machine, int64_t until_ps) {
-    return reason_of(*machine, machine->run(until_ps));
+int32_t iss_run(IssMachine *machine, int64_t until_ps, int64_t *reached) {
+    const int32_t reason = reason_of(*machine, machine->run(until_ps));
+    *reached = machine->now();
+    return reason | (machine->part && machine->part->outbox.count ? 256 : 0);
 }
 
-int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high) {
+int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high,
+                 int64_t *reached) {
     machine->cpu.steps(1, low, high);
-    const int32_t reason = iss_run(machine, until_ps);
+    const int32_t reason = iss_run(machine, until_ps, reached);
     machine->cpu.steps(0);
     return reason;
 }

@@ -45,9 +45,11 @@ void iss_delete(IssMachine *machine);
 
 // Time and running.
 void iss_reset(IssMachine *machine, int32_t cause);
-int32_t iss_run(IssMachine *machine, int64_t until_ps);
+// The reason, plus 256 if there is something in the outbox; `reached` is the time.
+int32_t iss_run(IssMachine *machine, int64_t until_ps, int64_t *reached);
 // One instruction, or more while the next one lies in [low, high).
-int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high);
+int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high,
+                 int64_t *reached);
 int64_t iss_now(const IssMachine *machine);
 int64_t iss_cycles(const IssMachine *machine);
 int64_t iss_next_event(const IssMachine *machine);  // INT64_MAX for none

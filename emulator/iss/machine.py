@@ -58,16 +58,21 @@ class StopReason(IntEnum):
     FAULT = 9
 
 
+_REASONS = tuple(StopReason)
+
+
 class Stop(NamedTuple):
     """End of a run.
 
     Attributes:
         reason: of it.
         now_ps: time that the machine has reached.
+        sends: whether there is something in the outbox, whatever the reason.
     """
 
     reason: StopReason
     now_ps: int
+    sends: bool = False
 
 
 class Kind(IntEnum):
@@ -163,6 +168,7 @@ class Machine:
         self.analog = np.zeros(ANALOG_INPUTS, np.float64)
         self.image: Image | None = None
         self._outgoing = (OutgoingRecord * 256)()
+        self._reached = ctypes.c_int64()
         self._handle: int | None = self._library.iss_new(
             *(item for memory in (self.flash, self.ram, self.external)
               for item in (memory.ctypes.data, memory.size)),
@@ -212,13 +218,13 @@ class Machine:
 
         An asleep machine stands at the next thing that happens, or at ``until_ps``.
         """
-        reason = self._library.iss_run(self.handle, until_ps)
-        return Stop(StopReason(reason), self.now_ps)
+        answer = self._library.iss_run(self.handle, until_ps, self._reached)
+        return Stop(_REASONS[answer & 0xFF], self._reached.value, answer > 0xFF)
 
     def step(self, until_ps: int = NEVER, within: tuple[int, int] = (0, 0)) -> Stop:
         """Execute one instruction, or more while the next one is ``within`` [low, high)."""
-        reason = self._library.iss_step(self.handle, until_ps, *within)
-        return Stop(StopReason(reason), self.now_ps)
+        answer = self._library.iss_step(self.handle, until_ps, *within, self._reached)
+        return Stop(_REASONS[answer & 0xFF], self._reached.value, answer > 0xFF)
 
     def hang(self) -> None:
         """The core executes nothing from now on, until a reset."""

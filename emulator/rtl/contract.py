@@ -82,6 +82,7 @@ class RtlEngine(ABC):
         self._log = ViolationLog()
         self._cameras = [_Camera(number, pins) for number, pins in enumerate(wiring.cameras)]
         self._camera_of = {pin: camera for camera in self._cameras for pin in camera.pins.pins}
+        self._idle = False  # no camera runs, and none will before something is done to the pins
         self._next_strobe = 0, Fraction(0), Fraction(0)  # time, period, fraction
 
     @abstractmethod
@@ -132,7 +133,7 @@ class RtlEngine(ABC):
     @property
     def running(self) -> int:
         """Cameras whose clocks are made now; see ``FpgaPort``."""
-        return sum(1 << camera.number for camera in self._running())
+        return 0 if self._idle else sum(1 << camera.number for camera in self._running())
 
     @property
     def driver(self) -> Driver | None:
@@ -141,6 +142,7 @@ class RtlEngine(ABC):
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
         """Take over a burst that ended; see ``FpgaPort``."""
+        self._idle = False
         self.now_ps = max(self.now_ps, reached_ps)
         if _BURST_ENDS[end] is BurstEnd.SEGMENT_OVER:
             self._follow_segment(self._cameras[camera])
@@ -162,11 +164,13 @@ class RtlEngine(ABC):
 
         None disconnects it: clock, syncs and data go low.
         """
+        self._idle = False
         self._named(camera).source = source
         self.stream_changed(camera)
 
     def stream_changed(self, camera: str | None = None) -> None:
         """Ask the source again: what it does from ``now_ps`` on is not what it said before."""
+        self._idle = False
         self._follow_source(self._named(camera), self.now_ps)
 
     def power_memory(self, name: str, on: bool) -> None:
@@ -193,6 +197,7 @@ class RtlEngine(ABC):
         self.run(self.now_ps)
         for camera in self._cameras:
             self._catch_up(camera)
+        self._idle = False
         self._flip(register, bit)
 
     def set_pin(self, name: str, value: int) -> None:
@@ -205,6 +210,7 @@ class RtlEngine(ABC):
         self.run(self.now_ps)
         for camera in self._cameras:
             self._catch_up(camera)
+        self._idle = False
         self._set(name, value)
 
     def get_pin(self, name: str) -> int:
@@ -217,6 +223,9 @@ class RtlEngine(ABC):
 
     def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
         """Advance to ``until_ps`` or to ``stop_on``."""
+        if self._idle and stop_on is None and until_ps >= self.now_ps:
+            self.now_ps = until_ps
+            return until_ps
         if until_ps < self.now_ps:
             raise ValueError(f"can not run back from {self.now_ps} ps to {until_ps} ps")
         if stop_on is not None:
@@ -231,6 +240,7 @@ class RtlEngine(ABC):
                 if camera not in running:
                     camera.skipped = camera.loaded is not None
             if not running:
+                self._idle = True
                 self.now_ps = until_ps
                 return self.now_ps
             # An acknowledge is where idle time begins, so it ends the burst in any case.
@@ -271,6 +281,7 @@ class RtlEngine(ABC):
             selects = " and ".join(bus.selects)
             raise ValueError(f"there is no chip select {transactions.select}, only {selects}")
         self.run(self.now_ps)
+        self._idle = False
         start, period = self.now_ps, transactions.period
         # Transaction n ends at floor(n * period): the largest n that keeps it within reach.
         fitting = max(0, ceil((until_ps - start + 1) / period) - 1)
@@ -306,6 +317,7 @@ class RtlEngine(ABC):
         outputs = np.zeros((len(events), len(pins)), np.int64)
         for row, (time_ps, pin, level) in enumerate(events):
             self.run(time_ps)
+            self._idle = False
             if pin in self._camera_of and self._camera_of[pin].source is None:
                 self._set(pin, level)
             else:
@@ -339,7 +351,7 @@ class RtlEngine(ABC):
     def _catch_up(self, camera: _Camera) -> None:
         """Put the pixel clock where it would be, had no clock been skipped."""
         if camera.skipped:
-            camera.skipped = False
+            camera.skipped = self._idle = False
             entered = camera.entered
             # The edges up to now, now included, are those that were skipped.
             self._follow_source(camera, self.now_ps + 1)

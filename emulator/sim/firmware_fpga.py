@@ -65,6 +65,7 @@ class FpgaCoupling:
         self._machine, self.fpga, self._banks = machine, fpga, tuple(banks)
         self._names = [pin.name for pin in pins]
         self._error: BaseException | None = None
+        self._told = -1  # which cameras the machine believes to run
         driver = fpga.driver if compiled and not banks else None
         self._compiled = driver is not None
         self._callbacks = (
@@ -84,7 +85,10 @@ class FpgaCoupling:
 
     def before_run(self) -> None:
         """The machine is about to run: it has to know which cameras do."""
-        self._machine.fpga_running(self.fpga.running)
+        running = self.fpga.running
+        if running or self._told:
+            self._machine.fpga_running(running)
+            self._told = running
 
     def after_run(self, time_ps: int) -> None:
         """The machine has run to ``time_ps``: the FPGA follows. Raises what callbacks raised."""

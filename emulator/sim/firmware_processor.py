@@ -20,8 +20,7 @@ from cubestack.emulator.sim.fpga_port import FpgaPort
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
 
 LOOK_AHEAD_PS = 80 * PS_PER_US
-"""Longest run of a machine. Less than the time of a byte on the wires: what a host begins to send
-while the machine is ahead arrives after that, and from then on nothing is late."""
+"""Longest run of a machine, unless a board says otherwise."""
 
 QUANTUM_PS = 10 * PS_PER_US
 """Run of a machine that has to take turns with another one at the same picosecond."""
@@ -61,6 +60,8 @@ class FirmwareProcessor:
         causes: the part's bits for each cause of a reset that ``reset`` may be given; those that
             are not among them hang it instead.
         couple: leads the machine's pins to an FPGA.
+        look_ahead_ps: longest run of the machine: less than the time of a byte on the wires, so
+            what a host begins to send while the machine is ahead arrives after that.
         on_activity: told when the core falls asleep (False) or awakes (True).
         console: receives text that the program prints by its debug channels, line by line.
         on_fault: told of what stops the program for good, with a line of text.
@@ -75,6 +76,7 @@ class FirmwareProcessor:
     handlers: Mapping[Kind, Callable[[Outgoing], None]] = field(default_factory=dict)
     causes: Mapping[int, int] = field(default_factory=dict)
     couple: Callable[[FpgaPort], FpgaCoupling] | None = None
+    look_ahead_ps: int = LOOK_AHEAD_PS
     on_activity: Callable[[bool], None] = lambda _awake: None
     console: Callable[[str], None] = logger.info
     on_fault: Callable[[str], None] = logger.error
@@ -164,25 +166,27 @@ class FirmwareProcessor:
     # --------------------------------------------------------------------------------------------
 
     def _run(self) -> Steps:
-        standing = 0
+        env, standing = self.env, 0
+        reached_ps = self.machine.now_ps
         while True:
-            yield from self._take_turn()
-            before_ps = self.machine.now_ps
+            if env.horizon() == env.now:
+                yield env.timeout(0)  # everybody else who is to act now does so first
             stop = self._run_machine(self._until())
-            yield from self._empty_outbox()
-            while self.env.paused:  # by the debugger: as if it had not stopped here
+            yield from self._settle(stop)
+            while env.paused:  # by the debugger: as if it had not stopped here
                 yield self._urgent()
                 stop = self._run_machine(self._until())
-                yield from self._empty_outbox()
-            if self._sleeps(stop):
+                yield from self._settle(stop)
+            if not self._awake and self._sleeps(stop):
                 yield from self._sleep()
                 continue
-            ahead_ps = stop.now_ps - self.env.now
-            standing = standing + 1 if stop.now_ps == before_ps and ahead_ps <= 0 else 0
+            ahead_ps = stop.now_ps - env.now
+            standing = standing + 1 if stop.now_ps == reached_ps and ahead_ps <= 0 else 0
+            reached_ps = stop.now_ps
             if standing > 2:  # a machine that can not go on must not keep the kernel
-                yield from self._stand_still()
+                yield from self._await_input(self._until())
                 continue
-            yield self.env.timeout(max(0, ahead_ps))
+            yield env.timeout(max(0, ahead_ps))
 
     def _run_machine(self, until_ps: int) -> Stop:
         if self._coupling is not None:
@@ -206,19 +210,14 @@ class FirmwareProcessor:
     def _report(self) -> str:
         return fault_report(self.machine, Symbols.of(self.machine.image), self.machine.now_ps)
 
-    def _take_turn(self) -> Steps:
-        """Let everybody else act who is to act now."""
-        if self.env.horizon() == self.env.now:
-            yield self.env.timeout(0)
-
     def _until(self) -> int:
         """Nothing else happens before this time."""
         now_ps, horizon = self.env.now, self.env.horizon()
         if horizon is None:
-            return now_ps + LOOK_AHEAD_PS
+            return now_ps + self.look_ahead_ps
         if horizon <= now_ps:
             return now_ps + QUANTUM_PS
-        return min(horizon, now_ps + LOOK_AHEAD_PS)
+        return min(horizon, now_ps + self.look_ahead_ps)
 
     def _sleeps(self, stop: Stop) -> bool:
         """Whether the kernel can go on without the machine for a while."""
@@ -229,9 +228,6 @@ class FirmwareProcessor:
         """Until the machine's own next event, or an input."""
         due_ps = self.machine.next_event_ps
         yield from self._await_input(None if due_ps == NEVER else max(due_ps, self.env.now))
-
-    def _stand_still(self) -> Steps:
-        yield from self._await_input(self._until())
 
     def _await_input(self, until_ps: int | None) -> Steps:
         """Until an input, one that was there already included, or a time."""
@@ -251,6 +247,13 @@ class FirmwareProcessor:
 
     # --- what leaves the machine ----------------------------------------------------------------
 
+    def _settle(self, stop: Stop) -> Steps:
+        """Do what is due after a run."""
+        if stop.sends or self._early or self.debugger is not None:
+            yield from self._empty_outbox()
+        if self._coupling is not None:
+            self._coupling.after_run(stop.now_ps)
+
     def _empty_outbox(self) -> Steps:
         early, self._early = self._early, []
         for one in (*early, *self.machine.outbox()):
@@ -259,8 +262,6 @@ class FirmwareProcessor:
             if self._coupling is not None:
                 self._coupling.after_run(max(self.env.now, one.time_ps))
             self._handle(one)
-        if self._coupling is not None:
-            self._coupling.after_run(self.machine.now_ps)
 
     def _handle(self, one: Outgoing) -> None:
         if one.kind not in INWARD:

@@ -13,6 +13,7 @@ from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStac
 from cubestack.emulator.boards.firmware import CameraWire, Core, SerialWire, SlaveWire
 from cubestack.emulator.boards.insight import Insight
 from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.iss.image import Image
@@ -113,6 +114,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
             handlers={Kind.PIN: self._pin, **bus, Kind.UART: lambda one: self._serial.sent(one)},
             causes=CAUSES,
             couple=partial(self._couple, compiled=not callbacks),
+            look_ahead_ps=LineFormat(baud).character_ps * 9 // 10,
             on_activity=lambda awake: self.power.set_state(
                 "processor", "run" if awake else "sleep"
             ),
