@@ -152,7 +152,7 @@ _START = """
 #define IN_RAM __attribute__((section(".code_in_ram"), noinline, long_call))
 #define RESULT ((volatile uint32_t *)0x20010000)
 int main(void);
-void IRQ(void) __attribute__((weak, alias("spin")));
+void IRQ(void);
 void spin(void) { for (;;) ; }
 extern uint32_t data_from, data_start, data_end;
 void start(void)
@@ -166,6 +166,7 @@ void start(void)
 """
 _SCRIPT = """
 ENTRY(start)
+PROVIDE(IRQ = spin);
 SECTIONS {
     .text 0 : {
         LONG(0x20008000) LONG(start | 1)
