@@ -10,23 +10,27 @@ from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
 
 class Insight:
-    """Looks at a machine from the first use on; until then the machine runs at full speed."""
+    """Looks at a machine from the first use on; until then the machine runs at full speed.
+
+    Attributes:
+        machine: it.
+    """
 
     def __init__(self, machine: Machine) -> None:
         """Look at ``machine``, which is loaded."""
-        self._machine = machine
+        self.machine = machine
         self._observed = False
 
     @cached_property
     def symbols(self) -> Symbols:
         """Names of the program."""
-        return Symbols.of(self._machine.image)
+        return Symbols.of(self.machine.image)
 
     @cached_property
     def observer(self) -> Observer:
         """Counts cycles, executions and calls."""
         self._observed = True
-        return Observer(self._machine, self.symbols)
+        return Observer(self.machine, self.symbols)
 
     @cached_property
     def history(self) -> History:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from cubestack.emulator.boards.processor_registers import peek, peripherals
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.faults.injector import Faults
 from cubestack.emulator.iss.insight.fault_report import fault_report
@@ -11,14 +12,12 @@ from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
-from cubestack.firmware_model.interface.efm32gg import LAYOUTS
-from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
 
 HELP = """time              virtual time, core clock, sleep
 camera            registers of the camera
 power             supply currents
 pins              FPGA pins from and to the processor
-regs [UNIT[.REGISTER]]      registers of a peripheral, without side effects
+regs [WHAT]       a peripheral, UNIT.REGISTER, a variable or an address
 faults            what can be injected
 faults inject KIND [TARGET] [PARAMETER=VALUE ...]
 faults log|clear  what faults have done; end them
@@ -110,16 +109,9 @@ class Monitor:
 
     def _registers(self, words: list[str]) -> str:
         if not words:
-            return " ".join(instance.name for layout in LAYOUTS for instance in layout.instances)
-        unit, _, name = words[0].upper().partition(".")
-        layout, instance = find_instance(unit)
-        registers = [one for one in layout.registers if name in ("", one.name)]
-        if not registers:
-            known = " ".join(one.name for one in layout.registers)
-            raise ValueError(f"{unit} has no register {name}; known: {known}")
-        return "\n".join(
-            register_text(self._board.machine, instance, register) for register in registers
-        )
+            return " ".join(peripherals())
+        found = peek(self._board.machine, self._symbols, words[0])
+        return "\n".join(f"{one.name} {one.text}" for one in found)
 
     def _faults(self, words: list[str]) -> str:
         faults = self._board.faults
@@ -159,30 +151,6 @@ class Monitor:
     def _report(self, _words: list[str]) -> str:
         machine = self._board.machine
         return fault_report(machine, self._symbols, machine.now_ps)
-
-
-def find_instance(name: str) -> tuple[Layout, Instance]:
-    """A peripheral by its name; ValueError says which there are."""
-    for layout in LAYOUTS:
-        for instance in layout.instances:
-            if instance.name == name:
-                return layout, instance
-    known = " ".join(instance.name for layout in LAYOUTS for instance in layout.instances)
-    raise ValueError(f"no peripheral {name!r}; known: {known}")
-
-
-def register_text(machine: Machine, instance: Instance, register: Register) -> str:
-    """A register with its fields that are not 0."""
-    data = machine.peek(instance.base + register.offset, 4)
-    if len(data) < 4:
-        return f"{instance.name}.{register.name} can not be read"
-    value = int.from_bytes(data, "little")
-    fields = (
-        f"{field.name}={(value & field.mask) >> field.lsb:#x}"
-        for field in register.fields
-        if field.name and value & field.mask
-    )
-    return f"{instance.name}.{register.name} {value:08x} {' '.join(fields)}".rstrip()
 
 
 def _value(text: str) -> Any:

@@ -78,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
     if len(args.devices) > 1:
         for name in ONE_DEVICE:
-            if getattr(args, name) not in (None, False, ""):
+            value = getattr(args, name)
+            if value not in (None, "") and value is not False:
                 raise ValueError(f"{flag(name)} belongs to one device, and there are several")
     with ExitStack() as stack:
         opened: list[AnyEmulated] = []

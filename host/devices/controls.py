@@ -107,6 +107,19 @@ class EmulatedControls:
         self._board.power.switch(channel, on)
         self.on_act(("power", channel, "on" if on else "off"), "")
 
+    def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
+        """Words of the processor that runs own firmware, with a text each, by name.
+
+        ValueError for what is not there.
+        """
+        from cubestack.emulator.boards.processor_registers import peek
+
+        insight = self._board.insight
+        if insight is None:
+            raise TargetError("peek: this device runs no firmware of its own: give --firmware")
+        found = peek(insight.machine, insight.symbols, what)
+        return {one.name: (one.value, one.text) for one in found}
+
     def time_s(self) -> float:
         """Virtual time."""
         return self._emulated.time_s

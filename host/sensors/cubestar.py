@@ -132,6 +132,11 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             "compile the onboard star catalogue and say what is in it",
             get(f"{EXPERIMENTS}.catalogue:EXPERIMENT"),
         ),
+        Report(
+            "memory",
+            "list what firmware uses of the processor's memories",
+            get(f"{EXPERIMENTS}.memory:EXPERIMENT"),
+        ),
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),

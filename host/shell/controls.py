@@ -15,6 +15,7 @@ LOG = "log"
 """What follows ``fault`` to see what faults have done."""
 POWER = "power [CHANNEL on|off]"
 TIME = "time [SECONDS]"
+PEEK = "peek UNIT[.REGISTER]|VARIABLE|ADDRESS"
 
 
 @dataclass
@@ -30,6 +31,7 @@ class ControlCommands:
             ShellCommand(FAULT, "let something break; fault clear, fault log", self._fault, True),
             ShellCommand(POWER, "supply currents, load switches", self._power, True),
             ShellCommand(TIME, "virtual time; let it pass", self._time, True),
+            ShellCommand(PEEK, "what own firmware's processor has there", self._peek, True),
         ]
 
     def _scene(self, words: list[str]) -> Result:
@@ -64,6 +66,12 @@ class ControlCommands:
             controls.advance(to_number("time", words[0], 0))
         now_s = controls.time_s()
         return Result([("time", f"{now_s:.6f} s")], {"time_s": now_s})
+
+    def _peek(self, words: list[str]) -> Result:
+        check_count(PEEK, words, 1, 1)
+        found = self._controls.peek(words[0])
+        rows = [(name, text) for name, (_, text) in found.items()]
+        return Result(rows, {"values": {name: value for name, (value, _) in found.items()}})
 
     @property
     def _controls(self) -> EmulatedControls:

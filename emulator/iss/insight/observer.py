@@ -89,6 +89,7 @@ class Observer:
     Attributes:
         machine: it.
         symbols: of its program.
+        ram_at_start: its RAM when this began.
         codes: counters of flash and RAM.
     """
 
@@ -96,6 +97,7 @@ class Observer:
         """Count cycles and calls."""
         self._library = insight_library()
         self.machine, self.symbols = machine, symbols
+        self.ram_at_start = machine.ram.copy()
         self.codes = []
         self._names = [""]
         self._kept: list[Any] = []

@@ -296,3 +296,35 @@ def test_waiting_ends_with_input_with_room_for_output_or_in_time(sent, events, t
         theirs.send(sent)
         realtime.wait_ready([(ours.fileno(), events)], timeout_s)  # hangs, if it does not
     realtime.wait_ready([], 0.0)
+
+
+# --- halted by a debugger ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("pace", ["real", "fast"])
+def test_virtual_time_stands_while_the_kernel_is_paused(bench, pace):
+    ticks = bench.tick(10 * PS_PER_MS)
+    kernel, wall, since = bench.kernel, bench.wall, []
+
+    def process():
+        yield kernel.timeout(105 * PS_PER_MS)
+        kernel.paused = True
+        since.append(wall.ns)
+
+    kernel.process(process())
+    stop = bench.port.exchange
+
+    def exchange(now_ps):
+        if since and kernel.paused and wall.ns - since[0] > 2000 * NS_PER_MS:
+            kernel.paused = False
+            kernel.held_ns += wall.ns - since[0]
+        stop(now_ps)
+
+    bench.port.exchange = exchange
+    bench.run(pace, 3000)
+    virtual = [ms for ms, _ in ticks]
+    assert virtual[10] == pytest.approx(110)
+    assert ticks[10][1] - ticks[9][1] > 2000
+    assert kernel.now / PS_PER_MS == pytest.approx(1000, abs=60)
+    assert min(bench.wall.waits[12:100]) > IDLE_S / 2  # asleep meanwhile
+    assert not bench.reports

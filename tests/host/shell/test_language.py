@@ -238,7 +238,7 @@ def test_every_name_completes(silent_shell):
     ("line", "found"),
     [
         ("", ["read", "write", "watch", "dump", "list", "image", "bench", "raw", "scene", "fault",
-              "power", "time", "help"]),
+              "power", "time", "peek", "help"]),
         ("wa", ["watch"]),
         ("bench ", ["a", "q", "s", "w"]),
         ("fault ", ["latch-up", "camera", "log"]),

@@ -1,0 +1,73 @@
+"""How deep a program's stacks have been, how far its heap, and what is static.
+
+The stacks by the lowest stack pointers that the observer saw. The heap, which begins at the linker
+script's ``end``, by the bytes that are others than at the observer's start: what a program
+allocates and never writes is not seen.
+"""
+
+from dataclasses import dataclass
+
+from cubestack.emulator.iss.insight.observer import Observer
+from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE
+
+ENDS = ("end", "_end", "__end__", "bss_end", "_ebss", "__bss_end__", "ebss")
+"""Names that linker scripts give to the end of static data, the surest one first."""
+
+VECTOR_TABLE = 0xE000_ED08
+
+
+@dataclass(frozen=True)
+class MemoryUse:
+    """Bytes; None for what is not known.
+
+    Attributes:
+        flash: of the program.
+        flash_size, ram_size: of the part.
+        static: data with a fixed place.
+        heap: beyond that, up to the highest byte that was ever written.
+        stack: deepest use of the main stack.
+        process_stack: lowest address of the process stack; None where there is none.
+        free: never touched, between heap and main stack.
+    """
+
+    flash: int
+    flash_size: int
+    ram_size: int
+    static: int | None
+    heap: int | None
+    stack: int | None
+    process_stack: int | None
+    free: int | None
+
+
+def memory_use(observer: Observer) -> MemoryUse:
+    """Of the observed program so far."""
+    machine, labels, figures = observer.machine, observer.symbols.labels, observer.figures()
+    table = int.from_bytes(machine.peek(VECTOR_TABLE, 4), "little")
+    top = int.from_bytes(machine.peek(table, 4), "little")
+    end = next((labels[name] for name in ENDS if name in labels), None)
+    if end is not None and not RAM_BASE <= end <= RAM_BASE + machine.ram.size:
+        end = None
+    low = figures.main_sp
+    heap = free = None
+    if end is not None:
+        limit = low if low is not None and low >= end else RAM_BASE + machine.ram.size
+        begin, stop = end - RAM_BASE, limit - RAM_BASE
+        changed = (machine.ram[begin:stop] != observer.ram_at_start[begin:stop]).nonzero()[0]
+        heap = int(changed[-1]) + 1 if changed.size else 0
+        free = stop - begin - heap
+    return MemoryUse(
+        flash=sum(len(data) for at, data in _segments(observer) if at >= FLASH_BASE),
+        flash_size=machine.flash.size,
+        ram_size=machine.ram.size,
+        static=None if end is None else end - RAM_BASE,
+        heap=heap,
+        stack=None if low is None else top - low,
+        process_stack=figures.process_sp,
+        free=free,
+    )
+
+
+def _segments(observer: Observer) -> tuple[tuple[int, bytes], ...]:
+    image = observer.machine.image
+    return () if image is None else image.segments

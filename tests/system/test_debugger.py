@@ -1,0 +1,145 @@
+"""A debugger, and the files about own firmware, by the command line."""
+
+import json
+import re
+import socket
+import time
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.iss.gdb.packets import framed
+from cubestack.emulator.iss.insight.symbols import Symbols
+from tests.conftest import Run
+from tests.emulator.boards.cubestar.builds import build, needs_toolchain
+from tests.system.conftest import Emulate
+
+pytestmark = needs_toolchain
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Sleeps between ticks of a millisecond, and sends each byte back."""
+    return build("debugged", tmp_path_factory.mktemp("debugged"))
+
+
+class Client:
+    """Speaks GDB's protocol by hand."""
+
+    def __init__(self, address: str) -> None:
+        host, port = address.rsplit(":", 1)
+        self._socket = socket.create_connection((host, int(port)), timeout=20)
+
+    def ask(self, text: str) -> str:
+        """What a packet is answered with."""
+        self.send(text)
+        return self.answer()
+
+    def send(self, text: str) -> None:
+        self._socket.sendall(framed(text.encode()))
+
+    def answer(self) -> str:
+        data = b""
+        while b"#" not in data[:-2]:
+            part = self._socket.recv(4096)
+            if not part:
+                break
+            data += part
+        self._socket.sendall(b"+")
+        return data.lstrip(b"+").removeprefix(b"$").partition(b"#")[0].decode()
+
+    def monitor(self, command: str) -> str:
+        return bytes.fromhex(self.ask("qRcmd," + command.encode().hex())).decode()
+
+    def time_s(self) -> float:
+        return float(self.monitor("time").split()[0])
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def test_time_stands_while_gdb_halts_and_ports_stay_open(
+    emulate: Emulate, program: Path, tmp_path: Path
+) -> None:
+    arguments = ("--firmware", program, "--tcp", 0, "--gdb", 0, "--gdb-wait")
+    files = ("--profile-out", tmp_path / "profile", "--coverage-out", tmp_path / "coverage")
+    with emulate(*arguments, *files) as served:
+        address = re.search(r"target remote (\S+)", served.said)
+        assert address is not None
+        debugger = Client(address[1])
+        assert debugger.ask("?").startswith("T02")
+        assert debugger.time_s() < 1e-6  # the fetch of the reset vector
+        host, port = served.port.removeprefix("tcp://").rsplit(":", 1)
+        line = socket.create_connection((host, int(port)), timeout=20)
+        sleep = Symbols(program.read_bytes()).function("sleep")
+        assert sleep is not None
+        assert debugger.ask(f"Z1,{sleep.address:x},2") == "OK"
+        began = time.monotonic()
+        assert "hwbreak" in debugger.ask("vCont;c")  # all is set up
+        assert debugger.ask(f"z1,{sleep.address:x},2") == "OK"
+        debugger.send("vCont;c")
+        line.sendall(b"A")
+        assert line.recv(1) == b"A"
+        debugger._socket.sendall(b"\x03")
+        assert debugger.answer().startswith("T02")
+        halted_s = debugger.time_s()
+        assert 0 < halted_s < time.monotonic() - began + 0.1
+        line.sendall(b"B")
+        time.sleep(0.4)  # wall time that must not count
+        assert debugger.time_s() == halted_s
+        debugger.send("c")
+        began = time.monotonic()
+        assert line.recv(1) == b"B"
+        debugger._socket.sendall(b"\x03")
+        debugger.answer()
+        went_on_s = debugger.time_s() - halted_s
+        assert went_on_s < time.monotonic() - began + 0.1  # no catching up
+        assert debugger.ask("D") == "OK"
+        debugger.close()
+        line.sendall(b"C")
+        assert line.recv(1) == b"C"
+        again = Client(address[1])
+        assert again.ask("?").startswith("T02")
+        again.close()
+        line.sendall(b"D")
+        assert line.recv(1) == b"D"
+        line.close()
+    assert served.process.returncode == 0
+    assert "uart_handler" in (tmp_path / "profile").read_text()
+    coverage = (tmp_path / "coverage").read_text()
+    assert "FNDA:4,uart_handler" in coverage
+    assert "FNDA:0,fail" in coverage
+
+
+def test_memory_tells_what_a_program_used(run: Run, program: Path) -> None:
+    told = json.loads(run("memory", "cubestar", "--firmware", program, "--json").out)
+    assert told["static"] == 12
+    assert 32 <= told["stack"] < 256
+    assert told["heap"] == 0
+    assert told["flash"] == pytest.approx(750, abs=150)
+
+
+def test_shell_peeks_at_registers_and_variables(run: Run, program: Path) -> None:
+    commands = "time 0.0105; peek ticks; peek cmu.hfperclken0"
+    shell = ("shell", "emulated:cubestar", "--firmware", program, "--json", "-c", commands)
+    _, ticks, clocks = map(json.loads, run(*shell).out.splitlines())
+    assert [*ticks["values"].values()] == [pytest.approx(9, abs=1)]
+    assert clocks["values"]["CMU.HFPERCLKEN0"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (("memory", "cubestar"), "runs no firmware of its own: --firmware"),
+        (("shell", "emulated:cubestar", "-c", "peek CMU"), "give --firmware"),
+        (("emulate", "cubestar", "--tcp", 0, "--gdb", 0), "runs no firmware of its own"),
+        (("emulate", "cubestar", "--tcp", 0, "--gdb-wait"), "--gdb-wait: give the port as well"),
+        (("emulate", "cubestar", "cubesense", "--gdb", 0), "--gdb belongs to one device"),
+    ],
+)
+def test_without_firmware_there_is_nothing_to_look_at(
+    run: Run, arguments: tuple[object, ...], error: str
+) -> None:
+    outcome = run(*arguments)
+    assert outcome.code
+    assert error in outcome.line
