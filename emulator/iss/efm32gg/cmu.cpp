@@ -1,25 +1,14 @@
 #include "cmu.h"
 
-#include "msc.h"
-
 #include <cstring>
 
 namespace efm32gg {
 
 using namespace cmu;
 
-// Centre frequencies of the bands: data sheet, 3.9 (early parts had 1 and 7 MHz).
-static constexpr uint32_t BANDS[8] = {1200000, 6600000, 11000000, 14000000,
-                                      21000000, 28000000, 28000000, 28000000};
-static constexpr uint32_t AUX_BANDS[8] = {14000000, 11000000, 6600000, 1200000,
-                                          14000000, 14000000, 28000000, 21000000};
-static constexpr uint32_t HFXO_HERTZ = 48000000, LF_HERTZ = 32768, ULFRCO_HERTZ = 1000;
 // Start-up without the time-outs that CTRL counts: data sheet, 3.9, typical.
 static constexpr int64_t RC_START = 600 * NANOSECOND, HFXO_START = 400 * MICROSECOND,
                          LFRCO_START = 150 * MICROSECOND, LFXO_START = 400 * MILLISECOND;
-// A step of an RC oscillator's tuning, in thousandths of the frequency; 0x80 and 0x40 are nominal.
-static constexpr int TUNING_STEP = 3;
-
 // OSCENCMD has enable and disable bits, STATUS enabled and ready, in this order; IF has its own.
 static constexpr uint32_t READY_FLAGS[] = {IF_HFRCORDY, IF_HFXORDY, IF_AUXHFRCORDY, IF_LFRCORDY,
                                            IF_LFXORDY};
@@ -43,52 +32,6 @@ Cmu::Cmu(Part &part, const Instance &instance)
                                one.cmu->on_started(one.number);
                            }}};
     }
-    const struct {
-        const Instance *instance;
-        uint32_t registers, mask;
-        bool low_energy;
-        int synced;
-        uint32_t enable, prescaler;
-    } units[] = {
-        {&instance::USART0, HFPERCLKEN0, HFPERCLKEN0_USART0, false, -1, 0, 0},
-        {&instance::USART1, HFPERCLKEN0, HFPERCLKEN0_USART1, false, -1, 0, 0},
-        {&instance::USART2, HFPERCLKEN0, HFPERCLKEN0_USART2, false, -1, 0, 0},
-        {&instance::UART0, HFPERCLKEN0, HFPERCLKEN0_UART0, false, -1, 0, 0},
-        {&instance::UART1, HFPERCLKEN0, HFPERCLKEN0_UART1, false, -1, 0, 0},
-        {&instance::TIMER0, HFPERCLKEN0, HFPERCLKEN0_TIMER0, false, -1, 0, 0},
-        {&instance::TIMER1, HFPERCLKEN0, HFPERCLKEN0_TIMER1, false, -1, 0, 0},
-        {&instance::TIMER2, HFPERCLKEN0, HFPERCLKEN0_TIMER2, false, -1, 0, 0},
-        {&instance::TIMER3, HFPERCLKEN0, HFPERCLKEN0_TIMER3, false, -1, 0, 0},
-        {&instance::ACMP0, HFPERCLKEN0, HFPERCLKEN0_ACMP0, false, -1, 0, 0},
-        {&instance::ACMP1, HFPERCLKEN0, HFPERCLKEN0_ACMP1, false, -1, 0, 0},
-        {&instance::I2C0, HFPERCLKEN0, HFPERCLKEN0_I2C0, false, -1, 0, 0},
-        {&instance::I2C1, HFPERCLKEN0, HFPERCLKEN0_I2C1, false, -1, 0, 0},
-        {&instance::GPIO, HFPERCLKEN0, HFPERCLKEN0_GPIO, false, -1, 0, 0},
-        {&instance::VCMP, HFPERCLKEN0, HFPERCLKEN0_VCMP, false, -1, 0, 0},
-        {&instance::PRS, HFPERCLKEN0, HFPERCLKEN0_PRS, false, -1, 0, 0},
-        {&instance::ADC0, HFPERCLKEN0, HFPERCLKEN0_ADC0, false, -1, 0, 0},
-        {&instance::DAC0, HFPERCLKEN0, HFPERCLKEN0_DAC0, false, -1, 0, 0},
-        {&instance::DMA, HFCORECLKEN0, HFCORECLKEN0_DMA, false, -1, 0, 0},
-        {&instance::AES, HFCORECLKEN0, HFCORECLKEN0_AES, false, -1, 0, 0},
-        {&instance::EBI, HFCORECLKEN0, HFCORECLKEN0_EBI, false, -1, 0, 0},
-        {&instance::WDOG, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, 0, 0},
-        {&instance::BURTC, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, 0, 0},
-        {&instance::PCNT0, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, 0, 0},
-        {&instance::PCNT1, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, 0, 0},
-        {&instance::PCNT2, HFCORECLKEN0, HFCORECLKEN0_LE, true, -1, 0, 0},
-        {&instance::LESENSE, HFCORECLKEN0, HFCORECLKEN0_LE, true, 0, LFACLKEN0_LESENSE,
-         LFAPRESC0_LESENSE},
-        {&instance::RTC, HFCORECLKEN0, HFCORECLKEN0_LE, true, 0, LFACLKEN0_RTC, LFAPRESC0_RTC},
-        {&instance::LETIMER0, HFCORECLKEN0, HFCORECLKEN0_LE, true, 0, LFACLKEN0_LETIMER0,
-         LFAPRESC0_LETIMER0},
-        {&instance::LEUART0, HFCORECLKEN0, HFCORECLKEN0_LE, true, 2, LFBCLKEN0_LEUART0,
-         LFBPRESC0_LEUART0},
-        {&instance::LEUART1, HFCORECLKEN0, HFCORECLKEN0_LE, true, 2, LFBCLKEN0_LEUART1,
-         LFBPRESC0_LEUART1},
-    };
-    for (const auto &unit : units)
-        enables[enable_count++] = {unit.instance, unit.registers, unit.mask, unit.low_energy,
-                                   unit.synced, unit.enable, unit.prescaler};
 }
 
 void Cmu::reset() {
@@ -194,33 +137,6 @@ void Cmu::write(uint32_t offset, uint32_t value) {
 
 // -- oscillators ------------------------------------------------------------------------------
 
-bool Cmu::running(int oscillator) const {
-    if (!oscillators[oscillator].ready)
-        return false;
-    return sleeping < 2 || (sleeping == 2 && (oscillator == LFRCO || oscillator == LFXO)) ||
-           (sleeping == 4 && (oscillator == LFRCO || oscillator == LFXO));
-}
-
-uint32_t Cmu::hertz(const Cmu &cmu, int oscillator) {
-    const auto tuned = [&](uint32_t nominal, uint32_t tuning, int middle) {
-        return (uint32_t)((int64_t)nominal * (1000 + TUNING_STEP * ((int)tuning - middle)) / 1000);
-    };
-    switch (oscillator) {
-    case HFRCO:
-        return tuned(BANDS[take(cmu.reg(HFRCOCTRL), HFRCOCTRL_BAND)],
-                     take(cmu.reg(HFRCOCTRL), HFRCOCTRL_TUNING), 0x80);
-    case AUXHFRCO:
-        return tuned(AUX_BANDS[take(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_BAND)],
-                     take(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_TUNING), 0x80);
-    case LFRCO:
-        return tuned(LF_HERTZ, cmu.reg(LFRCOCTRL), 0x40);
-    case HFXO:
-        return HFXO_HERTZ;
-    default:
-        return LF_HERTZ;
-    }
-}
-
 void Cmu::command_oscillators(uint32_t value) {
     for (int n = 0; n < OSCILLATORS; n++) {
         if (value >> 2 * n & 1) {
@@ -296,90 +212,6 @@ void Cmu::wake() {
     sleeping = 0;
 }
 
-// -- the tree ---------------------------------------------------------------------------------
-
-Rate Cmu::clock_of(int oscillator, int64_t now) const {
-    return running(oscillator) ? Rate(hertz(*this, oscillator), 1, now) : Rate();
-}
-
-Rate Cmu::low_frequency(uint32_t select, bool ultra_low, int64_t now) const {
-    switch (select) {
-    case 0:
-        return ultra_low ? Rate(ULFRCO_HERTZ, 1, now) : Rate();
-    case 1:
-        return clock_of(LFRCO, now);
-    case 2:
-        return clock_of(LFXO, now);
-    default:
-        return Rate();
-    }
-}
-
-void Cmu::rates(Rates &rates, int64_t now) const {
-    const uint32_t control = reg(CTRL), core = reg(HFCORECLKDIV), per = reg(HFPERCLKDIV);
-    const auto power = [](uint32_t exponent) { return (int64_t)1 << (exponent > 9 ? 9 : exponent); };
-    const auto divided = [&](const Rate &rate, int64_t by) {
-        return rate.runs() ? rate.divided(by, now) : rate;
-    };
-    const Rate source = sleeping >= 2 ? Rate() : clock_of(selected, now);
-    const Rate high = divided(source, take(control, CTRL_HFCLKDIV) + 1);
-    Rate &hfcore = rates[(int)Clock::HFCORE];
-    hfcore = divided(high, power(take(core, HFCORECLKDIV_HFCORECLKDIV)));
-    rates[(int)Clock::HFPER] = per & HFPERCLKDIV_HFPERCLKEN
-        ? divided(high, power(take(per, HFPERCLKDIV_HFPERCLKDIV))) : Rate();
-    rates[(int)Clock::HFCORELE] = divided(hfcore, core & HFCORECLKDIV_HFCORECLKLEDIV ? 4 : 2);
-    const uint32_t low = reg(LFCLKSEL);
-    const uint32_t a = take(low, LFCLKSEL_LFA), b = take(low, LFCLKSEL_LFB);
-    rates[(int)Clock::LFA] = a == 3 ? rates[(int)Clock::HFCORELE]
-                                    : low_frequency(a, low & LFCLKSEL_LFAE, now);
-    rates[(int)Clock::LFB] = b == 3 ? rates[(int)Clock::HFCORELE]
-                                    : low_frequency(b, low & LFCLKSEL_LFBE, now);
-    rates[(int)Clock::HFRCO] = clock_of(HFRCO, now);
-    rates[(int)Clock::HFXO] = clock_of(HFXO, now);
-    rates[(int)Clock::AUXHFRCO] = clock_of(AUXHFRCO, now);
-    rates[(int)Clock::LFXO] = clock_of(LFXO, now);
-    rates[(int)Clock::LFRCO] = clock_of(LFRCO, now);
-    rates[(int)Clock::ULFRCO] = Rate(ULFRCO_HERTZ, 1, now);
-}
-
-const Cmu::Enable &Cmu::enable_of(const Instance &instance) const {
-    static const Enable always = {nullptr, 0, 0, false, -1, 0, 0};
-    for (int n = 0; n < enable_count; n++)
-        if (enables[n].instance->base == instance.base)
-            return enables[n];
-    return always;
-}
-
-bool Cmu::enabled(const Instance &instance) const {
-    // Loops poll one unit: its bit is found at once.
-    if (!last || last->base != instance.base) {
-        last = &instance;
-        last_enable = enable_of(instance);
-    }
-    return !last_enable.mask || reg(last_enable.registers) & last_enable.mask;
-}
-
-bool Cmu::on_slow_bus(const Instance &instance) const {
-    enabled(instance);
-    return last_enable.registers == HFPERCLKEN0;
-}
-
-Rate Cmu::unit_rate(const Instance &instance) const {
-    const Enable &enable = enable_of(instance);
-    if (enable.synced >= 0) {
-        const Rate &clock = part.rate(enable.synced ? Clock::LFB : Clock::LFA);
-        if (!(effective[enable.synced] & enable.enable) || !clock.runs())
-            return Rate();
-        const uint32_t exponent = take(effective[enable.synced + 1], enable.prescaler);
-        return clock.divided((int64_t)1 << exponent, clock.origin);
-    }
-    if (enable.low_energy)
-        return part.rate(Clock::LFA);
-    if (!enabled(instance))
-        return Rate();
-    return part.rate(enable.registers == HFPERCLKEN0 ? Clock::HFPER : Clock::HFCORE);
-}
-
 // -- synchronisation, calibration ---------------------------------------------------------------
 
 void Cmu::synchronise() {
@@ -445,13 +277,6 @@ void Cmu::on_calibrated(int64_t time) {
         start_calibration();
         reg(CALCNT) = result;
     }
-}
-
-void Cmu::check_limits() {
-    const int64_t core = part.hertz(Clock::HFCORE);
-    if (core > 32000000 && reg(HFCORECLKEN0) & HFCORECLKEN0_LE &&
-        !(reg(CTRL) & CTRL_HFLE && reg(HFCORECLKDIV) & HFCORECLKDIV_HFCORECLKLEDIV))
-        part.log_once("CMU: above 32 MHz the low energy bus needs CTRL.HFLE and HFCORECLKLEDIV");
 }
 
 }  // namespace efm32gg

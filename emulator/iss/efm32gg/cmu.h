@@ -7,6 +7,8 @@ namespace efm32gg {
 
 class Cmu : public Peripheral {
 public:
+    static constexpr uint32_t HFXO_HERTZ = 48000000, LF_HERTZ = 32768, ULFRCO_HERTZ = 1000;
+
     Cmu(Part &part, const Instance &instance);
 
     void reset() override;
@@ -56,8 +58,7 @@ private:
         int synced;                    // of its LF clock: index into `effective`, or -1
         uint32_t enable, prescaler;    // masks there
     };
-    Enable enables[64];
-    int enable_count = 0;
+    static const Enable UNITS[];
     mutable const Instance *last = nullptr;
     mutable Enable last_enable = {};
 

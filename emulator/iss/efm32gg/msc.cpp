@@ -156,6 +156,11 @@ void Msc::write(uint32_t offset, uint32_t value) {
             set_up_reads();
         }
         break;
+    case WRITECTRL:
+        store(offset, value);
+        if (value & WRITECTRL_IRQERASEABORT)
+            part.log_once("MSC: interrupts do not abort an erasure (IRQERASEABORT)");
+        break;
     default:
         Peripheral::write(offset, value);
     }

@@ -45,7 +45,7 @@ CMU = peripheral(
     078 PCNTCTRL     rw 00000000  PCNT0CLKEN:0 PCNT0CLKSEL:1 PCNT1CLKEN:2 PCNT1CLKSEL:3
     +                             PCNT2CLKEN:4 PCNT2CLKSEL:5 - no pulse counters
     07C LCDCTRL      rw 00000020  FDIV:0:3 VBOOSTEN:3 VBFDIV:4:3 - no display
-    080 ROUTE        rw 00000000  CLKOUT0PEN:0 CLKOUT1PEN:1 LOCATION:2:3
+    080 ROUTE        rw 00000000  CLKOUT0PEN:0 CLKOUT1PEN:1 LOCATION:2:3 - no clock outputs
     084 LOCK         rw 00000000  LOCKKEY:0:16
     """,
     Instance("CMU", 0x400C8000, {"CMU": 32}),
