@@ -56,10 +56,10 @@ static void wait_ms(uint32_t count) {
 }
 
 static void start_clock(void) {
-    MSC->READCTRL = (MSC->READCTRL & ~MSC_READCTRL_MODE) | 2u << MSC_READCTRL_MODE_SHIFT;
+    MSC->READCTRL = (MSC->READCTRL & ~MSC_READCTRL_MODE) | 4u << MSC_READCTRL_MODE_SHIFT;  // WS2
     CMU->OSCENCMD = CMU_OSCENCMD_HFXOEN;
     while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) {}
-    CMU->CMD = 2u << CMU_CMD_HFCLKSEL_SHIFT;
+    CMU->CMD = 2u << CMU_CMD_HFCLKSEL_SHIFT;  // HFXO
     CMU->HFPERCLKEN0 = CMU_HFPERCLKEN0_GPIO | CMU_HFPERCLKEN0_I2C1 | SATELLITE_UART_CLOCK;
     volatile uint32_t *const systick = (volatile uint32_t *)0xE000E010;
     systick[1] = CLOCK_HZ / 1000 - 1;

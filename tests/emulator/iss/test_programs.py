@@ -38,6 +38,7 @@ class Bench:
                 if out.kind is Kind.UART and out.unit & 0xFF == UART0:
                     self.text += chr(out.value & 0xFF)
                     self.times_ps.append(out.time_ps)
+                assert out.kind is not Kind.LOG, out.text  # nothing to complain of
             if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP:
                 return stop
 

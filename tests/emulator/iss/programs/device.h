@@ -189,6 +189,8 @@ static inline void __WFI(void) { __asm volatile("wfi" ::: "memory"); }
 static inline void __disable_irq(void) { __asm volatile("cpsid i" ::: "memory"); }
 static inline void __enable_irq(void) { __asm volatile("cpsie i" ::: "memory"); }
 
+#define CMU_CTRL_HFLE (1UL << 30)
+#define CMU_HFCORECLKDIV_LEDIV4 (1UL << 8)
 #define CMU_OSCENCMD_HFXOEN (1UL << 2)
 #define CMU_OSCENCMD_HFRCODIS (1UL << 1)
 #define CMU_OSCENCMD_LFXOEN (1UL << 8)
@@ -204,7 +206,7 @@ static inline void __enable_irq(void) { __asm volatile("cpsie i" ::: "memory"); 
 #define CMU_LFACLKEN0_RTC (1UL << 1)
 #define CMU_LFACLKEN0_LETIMER0 (1UL << 2)
 
-#define MSC_READCTRL_MODE_WS2 2UL
+#define MSC_READCTRL_MODE_WS2 4UL
 #define USART_CMD_RXEN (1UL << 0)
 #define USART_CMD_TXEN (1UL << 2)
 #define USART_STATUS_TXC (1UL << 5)

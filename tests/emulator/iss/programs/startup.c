@@ -58,6 +58,9 @@ __attribute__((section(".isr_vector"), used)) void (*const vectors[16 + 39])(voi
 
 void SystemInit(void) {
     MSC->READCTRL = (MSC->READCTRL & ~7UL) | MSC_READCTRL_MODE_WS2;
+    // The low energy bus is to be slower than 32 MHz.
+    CMU->CTRL |= CMU_CTRL_HFLE;
+    CMU->HFCORECLKDIV |= CMU_HFCORECLKDIV_LEDIV4;
     CMU->OSCENCMD = CMU_OSCENCMD_HFXOEN;
     while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) {
     }
