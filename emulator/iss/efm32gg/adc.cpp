@@ -43,7 +43,9 @@ void Adc::reset() {
 
 // -- what is converted --
 
-double Adc::volts(int input) const { return part.memories.analog ? part.memories.analog[input] : 0; }
+double Adc::volts(int input) const {
+    return part.memories.analog ? part.memories.analog[input] : 0;
+}
 
 double Adc::reference(uint32_t control) const {
     switch (take(control, SINGLECTRL_REF)) {
@@ -238,7 +240,8 @@ void Adc::write(uint32_t offset, uint32_t value) {
 }
 
 void Adc::follow() {
-    const bool warm = converting || (take(reg(CTRL), CTRL_WARMUPMODE) == KEEP_WARM && warm_until >= 0);
+    const bool kept = take(reg(CTRL), CTRL_WARMUPMODE) == KEEP_WARM && warm_until >= 0;
+    const bool warm = converting || kept;
     uint32_t &status = reg(STATUS);
     status &= STATUS_SINGLEDV | STATUS_SCANDV | STATUS_SCANDATASRC;
     status |= (single_wanted ? STATUS_SINGLEACT : 0) | (scanning ? STATUS_SCANACT : 0) |

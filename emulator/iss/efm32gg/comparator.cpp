@@ -11,10 +11,12 @@ namespace efm32gg {
 
 // CTRL, STATUS and IF have these at the same place in both.
 static constexpr uint32_t CTRL = acmp::CTRL, STATUS = acmp::STATUS;
-static_assert(+vcmp::CTRL == +acmp::CTRL && +vcmp::STATUS == +acmp::STATUS && +vcmp::IF == +acmp::IF,
+static_assert(+vcmp::CTRL == +acmp::CTRL && +vcmp::STATUS == +acmp::STATUS &&
+                  +vcmp::IF == +acmp::IF,
               "one base for both comparators");
 static_assert(+acmp::CTRL_EN == +vcmp::CTRL_EN && +acmp::CTRL_IRISE == +vcmp::CTRL_IRISE &&
-              +acmp::CTRL_IFALL == +vcmp::CTRL_IFALL && +acmp::CTRL_WARMTIME == +vcmp::CTRL_WARMTIME);
+              +acmp::CTRL_IFALL == +vcmp::CTRL_IFALL &&
+              +acmp::CTRL_WARMTIME == +vcmp::CTRL_WARMTIME);
 static_assert(+acmp::STATUS_ACMPACT == +vcmp::STATUS_VCMPACT &&
               +acmp::STATUS_ACMPOUT == +vcmp::STATUS_VCMPOUT && +acmp::IF_EDGE == +vcmp::IF_EDGE);
 

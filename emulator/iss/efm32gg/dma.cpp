@@ -11,7 +11,7 @@ namespace {
 constexpr uint32_t ALL = (1u << Dma::CHANNELS) - 1;
 constexpr uint32_t ALTERNATE = 0x100;  // bytes from the primary to the alternate descriptors
 
-// Cycles: arbitration with three words of descriptor read and one written; an item read and written.
+// Cycles: arbitration, three words of descriptor read and one written; an item read and written.
 constexpr int64_t ROUND = 6, ITEM = 4;
 
 // How long EM2 is left for a transfer of a unit that asks for it (t_EM20 of the data sheet).
@@ -217,7 +217,8 @@ int64_t Dma::round(int channel) {
         count = 1;
     count = std::min(count, left);
     const int size = 1 << take(control, SOURCE_SIZE);
-    const int from_step = (int)take(control, SOURCE_STEP), to_step = (int)take(control, TARGET_STEP);
+    const int from_step = (int)take(control, SOURCE_STEP);
+    const int to_step = (int)take(control, TARGET_STEP);
     for (uint32_t n = 0; n < count; n++) {
         const uint32_t back = left - 1 - n;
         // Four words at a time go to the same alternate descriptor.

@@ -58,6 +58,7 @@ private:
     Event low_timeout = Event::of<&I2c::on_low_timeout>(this);
 
     bool usable() const;
+    int unit() const;    // as the outbox has it: number and SDA pin
     int64_t bit(int64_t count) const;
     void after(int64_t bit_count, Master next);
     void command(uint32_t value);
@@ -78,6 +79,7 @@ private:
     void on_idle_timeout(int64_t time);
     void on_low_timeout(int64_t time);
     void watch_idle();
+    void watch_low();
     void follow();
 };
 

@@ -133,22 +133,14 @@ void Leuart::start(bool behind_another) {
     const int64_t halves = take(reg(CTRL), CTRL_STOPBITS) ? 2 : 1;
     const bool parity = take(reg(CTRL), CTRL_PARITY) & 2;
     const int64_t units = (1 + data_bits() + parity + halves) * (256 + (int64_t)reg(CLKDIV));
-    if (!behind_another || train_rate.origin != rate.origin ||
-        !train_rate.same_frequency(rate)) {
-        train_rate = rate;
-        train_start = rate.time(rate.edge_at_or_after(part.now()));
-        train_units = 0;
-    }
-    const int64_t begin = train_start + rate.span(train_units) / 256;
-    train_units += units;
-    frame_end = train_start + rate.span(train_units) / 256;
+    train.append(rate, units, 256, behind_another, part.now());
     shifting = true;
     shifted = frame;
     const int64_t data = frame & ((1u << data_bits()) - 1);
     if (const int to = transmit_pin(); to >= 0)
         part.send(Kind::UART, unit | to << 8, frame & TXDATAX_TXBREAK ? 0x10000 : data,
-                  frame_end - begin).time = begin;
-    part.schedule(sent, frame_end);
+                  train.end - train.begin).time = train.begin;
+    part.schedule(sent, train.end);
 }
 
 void Leuart::on_sent(int64_t) {
@@ -234,11 +226,10 @@ void Leuart::accept(uint32_t frame) {
 
 void Leuart::follow() {
     uint32_t &status = reg(STATUS), &flags = reg(IF);
-    const auto set = [](uint32_t &word, uint32_t bit, bool on) { word = on ? word | bit : word & ~bit; };
-    set(status, STATUS_TXBL, transmit_buffer.empty());
-    set(flags, IF_TXBL, transmit_buffer.empty());
-    set(status, STATUS_RXDATAV, !receive_buffer.empty());
-    set(flags, IF_RXDATAV, !receive_buffer.empty());
+    put(status, STATUS_TXBL, transmit_buffer.empty());
+    put(flags, IF_TXBL, transmit_buffer.empty());
+    put(status, STATUS_RXDATAV, !receive_buffer.empty());
+    put(flags, IF_RXDATAV, !receive_buffer.empty());
     const bool stopped = reg(CTRL) & CTRL_ERRSDMA && flags & (IF_FERR | IF_PERR);
     Dma &dma = *part.dma;
     dma.wakes(source, reg(CTRL) & (CTRL_RXDMAWU | CTRL_TXDMAWU));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "frame_queue.h"
+#include "frame_train.h"
 #include "low_energy.h"
 
 namespace efm32gg {
@@ -27,8 +28,7 @@ private:
     FrameQueue<3> receive_buffer;  // with the shift register behind two entries
     bool shifting = false, stalled = false;
     uint32_t shifted = 0;
-    Rate train_rate;
-    int64_t train_start = 0, train_units = 0, frame_end = 0;
+    FrameTrain train;
     Event sent = Event::of<&Leuart::on_sent>(this);
 
     uint32_t busy_bit(uint32_t offset) const override;

@@ -13,6 +13,9 @@ class Part;
 // A field's value out of a register's, and back; the mask says where it is.
 constexpr uint32_t take(uint32_t value, uint32_t mask) { return (value & mask) / (mask & -mask); }
 constexpr uint32_t give(uint32_t field, uint32_t mask) { return field * (mask & -mask) & mask; }
+constexpr void put(uint32_t &word, uint32_t bits, bool on) {
+    word = on ? word | bits : word & ~bits;
+}
 
 class Peripheral {
 public:

@@ -178,7 +178,8 @@ static constexpr uint32_t RETAINED = 128;
 
 Burtc::Burtc(Part &part, const Instance &instance)
     : CompareCounter(part, instance,
-                     {CNT, {COMP0, NONE}, 0xFFFFFFFF, IF_OF, {IF_COMP0, 0}, 55}, FREEZE, SYNCBUSY) {}
+                     {CNT, {COMP0, NONE}, 0xFFFFFFFF, IF_OF, {IF_COMP0, 0}, 55}, FREEZE,
+                     SYNCBUSY) {}
 
 void Burtc::reset() {
     if (!(part.reset_cause & rmu::RSTCAUSE_PORST) && !part.rmu->backup_domain_resets())

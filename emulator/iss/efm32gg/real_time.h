@@ -51,7 +51,9 @@ private:
 
     uint32_t top() const { return compare_is_top() ? reg(shape.compare[0]) : shape.last; }
     int64_t steps() const;
-    int64_t until_zero() const { return (int64_t)(value <= top() ? top() : shape.last) - value + 1; }
+    int64_t until_zero() const {
+        return (int64_t)(value <= top() ? top() : shape.last) - value + 1;
+    }
     int64_t until(uint32_t wanted) const;
     uint32_t after(int64_t passed) const;
     void on_due(int64_t time);

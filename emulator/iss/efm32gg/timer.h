@@ -28,6 +28,13 @@ public:
 
 private:
     static constexpr int CHANNELS = 3;
+    enum Mode : uint32_t { UP, DOWN, UP_DOWN, QUADRATURE };
+    enum ChannelMode : uint32_t { OFF, CAPTURE, COMPARE, PWM };
+    enum ClockSource : uint32_t { PRESCALED, CHANNEL_1, CASCADE };
+    enum Action : uint32_t { NONE, TOGGLE, CLEAR, SET };           // of outputs
+    enum InputAction : uint32_t { NOTHING, START, STOP, RELOAD };  // of CC0's edges
+    static constexpr uint32_t LAST = 0xFFFF;
+    static constexpr uint32_t UNLOCK = 0xCE80;
     static constexpr int64_t FAR = INT64_MAX;
 
     struct Count {
@@ -48,7 +55,9 @@ private:
     Event due = Event::of<&Timer::on_due>(this);
 
     uint32_t cc(int n, uint32_t offset) const { return offset + 0x10 * (uint32_t)n; }
-    uint32_t cc_mode(int n) const { return take(reg(cc(n, timer::CC0_CTRL)), timer::CC0_CTRL_MODE); }
+    uint32_t cc_mode(int n) const {
+        return take(reg(cc(n, timer::CC0_CTRL)), timer::CC0_CTRL_MODE);
+    }
     uint32_t mode() const { return take(reg(timer::CTRL), timer::CTRL_MODE); }
     bool compares(int n) const { return cc_mode(n) >= 2; }
     int64_t until_wrap(const Count &from) const;

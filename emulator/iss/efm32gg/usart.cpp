@@ -48,12 +48,11 @@ int64_t Usart::bit_units() const {
     return synchronous() ? 2 * divided : OVERSAMPLING[take(reg(CTRL), CTRL_OVS)] * divided;
 }
 
-int64_t Usart::frame_units(uint32_t frame) const {
+int64_t Usart::frame_units() const {
     if (synchronous())
         return 2 * data_bits() * bit_units();
     const bool parity = take(reg(FRAME), FRAME_PARITY) & 2;
     const int64_t stop_halves = 1 + take(reg(FRAME), FRAME_STOPBITS);
-    (void)frame;
     return (2 * (1 + data_bits() + parity) + stop_halves) * bit_units();
 }
 
@@ -182,28 +181,16 @@ void Usart::start(bool behind_another) {
         shifted = (frame & 0xFF) | (transmit_buffer.pop() & 0xFF) << 8;
     const uint32_t controls = frame & 0xF800;
     shifting = true;
-    // Characters back to back share one beginning, so that rounding does not add up.
-    const int64_t units = frame_units(frame);
-    if (!behind_another || train_rate.origin != rate.origin ||
-        !train_rate.same_frequency(rate)) {
-        train_rate = rate;
-        train_start = rate.time(rate.edge_at_or_after(part.now()));
-        train_units = 0;
-    }
-    const int64_t begin = train_start + rate.span(train_units) / UNITS;
-    train_units += units;
-    frame_end = train_start + rate.span(train_units) / UNITS;
+    train.append(rate, frame_units(), UNITS, behind_another, part.now());
     const uint32_t sent_bits = shifted & ((1u << bits) - 1);
-    if (synchronous()) {
-        if (transmit_pin() >= 0)
-            part.send(Kind::SPI, place.unit | transmit_pin() << 8, sent_bits, frame_end - begin);
-    } else if (transmit_pin() >= 0 && !(reg(STATUS) & STATUS_TXTRI)) {
-        const int64_t value = controls & TXDATAX_TXBREAK ? 0x10000 : sent_bits;
-        part.send(Kind::UART, place.unit | transmit_pin() << 8, value, frame_end - begin).time =
-            begin;
-    }
+    const int to = transmit_pin();
+    const bool driven = to >= 0 && !(reg(STATUS) & STATUS_TXTRI);
+    const bool breaks = controls & TXDATAX_TXBREAK && !synchronous();
+    if (driven)
+        part.send(synchronous() ? Kind::SPI : Kind::UART, place.unit | to << 8,
+                  breaks ? 0x10000 : sent_bits, train.end - train.begin).time = train.begin;
     shifted = sent_bits | controls;
-    part.schedule(sent, frame_end);
+    part.schedule(sent, train.end);
 }
 
 void Usart::on_sent(int64_t time) {
@@ -317,13 +304,12 @@ uint32_t Usart::take_received() {
 
 void Usart::follow() {
     uint32_t &status = reg(STATUS), &flags = reg(IF);
-    const auto set = [](uint32_t &word, uint32_t bit, bool on) { word = on ? word | bit : word & ~bit; };
     const bool room = reg(CTRL) & CTRL_TXBIL ? !transmit_buffer.full() : transmit_buffer.empty();
-    set(status, STATUS_TXBL, room);
-    set(flags, IF_TXBL, room);
-    set(status, STATUS_RXDATAV, !receive_buffer.empty());
-    set(flags, IF_RXDATAV, !receive_buffer.empty());
-    set(status, STATUS_RXFULL, receive_buffer.size() >= 2);
+    put(status, STATUS_TXBL, room);
+    put(flags, IF_TXBL, room);
+    put(status, STATUS_RXDATAV, !receive_buffer.empty());
+    put(flags, IF_RXDATAV, !receive_buffer.empty());
+    put(status, STATUS_RXFULL, receive_buffer.size() >= 2);
     const bool stopped = reg(CTRL) & CTRL_ERRSDMA && flags & (IF_FERR | IF_PERR);
     Dma &dma = *part.dma;
     dma.request(place.source, 0, !receive_buffer.empty() && !stopped);

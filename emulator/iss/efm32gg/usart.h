@@ -6,6 +6,7 @@
 #pragma once
 
 #include "frame_queue.h"
+#include "frame_train.h"
 #include "part.h"
 
 namespace efm32gg {
@@ -39,14 +40,13 @@ private:
     FrameQueue<3> receive_buffer;  // with the shift register behind two entries
     bool shifting = false, stalled = false;
     uint32_t shifted = 0;
-    Rate train_rate;
-    int64_t train_start = 0, train_units = 0, frame_end = 0;
+    FrameTrain train;
     Event sent = Event::of<&Usart::on_sent>(this);
 
     bool synchronous() const { return reg(usart::CTRL) & usart::CTRL_SYNC; }
     int data_bits() const;
     int64_t bit_units() const;
-    int64_t frame_units(uint32_t frame) const;
+    int64_t frame_units() const;
     void command(uint32_t value);
     void enqueue(uint32_t frame);
     void start(bool behind_another = false);
