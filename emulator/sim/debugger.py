@@ -102,6 +102,7 @@ class Debugger:
     def __post_init__(self) -> None:
         """Take a place before the kernel."""
         self.halted: Reason | None = None
+        self._attached = False
         self._since_ns = 0
         self._range: tuple[int, int] | None = None
         self._to_wake = False  # a step has fallen asleep: stand when it goes on
@@ -129,6 +130,8 @@ class Debugger:
         machine = self.machine
         if self.kernel.paused:  # somebody gives it an input: it stands where it is
             return Stop(StopReason.TIME, machine.now_ps)
+        if not self._attached:
+            return machine.run(until_ps)
         if self._range is None or self._to_wake:
             stop = machine.run(until_ps)
         else:
@@ -197,6 +200,7 @@ class Debugger:
 
     def attach(self) -> None:
         """See ``Target``."""
+        self._attached = True
         self.machine.attach_debugger(True)
         self.halt()
 
@@ -208,6 +212,7 @@ class Debugger:
             self.machine.watch(watch, False)
         self._watches.clear()
         self.machine.attach_debugger(False)
+        self._attached = False
         self.resume()
 
     def halt(self) -> None:

@@ -6,6 +6,7 @@ due, and the machine goes on. While it sleeps, the kernel goes from event to eve
 """
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, Protocol
@@ -94,6 +95,7 @@ class FirmwareProcessor:
         self._early: list[Outgoing] = []  # what left the machine while it caught up
         self._locked_up = False
         self._look_ps = self._told_faults = 0
+        self._faults = Counter[tuple[int, int, int]]()
         self.machine.reset(self.power_on)
         for _ in self.machine.outbox():
             pass  # being made is no news to anybody
@@ -194,7 +196,7 @@ class FirmwareProcessor:
         runner = self.machine if self.debugger is None else self.debugger
         stop = runner.run(until_ps)
         if stop.reason is StopReason.LOCKED_UP and not self._locked_up:
-            self.on_fault(f"the core is locked up\n{self._report()}")
+            self._tell_fault("the core is locked up")
         self._locked_up = stop.reason is StopReason.LOCKED_UP
         if stop.now_ps >= self._look_ps:
             self._look_ps = stop.now_ps + FAULT_LOOK_PS
@@ -205,10 +207,19 @@ class FirmwareProcessor:
         """Tell of a fault whose handler does nothing, once each."""
         if unhandled(self.machine) and last_fault(self.machine).count != self._told_faults:
             self._told_faults = last_fault(self.machine).count
-            self.on_fault(f"the firmware does not handle a fault\n{self._report()}")
+            self._tell_fault("the firmware does not handle a fault")
 
-    def _report(self) -> str:
-        return fault_report(self.machine, Symbols.of(self.machine.image), self.machine.now_ps)
+    def _tell_fault(self, what: str) -> None:
+        """With a report; of the same fault again and again a line, ever more seldom."""
+        fault = last_fault(self.machine)
+        kind = fault.pc, fault.cfsr, fault.hfsr
+        self._faults[kind] += 1
+        times = self._faults[kind]
+        if times == 1:
+            symbols = Symbols.of(self.machine.image)
+            self.on_fault(f"{what}\n{fault_report(self.machine, symbols, self.machine.now_ps)}")
+        elif times & (times - 1) == 0:
+            self.on_fault(f"{what}: the same fault for the {times}th time")
 
     def _until(self) -> int:
         """Nothing else happens before this time."""

@@ -224,7 +224,12 @@ class Session:
         return None
 
     def _erased(self, address: int, count: int) -> bool:
-        return self._target.write(address, b"\xff" * count)
+        inside = any(
+            region.kind == "flash"
+            and region.start <= address <= address + count <= region.start + region.length
+            for region in self._target.regions
+        )
+        return inside and self._target.write(address, b"\xff" * count)
 
     def _flash_write(self, address: str, data: bytes) -> bytes:
         self._flashed[int(address, 16)] = data
@@ -248,7 +253,8 @@ class Session:
             case "Supported":
                 return FEATURES.encode()
             case "Xfer":
-                return self._transfer(*text.split(":")[1:])
+                what, action, annex, where = text.split(":")[1:]
+                return self._transfer(what, action, annex, where)
             case "Rcmd":
                 return self._monitor(bytes.fromhex(text.partition(",")[2]).decode("latin-1"))
             case "Attached":
@@ -278,7 +284,7 @@ class Session:
     def _monitor(self, command: str) -> bytes:
         try:
             said = self._target.monitor(command)
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             said = str(error)
         text = said.rstrip("\n") + "\n" if said else ""
         return text.encode("utf-8").hex().encode() or OK

@@ -7,7 +7,7 @@ import os
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from io import BytesIO
 from typing import Any
 
@@ -67,10 +67,11 @@ class Symbols:
             self._read_symbols()
         self._starts = [function.address for function in self.functions]
 
-    @classmethod
-    def of(cls, image: Image | None) -> "Symbols":
-        """Those of a program; none for none."""
-        return cls(None if image is None else image.elf)
+    @staticmethod
+    @lru_cache(maxsize=4)
+    def of(image: Image | None) -> "Symbols":
+        """Those of a program, read once; none for none."""
+        return Symbols(None if image is None else image.elf)
 
     def function_at(self, address: int) -> Function | None:
         """The function that has code at ``address``."""

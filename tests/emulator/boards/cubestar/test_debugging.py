@@ -14,6 +14,7 @@ import pytest
 from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.boards.debugging import open_debugger
 from cubestack.emulator.iss.gdb.packets import framed
+from cubestack.emulator.iss.gdb.session import Session
 from cubestack.emulator.iss.image import Image, load_image
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.ports.gdb import GdbEndpoint
@@ -230,6 +231,7 @@ def test_a_trace_with_gdb_is_that_without(image: Image) -> None:
         endpoint = open_debugger(board, 0)
         board.on_close.append(endpoint.close)
         debugger = board.processor.debugger
+        debugger.attach()
         halts: list[int] = []
         symbols = board.insight.symbols
 
@@ -286,3 +288,71 @@ def test_a_second_client_is_refused_and_the_next_one_is_served(
 
 def test_the_port_is_on_this_machine_only(endpoint: GdbEndpoint) -> None:
     assert endpoint.address[0] == "127.0.0.1"
+
+
+def test_a_fault_that_nobody_handles_is_reported_once(board: CubeStarFirmwareBoard) -> None:
+    said: list[str] = []
+    board.tell(said.append)
+    send_bytes(board, b"a\0")
+    board.kernel.advance_to(200 * PS_PER_MS)
+    (report,) = said
+    assert report.startswith("the firmware does not handle a fault\n")
+    assert "BFAR 70000000" in report or "IMPRECISERR" in report
+    assert "fail" in report
+    assert "uart_handler" in report
+
+
+MONITOR = (
+    *("time", "camera", "power", "pins", "regs", "regs CMU", "regs X", "regs 0x20000000", "faults"),
+    *("faults log", "faults clear", "faults inject latch-up imager", "faults inject x", "report"),
+    *("faults inject uart-drop uart rate=x", "symbols main", "symbols 0x100", "symbols q", "reset"),
+    *("reset halt", "catch on", "catch off", "help", "", "bogus x"),
+)
+
+
+def test_whatever_clients_do_the_board_goes_on(
+    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
+) -> None:
+    """Drawn packets at a board that runs, with clients that come and go."""
+    rng = np.random.default_rng(5)
+    debugger: Any = board.processor.debugger
+    debugger.visit = debugger.serve = lambda: None
+    places = (0, 0x100, 0x2000_0000, 0x2001_FFF0, 0x4000_C000, 0xE000_E010, 0xC000_0000, 1 << 31)
+    for _ in range(8):
+        client = Session(debugger)
+        for _ in range(40):
+            at, other = int(rng.choice(places)) + 4 * int(rng.integers(64)), int(rng.integers(5))
+            packets = (
+                *(
+                    "?",
+                    "g",
+                    f"p{other * 9:x}",
+                    f"m{at:x},40",
+                    "c",
+                    "s",
+                    "vRun;",
+                    f"z{other},{at:x},4",
+                ),
+                *(f"Z{other},{at:x},4", f"vCont;r{at:x},{at + 64:x}", f"M{at:x},4:01020304"),
+                *(
+                    "vFlashErase:0,100000000",
+                    f"X{at:x},2:ab",
+                    f"vFlashWrite:{at:x}:abc",
+                    "vFlashDone",
+                ),
+                f"qRcmd,{str(rng.choice(MONITOR)).encode().hex()}",
+            )
+            client.receive(framed(str(rng.choice(packets)).encode()))
+            for _ in range(int(rng.integers(100))):
+                if board.kernel.paused:
+                    break
+                board.kernel.step()
+            client.look()
+            if not board.kernel.paused:
+                client.receive(b"\x03")
+        client.close()
+        assert not board.kernel.paused
+        before_ps = board.kernel.now
+        for _ in range(300):
+            board.kernel.step()
+        assert board.kernel.now > before_ps
