@@ -151,9 +151,13 @@ bool System::write_word(uint32_t address, uint32_t value, uint32_t lanes) {
     if (address < DWT_BASE) {
         itm.write(address - ITM_BASE, value);
     } else if (address < FPB_BASE) {
-        dwt.write(address - DWT_BASE, value, cpu.cycles);
+        const uint32_t dwt_offset = address - DWT_BASE;
+        if (dwt_offset >= 0x20 && dwt_offset % 16 == 8 && value & 15)
+            listener.unmodelled("comparators of the DWT");
+        dwt.write(dwt_offset, value, cpu.cycles);
     } else if (address < FPB_BASE + 0x1000) {
         const uint32_t patch_offset = address - FPB_BASE;
+        if (patch_offset == 0 && value & 1) listener.unmodelled("flash patch (FPB)");
         if (patch_offset == 0 && (value & 2)) patch_control = value & 1;    // KEY
         else if (patch_offset == 4) patch_remap = value & 0x1FFFFFE0;
         else if (patch_offset >= 8 && patch_offset < 0x28) patch[(patch_offset - 8) / 4] = value;

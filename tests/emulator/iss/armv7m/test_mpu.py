@@ -159,6 +159,25 @@ def test_stacking_is_checked_with_the_rights_of_the_code():
     assert bench["psp"] == 0x2000_3000 - 32
 
 
+def test_unstacking_is_checked_too():
+    code = Program()
+    code.nop(60)
+    code.handler(16)
+    code.load(0, USER)  # where no region is
+    code.msr("psp", 0)
+    code.bx()
+    code.handler(4)
+    code.forever()
+    bench = guarded(code, ENABLE)
+    bench["psp"] = 0x2000_7000
+    bench["control"] = 2
+    bench.write(ISER, 1)
+    bench.at(5, PULSE, 0)
+    bench.run(80)
+    assert (bench.ipsr, bench.read(CFSR)) == (4, MUNSTKERR)
+    assert bench["psp"] == USER
+
+
 @pytest.mark.parametrize("on", [False, True])
 def test_it_is_off_in_the_hard_fault_handler_unless_hfnmiena(on):
     code = Program()

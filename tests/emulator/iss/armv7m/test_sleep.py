@@ -101,6 +101,21 @@ def test_wfe_wakes_of_a_disabled_interrupt_if_sevonpend(sev_on_pend):
     assert [entry.exception for entry in bench.log] == [0] * sev_on_pend
 
 
+def test_an_event_that_woke_is_used_up():
+    code = Program()
+    code.load(6, LOG)
+    code.cps(False)
+    for _ in range(2):
+        code.wfe()
+        code.str(6, 6)
+    bench = Bench(code.finish())
+    bench.write(SCR, 0x10)
+    bench.run(50)
+    bench.at(bench.cycles + 10, PULSE, 0)
+    bench.run(200)
+    assert (len(bench.log), bench["sleep"]) == (1, WFE)
+
+
 def test_sleep_on_exit_runs_handlers_only():
     bench = start(sleeping("wfi"))
     bench.write(SCR, 2)
