@@ -4,7 +4,7 @@ import pytest
 
 from cubestack.emulator.iss.machine import Kind
 
-from .bench import Bench, S, mask_of
+from .bench import SYSTEM_REQUEST, Bench, S, asleep, mask_of
 
 HZ = 14_000_000
 BIT_PS = (8 * (16 + 1) + 4) * S // HZ
@@ -312,6 +312,40 @@ def test_without_pins_clock_or_enable_nobody_is_there() -> None:
         bench = slave(SLAVE | mask_of("I2C.CTRL.AUTOACK"))
         bench[name] = value
         assert bench.machine.i2c_slave_start(0, ADDRESS) == 0
+
+
+def test_its_address_wakes_a_slave_that_sleeps_with_the_clock_held() -> None:
+    bench = asleep(2).clock("I2C0", "GPIO")
+    bench["GPIO.PD_MODEH"] = WIRED_AND << 24 | WIRED_AND << 28
+    bench["I2C0.ROUTE"] = 3 | 3 << 8
+    bench["I2C0.CTRL"] = SLAVE | mask_of("I2C.CTRL.AUTOACK")
+    bench["I2C0.SADDR"] = ADDRESS
+    bench["I2C0.SADDRMASK"] = 0xFE
+    bench["I2C0.IEN"] = flag("ADDR")
+    machine = bench.machine
+    assert machine.i2c_slave_start(0, 0x50) == 0
+    machine.i2c_slave_stop(0)
+    bench.run_for(10 * 10**6)
+    assert machine.energy_mode == 2
+    assert machine.i2c_slave_start(0, ADDRESS) is None
+    bench.run_for(10 * 10**6)
+    assert machine.energy_mode == 0
+    assert one(bench, Kind.I2C_SLAVE) == 1
+    assert machine.i2c_slave_poll(0) == 1
+
+
+def test_a_reset_lets_the_bus_go() -> None:
+    bench = slave()
+    assert bench.machine.i2c_slave_start(0, ADDRESS) is None
+    bench.reset(SYSTEM_REQUEST)
+    assert bench.machine.i2c_slave_poll(0) == 0
+    bench = master()
+    bench["I2C0.TXDATA"] = 0xA0
+    bench["I2C0.CMD"] = command("START")
+    bits(bench, 5)
+    bench.reset(SYSTEM_REQUEST)
+    assert len(bench.out(Kind.I2C_STOP)) == 1
+    assert state(bench.clock("I2C0")) == 1
 
 
 def test_both_ends_can_be_found_by_their_pin() -> None:
