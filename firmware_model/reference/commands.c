@@ -29,7 +29,7 @@ uint8_t memory_test = CUBESTAR_MEMORY_TEST_NOT_RUN;
 uint16_t next_block, blocks_received;
 bool second_half;
 
-/* --- node --------------------------------------------------------------------------------------- */
+/* --- node ------------------------------------------------------------------------------------- */
 
 static void toggle_supply(void)
 {
@@ -85,7 +85,7 @@ static uint16_t paged(const uint8_t *parameters)
     return (uint16_t)(SETTING(u8, SetCameraRegisterPage, Page) << 8 | parameters[0]);
 }
 
-/* --- picture ------------------------------------------------------------------------------------ */
+/* --- picture ---------------------------------------------------------------------------------- */
 
 static bool test_pattern(uint8_t kind)
 {
@@ -127,7 +127,7 @@ static void stream_image(void)
     }
 }
 
-/* --- stars and loop ----------------------------------------------------------------------------- */
+/* --- stars and loop --------------------------------------------------------------------------- */
 
 static void set_hint(void)
 {
@@ -145,7 +145,7 @@ static void trigger(void)
     retained.looping = retained.delaying = 1;
 }
 
-/* --- all ---------------------------------------------------------------------------------------- */
+/* --- all -------------------------------------------------------------------------------------- */
 
 /* False: the task failed. */
 static bool act(uint8_t id, const uint8_t *parameters)
@@ -184,14 +184,16 @@ static bool act(uint8_t id, const uint8_t *parameters)
         second_half = false;
         break;
     case CUBESTAR_TC_WriteTo_IS_Register:
-        sensor_write_byte(paged(parameters), parameters[CUBESTAR_TC_WriteTo_IS_Register_DataL_OFFSET]);
+        sensor_write_byte(paged(parameters),
+                          parameters[CUBESTAR_TC_WriteTo_IS_Register_DataL_OFFSET]);
         break;
     case CUBESTAR_TC_ReadFrom_IS_Register:
         sensor_select_register(paged(parameters));
         break;
     case CUBESTAR_TC_WriteCameraRegister:
-        sensor_write_byte(cubestar_get_u16(parameters, CUBESTAR_TC_WriteCameraRegister_Address_OFFSET),
-                          parameters[CUBESTAR_TC_WriteCameraRegister_Value_OFFSET]);
+        sensor_write_byte(
+            cubestar_get_u16(parameters, CUBESTAR_TC_WriteCameraRegister_Address_OFFSET),
+            parameters[CUBESTAR_TC_WriteCameraRegister_Value_OFFSET]);
         break;
     case CUBESTAR_TC_SelectCameraRegister:
         sensor_select_register(cubestar_get_u16(parameters, 0));

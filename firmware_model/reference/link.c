@@ -56,7 +56,7 @@ bool link_idle(void)
     return !frame_unfinished(&decoder) && !i2c.addressed && !link_waiting() && !uart_backlog();
 }
 
-/* --- both buses --------------------------------------------------------------------------------- */
+/* --- both buses ------------------------------------------------------------------------------- */
 
 /* Length of the answer, in `data`; -1 without one. */
 static int read_telemetry(uint8_t id, uint8_t *data)
@@ -115,7 +115,7 @@ static uint8_t checked(uint8_t id, const uint8_t *parameters, int length,
     return CUBESTAR_ACK_ERROR_OK;
 }
 
-/* --- UART --------------------------------------------------------------------------------------- */
+/* --- UART ------------------------------------------------------------------------------------- */
 
 /* Answers, if there is room for it. */
 static void send(const uint8_t *payload, int length)
@@ -166,7 +166,7 @@ void link_uart_silence(void)
     }
 }
 
-/* --- I2C ---------------------------------------------------------------------------------------- */
+/* --- I2C -------------------------------------------------------------------------------------- */
 
 /* Acts on the message that a stop or a repeated start ended. */
 static void finish_write(void)

@@ -39,7 +39,7 @@ void discard_results(void)
     retained.solved = 0;
 }
 
-/* --- detection ---------------------------------------------------------------------------------- */
+/* --- detection -------------------------------------------------------------------------------- */
 
 static uint8_t at_least_one(uint8_t value)
 {
@@ -124,7 +124,7 @@ bool detect(void)
     return found.count > 0;
 }
 
-/* --- identification ----------------------------------------------------------------------------- */
+/* --- identification --------------------------------------------------------------------------- */
 
 /* The flag of the mode decides; without an attitude and a hint the node is lost in space. */
 static uint8_t choose_mode(void)
@@ -214,7 +214,7 @@ bool identify_stars(void)
     return true;
 }
 
-/* --- attitude ----------------------------------------------------------------------------------- */
+/* --- attitude --------------------------------------------------------------------------------- */
 
 bool select_best(void)
 {

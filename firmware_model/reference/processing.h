@@ -13,7 +13,7 @@
 #include "algorithms/detection.h"
 #include "algorithms/matching.h"
 
-/* Results of the latest picture. Interrupts read them: what is not marked as there is being made. */
+/* Results of the latest picture. Interrupts read them: what is not marked is being made. */
 struct results {
     volatile bool detected, identified; /* whether there is a detection, an identification */
     volatile unsigned generation;       /* another number for other results */

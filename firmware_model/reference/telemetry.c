@@ -24,7 +24,7 @@ static double ms(uint32_t us)
     return us / 1000.0;
 }
 
-/* --- node --------------------------------------------------------------------------------------- */
+/* --- node ------------------------------------------------------------------------------------- */
 
 static void identification(uint8_t *data)
 {
@@ -94,7 +94,7 @@ static void loop_status(uint8_t *data)
     PUT(LoopStatus, Running, retained.looping);
 }
 
-/* --- camera and picture ------------------------------------------------------------------------- */
+/* --- camera and picture ----------------------------------------------------------------------- */
 
 static void image_setup(uint8_t *data)
 {
@@ -150,7 +150,7 @@ static void image_block(uint8_t *data)
     memcpy(data, PICTURE + start, length);
 }
 
-/* --- the latest picture ------------------------------------------------------------------------- */
+/* --- the latest picture ----------------------------------------------------------------------- */
 
 static const struct detection *found(void)
 {
@@ -222,7 +222,7 @@ static void performance(uint8_t *data)
     PUT(PerformanceParameters, CommsError, communication_failed());
 }
 
-/* --- attitude ----------------------------------------------------------------------------------- */
+/* --- attitude --------------------------------------------------------------------------------- */
 
 /* Without any attitude: no rotation. */
 static const struct attitude *latest_attitude(void)
@@ -288,7 +288,7 @@ static void attitude_quaternion(uint8_t *data)
     PUT(AttitudeQuaternion, Valid, retained.solved);
 }
 
-/* --- all ---------------------------------------------------------------------------------------- */
+/* --- all -------------------------------------------------------------------------------------- */
 
 static const struct {
     uint8_t id;

@@ -1,6 +1,6 @@
 /* Clocks, the free-running timer and sleep.
  *
- * EFM32GG Reference Manual, chapters 11 (CMU), 7 (MSC), 20 (TIMER) and 22 (BURTC). TIMER0 and 1 count
+ * EFM32GG Reference Manual, chapters 7 (MSC), 11 (CMU), 20 (TIMER), 22 (BURTC). TIMER0 and 1 count
  * thirds of a microsecond within one life of the program. BURTC counts on through resets, so that
  * the time goes on after one: it has 32 768 counts a second, 512 of which are 15 625 us. Until its
  * crystal has started, what lies before `timer_start` is taken to last RESTART_US.
@@ -61,7 +61,7 @@ void clock_start(void)
     DWT_CTRL |= 1; /* counts cycles, for the times of the steps */
 }
 
-/* --- the free-running timer --------------------------------------------------------------------- */
+/* --- the free-running timer ------------------------------------------------------------------- */
 
 static uint32_t ticks(void)
 {
@@ -138,7 +138,7 @@ void spin_us(uint32_t us)
     __asm volatile("1: subs %0, #1\n bne 1b" : "+r"(turns) : : "cc");
 }
 
-/* --- sleep ---------------------------------------------------------------------------------------- */
+/* --- sleep ------------------------------------------------------------------------------------ */
 
 void TIMER2_handler(void)
 {

@@ -1,7 +1,6 @@
 /* The SRAM on the external bus. EFM32GG Reference Manual, chapter 14.
  *
- * Eight data lines and 24 address lines, latched in two steps; a load or store takes eight clocks on
- * the bus (an SRAM of 55 ns).
+ * Eight data lines and 24 address lines, latched in two steps, for an SRAM of 55 ns.
  *
  * SPDX-License-Identifier: BSD-2-Clause
  */
@@ -16,9 +15,10 @@
 /* Alternate functions of the EBI at location 0: address and data lines, ALE, WEn, REn, CS0. */
 #define PIN(port, bit) (16 * ((port) - 'A') + (bit))
 static const uint8_t lines[] = {
-    PIN('E', 8),  PIN('E', 9),  PIN('E', 10), PIN('E', 11), PIN('E', 12), PIN('E', 13), PIN('E', 14),
-    PIN('E', 15), PIN('A', 15), PIN('A', 0),  PIN('A', 1),  PIN('A', 2),  PIN('A', 3),  PIN('A', 4),
-    PIN('A', 5),  PIN('A', 6),  PIN('F', 3),  PIN('F', 4),  PIN('F', 5),  PIN('D', 9),
+    PIN('E', 8),  PIN('E', 9),  PIN('E', 10), PIN('E', 11), PIN('E', 12),
+    PIN('E', 13), PIN('E', 14), PIN('E', 15), PIN('A', 15), PIN('A', 0),
+    PIN('A', 1),  PIN('A', 2),  PIN('A', 3),  PIN('A', 4),  PIN('A', 5),
+    PIN('A', 6),  PIN('F', 3),  PIN('F', 4),  PIN('F', 5),  PIN('D', 9),
 };
 
 void external_ram_start(void)

@@ -42,6 +42,12 @@ static void addressed(void)
         SATELLITE_I2C->TXDATA = link_i2c_read();
 }
 
+static void written(void)
+{
+    bool taken = link_i2c_write((uint8_t)SATELLITE_I2C->RXDATA);
+    SATELLITE_I2C->CMD = taken ? I2C_CMD_ACK : I2C_CMD_NACK;
+}
+
 void i2c_slave_handler(void)
 {
     uint32_t flags = SATELLITE_I2C->IF;
@@ -51,7 +57,7 @@ void i2c_slave_handler(void)
     if (flags & I2C_IF_ADDR)
         addressed();
     else if (flags & I2C_IF_RXDATAV)
-        SATELLITE_I2C->CMD = link_i2c_write((uint8_t)SATELLITE_I2C->RXDATA) ? I2C_CMD_ACK : I2C_CMD_NACK;
+        written();
     else if (flags & I2C_IF_ACK)
         SATELLITE_I2C->TXDATA = link_i2c_read();
 }

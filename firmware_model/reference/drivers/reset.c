@@ -1,7 +1,7 @@
 /* Resets and their causes: bits stay in RSTCAUSE until the program clears them.
  *
- * What begins with a rise of the supply hides all else; the published list has numbers for two pairs
- * of causes, as firmware_model/cubestar/reset_cause.py has it.
+ * What begins with a rise of the supply hides all else; two pairs of causes have numbers of their
+ * own, as firmware_model/cubestar/reset_cause.py has it.
  *
  * SPDX-License-Identifier: BSD-2-Clause
  */
@@ -12,15 +12,16 @@
 #include "efm32gg.h"
 
 #define CAUSES                                                                                     \
-    (RMU_RSTCAUSE_PORST | RMU_RSTCAUSE_BODUNREGRST | RMU_RSTCAUSE_BODREGRST | RMU_RSTCAUSE_EXTRST | \
-     RMU_RSTCAUSE_WDOGRST | RMU_RSTCAUSE_LOCKUPRST | RMU_RSTCAUSE_SYSREQRST)
+    (RMU_RSTCAUSE_PORST | RMU_RSTCAUSE_BODUNREGRST | RMU_RSTCAUSE_BODREGRST |                       \
+     RMU_RSTCAUSE_EXTRST | RMU_RSTCAUSE_WDOGRST | RMU_RSTCAUSE_LOCKUPRST | RMU_RSTCAUSE_SYSREQRST)
 
 static const struct {
     uint32_t mask, bits;
     uint8_t cause;
 } meanings[] = {
     {RMU_RSTCAUSE_PORST, RMU_RSTCAUSE_PORST, CUBESTAR_RESET_CAUSE_POWER_ON},
-    {RMU_RSTCAUSE_BODUNREGRST, RMU_RSTCAUSE_BODUNREGRST, CUBESTAR_RESET_CAUSE_BROWN_OUT_UNREGULATED},
+    {RMU_RSTCAUSE_BODUNREGRST, RMU_RSTCAUSE_BODUNREGRST,
+     CUBESTAR_RESET_CAUSE_BROWN_OUT_UNREGULATED},
     {RMU_RSTCAUSE_BODREGRST, RMU_RSTCAUSE_BODREGRST, CUBESTAR_RESET_CAUSE_BROWN_OUT_REGULATED},
     {CAUSES, RMU_RSTCAUSE_EXTRST | RMU_RSTCAUSE_WDOGRST, CUBESTAR_RESET_CAUSE_EXTERNAL_OR_WATCHDOG},
     {CAUSES, RMU_RSTCAUSE_EXTRST, CUBESTAR_RESET_CAUSE_EXTERNAL_PIN},

@@ -1,7 +1,7 @@
 /* Load switches, current monitors and comparators. EFM32GG Reference Manual, chapters 26 and 28.
  *
- * A monitor's voltage goes to an input of the ADC and to a comparator, whose other input is a part of
- * the supply, in steps of a 63rd. The trip currents are assumed: a third above the highest regular
+ * A monitor's voltage goes to an input of the ADC and to a comparator, whose other input is a part
+ * of the supply, in steps of a 63rd. The trip currents are assumed: a third above the highest regular
  * one for imager and FPGA, ten times it for the memory, which draws little.
  *
  * SPDX-License-Identifier: BSD-2-Clause
@@ -107,15 +107,15 @@ static uint32_t converted(uint32_t input, uint32_t reference)
 
 float supply_current_ma(enum channel channel)
 {
-    float volts = (float)converted(channels[channel].input, ADC_REFERENCE_2V5) / ADC_COUNTS_PER_VOLT;
-    return volts * channels[channel].ma_per_volt;
+    uint32_t counts = converted(channels[channel].input, ADC_REFERENCE_2V5);
+    return (float)counts / ADC_COUNTS_PER_VOLT * channels[channel].ma_per_volt;
 }
 
 float temperature_c(void)
 {
     float at = (float)((DEVINFO->CAL & DEVINFO_CAL_TEMP) >> DEVINFO_CAL_TEMP_SHIFT);
-    int32_t calibrated =
-        (int32_t)((DEVINFO->ADC0CAL2 & DEVINFO_ADC0CAL2_TEMP1V25) >> DEVINFO_ADC0CAL2_TEMP1V25_SHIFT);
+    int32_t calibrated = (int32_t)((DEVINFO->ADC0CAL2 & DEVINFO_ADC0CAL2_TEMP1V25) >>
+                                   DEVINFO_ADC0CAL2_TEMP1V25_SHIFT);
     int32_t counts = (int32_t)converted(ADC_INPUT_TEMPERATURE, ADC_REFERENCE_1V25);
     return at - (float)(calibrated - counts) / TEMPERATURE_GRADIENT;
 }
