@@ -132,6 +132,10 @@ class CubeStarFirmwareBoard(CubeStarStack):
         """Whether anything is under way that does not wait for the host."""
         return any(line.uart.busy for line in self.lines) or not self.processor.waiting
 
+    def probes(self) -> dict[str, int | str]:
+        """What a trace shows: the energy mode (0: awake) beside what all boards show."""
+        return super().probes() | {"energy_mode": self.machine.energy_mode}
+
     def tell(self, say: Callable[[str], None]) -> None:
         """Give ``say`` what the firmware prints, and reports of its faults."""
         self.processor.console = self.processor.on_fault = say

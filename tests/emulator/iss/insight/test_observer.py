@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.insight.callgrind import write_callgrind
 from cubestack.emulator.iss.insight.history import History
 from cubestack.emulator.iss.insight.lcov import write_lcov
@@ -174,3 +175,36 @@ def test_a_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
     assert machine.now_ps < standing + RUN_PS
     taken = [name for _, variable, name in history.take() if variable == "function"]
     assert taken.count("square") == pytest.approx(5 * taken.count("work") / 6, rel=0.01)
+
+
+def test_calls_of_tasks_are_told_apart(tmp_path: Path) -> None:
+    """Three tasks with stacks of their own are switched in the middle of their calls."""
+    compiler = shutil.which("arm-none-eabi-gcc")
+    if compiler is None:
+        pytest.skip("arm-none-eabi-gcc is not installed")
+    folder, path = Path(__file__).parents[1] / "programs", tmp_path / "rtos.elf"
+    options = ["-mcpu=cortex-m3", "-mthumb", "-g", "-O0", "-ffreestanding", "-nostdlib", "-T"]
+    files = (folder / "device.ld", folder / "startup.c", folder / "rtos.c", "-lgcc", "-o", path)
+    subprocess.run([compiler, *options, *files], check=True)
+    image = load_image(path)
+    machine = Machine()
+    machine.load(image)
+    machine.reset()
+    observer = Observer(machine, Symbols.of(image))
+    run(machine, 200 * PS_PER_MS)
+
+    def below(name: str) -> int:
+        """Cycles of what a function called."""
+        edges = observer.edges()
+        sites = [observer.symbols.function_at(edge.site) for edge in edges]
+        pairs = zip(edges, sites, strict=True)
+        return sum(e.cycles for e, site in pairs if site is not None and site.name == name)
+
+    switch = calls(observer, "PendSV_Handler")
+    assert switch.count > 100
+    assert switch.cycles == self_cycles(observer, "PendSV_Handler") + below("PendSV_Handler")
+    printed = calls(observer, "console_hex")
+    assert printed.cycles == self_cycles(observer, "console_hex") + below("console_hex")
+    counted = sum(int(code.cycles.sum()) for code in observer.codes)
+    assert counted + observer.figures().idle_cycles == pytest.approx(machine.cycles, abs=50_000)
+    machine.close()
