@@ -106,17 +106,12 @@ class MemoryFaults(Mechanism):
         self._memory = memory
         self._engine = engine
         self._stuck: dict[Injection, tuple[int, int]] = {}
-        self._pins, self._holding, self._changed = pins, False, changed
+        self._pins, self._changed = pins, changed
 
     def prepare(self, injection: Injection) -> None:
         """Refuse stuck bits where no reading can be noticed; FaultError."""
-        if not isinstance(injection.fault, table.MemoryStuck):
-            return
-        if self._pins is None:
+        if isinstance(injection.fault, table.MemoryStuck) and self._pins is None:
             raise FaultError("memory-stuck: only memories of a device with an FPGA can have it")
-        if not self._holding:
-            self._holding = True
-            self._pins().around_reads.append(self._hold)
 
     def begin(self, injection: Injection) -> None:
         """Act from now on."""
@@ -127,6 +122,8 @@ class MemoryFaults(Mechanism):
                 address, bit = self._place(injection, fault)
                 self._flip(injection, 8 * address + bit)
             case table.MemoryStuck():
+                if not self._stuck and self._pins is not None:
+                    self._pins().around_reads.append(self._hold)
                 self._stuck[injection] = self._place(injection, fault)
                 self._hold()
             case table.MemoryUpsets():
@@ -136,7 +133,8 @@ class MemoryFaults(Mechanism):
     def end(self, injection: Injection) -> None:
         """Act no longer."""
         super().end(injection)
-        self._stuck.pop(injection, None)
+        if self._stuck.pop(injection, None) and not self._stuck and self._pins is not None:
+            self._pins().around_reads.remove(self._hold)
 
     def _place(
         self, injection: Injection, fault: table.MemoryFlip | table.MemoryStuck

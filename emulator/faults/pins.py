@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.faults.injection import Injection, Mechanism, Report, active
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck, ControlGlitch
-from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
+from cubestack.emulator.sim.fpga_port import Driver, FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 
 PS_PER_NS = 1000
@@ -56,13 +56,14 @@ class PinFaults(Mechanism, FpgaPort):
         return self._engine.running
 
     @property
-    def driver(self) -> None:
-        """Nobody may go past the faults."""
-        return None
+    def driver(self) -> Driver | None:
+        """None while there are faults that nobody may go past."""
+        stands = self.injections or self._forced or self.around_reads
+        return None if stands else self._engine.driver
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
-        """Not asked of what has no ``driver``."""
-        raise AssertionError("there is no driver whose bursts could end")
+        """A burst of ``driver`` ended."""
+        return self._engine.attend(reached_ps, end, camera, until_ps)
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive a pin; one that is in a glitch follows after it."""

@@ -63,28 +63,37 @@ class FpgaCoupling:
             compiled: use the FPGA's own functions where there are any.
         """
         self._machine, self.fpga, self._banks = machine, fpga, tuple(banks)
-        self._names = [pin.name for pin in pins]
+        self._pins, self._by_driver = tuple(pins), compiled and not banks
         self._error: BaseException | None = None
-        self._told = -1  # which cameras the machine believes to run
-        driver = fpga.driver if compiled and not banks else None
-        self._compiled = driver is not None
         self._callbacks = (
             binding.ATTEND(self._guarded(fpga.attend, 0)),
             binding.SLOW_GET(self._guarded(self._get, 0)),
             binding.SLOW_SET(self._guarded(self._set, None)),
             binding.SLOW_EXTERNAL(self._guarded(self._external, -1)),
         )
+        self._couple()
+
+    def _couple(self) -> None:
+        """Lead the machine's pins to the FPGA's driver, or to callbacks."""
+        self._driver = driver = self.fpga.driver if self._by_driver else None
+        self._told = -1  # which cameras the machine believes to run
         addresses = (0, 0, 0, 0) if driver is None else driver[:4]
-        record = binding.FpgaDriverRecord(*addresses, *self._callbacks)
-        numbers = range(len(pins)) if driver is None else [driver.pins[n] for n in self._names]
+        numbers = (
+            range(len(self._pins))
+            if driver is None
+            else [driver.pins[pin.name] for pin in self._pins]
+        )
         wires = [
             binding.FpgaWireRecord(pin.port, pin.bit, pin.width, number, pin.input, pin.alert)
-            for pin, number in zip(pins, numbers, strict=True)
+            for pin, number in zip(self._pins, numbers, strict=True)
         ]
-        machine.couple(record, (binding.FpgaWireRecord * len(wires))(*wires))
+        record = binding.FpgaDriverRecord(*addresses, *self._callbacks)
+        self._machine.couple(record, (binding.FpgaWireRecord * len(wires))(*wires))
 
     def before_run(self) -> None:
         """The machine is about to run: it has to know which cameras do."""
+        if self._by_driver and self.fpga.driver is not self._driver:
+            self._couple()  # faults have come to stand between, or are over
         running = self.fpga.running
         if running or self._told:
             self._machine.fpga_running(running)
@@ -104,11 +113,11 @@ class FpgaCoupling:
 
     def _get(self, pin: int, now_ps: int) -> int:
         self.fpga.run(max(self.fpga.now_ps, now_ps))
-        return self.fpga.get_pin(self._names[pin])
+        return self.fpga.get_pin(self._pins[pin].name)
 
     def _set(self, pin: int, value: int, now_ps: int) -> None:
         self.fpga.run(max(self.fpga.now_ps, now_ps))
-        self.fpga.set_pin(self._names[pin], value)
+        self.fpga.set_pin(self._pins[pin].name, value)
 
     def _external(self, bank: int, address: int, value: int, now_ps: int) -> int:
         """One access on the external bus; it began before the machine came to its data."""

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,11 @@ class CompiledEngine(RtlEngine):
 
     @property
     def driver(self) -> Driver:
-        """The driver's functions."""
+        """The driver's functions; always the same object."""
+        return self._functions
+
+    @cached_property
+    def _functions(self) -> Driver:
         library = self._library
         functions = library.driver_set, library.driver_get, library.driver_burst
         to_set, to_get, to_burst = (

@@ -78,3 +78,29 @@ def test_picture_goes_through_the_fpga_into_the_external_memory(images: dict[str
 def test_other_layouts_are_refused_in_one_line(images: dict[str, Image]) -> None:
     with pytest.raises(ValueError, match=r"own firmware runs on memory layout 1, not two-boards"):
         powered(images["toggle"], layout=Layout.TWO_BOARDS)
+
+
+def test_faults_at_the_pins_are_seen_and_leave_no_trace(images: dict[str, Image]) -> None:
+    board = powered(images["toggle"], engine="compiled")
+    board.faults.inject("ack-stuck", level=1, for_s=0.001)
+    board.kernel.advance_to(PS_PER_MS // 2)
+    assert board.processor.fpga is not board.engine
+    assert board.processor.fpga is not None
+    assert board.processor.fpga.driver is None
+    board.kernel.advance_to(3 * PS_PER_MS)
+    assert [results(board)[44 * number] for number in range(3)] == [0, 0, 0]
+    assert board.processor.fpga.driver is board.engine.driver
+    board.close()
+
+
+def test_upsets_of_code_are_executed(images: dict[str, Image]) -> None:
+    board = powered(images["toggle"], engine="compiled")
+    board.kernel.advance_to(PS_PER_MS // 100)
+    address = int.from_bytes(board.machine.flash[4:8].tobytes(), "little") & ~1
+    for bit in range(32):  # of the first instructions after a reset
+        place = {"address": address + bit // 8, "bit": bit % 8}
+        board.faults.inject("memory-flip", target="flash", **place)
+    board.faults.inject("processor-reset", target="reset-pin")
+    board.kernel.advance_to(5 * PS_PER_MS)
+    assert not results(board)
+    board.close()
