@@ -62,7 +62,7 @@ _TABLE = """
     DBG_SWO       PF2  PC15 PD1  PD2
 """
 
-LOCATIONS = 7  #: the most that any signal has
+LOCATIONS = 8  #: that a LOCATION field can say; no signal has as many pins
 
 
 def pin_number(name: str) -> int:
