@@ -96,6 +96,7 @@ class FirmwareProcessor:
         self._locked_up = False
         self._look_ps = self._told_faults = 0
         self._faults = Counter[tuple[int, int, int]]()
+        self._unwanted_resets = Counter[str]()
         self.machine.reset(self.power_on)
         for _ in self.machine.outbox():
             pass  # being made is no news to anybody
@@ -218,8 +219,15 @@ class FirmwareProcessor:
         if times == 1:
             symbols = Symbols.of(self.machine.image)
             self.on_fault(f"{what}\n{fault_report(self.machine, symbols, self.machine.now_ps)}")
-        elif times & (times - 1) == 0:
-            self.on_fault(f"{what}: the same fault for the {times}th time")
+        elif _round(times):
+            self.on_fault(f"{what}: the same fault, {times} times now")
+
+    def _tell_reset(self, what: str) -> None:
+        """One that the program did not want; ever more seldom."""
+        self._unwanted_resets[what] += 1
+        times = self._unwanted_resets[what]
+        if _round(times):
+            self.on_fault(what if times == 1 else f"{what}, {times} times now")
 
     def _until(self) -> int:
         """Nothing else happens before this time."""
@@ -287,6 +295,8 @@ class FirmwareProcessor:
                 self.resets += 1
                 self._locked_up = False
                 self._told_faults = 0
+                if one.text:
+                    self._tell_reset(one.text)
             case Kind.ITM:
                 self._print(one.unit, one.value.to_bytes(8, "little")[: max(1, one.extra)])
             case Kind.SEMIHOSTING:
@@ -305,3 +315,8 @@ class FirmwareProcessor:
         *lines, self._lines[channel] = text.split("\n")
         for line in lines:
             self.console(line.rstrip("\r"))
+
+
+def _round(times: int) -> bool:
+    """Whether it is 1, 10, 100 and so on."""
+    return str(times).strip("0") == "1"

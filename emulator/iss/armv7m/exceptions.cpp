@@ -222,8 +222,11 @@ void System::lock_up() {
 
 void System::note_fault(int number, uint32_t exc_return) {
     const uint32_t frame = exc_return & 4 ? cpu.process_sp() : cpu.main_sp();
-    record = {(uint32_t)number, cfsr, hfsr, dfsr, mmfar, bfar, fault_pc,
-              exc_return && frame_stacked ? frame : 0,
+    // A lock-up in a handler: its frame is that of the fault before.
+    const uint32_t shown = number           ? (frame_stacked ? frame : 0)
+                           : cpu.ipsr != 0 ? record.frame
+                                           : 0;
+    record = {(uint32_t)number, cfsr, hfsr, dfsr, mmfar, bfar, fault_pc, shown,
               exc_return, record.count + 1, cpu.cycles};
 }
 

@@ -19,7 +19,8 @@ enum class Kind : int32_t {
     ITM,          // unit: port; value; extra: size
     SEMIHOSTING,  // text
     LOG,          // text: something not modelled, or used wrongly; each once
-    RESET,        // the part was reset; value: RMU's cause bits
+    RESET,        // the part was reset; value: RMU's cause bits; text: what the program did not
+                  // want
     SLEEP,        // value: energy mode 1..4, 0: awake
     FLASH,        // value: address; extra: bytes written, or page size with unit 1: erased
     SUPPLY,       // value: state of clocks has changed (power)

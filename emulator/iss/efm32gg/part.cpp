@@ -131,7 +131,9 @@ void Part::perform_reset() {
     cpu.reset();
     cpu.system->reset((reset_cause & cold) != 0);
     stop_clock(time + START_UP);
-    send(Kind::RESET, 0, reset_cause);
+    Outgoing &said = send(Kind::RESET, 0, reset_cause);
+    if (reset_cause & rmu::RSTCAUSE_WDOGRST)
+        std::snprintf(said.text, sizeof said.text, "the watchdog has bitten");
 }
 
 void Part::reset_requested() { request_reset(rmu::RSTCAUSE_SYSREQRST); }

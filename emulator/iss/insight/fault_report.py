@@ -127,7 +127,8 @@ def _lines(machine: Machine, symbols: Symbols, fault: Fault, time_ps: int) -> It
     if not fault.count:
         yield f"firmware: no fault so far, {where}"
     else:
-        yield f"firmware: {exception_name(fault.exception)} {where}, core cycle {fault.cycle}"
+        what = exception_name(fault.exception) or "lock-up"
+        yield f"firmware: {what} {where}, core cycle {fault.cycle}"
         for reason in reasons(fault.cfsr, fault.hfsr):
             yield f"  {reason}"
         status = f"  CFSR {fault.cfsr:08x}  HFSR {fault.hfsr:08x}  DFSR {fault.dfsr:08x}"
