@@ -78,7 +78,7 @@ def _fixture(name: str) -> Any:
         config = request.config
         own, profile = device(name), config.getoption("--cubestack-profile")
         board = {one: value for one, value in options.items() if one not in KEYS}
-        if profile is not None and own.switches.declared():
+        if profile is not None and own.switches.declared() and "firmware" not in board:
             board = {"profile": profile, **board}
         seed = options.get("seed", config.getoption("--cubestack-seed"))
         engine: Engine = config.getoption("--cubestack-engine") if own.has_fpga else "auto"

@@ -4,14 +4,15 @@ The peripherals are in the machine, down to their registers; here are the wires.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from cubestack.emulator.bus.line_format import LineFormat
+from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat, Parity
 from cubestack.emulator.bus.uart import Uart, UartTap
 from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.iss.machine import REGISTERS, Kind, Machine, Outgoing
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.interface.efm32gg.serial import LEUART, USART
 
 BY_PIN = 0x100
 """Units at or above it name the port pin that leads to one; see the part's api."""
@@ -23,8 +24,16 @@ RATE_SHIFT = 8
 CLOSE = 0.01
 """Rates that differ by less are the same to both ends."""
 
-BITS = 10
-"""Of a character with 8 data bits and no parity, by whose length a rate is told."""
+PARITIES: tuple[Parity, ...] = ("N", "N", "E", "O")
+STOPS = (1.0, 1.0, 1.5, 2.0)
+"""By the field of USART_FRAME; half a stop bit is heard as a whole one."""
+
+FRAMES = [
+    (instance.base + offset, layout)
+    for layout, offset in ((USART, 0x004), (LEUART, 0x000))
+    for instance in layout.instances
+]
+"""Where each unit's frame is set: USART_FRAME, LEUART_CTRL."""
 
 
 @dataclass(eq=False)
@@ -61,14 +70,25 @@ class SerialWire(UartTap):
         """The machine's transmitter begins a character; a rate close to the host's is the same."""
         if one.unit >> 8 != self.tx:
             return
-        rate = max(1, round(BITS * PS_PER_S / max(1, one.extra)))
-        for form in (self._uart.host_form, self._nominal):
-            if abs(rate - form.baud) < CLOSE * form.baud:
-                self._take(form if form.data_bits == 8 else LineFormat(form.baud))
+        form = self._frame(one.unit & 0xFF)
+        rate = round(form.bits * PS_PER_S / max(1, one.extra))
+        form = replace(form, baud=min(max(1, rate), FASTEST_BAUD))
+        for known in (self._uart.host_form, self._nominal):
+            if abs(rate - known.baud) < CLOSE * known.baud:
+                form = replace(form, baud=known.baud)
                 break
-        else:
-            self._take(LineFormat(min(rate, 12_000_000)))
+        self._take(form)
         self._uart.send(bytes([one.value & 0xFF]))
+
+    def _frame(self, unit: int) -> LineFormat:
+        """Bits of a unit's characters by its registers; at any rate."""
+        address, where = FRAMES[unit]
+        word = int.from_bytes(self.processor.machine.peek(address, 4), "little")
+        if where is LEUART:  # a ninth data bit is not one of a serial line's
+            parity, stops = word >> 2 & 3, 2 if word >> 4 & 1 else 1
+            return LineFormat(1, 8, PARITIES[parity], stops)
+        data = min(max((word & 15) + 3, 5), 8)
+        return LineFormat(1, data, PARITIES[word >> 8 & 3], STOPS[word >> 12 & 3])
 
     def _take(self, form: LineFormat) -> None:
         if form != self._uart.form:

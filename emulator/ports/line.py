@@ -77,6 +77,8 @@ class HostLine:
             self.uart.host_form = self.uart.form
 
     def _deliver(self, data: bytes, first_ps: int, byte_ps: int) -> None:
+        if self._sampler is None and self.uart.form != self.uart.host_form:
+            self._sampler = LineSampler(self.uart.host_form)  # the device has changed its own
         if self._sampler is None:
             self._blocks.append((data, first_ps, byte_ps))
             return

@@ -116,6 +116,19 @@ def test_wrong_rate_is_garbage_or_nothing(star: AnyEmulated) -> None:
     assert port.read(64, 0.0) == b"hello\n"
 
 
+def test_parity_is_that_of_the_registers(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    port = star.board.serial()
+    port.write(b"e")
+    star.wait(0.01)
+    port.read(64, 0.0)
+    assert port._line.framing_errors  # parity bits where stop bits should be
+    port._line.form = LineFormat(57600, parity="E")
+    port.write(b"h")
+    star.wait(0.05)
+    assert port.read(64, 0.0) == b"hello\n"
+
+
 def test_upsets_of_core_and_memories_never_end_the_emulator(elf: Path) -> None:
     for seed in range(6):
         with open_device("cubestar", firmware=str(elf), seed=seed) as star:

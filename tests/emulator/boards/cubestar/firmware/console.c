@@ -128,6 +128,11 @@ int main(void) {
         case 'r': put_number(read_camera(0x851C)); break;
         case 'm': put_number(imager_ma()); break;
         case 'o': await_overcurrent(); break;
+        case 'e':
+            while (!(SATELLITE_UART->STATUS & USART_STATUS_TXC)) {}
+            SATELLITE_UART->FRAME = 1u << 12 | 2u << 8 | 5u;  // 8 bits, even, one stop bit
+            put("even\n");
+            break;
         case 'w': start_watchdog_and_stop(); break;
         case 'f': *(volatile uint32_t *)0x60000000 = 1; break;
         default: put("?\n");
