@@ -222,9 +222,12 @@ def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter)
             area = yield from _grow(int(samples[read - 1]), int(found[-1]), columns, rows, config)
             visited += area.offsets
             values += area.values
-            count = len(area.offsets)  # a call, a list entry, a brightness; per neighbour a test
+            count = len(area.offsets)  # two calls, a list entry, a brightness; a neighbour's test
             tests = area.looked_at
-            meter.charge(call=count, ram_write=2 * count, loop=tests, i32_add=5 * count + 3 * tests)
+            meter.charge(
+                call=2 * count, ram_write=2 * count, loop=tests, i32_add=5 * count + 3 * tests
+            )
+            meter.charge(ram_read=count, ram_write=count, loop=count)  # into the list of visited
             if not area.complete:
                 invalid += 1
             elif count < config.min_pixels:
@@ -239,7 +242,8 @@ def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter)
                 end = SearchEnd.INVALID
             elif noise > config.max_noise:
                 end = SearchEnd.NOISE
-        meter.charge(i32_add=2 * read + 2 * background, loop=read, i32_div=1)
+        # The place, two comparisons and a step; what does not fit into registers comes from RAM.
+        meter.charge(i32_add=4 * read + 2 * background, ram_read=3 * read, loop=read, i32_div=1)
         meter.charge(ram_read=len(visited), loop=len(visited))
         yield Put(np.array(visited, np.int32), np.array(values, np.uint8))
     return Detection(
@@ -316,7 +320,7 @@ def _centroid(
     count = len(places)
     meter.charge(
         ram_read=4 * count,
-        i32_add=12 * count,
+        i32_add=24 * count,
         i32_mul=2 * count,
         loop=2 * count,
         i32_div=2,

@@ -73,7 +73,7 @@ def angles_between(
     """Angles in rad between unit vectors (n, 3) row by row: equation 4.3.1 in single precision."""
     cosine = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
     count = len(a)
-    meter.charge(f32_mul=3 * count, f32_add=2 * count, f32_compare=count, f32_acos=count)
+    meter.charge(f32_mul=3 * count, f32_add=2 * count, f32_compare=2 * count, f32_acos=count)
     return arc_cosine(np.clip(cosine, np.float32(-1), np.float32(1)))
 
 

@@ -178,7 +178,7 @@ def _search(
 def _best(votes: NDArray[np.intp], meter: Meter, *, ties: bool) -> NDArray[np.int32]:
     """Star with the most votes for each centroid, -1 without votes; the first of several if `ties`,
     else -1."""
-    meter.charge(table_byte=votes.size, i32_add=2 * votes.size, loop=votes.size)
+    meter.charge(ram_read=votes.size, i32_add=4 * votes.size, loop=votes.size)
     most = votes.max(axis=1)
     settled = ties | ((votes == most[:, None]).sum(axis=1) == 1)
     return np.where((most > 0) & settled, votes.argmax(axis=1), NONE).astype(np.int32)

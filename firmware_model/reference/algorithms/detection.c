@@ -15,12 +15,12 @@
 #define PLACE(pixel) ((pixel) >> 8)
 #define VALUE(pixel) ((pixel) & 0xFFu)
 
-/* The area that is grown: the end of the list of visited pixels. */
+/* The area that is grown. */
 struct area {
     uint8_t *picture;
-    uint32_t *pixels;
     unsigned count, most;
     uint8_t threshold;
+    uint32_t pixels[MOST_PIXELS];
 };
 
 bool detection_valid(const struct detection_config *c) {
@@ -119,12 +119,16 @@ static enum search_end end_of(const struct detection *found,
 
 void detect_stars(uint8_t *picture, uint32_t *visited, const struct detection_config *config,
                   struct detection *found) {
-    struct area area = {picture, visited, 0, config->max_pixels, config->star_threshold};
+    static struct area area;
+    uint32_t *listed = visited;
     uint8_t seed = config->detection_threshold > config->star_threshold
                        ? config->detection_threshold
                        : config->star_threshold;
     uint32_t total = 0, background = 0;
     *found = (struct detection){.end = SEARCH_COMPLETE};
+    area.picture = picture;
+    area.most = config->max_pixels;
+    area.threshold = config->star_threshold;
     phase_begin(PHASE_SEARCH);
     for (uint32_t y = config->y_start; y < config->y_end; y += config->step) {
         const uint8_t *row = picture + y * IMAGE_COLUMNS;
@@ -144,7 +148,9 @@ void detect_stars(uint8_t *picture, uint32_t *visited, const struct detection_co
             } else {
                 list_star(&area, config->grid_size, found);
             }
-            area.pixels += area.count;
+            for (unsigned i = 0; i < area.count; i++) {
+                *listed++ = area.pixels[i];
+            }
             found->end = end_of(found, config);
             if (found->end != SEARCH_COMPLETE) {
                 goto ended;
@@ -153,7 +159,7 @@ void detect_stars(uint8_t *picture, uint32_t *visited, const struct detection_co
     }
 ended:
     found->dark_value = background ? (uint8_t)((total + background / 2) / background) : 0;
-    for (const uint32_t *pixel = visited; pixel < area.pixels; pixel++) {
+    for (const uint32_t *pixel = visited; pixel < listed; pixel++) {
         picture[PLACE(*pixel)] = (uint8_t)VALUE(*pixel);
     }
     phase_end(PHASE_SEARCH);

@@ -32,10 +32,18 @@ volatile uint8_t bytes[OPERANDS];
         }                                               \
     }
 
-#define FLOATS(expression)                                             \
-    float x = left[OPERAND(turn)], y = right[OPERAND(turn)];           \
-    result[OPERAND(turn)] = (expression);                              \
-    (void)y
+/* Eight additions and multiplications in turn, and an operation after each pair: more code than the
+ * flash cache has, as in a formula. An operand comes out of RAM. */
+#define STEP(n, operation) x = x + left[n]; x = x * right[n]; operation(n);
+#define NONE(n)
+#define ADD(n) x = x + right[n]
+#define MULTIPLY(n) x = x * left[n]
+#define DIVIDE(n) x = x / right[n]
+#define FORMULA(operation)                                                              \
+    float x = left[OPERAND(turn)];                                                      \
+    STEP(0, operation) STEP(1, operation) STEP(2, operation) STEP(3, operation)         \
+    STEP(4, operation) STEP(5, operation) STEP(6, operation) STEP(7, operation)         \
+    result[OPERAND(turn)] = x
 
 #define UNITS(expression)                \
     float x = unit[OPERAND(turn)];       \
@@ -46,10 +54,10 @@ volatile uint8_t bytes[OPERANDS];
     answer[OPERAND(turn)] = (expression);                              \
     (void)y
 
-REPEATED(plain_floats, FLOATS(x))
-REPEATED(f32_add, FLOATS(x + y))
-REPEATED(f32_mul, FLOATS(x * y))
-REPEATED(f32_div, FLOATS(x / y))
+REPEATED(plain_formula, FORMULA(NONE))
+REPEATED(f32_add, FORMULA(ADD))
+REPEATED(f32_mul, FORMULA(MULTIPLY))
+REPEATED(f32_div, FORMULA(DIVIDE))
 
 REPEATED(plain_units, UNITS(x))
 REPEATED(f32_sqrt, UNITS(sqrtf(x)))
@@ -57,7 +65,7 @@ REPEATED(f32_acos, UNITS(arc_cosine(x)))
 REPEATED(f32_sin, UNITS(sine(x)))
 REPEATED(f32_atan2, UNITS(arc_tangent(x, 0.3f)))
 
-/* A comparison decides something: the plain function decides by the integers. */
+/* A comparison decides something, as in a search; the plain function decides by integers. */
 REPEATED(plain_compare, {
     float x = left[OPERAND(turn)], y = right[OPERAND(turn)];
     int32_t decided = whole[OPERAND(turn)];

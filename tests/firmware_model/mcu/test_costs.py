@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -94,17 +95,16 @@ def test_the_transfer_loop_is_the_only_fitted_cost_and_reproduces_its_anchor() -
     assert duration == pytest.approx(0.404, abs=0.0005)
 
 
-def test_wait_states_lengthen_only_their_own_accesses() -> None:
-    quick = cortex_m3(flash_waits=0, ebi_waits=0, gpio_waits=0).operations
-    slow = cortex_m3(flash_waits=3, ebi_waits=10, gpio_waits=1).operations
-    longer = {name: slow[name].cycles - quick[name].cycles for name in quick}
-    assert {name: extra for name, extra in longer.items() if extra} == {
-        "flash_read": 3,
-        "ebi_read": 10,
-        "ebi_write": 10,
-        "port_read": 1,
-        "port_write": 1,
-    }
+def test_what_a_compiler_made_depends_on_build_and_waits() -> None:
+    usual, doubles = CORTEX_M3.operations, cortex_m3(build="-O2 double").operations
+    quick = cortex_m3(timing="0 flash waits, cache, bus 1-1-3-0").operations
+    assert usual["f32_add"].provenance == "measured"
+    assert usual["transfer_byte"] == doubles["transfer_byte"]
+    assert doubles["f32_mul"].cycles > 1.5 * usual["f32_mul"].cycles
+    assert usual["flash_read"].cycles - quick["flash_read"].cycles == 2
+    assert quick["ram_read"] == replace(usual["ram_read"], source=quick["ram_read"].source)
+    with pytest.raises(ValueError, match=r"-O9 own, .* was not measured"):
+        cortex_m3(build="-O9 own")
 
 
 # --- Blackfin -------------------------------------------------------------------------------------
