@@ -151,7 +151,7 @@ def test_memory_test_takes_the_bus_s_time_and_finds_a_bit_that_does_not_hold(nod
         took_s = (node.board.kernel.now - began_ps) / 1e12
         assert node.client.telemetry("SRAMTestResults")["TestResult"] == expected
         if expected is MemoryTest.PASSED:
-            assert took_s == pytest.approx(4 * (1 << 20) * (8 + 5) / 48e6, abs=0.05)
+            assert took_s == pytest.approx(4 * (1 << 20) * (8 + 4) / 48e6, abs=0.05)
         node.board.faults.inject("memory-stuck", address=4711, bit=3, level=0)
 
 
