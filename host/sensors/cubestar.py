@@ -13,6 +13,7 @@ from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device,
 from cubestack.host.devices.lazily import call, get
 
 if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
     from cubestack.emulator.boards.cubestar.stack import CubeStarStack
     from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.sky import Scene
@@ -37,10 +38,15 @@ def _open_board(
     baud: int | None = None,
     layout: str = Layout.COPIED.value,
     firmware: str = "",
+    semihosting: bool = False,
     **common: Any,
 ) -> "CubeStarStack":
     if firmware:
-        return _open_with(firmware, scene, baud or INTERFACE.baud, Layout(layout), **common)
+        board = _open_with(firmware, scene, baud or INTERFACE.baud, Layout(layout), **common)
+        board.machine.semihosting(semihosting)
+        return board
+    if semihosting:
+        raise ValueError("semihosting is a way of own firmware to print: name one by firmware")
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
@@ -61,7 +67,7 @@ def _open_with(
     *,
     switches: CubeStarSwitches = DEFAULT_SWITCHES,
     **common: Any,
-) -> "CubeStarStack":
+) -> "CubeStarFirmwareBoard":
     """A board that runs an image; ValueError for what only our own program can be told."""
     from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
     from cubestack.emulator.iss.image import load_image
@@ -156,6 +162,9 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             f"or {REFERENCE}, the same in C, instead of this project's own (docs/own-firmware.md)",
             default="",
             metavar="FILE",
+        ),
+        BoardOption(
+            "semihosting", "own firmware prints, and ends, by BKPT 0xAB, which is a fault otherwise"
         ),
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),

@@ -74,9 +74,10 @@ def test_seed_and_profile_are_the_marker_s_or_the_command_line_s(run: Run) -> No
     assert done.returncode == 0, done.stdout
 
 
+TAKES = "marker cubestack takes scene, seed, faults, layout, firmware, semihosting, profile, set"
 WRONG_MARKERS = {
-    "(3)": "marker cubestack takes scene, seed, faults, layout, firmware, profile, set",
-    "(sead=3)": "marker cubestack takes scene, seed, faults, layout, firmware, profile, set",
+    "(3)": TAKES,
+    "(sead=3)": TAKES,
     "(faults='seed = -1')": "seed must be a whole number from 0, not -1",
     "(layout='2')": "layout is an option of cubestar, not of aramis",
     "(profile='best')": "profile of aramis must be one of published, extended, not 'best'",

@@ -54,6 +54,18 @@ def test_serial_line_and_trace_channel(star: AnyEmulated) -> None:
     assert lines == ["traced"]
 
 
+def test_semihosting_prints_where_it_is_wanted(elf: Path) -> None:
+    for on in (True, False):
+        with open_device("cubestar", firmware=str(elf), semihosting=on) as star:
+            lines: list[str] = []
+            star.board.tell(lines.append)
+            star.wait(0.02)
+            assert answer(star, b"s") == (b"said\n" if on else b"")
+            assert ("by the debugger" in lines) == on
+    with pytest.raises(ValueError, match="a way of own firmware"):
+        open_device("cubestar", semihosting=True)
+
+
 def test_registers_of_the_camera(star: AnyEmulated) -> None:
     star.wait(0.02)
     board(star).camera.i2c_write(0x2C, b"\x85\x1c\x12\x34", board(star).kernel.now)

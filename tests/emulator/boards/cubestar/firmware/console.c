@@ -133,6 +133,13 @@ int main(void) {
             SATELLITE_UART->FRAME = 1u << 12 | 2u << 8 | 5u;  // 8 bits, even, one stop bit
             put("even\n");
             break;
+        case 's': {
+            register uint32_t call __asm("r0") = 4;  // SYS_WRITE0
+            register const char *text __asm("r1") = "by the debugger\n";
+            __asm volatile("bkpt 0xAB" : "+r"(call) : "r"(text) : "memory");
+            put("said\n");
+            break;
+        }
         case 'w': start_watchdog_and_stop(); break;
         case 'f': *(volatile uint32_t *)0x60000000 = 1; break;
         default: put("?\n");
