@@ -175,11 +175,12 @@ class FirmwareProcessor:
             if env.horizon() == env.now:
                 yield env.timeout(0)  # everybody else who is to act now does so first
             stop = self._run_machine(self._until())
-            yield from self._settle(stop)
             while env.paused:  # by the debugger: as if it had not stopped here
                 yield self._urgent()
-                stop = self._run_machine(self._until())
-                yield from self._settle(stop)
+                if stop.sends or self._early:
+                    break
+                stop = self._go_on(self._until())
+            yield from self._settle(stop)
             if not self._awake and self._sleeps(stop):
                 yield from self._sleep()
                 continue
@@ -194,6 +195,10 @@ class FirmwareProcessor:
     def _run_machine(self, until_ps: int) -> Stop:
         if self._coupling is not None:
             self._coupling.before_run()
+        return self._go_on(until_ps)
+
+    def _go_on(self, until_ps: int) -> Stop:
+        """Run on after a halt, or from what ``before_run`` has prepared."""
         runner = self.machine if self.debugger is None else self.debugger
         stop = runner.run(until_ps)
         if stop.reason is StopReason.LOCKED_UP and not self._locked_up:

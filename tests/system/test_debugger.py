@@ -1,15 +1,20 @@
 """A debugger, and the files about own firmware, by the command line."""
 
+import io
 import json
 import re
 import socket
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import cubestack
+from cubestack.emulator.boards.debugging import open_debugger
 from cubestack.emulator.iss.gdb.packets import framed
 from cubestack.emulator.iss.insight.symbols import Symbols
+from cubestack.host.devices.records import start_trace
 from tests.conftest import Run
 from tests.emulator.boards.cubestar.builds import build, needs_toolchain
 from tests.system.conftest import Emulate
@@ -143,3 +148,39 @@ def test_without_firmware_there_is_nothing_to_look_at(
     outcome = run(*arguments)
     assert outcome.code
     assert error in outcome.line
+
+
+def processed(halting: bool) -> tuple[str, object, int]:
+    """Trace of a boot and a picture with the reference firmware, its memory, and the halts."""
+    with cubestack.open_device("cubestar", firmware="reference", seed=2) as device:
+        board: Any = device.board
+        stream, halts = io.StringIO(), list[int]()
+        trace = start_trace(device, stream)
+        if halting:
+            endpoint = open_debugger(board, 0)
+            board.on_close.append(endpoint.close)
+            debugger: Any = board.processor.debugger
+            debugger.attach()
+
+            def resume() -> None:
+                halts.append(board.machine.now_ps)
+                if len(halts) % 3:
+                    debugger.resume()
+                else:
+                    debugger.step(0, 0)
+
+            debugger.visit, debugger.serve = lambda: None, resume
+            for name in ("uart_receive_handler", "time_us", "fpga_acknowledges"):
+                debugger.set_breakpoint(board.insight.symbols.function(name).address, True)
+        device.wait(0.3)
+        device.client.capture_and_process()
+        trace.close()
+        state = board.machine.cycles, board.machine.registers(), board.machine.ram.tobytes()
+        return stream.getvalue(), state, len(halts)
+
+
+def test_halts_leave_no_mark_while_the_fpga_stores_a_picture() -> None:
+    """Every pin, byte, function and cycle is the same."""
+    alone, halting = processed(False), processed(True)
+    assert halting[2] > 1000
+    assert alone[:2] == halting[:2]
