@@ -62,7 +62,8 @@ def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
 
 def _around_one(rng: np.random.Generator) -> NDArray[np.float64]:
     """Factors and summands of both signs with which no chain of them runs away."""
-    return rng.uniform(0.5, 1.6, _OPERANDS) * rng.choice([-1, 1], _OPERANDS)
+    signs: NDArray[np.float64] = rng.choice([-1.0, 1.0], _OPERANDS)
+    return rng.uniform(0.5, 1.6, _OPERANDS) * signs
 
 
 def _turn(calls: Calls, name: str, *arguments: int) -> float:
