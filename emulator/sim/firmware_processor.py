@@ -68,6 +68,7 @@ class FirmwareProcessor:
         on_fault: told of what stops the program for good, with a line of text.
         debugger: runs the machine, if any.
         resets: number of resets since power-up.
+        energy_mode: 0 awake, else how deep the part sleeps.
     """
 
     env: Kernel
@@ -85,7 +86,7 @@ class FirmwareProcessor:
     def __post_init__(self) -> None:
         """Power up."""
         self.debugger: Debugger | None = None
-        self.resets = 0
+        self.resets = self.energy_mode = 0
         self._fpga: FpgaPort | None = None
         self._coupling: FpgaCoupling | None = None
         self._input = self.env.event()
@@ -292,6 +293,7 @@ class FirmwareProcessor:
             self._active_ps = one.time_ps
         match one.kind:
             case Kind.SLEEP:
+                self.energy_mode = one.value
                 awake = one.value == 0
                 if awake != self._awake:
                     self._awake = awake

@@ -134,7 +134,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
 
     def probes(self) -> dict[str, int | str]:
         """What a trace shows: the energy mode (0: awake) beside what all boards show."""
-        return super().probes() | {"energy_mode": self.machine.energy_mode}
+        return super().probes() | {"energy_mode": self.processor.energy_mode}
 
     def tell(self, say: Callable[[str], None]) -> None:
         """Give ``say`` what the firmware prints, and reports of its faults."""

@@ -14,7 +14,7 @@ from cubestack.host.devices.device import Shown
 from cubestack.host.devices.insight import own_firmware
 from cubestack.host.experiments.facts import Facts, Lookup
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import POSITIVE, Options, option
+from cubestack.host.options import POSITIVE, Options, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.iss.insight.memory_report import MemoryUse
@@ -25,6 +25,7 @@ class MemoryOptions(Options):
     """Options of `cubestack memory cubestar`."""
 
     seconds: float = option(2.0, "virtual time to run for (default 2)", POSITIVE)
+    seed: int = option(0, "seed of everything random (default 0)", whole(0))
     capture: bool = option(False, "let it capture and process a picture, by telecommand")
 
 
@@ -41,7 +42,7 @@ class _Memory(Lookup[MemoryOptions]):
     def run(self, opened: Opener[Any, Any], options: MemoryOptions) -> Iterator[Facts]:
         from cubestack.emulator.iss.insight.memory_report import memory_use
 
-        with opened(None, seed=0) as emulated:
+        with opened(None, seed=options.seed) as emulated:
             observer = own_firmware(emulated, "memory").observer
             emulated.wait(options.seconds)
             if options.capture:

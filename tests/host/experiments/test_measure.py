@@ -152,6 +152,6 @@ def test_every_declared_experiment_report_and_demonstration_loads(name: str) -> 
     for experiment in experiments:
         assert experiment.options().declared()["seed"] if experiment.powers_up else True
         assert experiment.count(experiment.options()) >= 1
-        assert set(experiment.decides) <= {option.name for option in one.options}
+        assert set(experiment.decides) <= {option.name for option in one.all_options}
     assert one.benchmark is not None
     assert one.benchmark().figures
