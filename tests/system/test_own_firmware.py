@@ -114,6 +114,15 @@ def test_hanging_program_without_a_watchdog_stays_silent(star: AnyEmulated) -> N
     assert answer(star, b"h", timeout_s=3.0) == b""
 
 
+def test_a_program_that_only_polls_waits_for_the_host_after_a_while(star: AnyEmulated) -> None:
+    star.wait(0.02)
+    assert star.board.busy()  # it computes, for all that anybody can tell
+    star.wait(6.0)
+    assert not star.board.busy()
+    answer(star, b"h")
+    assert star.board.busy()
+
+
 def test_wrong_rate_is_garbage_or_nothing(star: AnyEmulated) -> None:
     star.wait(0.02)
     port = star.board.serial()
