@@ -5,6 +5,7 @@
 #include "link.h"
 
 #include "drivers/clock.h"
+#include "drivers/i2c_slave.h"
 #include "drivers/uart.h"
 #include "frames.h"
 #include "state.h"
@@ -141,7 +142,7 @@ static void uart_message(const uint8_t *payload, int length)
     state_retain();
 }
 
-void link_uart_byte(uint8_t byte)
+void uart_received(uint8_t byte)
 {
     switch (frame_feed(&decoder, byte)) {
     case FRAME_WHOLE: /* the kept front of a long one is too long as well */
@@ -158,7 +159,7 @@ void link_uart_byte(uint8_t byte)
     }
 }
 
-void link_uart_silence(void)
+void uart_silent(void)
 {
     if (frame_reset(&decoder)) {
         raise_flag(FLAG_UART_MsgIncomplete);
@@ -185,7 +186,7 @@ static void finish_write(void)
     state_retain();
 }
 
-void link_i2c_start(bool read)
+void i2c_slave_started(bool read)
 {
     finish_write();
     i2c.addressed = true;
@@ -194,7 +195,7 @@ void link_i2c_start(bool read)
         raise_flag(FLAG_I2C_WaitForIDReadRequestError);
 }
 
-bool link_i2c_write(uint8_t byte)
+bool i2c_slave_received(uint8_t byte)
 {
     if (i2c.written > LONGEST_TELECOMMAND)
         return false;
@@ -202,13 +203,13 @@ bool link_i2c_write(uint8_t byte)
     return true;
 }
 
-uint8_t link_i2c_read(void)
+uint8_t i2c_slave_wanted(void)
 {
     int position = i2c.position++;
     return i2c.answered && position < i2c.length ? i2c.answer[position] : NO_DATA;
 }
 
-void link_i2c_stop(void)
+void i2c_slave_stopped(void)
 {
     finish_write();
     if (i2c.reading)

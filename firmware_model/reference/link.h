@@ -18,14 +18,6 @@ struct queued_command {
     uint8_t parameters[LONGEST_TELECOMMAND];
 };
 
-/* Interrupts. */
-void link_uart_byte(uint8_t byte);
-void link_uart_silence(void);
-void link_i2c_start(bool read);
-bool link_i2c_write(uint8_t byte); /* whether it is acknowledged */
-uint8_t link_i2c_read(void);
-void link_i2c_stop(void);
-
 /* Whether a telecommand waits; the oldest one, which stays in its place until it is taken. */
 bool link_waiting(void);
 const struct queued_command *link_first(void);

@@ -11,9 +11,6 @@
 
 #include "drivers/supply.h"
 
-/* Interrupt: the comparator of a channel tripped. */
-void supply_overcurrent(enum channel channel);
-
 bool supply_cut(void);
 bool supply_imager_on(void);
 

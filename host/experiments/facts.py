@@ -1,4 +1,4 @@
-"""Experiments that look facts up, and need no device for it."""
+"""Experiments that give facts; most look them up and need no device for it."""
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,10 +31,19 @@ def fact_lines(facts: Mapping[str, Any]) -> Iterator[str]:
         yield f"{name.replace('_', ' '):>20}  {value}"
 
 
-class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
+class Telling(Experiment[Opener[Any, Any], OptionsT, Facts]):
     """Gives one result: facts."""
 
     label = ""
+
+    def summarise(self, results: Sequence[Facts], wall_s: float) -> Iterable[str]:
+        """Their own lines, or each fact on one."""
+        return results[0].lines or fact_lines(results[0].facts)
+
+
+class Lookup(Telling[OptionsT]):
+    """Facts that need no device."""
+
     powers_up = False
 
     @abstractmethod
@@ -44,7 +53,3 @@ class Lookup(Experiment[Opener[Any, Any], OptionsT, Facts]):
     def run(self, opened: Opener[Any, Any], options: OptionsT) -> Iterator[Facts]:
         """Yield them."""
         yield Facts(self.look_up(options, opened.shown))
-
-    def summarise(self, results: Sequence[Facts], wall_s: float) -> Iterable[str]:
-        """Their own lines, or each fact on one."""
-        return results[0].lines or fact_lines(results[0].facts)

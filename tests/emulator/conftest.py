@@ -6,10 +6,12 @@ The clock is 1 MHz unless given, so a cycle is a microsecond.
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.emulator.native import compiler
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.mcu.costs import Cost, CostTable, Meter
@@ -192,3 +194,11 @@ def script(*steps: object) -> Body:
 def desk_of() -> type[Desk]:
     """Makes a desk of the bodies to run."""
     return Desk
+
+
+@pytest.fixture
+def without_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No C++ compiler is found."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)

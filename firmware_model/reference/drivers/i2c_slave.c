@@ -6,13 +6,10 @@
  */
 #include "i2c_slave.h"
 
-#include <stdint.h>
-
 #include "core.h"
 #include "cubestar.h"
 #include "efm32gg.h"
 #include "gpio.h"
-#include "link.h"
 #include "pins.h"
 
 #define READ_BIT 1u
@@ -36,15 +33,15 @@ static void addressed(void)
 {
     uint32_t address = SATELLITE_I2C->RXDATA;
     SATELLITE_I2C->CMD = I2C_CMD_CLEARTX;
-    link_i2c_start(address & READ_BIT);
+    i2c_slave_started(address & READ_BIT);
     SATELLITE_I2C->CMD = I2C_CMD_ACK;
     if (address & READ_BIT)
-        SATELLITE_I2C->TXDATA = link_i2c_read();
+        SATELLITE_I2C->TXDATA = i2c_slave_wanted();
 }
 
 static void written(void)
 {
-    bool taken = link_i2c_write((uint8_t)SATELLITE_I2C->RXDATA);
+    bool taken = i2c_slave_received((uint8_t)SATELLITE_I2C->RXDATA);
     SATELLITE_I2C->CMD = taken ? I2C_CMD_ACK : I2C_CMD_NACK;
 }
 
@@ -53,11 +50,11 @@ void i2c_slave_handler(void)
     uint32_t flags = SATELLITE_I2C->IF;
     SATELLITE_I2C->IFC = flags & (I2C_IF_ADDR | I2C_IF_ACK | I2C_IF_SSTOP);
     if (flags & I2C_IF_SSTOP)
-        link_i2c_stop();
+        i2c_slave_stopped();
     if (flags & I2C_IF_ADDR)
         addressed();
     else if (flags & I2C_IF_RXDATAV)
         written();
     else if (flags & I2C_IF_ACK)
-        SATELLITE_I2C->TXDATA = link_i2c_read();
+        SATELLITE_I2C->TXDATA = i2c_slave_wanted();
 }

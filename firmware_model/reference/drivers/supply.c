@@ -13,7 +13,6 @@
 #include "efm32gg.h"
 #include "gpio.h"
 #include "pins.h"
-#include "supply_monitor.h"
 
 #define ADC_REFERENCE_1V25 0u
 #define ADC_REFERENCE_2V5 1u

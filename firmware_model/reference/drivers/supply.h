@@ -19,4 +19,7 @@ void supply_switch(enum channel channel, bool closed);
 float supply_current_ma(enum channel channel);
 float temperature_c(void);
 
+/* Given by the program, called by an interrupt: the comparator of a channel tripped. */
+void supply_overcurrent(enum channel channel);
+
 #endif

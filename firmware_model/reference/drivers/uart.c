@@ -14,7 +14,6 @@
 #include "cubestar.h"
 #include "efm32gg.h"
 #include "gpio.h"
-#include "link.h"
 #include "pins.h"
 
 #define DIVIDER (256u * (CLOCK_HZ / 16u) / CUBESTAR_BAUD - 256u)
@@ -81,7 +80,7 @@ void uart_receive_handler(void)
             continue; /* no character */
         TIMER3->CNT = 0;
         TIMER3->CMD = TIMER_CMD_START;
-        link_uart_byte((uint8_t)received);
+        uart_received((uint8_t)received);
     }
     SATELLITE_UART->IFC = USART_IFC_FERR | USART_IFC_RXOF;
 }
@@ -89,5 +88,5 @@ void uart_receive_handler(void)
 void TIMER3_handler(void)
 {
     TIMER3->IFC = TIMER_IFC_OF;
-    link_uart_silence();
+    uart_silent();
 }

@@ -17,4 +17,8 @@ void uart_send(const uint8_t *data, int count);
 /* Bytes that are still to be sent, those in the peripheral included. */
 int uart_backlog(void);
 
+/* Given by the program, called by interrupts: a byte came; nothing came for long. */
+void uart_received(uint8_t byte);
+void uart_silent(void);
+
 #endif

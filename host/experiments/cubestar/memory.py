@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from cubestack.host.devices.device import Shown
 from cubestack.host.devices.insight import own_firmware
-from cubestack.host.experiments.facts import Facts, Lookup
+from cubestack.host.experiments.facts import Facts, Telling
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import POSITIVE, Options, option, whole
 
@@ -29,15 +28,11 @@ class MemoryOptions(Options):
     capture: bool = option(False, "let it capture and process a picture, by telecommand")
 
 
-class _Memory(Lookup[MemoryOptions]):
+class _Memory(Telling[MemoryOptions]):
     options = MemoryOptions
     description = __doc__ or ""
     powers_up = True
     decides = ("profile", "set", "layout")
-
-    def look_up(self, options: MemoryOptions, shown: Shown) -> dict[str, Any]:
-        """Nothing without a device."""
-        raise NotImplementedError
 
     def run(self, opened: Opener[Any, Any], options: MemoryOptions) -> Iterator[Facts]:
         from cubestack.emulator.iss.insight.memory_report import memory_use

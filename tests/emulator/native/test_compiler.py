@@ -3,26 +3,8 @@
 import sys
 from pathlib import Path
 
-import pytest
-
 from cubestack.emulator.native import cache, compiler
-
-
-@pytest.fixture
-def without_compiler(tmp_path, monkeypatch) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.delenv("CXX", raising=False)
-    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
-
-
-def make_compiler(folder: Path, name: str, on_compile: str, version: str = "1.0") -> Path:
-    """A compiler that knows its version and, when it is to compile, runs ``on_compile``."""
-    program = folder / name
-    program.write_text(
-        f'#!/bin/sh\ncase "$*" in *--version) echo {version}; exit 0;; esac\n{on_compile}\n'
-    )
-    program.chmod(0o755)
-    return program
+from tests.emulator.fake_compiler import make_compiler
 
 
 def test_cxx_comes_first_and_version_tells_compilers_apart(tmp_path, monkeypatch):

@@ -16,6 +16,7 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
+from tests.emulator.fake_compiler import make_compiler
 
 TIMEOUT_S = 300
 
@@ -28,23 +29,6 @@ def cache(tmp_path, monkeypatch) -> Path:
     folder = tmp_path / "cache"
     monkeypatch.setattr(caches, "cache_folder", lambda: folder)
     return folder
-
-
-@pytest.fixture
-def without_compiler(tmp_path, monkeypatch) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.delenv("CXX", raising=False)
-    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
-
-
-def make_compiler(folder: Path, name: str, on_compile: str, version: str = "1.0") -> Path:
-    """A compiler that knows its version and, when it is to compile, runs ``on_compile``."""
-    program = folder / name
-    program.write_text(
-        f'#!/bin/sh\ncase "$*" in *--version) echo {version}; exit 0;; esac\n{on_compile}\n'
-    )
-    program.chmod(0o755)
-    return program
 
 
 def wiring() -> Wiring:
