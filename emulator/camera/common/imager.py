@@ -1,13 +1,14 @@
 """Frames of a scene in grey values: light through the lens, then the sensor's own pixels."""
 
 from abc import ABC, abstractmethod
-from functools import lru_cache
 from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.exposure import star_light
+from cubestack.emulator.camera.common.hazards import effects
+from cubestack.emulator.camera.common.hazards.contract import Exposure
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.scene.sky import PictureScene, Scene
@@ -15,9 +16,6 @@ from cubestack.emulator.scene.sky import PictureScene, Scene
 Light = NDArray[np.float32]
 Grey = NDArray[np.uint8]
 Settings = TypeVar("Settings", contravariant=True)
-
-DARK_DOUBLING_K = 8.0
-"""Warming that doubles the dark current: assumed, what silicon usually does."""
 
 
 class Imager(ABC, Generic[Settings]):
@@ -34,16 +32,37 @@ class Imager(ABC, Generic[Settings]):
             shutter: when its rows are exposed; row 0 is the sensor's first.
             settings: what the sensor's registers ask for.
         """
-        optics = condition.optics
+        optics = condition.lens
+        shape = optics.rows, optics.columns
+        exposure = self.exposure(shape, shutter.exposure_s, condition, settings)
+        # By frame time, so that a frame nobody looked at does not change the next one's noise.
+        seed = [condition.seed, max(0, shutter.readout_ps)]
         if isinstance(scene, PictureScene):
-            return _photograph(scene, scene.part(optics.columns, optics.rows), shutter)
-        light = star_light(scene, optics, shutter)
+            pixels = _photograph(scene, scene.part(optics.columns, optics.rows), shutter)
+            return effects.on_picture(pixels, condition.hazards, exposure, seed)
+        light = effects.on_light(
+            star_light(scene, optics, shutter), condition.hazards, exposure, seed
+        )
         generator = None
         if condition.noise:
-            # By frame time, so that a frame nobody looked at does not change the next one's noise.
-            seed = [condition.seed, max(0, shutter.readout_ps)]
             generator = np.random.Generator(np.random.SFC64(seed))
         return self.counts(light, shutter.exposure_s, condition, settings, generator)
+
+    def exposure(
+        self, shape: tuple[int, int], seconds: float, condition: SkyCondition, settings: Settings
+    ) -> Exposure:
+        """What hazards may know of a frame of ``shape`` (rows, columns)."""
+        return Exposure(
+            shape,
+            condition.optics.pixel_pitch_um,
+            seconds,
+            condition.temperature_c,
+            self.electrons_per_count(settings),
+        )
+
+    @abstractmethod
+    def electrons_per_count(self, settings: Settings) -> float:
+        """Charge of one grey value of 8 bits at the gain that ``settings`` ask for."""
 
     @abstractmethod
     def counts(
@@ -59,7 +78,7 @@ class Imager(ABC, Generic[Settings]):
         Args:
             light: mean number of electrons that it frees in each pixel, shape (rows, columns).
             exposure_s: exposure of each pixel.
-            condition: temperature, hot pixels and their seed.
+            condition: temperature, hot pixels and their seed, hazards.
             settings: as of ``picture``.
             generator: source of this frame's noise; None for a sensor without noise and defects.
         """
@@ -74,21 +93,3 @@ def _photograph(scene: PictureScene, pixels: Grey, shutter: RollingShutter) -> G
         return pixels
     scaled: Light = np.clip(pixels * np.float32(scale), 0, 255)
     return scaled.astype(np.uint8)
-
-
-def doubled(at_reference: float, temperature_c: float, reference_c: float) -> float:
-    """A dark current or signal at ``temperature_c``, by what it is at ``reference_c``."""
-    return float(at_reference * 2 ** ((temperature_c - reference_c) / DARK_DOUBLING_K))
-
-
-@lru_cache(maxsize=8)
-def hot_pixels(
-    seed: int, count: int, pixels: int, mean: float = 1.0
-) -> tuple[NDArray[np.int64], Light]:
-    """Flat indices among ``pixels`` of ``count`` that radiation has made hot, and how hot.
-
-    The strengths are distributed exponentially.
-    """
-    generator = np.random.default_rng([seed, 0x407])
-    places = generator.choice(pixels, count, replace=False)
-    return places, (mean * generator.exponential(size=count)).astype(np.float32)

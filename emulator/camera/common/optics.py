@@ -6,13 +6,15 @@ bandwidth and the flux of the star; transmission, bandwidth and quantum efficien
 here, an effective width.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.camera.common.hazards.contract import Lens
+from cubestack.emulator.camera.common.residual import Residual, displaced, restored
 from cubestack.emulator.scene.file import refuse_zero
 
 PHOTONS_V0 = 1000.0
@@ -50,6 +52,7 @@ class Optics:
         aperture_mm: diameter of the entrance pupil.
         effective_width_a: bandwidth in Angstrom times transmission times quantum efficiency.
         field_stop_deg: diameter of the round field that a light shade lets through; 360 is none.
+        residuals: what neither coefficients nor focal length say of where the picture is.
     """
 
     focal_length_mm: float
@@ -70,6 +73,7 @@ class Optics:
     aperture_mm: float
     effective_width_a: float
     field_stop_deg: float = 360.0
+    residuals: tuple[Residual, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a lens that can not make pictures."""
@@ -91,6 +95,26 @@ class Optics:
                 "within the sensor; smaller coefficients would be right"
             )
 
+    @property
+    def basics(self) -> Lens:
+        """What hazards may change of it."""
+        f_number = self.focal_length_mm / self.aperture_mm
+        shape = self.rows, self.columns
+        return Lens(f_number, self.pixel_pitch_um, shape, self.psf_sigma_px, 1.0, self.residuals)
+
+    def changed(self, lens: Lens) -> "Optics":
+        """These optics with what ``lens`` has otherwise; the very same where that is nothing."""
+        if lens == self.basics:
+            return self
+        return replace(
+            self,
+            focal_length_mm=self.focal_length_mm * lens.scale,
+            fx=self.fx * lens.scale,
+            fy=self.fy * lens.scale,
+            psf_sigma_px=lens.spot_px,
+            residuals=lens.residuals,
+        )
+
     def project(self, vectors: NDArray[np.float64]) -> Pixels:
         """Pixel coordinates (n, 2) of directions (n, 3) in camera axes, exact to 1e-9 px.
 
@@ -107,12 +131,13 @@ class Optics:
             distorted = self._polynomial(undistorted, -1)
         else:
             distorted = self._inverse_polynomial(undistorted, +1)
-        pixels[seen] = distorted * self._scale + (self.cx, self.cy)
+        pixels[seen] = displaced(distorted * self._scale + (self.cx, self.cy), self.residuals)
         return pixels
 
     def unproject(self, pixels: Pixels) -> NDArray[np.float64]:
         """Unit vectors (n, 3) in camera axes of pixel coordinates (n, 2)."""
-        distorted = (np.asarray(pixels, np.float64) - (self.cx, self.cy)) / self._scale
+        points = restored(np.asarray(pixels, np.float64), self.residuals)
+        distorted = (points - (self.cx, self.cy)) / self._scale
         if self.distortion is Distortion.TOOLBOX:
             undistorted = self._inverse_polynomial(distorted, -1)
         else:

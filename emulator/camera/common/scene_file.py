@@ -57,7 +57,7 @@ def load_scene(
 _OPTICS: file.Readers = {
     f.name: file.one_of({d.value: d for d in Distortion}) if f.name == "distortion" else file.number
     for f in fields(Optics)
-    if f.name not in ("columns", "rows")
+    if f.name not in ("columns", "rows", "residuals")
 }
 _POSE: file.Readers = {
     "ra_deg": file.number,

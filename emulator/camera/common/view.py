@@ -1,8 +1,11 @@
 """What a camera sees and what it is like: scenes know no sensor, conditions know no scene."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, TypeVar
 
+from cubestack.emulator.camera.common.hazards import effects
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.scene.file import SceneError, refuse_negative
 from cubestack.emulator.scene.sky import Scene
@@ -22,6 +25,12 @@ class View(Generic[S, C]):
     condition: C
 
 
+def check_temperature(temperature_c: float) -> None:
+    """Raise SceneError for a temperature that no sensor works at."""
+    if not -60 <= temperature_c <= 125:
+        raise SceneError(f"temperature_c must be in -60..125, not {temperature_c}")
+
+
 @dataclass(frozen=True)
 class SkyCondition:
     """What a camera that looks at the sky is like.
@@ -32,6 +41,7 @@ class SkyCondition:
         seed: of noise and hot pixels.
         temperature_c: of the sensor, -60 to 125.
         hot_pixels: number of pixels that radiation has made hot since the sensor left the factory.
+        hazards: what else is wrong with lens and sensor.
     """
 
     optics: Optics
@@ -39,15 +49,27 @@ class SkyCondition:
     seed: int = 0
     temperature_c: float = 20.0
     hot_pixels: int = 20
+    hazards: tuple[SensorHazard, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what can not be."""
         refuse_negative(self, "hot_pixels", "seed")
         pixels = self.optics.columns * self.optics.rows
-        if self.hot_pixels > pixels:
-            raise SceneError(f"hot_pixels must be at most {pixels}, not {self.hot_pixels}")
-        if not -60 <= self.temperature_c <= 125:
-            raise SceneError(f"temperature_c must be in -60..125, not {self.temperature_c}")
+        if self.hot_count > pixels:
+            raise SceneError(f"hot_pixels must be at most {pixels}, not {self.hot_count}")
+        check_temperature(self.temperature_c)
+
+    @property
+    def hot_count(self) -> int:
+        """All hot pixels, those of the hazards included."""
+        return self.hot_pixels + effects.hot(self.hazards)
+
+    @cached_property
+    def lens(self) -> Optics:
+        """The optics as the hazards make them; the firmware is told of no change."""
+        return self.optics.changed(
+            effects.lens(self.optics.basics, self.hazards, self.temperature_c)
+        )
 
 
 SkyView = View[Scene, SkyCondition]

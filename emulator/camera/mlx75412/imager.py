@@ -14,7 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cubestack.emulator.camera.common.imager import Grey, Imager, Light, doubled, hot_pixels
+from cubestack.emulator.camera.common.dark import doubled, hot_pixels
+from cubestack.emulator.camera.common.hazards import effects
+from cubestack.emulator.camera.common.imager import Grey, Imager, Light
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 
@@ -80,6 +82,11 @@ class Mlx75412Imager(Imager[Corrections]):
         self._hot = rows[FACTORY_DEAD:], columns[FACTORY_DEAD:] + 1
         self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
 
+    def electrons_per_count(self, settings: Corrections) -> float:
+        """The gain is always the same; see ``Imager``."""
+        del settings
+        return ELECTRONS_PER_DN12 * DN12_PER_DN8
+
     def counts(
         self,
         light: Light,
@@ -92,21 +99,21 @@ class Mlx75412Imager(Imager[Corrections]):
         if generator is None:
             return ideal_counts(light)
         per_second = dark_dn12_per_second(condition.temperature_c)
+        hot_per_second = HOT_DN12_PER_S_AT_20_C * (per_second / dark_dn12_per_second(20.0))
+        per_second *= effects.dark_rise(condition.hazards)
         dark_electrons = np.float32(per_second * exposure_s * ELECTRONS_PER_DN12)
-        hot_electrons = np.float32(
-            HOT_DN12_PER_S_AT_20_C
-            * (per_second / dark_dn12_per_second(20.0))
-            * (exposure_s * ELECTRONS_PER_DN12)
-        )
+        hot_electrons = np.float32(hot_per_second * (exposure_s * ELECTRONS_PER_DN12))
         mean = self._dark_share * dark_electrons
         mean += light * self._gain
         mean[self._hot] += self._hot_share * hot_electrons
-        if condition.hot_pixels:
+        if condition.hot_count:
             # The sensor does not know of these.
-            places, share = hot_pixels(condition.seed, condition.hot_pixels, light.size)
+            places, share = hot_pixels(condition.seed, condition.hot_count, light.size)
             mean.ravel()[places] += share * hot_electrons
+        exposure = self.exposure((ROWS, COLUMNS), exposure_s, condition, settings)
+        steady = READ_NOISE_ELECTRONS**2 + effects.variance(condition.hazards, exposure)
         signal = generator.standard_normal(mean.shape, np.float32)
-        signal *= np.sqrt(mean + np.float32(READ_NOISE_ELECTRONS**2))
+        signal *= np.sqrt(mean + np.float32(steady))
         signal += mean
         signal *= np.float32(1 / ELECTRONS_PER_DN12)
         signal += self._pattern * np.float32(PATTERN_LEFT if settings.fixed_pattern else 1)

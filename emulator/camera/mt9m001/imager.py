@@ -8,13 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from cubestack.emulator.camera.common.imager import Grey, Imager, Light, hot_pixels
+from cubestack.emulator.camera.common.dark import hot_pixels
+from cubestack.emulator.camera.common.hazards import effects
+from cubestack.emulator.camera.common.imager import Grey, Imager, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mt9m001 import noise as physics
 from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
+
+COUNTS = 256  # of the eight wired bits
 
 
 class Mt9m001Imager(Imager[SensorSettings]):
@@ -50,6 +54,10 @@ class Mt9m001Imager(Imager[SensorSettings]):
         whole = replace(shutter, readout_ps=readout_ps)
         return _window(super().picture(scene, condition, whole, settings), settings)
 
+    def electrons_per_count(self, settings: SensorSettings) -> float:
+        """By the mean of the four gains; see ``Imager``."""
+        return physics.FULL_WELL_ELECTRONS / (COUNTS * float(np.mean(settings.gains)))
+
     def counts(
         self,
         light: Light,
@@ -61,15 +69,18 @@ class Mt9m001Imager(Imager[SensorSettings]):
         """Grey values, same shape as ``light``; see ``Imager``."""
         terms = physics.NoiseTerms.none() if generator is None else self._noise
         surplus = self._background * exposure_s if terms.background else 0.0
-        dark = physics.dark_electrons_per_s(condition.temperature_c) * exposure_s
+        own_dark = physics.dark_electrons_per_s(condition.temperature_c) * exposure_s
+        dark = own_dark * effects.dark_rise(condition.hazards)
         if terms.dark:
             surplus += dark
         mean = light + np.float32(surplus)
-        if terms.dark and condition.hot_pixels:
+        if terms.dark and condition.hot_count:
             seed = condition.seed + self._seed
-            places, share = hot_pixels(seed, condition.hot_pixels, light.size, physics.HOT_SHARE)
-            mean.ravel()[places] += share * np.float32(dark)
+            places, share = hot_pixels(seed, condition.hot_count, light.size, physics.HOT_SHARE)
+            mean.ravel()[places] += share * np.float32(own_dark)
         steady = physics.READ_NOISE_ELECTRONS**2 if terms.readout else 0.0
+        exposure = self.exposure((ROWS, COLUMNS), exposure_s, condition, settings)
+        steady += effects.variance(condition.hazards, exposure)
         variance = (mean if terms.shot else mean - light) + np.float32(steady)
         signal = mean
         if generator is not None and (terms.shot or surplus or steady):

@@ -9,7 +9,7 @@ noise. What is published neither here nor there is marked as assumed.
 
 from dataclasses import dataclass
 
-from cubestack.emulator.camera.common.imager import doubled
+from cubestack.emulator.camera.common.dark import doubled
 
 FULL_WELL_ELECTRONS = 10 ** (45 / 10)
 READ_NOISE_ELECTRONS = FULL_WELL_ELECTRONS / 10 ** (68.2 / 20)

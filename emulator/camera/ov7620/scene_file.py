@@ -121,6 +121,7 @@ _SCENE: file.Readers = {
     "unevenness": file.number,
     "glow_km": file.number,
     "reflections": _reflections,
+    "temperature_c": file.number,
     "hot_pixels": file.whole,
     "hot_pairs": file.whole,
     "noise": file.flag,

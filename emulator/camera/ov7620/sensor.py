@@ -242,7 +242,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             # By frame time, so that a frame nobody looked at does not change the next one's noise.
             seed = [condition.seed, self.camera, shutter.readout_ps]
             generator = np.random.Generator(np.random.SFC64(seed))
-        stuck = stuck_pixels(condition.seed, self.camera, condition.hot_pixels, condition.hot_pairs)
+        stuck = stuck_pixels(condition.seed, self.camera, condition.hot_count, condition.hot_pairs)
         grey = luminance(light, settings.gain, generator, stuck)
         rows, columns = settings.rows, settings.columns
         window = grey[rows.start : rows.stop, columns.start : columns.stop]

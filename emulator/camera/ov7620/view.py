@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-from cubestack.emulator.camera.common.view import View
+from cubestack.emulator.camera.common.hazards import effects
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+from cubestack.emulator.camera.common.view import View, check_temperature
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import refuse_negative, refuse_zero
@@ -20,6 +22,8 @@ class FisheyeCondition:
         noise: False makes the sensor ideal but for its hot pixels.
         seed: of noise and hot pixels.
         nadir_lens, sun_lens: what is particular to a camera's lens; None: the unit's own.
+        temperature_c: of lens and sensor, -60 to 125; only hazards depend on it.
+        hazards: what else is wrong with lenses and sensors, the same with both cameras.
     """
 
     bloom_px: float = 7.0  # chosen between the published 8 and 6
@@ -29,11 +33,19 @@ class FisheyeCondition:
     seed: int = 0
     nadir_lens: LensError | None = None
     sun_lens: LensError | None = None
+    temperature_c: float = 20.0
+    hazards: tuple[SensorHazard, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what can not be."""
         refuse_zero(self, "bloom_px")
         refuse_negative(self, "hot_pixels", "hot_pairs", "seed")
+        check_temperature(self.temperature_c)
+
+    @property
+    def hot_count(self) -> int:
+        """All single stuck pixels, those of the hazards included."""
+        return self.hot_pixels + effects.hot(self.hazards)
 
 
 EarthSunView = View[EarthSunScene, FisheyeCondition]

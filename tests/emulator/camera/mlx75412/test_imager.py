@@ -4,8 +4,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.common.dark import hot_pixels
 from cubestack.emulator.camera.common.exposure import star_light
-from cubestack.emulator.camera.common.imager import hot_pixels
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412 import imager as chip

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.imager import hot_pixels
+from cubestack.emulator.camera.common.dark import hot_pixels
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mt9m001 import noise

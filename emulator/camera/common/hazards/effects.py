@@ -1,0 +1,86 @@
+"""What several hazards of sensor and lens do together; without any, nothing is touched.
+
+Stray and starlight and all charge that hazards add pass the same uneven response, as its cause, the
+pixels' own gain, is behind them. Shot noise of what is added is the imager's.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, Lens, SensorHazard
+
+Hazards = tuple[SensorHazard, ...]
+Grey = NDArray[np.uint8]
+
+
+def lens(own: Lens, hazards: Hazards, temperature_c: float) -> Lens:
+    """The lens ``own`` as they make it."""
+    for hazard in hazards:
+        own = hazard.lens(own, temperature_c)
+    return own
+
+
+def hot(hazards: Hazards) -> int:
+    """Number of pixels that they make hot."""
+    return sum(hazard.hot() for hazard in hazards)
+
+
+def dark_rise(hazards: Hazards) -> float:
+    """Factor on the mean dark current."""
+    return math.prod(hazard.dark_rise() for hazard in hazards)
+
+
+def variance(hazards: Hazards, exposure: Exposure) -> float:
+    """Of the noise that they add in each pixel, electrons squared."""
+    return sum(hazard.noise(exposure) ** 2 for hazard in hazards)
+
+
+@lru_cache(maxsize=4)
+def response(hazards: Hazards, shape: tuple[int, int]) -> Field | None:
+    """Relative response (rows, columns) of the pixels; None for an even one."""
+    fields = [field for hazard in hazards if (field := hazard.response(shape)) is not None]
+    return math.prod(fields[1:], start=fields[0]) if fields else None
+
+
+def charge(hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Field | None:
+    """Electrons (rows, columns) that they add to the frame of ``seed``; None for none."""
+    total: Field | None = None
+    for number, hazard in enumerate(hazards):
+        drawn = np.random.SFC64([*seed, 0x4A2, number, hazard.seed])
+        added = hazard.charge(exposure, np.random.Generator(drawn))
+        if added is not None:
+            total = added if total is None else total + added
+    return total
+
+
+def on_light(light: Field, hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Field:
+    """Electrons in the pixels, where ``light`` (rows, columns) frees its own."""
+    added, uneven = charge(hazards, exposure, seed), response(hazards, exposure.shape)
+    if added is not None:
+        light = light + added
+    return light if uneven is None else light * uneven
+
+
+def on_picture(pixels: Grey, hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Grey:
+    """Grey values of a photograph with what they do to the pixels; its lens was another one."""
+    added, uneven = charge(hazards, exposure, seed), response(hazards, exposure.shape)
+    sigma = math.sqrt(variance(hazards, exposure))
+    if added is None and uneven is None and not sigma:
+        return pixels
+    per_count = np.float32(exposure.electrons_per_count)
+    signal: Field = pixels.astype(np.float32)
+    if added is not None:
+        signal += added / per_count
+    if uneven is not None:
+        signal *= uneven
+    if sigma:
+        generator = np.random.Generator(np.random.SFC64([*seed, 0x4A3]))
+        signal += (
+            np.float32(sigma) / per_count * generator.standard_normal(pixels.shape, np.float32)
+        )
+    nearest: Field = np.clip(signal + np.float32(0.5), 0, 255)
+    return nearest.astype(np.uint8)
