@@ -16,6 +16,7 @@ from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angl
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
+from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
@@ -116,6 +117,7 @@ class EarthSunScene:
         unevenness: standard deviation of the Earth's brightness, relative (assumed).
         glow_km: scale height of the glow above the limb; 0 for none (assumed).
         reflections: false lights.
+        hazards: what else gives light, in scene axes.
         seed: of the Earth's surface.
     """
 
@@ -129,6 +131,7 @@ class EarthSunScene:
     unevenness: float = 0.1
     glow_km: float = 10.0
     reflections: tuple[Reflection, ...] = ()
+    hazards: tuple[SkyHazard, ...] = ()
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -141,6 +144,7 @@ class EarthSunScene:
             raise SceneError(f"rate_deg_s must be 3 numbers in deg/s, not {self.rate_deg_s!r}")
         refuse_zero(self, "altitude_km")
         refuse_negative(self, "unevenness", "glow_km", "seed")
+        refuse_strangers(self.hazards)
 
     @classmethod
     def facing(

@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from datetime import datetime
 from pathlib import Path
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 Readers = dict[str, Callable[[Any], Any]]
 V = TypeVar("V")
@@ -151,3 +152,51 @@ def subtable(readers: Readers) -> Callable[[Any], dict[str, Any]]:
         return read_table(value, readers)
 
     return read
+
+
+def readers_of(kind: type[Any]) -> Readers:
+    """Readers of the fields of a dataclass, by their types: keys of a table that makes one.
+
+    Types are float, int, bool, str, datetime, tuples of one of them, and each of those or None.
+    """
+    hints = get_type_hints(kind)
+    return {field.name: _reader(hints[field.name]) for field in fields(kind) if field.init}
+
+
+def _reader(hint: Any) -> Callable[[Any], Any]:
+    if get_origin(hint) is UnionType:
+        (hint,) = (part for part in get_args(hint) if part is not type(None))
+    if get_origin(hint) is tuple:
+        of, *others = get_args(hint)
+        if others == [...]:
+            return _list_of(_reader(of))
+        return several(1 + len(others), _reader(of))
+    simple = {float: number, int: whole, bool: flag, str: text, datetime: moment}
+    return simple[hint]
+
+
+def _list_of(of: Callable[[Any], Any]) -> Callable[[Any], tuple[Any, ...]]:
+    def read(value: Any) -> tuple[Any, ...]:
+        if not isinstance(value, list):
+            raise SceneError(f"must be a list, not {value!r}")
+        return tuple(of(item) for item in value)
+
+    return read
+
+
+def made_of(kinds: Mapping[str, type[V]], **defaults: Any) -> Callable[[Any], tuple[V, ...]]:
+    """A reader of tables by name, as ``[hazards.moon]``: each makes a dataclass of ``kinds``.
+
+    Several of a kind are an array of tables, as ``[[hazards.debris]]``. ``defaults`` stand for keys
+    that a table leaves out.
+    """
+
+    def make(kind: type[V]) -> Callable[[Any], tuple[V, ...]]:
+        read = subtable(readers_of(kind))
+        return lambda value: tuple(
+            kind(**(defaults | read(table)))
+            for table in (value if isinstance(value, list) else [value])
+        )
+
+    makers = subtable({name: make(kind) for name, kind in kinds.items()})
+    return lambda value: tuple(thing for things in makers(value).values() for thing in things)

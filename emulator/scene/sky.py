@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
 from cubestack.emulator.scene.file import SceneError, refuse_negative
+from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
 from cubestack.emulator.scene.picture import PictureScene, check_quaternion
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -64,6 +65,7 @@ class SkyScene:
         false_stars: number of lights at random places of the picture that no catalogue has.
         false_star_mag: range of their magnitudes, brightest first, uniform (assumed).
         atmosphere: the air that the stars, and only they, are seen through; None in space.
+        hazards: what else gives light, or stands in the stars' way.
         still: the stars stand still during each exposure, wherever they are at its middle, as in
             screenshots of a planetarium.
         seed: of the false stars and of the air.
@@ -77,6 +79,7 @@ class SkyScene:
     false_stars: int = 0
     false_star_mag: tuple[float, float] = (2.0, 3.8)
     atmosphere: Atmosphere | None = None
+    hazards: tuple[SkyHazard, ...] = ()
     still: bool = False
     seed: int = 0
 
@@ -86,6 +89,7 @@ class SkyScene:
         if sorted(starts) != starts:
             raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
         refuse_negative(self, "false_stars", "seed")
+        refuse_strangers(self.hazards)
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:
             raise SceneError(

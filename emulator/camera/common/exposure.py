@@ -11,13 +11,16 @@ a shear of the spot by the motion in one line time, a hundredth of a pixel a row
 """
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.camera.common.glow import glow_electrons
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
+from cubestack.emulator.scene.hazards.contract import Looking, Vectors
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -28,6 +31,7 @@ FAINTEST_V = 8.0
 SPOT_SIGMAS = 5.0
 CELLS_AT_ONCE = 3_400_000  # of all spots: bounds the memory of long streaks and wide spots
 VELOCITY_STEP_S = 0.01
+MOST_GLOWS = 8  # instants of an exposure at which a glow is evaluated, at most
 
 _Z = np.arange(-8.0, 8.0, 1 / 512)
 #: The normal distribution function; linear interpolation in it is good to 1e-7.
@@ -43,6 +47,9 @@ def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDAr
         places, weights = _instant(scene, optics, shutter, vectors, phase)
         pixels.append(places)
         light.append(rates * weights / len(phases))
+    for places, rates in _hazard_lights(scene, optics, shutter):
+        pixels.append(places)
+        light.append(rates)
     if scene.false_stars:
         places, magnitudes = scene.false_lights()
         pixels.append(places * [optics.columns - 1, optics.rows - 1])
@@ -52,7 +59,42 @@ def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDAr
     if scene.atmosphere is not None and scene.atmosphere.sky_mag is not None:
         glow = optics.electrons_per_second(scene.atmosphere.sky_mag) * optics.pixel_arcsec2
         image += np.float32(glow * shutter.exposure_s) * optics.even_light
+    if scene.hazards:
+        count = min(len(phases), MOST_GLOWS)
+        instants = [looking(scene, optics, shutter, (i + 0.5) / count) for i in range(count)]
+        electrons_per_s = glow_electrons(scene.hazards, instants, optics)
+        if electrons_per_s is not None:
+            image += electrons_per_s * np.float32(shutter.exposure_s)
     return image
+
+
+def looking(
+    scene: SkyScene, optics: Optics, shutter: RollingShutter, phase: float = 0.5
+) -> Looking:
+    """What hazards may know of the camera at the instant ``phase`` of the middle row's exposure."""
+    now = _time_ps(optics, shutter, phase)
+    return looking_along(
+        scene.truth(now), optics, time_s=now / PS_PER_S, exposure_s=shutter.exposure_s
+    )
+
+
+def looking_along(
+    quaternion: ArrayLike, optics: Optics, time_s: float = 0.0, exposure_s: float = 0.0
+) -> Looking:
+    """What hazards may know of a camera with the attitude (4,) ``quaternion``."""
+    x, y = optics.columns - 0.5, optics.rows - 0.5
+    middle_x, middle_y = (x - 0.5) / 2, (y - 0.5) / 2
+    edges = np.array([[-0.5, middle_y], [x, middle_y], [middle_x, -0.5], [middle_x, y]])
+    left, right, top, bottom = optics.unproject(edges)
+    return Looking(
+        axes=matrix_from_quaternion(quaternion),
+        width_deg=math.degrees(math.acos(left @ right)),
+        height_deg=math.degrees(math.acos(top @ bottom)),
+        half_field_deg=min(optics.half_field_deg, optics.field_stop_deg / 2),
+        pixel_rad=math.sqrt(optics.pixel_arcsec2) * math.pi / 648_000,
+        time_s=time_s,
+        exposure_s=exposure_s,
+    )
 
 
 def star_pixels(
@@ -64,10 +106,12 @@ def star_pixels(
         Hipparcos numbers (n,) and pixel coordinates (n, 2) of the stars on the sensor.
     """
     sky = load_sky(scene.epoch, _limit(scene))
-    pixels, _ = _instant(scene, optics, shutter, sky.vectors, 0.5)
+    vectors, covered = _through(scene, looking(scene, optics, shutter), sky.vectors)
+    pixels, _ = _instant(scene, optics, shutter, vectors, 0.5)
     columns, rows = optics.columns, optics.rows
     x, y = pixels.T
     seen = (np.abs(x - (columns - 1) / 2) <= columns / 2) & (np.abs(y - (rows - 1) / 2) <= rows / 2)
+    seen &= ~covered
     return sky.hip[seen], pixels[seen]
 
 
@@ -86,6 +130,9 @@ def _stars(
     boresight = matrix_from_quaternion(scene.truth(middle))[2]
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
     vectors, rates = sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
+    if scene.hazards:
+        vectors, covered = _through(scene, looking(scene, optics, shutter), vectors)
+        vectors, rates = vectors[~covered], rates[~covered]
     if scene.atmosphere is None:
         return vectors, rates
     # By frame time, as the sensor's noise.
@@ -96,11 +143,48 @@ def _stars(
     return vectors, rates * share
 
 
-def _phases(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDArray[np.float64]:
-    """Instants to sum over, as fractions of the exposure."""
+def _through(
+    scene: SkyScene, now: Looking, vectors: Vectors, depth: int = -1
+) -> tuple[Vectors, NDArray[np.bool_]]:
+    """Where the hazards let light at ``vectors`` (n, 3) seem to come from, and what they hide.
+
+    Returns:
+        Unit vectors (n, 3), and whether something nearer than ``depth`` stands in front (n,).
+    """
+    covered = np.zeros(len(vectors), bool)
+    for hazard in scene.hazards:
+        hidden = hazard.hidden(now, vectors) if hazard.depth > depth else None
+        if hidden is not None:
+            covered |= hidden
+    for hazard in scene.hazards:
+        vectors = hazard.seen(now, vectors)
+    return vectors, covered
+
+
+def _hazard_lights(
+    scene: SkyScene, optics: Optics, shutter: RollingShutter
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Pixels (n, 2) of the hazards' points of light and their electrons a second (n,)."""
+    for hazard in scene.hazards:
+        phases = _phases(scene, optics, shutter, hazard.speed_deg_s)
+        for phase in phases:
+            now = looking(scene, optics, shutter, phase)
+            lights = hazard.lights(now)
+            if lights is None:
+                break
+            vectors, covered = _through(scene, now, lights.vectors, hazard.depth)
+            places, weights = _instant(scene, optics, shutter, vectors[~covered], phase)
+            rates = optics.electrons_per_second(lights.v_mag[~covered])
+            yield places, rates * weights / len(phases)
+
+
+def _phases(
+    scene: SkyScene, optics: Optics, shutter: RollingShutter, own_deg_s: float = 0.0
+) -> NDArray[np.float64]:
+    """Instants to sum over, as fractions of the exposure, for lights that move by themselves."""
     # The scale of the picture is largest at its corners, by a fifth or so.
     px_per_deg = 1.25 * optics.fx * math.pi / 180
-    travel_px = scene.speed_deg_s * shutter.exposure_s * px_per_deg
+    travel_px = (scene.speed_deg_s + own_deg_s) * shutter.exposure_s * px_per_deg
     samples = max(1, math.ceil(travel_px / optics.psf_sigma_px))
     return (np.arange(samples) + 0.5) / samples
 

@@ -10,6 +10,8 @@
     [atmosphere]                   # what the stars are seen through
     latitude_deg = -33.9
     sidereal_deg = 200.0           # right ascension of the zenith at time 0
+    [hazards.moon]                 # see docs/scenes.md
+    direction = [90.0, -10.0]
 
     kind = "picture"
     file = "night.jpg"             # relative to the scene file
@@ -30,11 +32,14 @@ from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.camera.common.hazards import HAZARDS as SENSOR_HAZARDS
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.optics import Distortion, Optics
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.scene import file
 from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s, sidereal_deg
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.hazards import SKY_HAZARDS, Hazard, SkyHazard
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
 
 
@@ -111,6 +116,7 @@ _SKY: file.Readers = _POSE | {
     "seed": file.whole,
     "temperature_c": file.number,
     "hot_pixels": file.whole,
+    "hazards": lambda value: value,
 }
 _PICTURE: file.Readers = {
     "file": file.text,
@@ -118,6 +124,7 @@ _PICTURE: file.Readers = {
     "exposure_ms": file.number,
     "quaternion": file.several(4, file.number),
     "temperature_c": file.number,
+    "hazards": lambda value: value,
 }
 
 
@@ -147,10 +154,29 @@ def _sky(
         if poses or np.any(np.asarray(first.rate_deg_s)):
             raise file.SceneError('mount = "earth" needs one pose without rate_deg_s')
         first = replace(first, rate_deg_s=earth_rate_deg_s(first.quaternion))
+    light, wrong = read_hazards(values)
     scene = SkyScene(
-        first.quaternion, first.rate_deg_s, tuple(poses), **file.values_for(SkyScene, values)
+        first.quaternion,
+        first.rate_deg_s,
+        tuple(poses),
+        hazards=light,
+        **file.values_for(SkyScene, values),
     )
+    values["hazards"] = wrong
     return SkyView(scene, replace(condition, **file.values_for(condition, values)))
+
+
+def read_hazards(values: dict[str, Any]) -> tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]:
+    """Hazards of light, and those of sensor and lens, of the tables under ``hazards``.
+
+    Takes that key out of ``values``. The seed of a hazard is the file's, if it says no other.
+    """
+    kinds: dict[str, type[Hazard]] = {**SKY_HAZARDS, **SENSOR_HAZARDS}
+    reader = file.made_of(kinds, seed=values.get("seed", 0))
+    hazards = file.read_table({"hazards": values.pop("hazards", {})}, {"hazards": reader})
+    return tuple(h for h in hazards["hazards"] if isinstance(h, SkyHazard)), tuple(
+        h for h in hazards["hazards"] if isinstance(h, SensorHazard)
+    )
 
 
 def drawn_optics(optics: Optics, uncertain: Mapping[str, float], seed: int) -> Optics:
@@ -179,6 +205,9 @@ def _picture(table: Mapping[str, Any], folder: Path, condition: SkyCondition) ->
     values = file.read_table(table, _PICTURE)
     if "file" not in values:
         raise file.SceneError("a picture needs the key file")
+    light, values["hazards"] = read_hazards(values)
+    if light:
+        raise file.SceneError(f"a picture has no hazard of light, as {light[0].name} is")
     condition = replace(condition, **file.values_for(condition, values))
     values["file"] = folder / values["file"]
     scene = PictureScene(**file.values_for(PictureScene, values))

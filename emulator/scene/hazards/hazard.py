@@ -21,11 +21,13 @@ class Strength:
         key: the field that is swept.
         unit: of its values, empty for a plain number.
         values: from harmless to worst.
+        default: that of a hazard asked for without a strength; None: the last of ``values``.
     """
 
     key: str
     unit: str
     values: tuple[float, ...]
+    default: float | None = None
 
 
 def key(default: Any, meaning: str, low: float = -math.inf, high: float = math.inf) -> Any:

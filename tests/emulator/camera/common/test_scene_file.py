@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from cubestack.emulator.scene.attitude import (
     pointing_from_matrix,
     quaternion_from_pointing,
 )
+from cubestack.emulator.scene.hazards import Moon
 from cubestack.emulator.scene.sky import PictureScene, SceneError, SkyScene
 
 from ..files import check_refused, save
@@ -227,3 +229,47 @@ def test_a_lens_drawn_as_its_calibration_knows_it(tmp_path: Path) -> None:
     assert drawn(3, "cx = 500.0") == replace(lenses[3], cx=500.0)
     text = 'kind = "sky"\nra_deg = 1\ndec_deg = 2\n[optics]\ndrawn = 1'
     check_refused(load, save(tmp_path, text), "optics: drawn must be left out for this lens")
+
+
+HAZARDS = """
+kind = "sky"
+ra_deg = 10
+dec_deg = 20
+seed = 5
+[[hazards.moon]]
+direction = [10.0, 21.0]
+[[hazards.moon]]
+direction = [0, 0, -1]
+sun = [1, 0, 0]
+seed = 6
+[hazards.hot-pixels]
+"""
+
+
+def test_hazards_go_to_scene_and_condition(tmp_path: Path) -> None:
+    view = load(save(tmp_path, HAZARDS))
+    assert isinstance(view.scene, SkyScene)
+    assert view.scene.hazards == (
+        Moon(direction=(10.0, 21.0), seed=5),
+        Moon(direction=(0.0, 0.0, -1.0), sun=(1.0, 0.0, 0.0), seed=6),
+    )
+    assert [(hazard.name, hazard.seed) for hazard in view.condition.hazards] == [("hot-pixels", 5)]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("[hazards.moo]", "hazards: unknown key 'moo'; allowed are moon, "),
+        ("[hazards.moon]\nphase = 1", "hazards: moon: unknown key 'phase'; allowed are "),
+        (
+            "[hazards.moon]\nscatter = 2",
+            "hazards: moon: scatter of the hazard moon must be in 0..0",
+        ),
+        ("[hazards.moon]\nsun = 2", "hazards: moon: sun must be a list, not 2"),
+        ("[hazards]\nmoon = 2", "hazards: moon must be a table, not 2"),
+    ],
+)
+def test_refuses_wrong_hazards(tmp_path: Path, table: str, message: str) -> None:
+    path = save(tmp_path, 'kind = "sky"\nra_deg = 1\ndec_deg = 1\n' + table)
+    with pytest.raises(SceneError, match=re.escape(message)):
+        load(path)

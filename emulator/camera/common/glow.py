@@ -1,0 +1,150 @@
+"""Light of hazards that is no point: surface brightness on the sensor's pixels.
+
+Smooth brightness is evaluated every 16 px and interpolated; where a hazard says that it is not
+smooth, at each pixel, and the lens' spot then blurs it. A glow is taken as of the middle row: what
+is neglected is its shift between the first and the last row of a rolling shutter.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.scene.hazards.contract import Looking, SkyHazard, angles_rad
+
+CELL_PX = 16
+Values = NDArray[np.float32]
+
+
+def glow_electrons(
+    hazards: Sequence[SkyHazard], instants: Sequence[Looking], optics: Optics
+) -> Values | None:
+    """Mean number of electrons a second in each pixel (rows, columns), over ``instants``.
+
+    None when no hazard glows.
+    """
+    pictures = [_picture(hazards, now, optics) for now in instants]
+    seen = [picture for picture in pictures if picture is not None]
+    if not seen:
+        return None
+    total = sum(seen[1:], start=seen[0])
+    return np.asarray(total * (_field(optics)[1] * np.float32(1 / len(pictures))), np.float32)
+
+
+def brightness(
+    hazards: Sequence[SkyHazard], now: Looking, vectors: NDArray[np.float64]
+) -> Values | None:
+    """Surface brightness (n,) of all hazards along ``vectors`` (n, 3) of the scene's axes.
+
+    In V = 0 stars a steradian; None when none glows.
+    """
+    glows = [(hazard, hazard.glow(now, vectors)) for hazard in hazards]
+    if all(glow is None for _, glow in glows):
+        return None
+    covers = [(hazard.depth, hazard.hidden(now, vectors)) for hazard in hazards]
+    total = np.zeros(len(vectors), np.float32)
+    for hazard, glow in glows:
+        if glow is None:
+            continue
+        for depth, hidden in covers:
+            if hidden is not None and depth > hazard.depth:
+                glow = np.where(hidden, np.float32(0), glow)
+        total += glow
+    return total
+
+
+def _picture(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) -> Values | None:
+    """Surface brightness (rows, columns)."""
+    (x, y), nodes = _grid(optics)
+    directions = nodes @ now.axes
+    coarse = brightness(hazards, now, directions)
+    if coarse is None:
+        return None
+    down, across = _hats(optics.rows, y), _hats(optics.columns, x)
+    picture = np.asarray(down @ coarse.reshape(len(y), len(x)) @ across.T, np.float32)
+    fine = _not_smooth(hazards, now, directions.reshape(len(y), len(x), 3))
+    if not fine.any():
+        return picture
+    rows = np.minimum(np.searchsorted(y, np.arange(optics.rows), "right"), len(y) - 1) - 1
+    columns = np.minimum(np.searchsorted(x, np.arange(optics.columns), "right"), len(x) - 1) - 1
+    places = np.flatnonzero(fine[rows][:, columns])
+    exact = _field(optics)[0][places].astype(np.float64) @ now.axes
+    picture.ravel()[places] = brightness(hazards, now, exact)
+    _blur(picture, places, optics.psf_sigma_px)
+    return picture
+
+
+def _not_smooth(
+    hazards: Sequence[SkyHazard], now: Looking, nodes: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which cells of the grid of ``nodes`` (ny, nx, 3) a line can not stand for, (ny-1, nx-1)."""
+    cell = np.linalg.norm(nodes[1:, 1:] - nodes[:-1, :-1], axis=2)
+    fine = np.zeros(cell.shape, bool)
+    for hazard in hazards:
+        for ring in hazard.rings(now):
+            # From a corner of the cell; no point of it is farther from there than the diagonal.
+            angle = angles_rad(nodes[:-1, :-1], ring.centre)
+            fine |= (angle < ring.outer_rad + 1.1 * cell) & (angle > ring.inner_rad - 1.1 * cell)
+    return fine
+
+
+def _blur(picture: Values, places: NDArray[np.int64], sigma_px: float) -> None:
+    """Blur the part of ``picture`` that holds the flat ``places`` with the lens' spot."""
+    half = math.ceil(4 * sigma_px)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / sigma_px) ** 2)
+    kernel = (kernel / kernel.sum()).astype(np.float32)
+    rows, columns = np.divmod(places, picture.shape[1])
+    part = picture[
+        max(0, rows.min() - half) : rows.max() + half + 1,
+        max(0, columns.min() - half) : columns.max() + half + 1,
+    ]
+    for axis in (0, 1):
+        pad = [(half, half) if a == axis else (0, 0) for a in (0, 1)]
+        wide = np.moveaxis(np.pad(part, pad, "edge"), axis, 0)
+        size = part.shape[axis]
+        blurred = sum(w * wide[i : i + size] for i, w in enumerate(kernel))
+        part[:] = np.moveaxis(np.asarray(blurred), 0, axis)
+
+
+@lru_cache(maxsize=4)
+def _grid(
+    optics: Optics,
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
+    """Columns (nx,) and rows (ny,) of the grid, and its directions (ny * nx, 3), camera axes."""
+    x, y = (
+        np.linspace(0, size - 1, math.ceil((size - 1) / CELL_PX) + 1)
+        for size in (optics.columns, optics.rows)
+    )
+    across, down = np.meshgrid(x, y)
+    return (x, y), optics.unproject(np.stack([across.ravel(), down.ravel()], axis=1))
+
+
+def _hats(size: int, nodes: NDArray[np.float64]) -> Values:
+    """Weights (size, len(nodes)) that interpolate between ``nodes`` linearly."""
+    step = nodes[1] - nodes[0]
+    weights = np.maximum(1 - np.abs(np.arange(size)[:, None] - nodes) / step, 0)
+    return np.asarray(weights, np.float32)
+
+
+@lru_cache(maxsize=2)
+def _field(optics: Optics) -> tuple[Values, Values]:
+    """Each pixel's direction (rows * columns, 3), and electrons a second (rows, columns) there.
+
+    The electrons are those of a brightness of one V = 0 star a steradian: what a pixel sees of the
+    sky gets smaller towards the corners.
+    """
+    y, x = np.mgrid[: optics.rows, : optics.columns].astype(np.float64)
+    directions = optics.unproject(np.stack([x.ravel(), y.ravel()], axis=1))
+    (xs, ys), _ = _grid(optics)
+    gx, gy = (a.ravel() for a in np.meshgrid(xs, ys))
+    right, left, below, above = (
+        optics.unproject(np.stack([gx + dx, gy + dy], axis=1))
+        for dx, dy in ((0.5, 0), (-0.5, 0), (0, 0.5), (0, -0.5))
+    )
+    solid = np.linalg.norm(np.cross(right - left, below - above), axis=1)
+    smooth = _hats(optics.rows, ys) @ solid.reshape(len(ys), len(xs)) @ _hats(optics.columns, xs).T
+    electrons = smooth * optics.electrons_per_second(0.0) * optics.even_light
+    return directions.astype(np.float32), electrons.astype(np.float32)

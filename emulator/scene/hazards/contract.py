@@ -1,0 +1,194 @@
+"""What a hazard of light is: something in front of a camera that no catalogue of stars has.
+
+A hazard gives points of light, a glow, or both; it may also hide what is beyond it, and move where
+starlight comes from. It knows no sensor. Directions are unit vectors in the scene's axes: ICRS for
+the night sky, the satellite's body axes at time 0 for Earth and Sun.
+
+Brightness is counted in stars of V = 0: for a light, 10^(-0.4 V) of them; for a glow, stars a
+steradian.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards.hazard import Hazard
+
+ARCSEC2_PER_SR = (648_000 / math.pi) ** 2
+"""So many stars of V = 0 a steradian are V 0 a square arcsecond."""
+
+SUN_V = -26.74
+"""Apparent magnitude of the Sun from the Earth (Allen's Astrophysical Quantities, section 14.2)."""
+
+EARTH_RADIANCE = 0.3 / math.pi * 10 ** (-0.4 * SUN_V)
+"""Radiance 1 of ``emulator.scene.earth`` in V = 0 stars a steradian: its albedo is 0.3."""
+
+Vectors = NDArray[np.float64]
+Brightness = NDArray[np.float32]
+
+
+class Depth(IntEnum):
+    """In which order hazards stand one behind the other, the farthest first."""
+
+    SKY = 0
+    PLANETS = 1
+    MOON = 2
+    EARTH = 3
+    ORBIT = 4
+    LENS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Lights:
+    """Points of light: unit vectors (n, 3) to them, and their V magnitudes (n,)."""
+
+    vectors: Vectors
+    v_mag: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Where a glow is not smooth: between two angles around a direction.
+
+    Attributes:
+        centre: unit vector (3,).
+        inner_rad, outer_rad: angles from there.
+    """
+
+    centre: Vectors
+    inner_rad: float
+    outer_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class Looking:
+    """What a hazard may know of who looks, at one instant of an exposure.
+
+    Attributes:
+        axes: (3, 3), the camera's x, y and boresight as its rows, in the scene's axes.
+        width_deg, height_deg: of the picture, as angles from edge to edge through its middle.
+        half_field_deg: angle from the boresight beyond which no light reaches the picture.
+        pixel_rad: angle that a pixel covers on the boresight.
+        time_s: the instant.
+        exposure_s: of each pixel.
+    """
+
+    axes: Vectors
+    width_deg: float
+    height_deg: float
+    half_field_deg: float
+    pixel_rad: float
+    time_s: float = 0.0
+    exposure_s: float = 0.0
+
+    @property
+    def boresight(self) -> Vectors:
+        """Unit vector (3,)."""
+        return np.asarray(self.axes[2])
+
+    def anywhere(self, generator: np.random.Generator) -> Vectors:
+        """A random direction (3,) in the picture, uniform in its angles."""
+        while True:
+            across, down = generator.uniform(-0.5, 0.5, 2) * (self.width_deg, self.height_deg)
+            if math.hypot(across, down) <= self.half_field_deg:
+                return np.asarray(vector_from_angles(across, down) @ self.axes, np.float64)
+
+    def beside(self, angle_deg: float, generator: np.random.Generator) -> Vectors:
+        """A direction (3,) at ``angle_deg`` from the boresight, to a random side."""
+        around = generator.uniform(0, 2 * math.pi)
+        sides = angle_deg * np.cos(around), angle_deg * np.sin(around)
+        return np.asarray(vector_from_angles(*sides) @ self.axes, np.float64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkyHazard(Hazard):
+    """Light that no catalogue has, or that stands in the stars' way; by itself nothing at all.
+
+    Attributes:
+        depth: it hides glow and lights of those behind it.
+    """
+
+    depth: ClassVar[Depth] = Depth.SKY
+
+    @property
+    def speed_deg_s(self) -> float:
+        """How fast its lights move against the stars."""
+        return 0.0
+
+    def lights(self, looking: Looking) -> Lights | None:
+        """Its points of light at an instant."""
+        del looking
+        return None
+
+    def glow(self, looking: Looking, vectors: Vectors) -> Brightness | None:
+        """Its surface brightness (n,) along ``vectors`` (n, 3), V = 0 stars a steradian.
+
+        The mean over a round pixel of ``looking.pixel_rad``, where that matters.
+        """
+        del looking, vectors
+        return None
+
+    def rings(self, looking: Looking) -> tuple[Ring, ...]:
+        """Where its glow changes from pixel to pixel; elsewhere, a line over 16 px follows it."""
+        del looking
+        return ()
+
+    def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_] | None:
+        """Which of ``vectors`` (n, 3) to things behind it are hidden, (n,); None for none."""
+        del looking, vectors
+        return None
+
+    def seen(self, looking: Looking, vectors: Vectors) -> Vectors:
+        """Where light of points at ``vectors`` (n, 3) seems to come from."""
+        del looking
+        return vectors
+
+
+def brightness(mag_arcsec2: ArrayLike) -> NDArray[np.float64]:
+    """Surface brightness in V = 0 stars a steradian, of V magnitudes a square arcsecond."""
+    return np.asarray(ARCSEC2_PER_SR * 10 ** (-0.4 * np.asarray(mag_arcsec2, np.float64)))
+
+
+def direction(name: str, values: ArrayLike) -> Vectors:
+    """Unit vector (3,) of three numbers, or of right ascension and declination in degrees.
+
+    SceneError names ``name`` when it is neither.
+    """
+    v = np.asarray(values, np.float64)
+    if v.shape == (2,) and np.all(np.isfinite(v)):
+        ra, dec = np.radians(v)
+        v = np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
+    if v.shape != (3,) or not 0 < np.linalg.norm(v) < np.inf:
+        raise SceneError(
+            f"{name} must be 3 numbers, not all 0, or right ascension and declination, not "
+            f"{values!r}"
+        )
+    return v / np.linalg.norm(v)
+
+
+def angles_rad(vectors: Vectors, centre: Vectors) -> NDArray[np.float64]:
+    """Angles (n,) between unit vectors (n, 3) and one (3,), exact for small ones too."""
+    chord = np.linalg.norm(vectors - centre, axis=-1)
+    return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)))
+
+
+def aside(centre: Vectors, angle_deg: float, generator: np.random.Generator) -> Vectors:
+    """A unit vector (3,) at ``angle_deg`` from ``centre``, to a random side."""
+    side = np.cross(centre, generator.standard_normal(3))
+    side /= np.linalg.norm(side)
+    angle = math.radians(angle_deg)
+    return np.asarray(math.cos(angle) * centre + math.sin(angle) * side)
+
+
+def refuse_strangers(hazards: Sequence[object]) -> None:
+    """Raise SceneError for what is no hazard of light."""
+    for hazard in hazards:
+        if not isinstance(hazard, SkyHazard):
+            raise SceneError(f"hazards must be hazards of light, not {hazard!r}")

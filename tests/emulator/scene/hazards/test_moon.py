@@ -1,0 +1,105 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.exposure import looking_along, star_light, star_pixels
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards.glare import aureole
+from cubestack.emulator.scene.hazards.moon import RADIUS_RAD, Moon
+from cubestack.emulator.scene.sky import SkyScene
+from tests.emulator.scene.hazards.around import whole_light
+
+SHUTTER = RollingShutter(10**12, 132_200_000, 2917, 2917)
+ORION = SkyScene.pointing(83.8, -1.0)
+NOW = looking_along(ORION.quaternion, LENS)
+CENTRE = tuple(NOW.boresight)
+
+
+def moon_at_phase(phase_deg: float) -> Moon:
+    angle = math.radians(180 - phase_deg)
+    sun = math.cos(angle) * NOW.boresight + math.sin(angle) * NOW.axes[0]
+    return Moon(direction=CENTRE, sun=tuple(sun), scatter=0.0)
+
+
+@pytest.mark.parametrize(
+    ("phase_deg", "v_mag"),
+    [(0, -12.73), (90, -10.13), (150, -6.81)],  # Allen's formula, worked by hand
+)
+def test_disc_holds_its_magnitude(phase_deg: float, v_mag: float) -> None:
+    moon = moon_at_phase(phase_deg)
+    assert moon.phase_deg == pytest.approx(phase_deg, abs=1e-6)
+    assert moon.v_mag == pytest.approx(v_mag, abs=0.01)
+    whole = whole_light(moon, replace(NOW, pixel_rad=1e-5), NOW.boresight, 1.1 * RADIUS_RAD)
+    assert -2.5 * math.log10(whole) == pytest.approx(v_mag, abs=0.02)
+
+
+def test_picture_holds_its_electrons() -> None:
+    moon = moon_at_phase(90)
+    dark = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(moon,))
+    light = star_light(dark, LENS, SHUTTER)
+    right = float(LENS.electrons_per_second(moon.v_mag)) * SHUTTER.exposure_s
+    assert light.sum(dtype=np.float64) == pytest.approx(right, rel=0.02)
+
+
+def test_lit_side_is_towards_the_sun() -> None:
+    vectors = NOW.boresight + 0.8 * RADIUS_RAD * np.array([NOW.axes[0], -NOW.axes[0]])
+    vectors /= np.linalg.norm(vectors, axis=1)[:, None]
+    lit, dark = moon_at_phase(90).glow(NOW, vectors)
+    assert lit > 0
+    assert dark == 0
+
+
+def test_full_moon_is_even_and_3_4_mag_an_arcsec2() -> None:
+    centre = NOW.boresight[None]
+    edge = NOW.boresight + 0.7 * RADIUS_RAD * NOW.axes[1]
+    full = Moon(direction=CENTRE, scatter=0.0)
+    middle = full.glow(NOW, centre)[0]
+    assert full.glow(NOW, edge[None] / np.linalg.norm(edge))[0] == pytest.approx(middle, rel=1e-3)
+    # -12.73 + 2.5 log10(pi 932.8^2), its area in square arcseconds
+    assert -2.5 * math.log10(middle / 4.2545e10) == pytest.approx(3.36, abs=0.02)
+
+
+def test_scatters_the_share_that_it_says() -> None:
+    angles = np.linspace(0, math.radians(44.9), 100_001)
+    share = np.trapezoid(aureole(angles, 0.1) * 2 * math.pi * np.sin(angles), angles)
+    assert share == pytest.approx(0.1, rel=0.1)
+
+
+def test_hides_the_stars_behind() -> None:
+    hip, pixels = star_pixels(ORION, LENS, SHUTTER)
+    behind = int(np.argmin(np.hypot(*(pixels - [512, 256]).T)))
+    vector = LENS.unproject(pixels[behind][None])[0] @ NOW.axes
+    moon = Moon(direction=tuple(vector))
+    left, _ = star_pixels(SkyScene(ORION.quaternion, hazards=(moon,)), LENS, SHUTTER)
+    assert set(hip) - set(left) >= {hip[behind]}
+    assert len(left) > len(hip) - 20
+
+
+def test_is_placed_in_the_picture_with_its_phase() -> None:
+    generator = np.random.default_rng(3)
+    for share in (0.0, 0.2, 1.0):
+        moon = Moon.placed(share, NOW, generator)
+        x, y = LENS.project((NOW.axes @ np.asarray(moon.direction))[None])[0]
+        assert -30 < x < LENS.columns + 30
+        assert -30 < y < LENS.rows + 30
+        assert (1 + math.cos(math.radians(moon.phase_deg))) / 2 == pytest.approx(share, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"direction": (0.0, 0.0, 0.0)}, "direction must be 3 numbers"),
+        (
+            {"direction": (10.0, 20.0), "scatter": 0.5},
+            r"scatter of the hazard moon must be in 0\.\.0\.2, not 0.5",
+        ),
+        ({"direction": (10.0, 20.0), "sun": (1.0,)}, "sun must be 3 numbers"),
+    ],
+)
+def test_refuses_what_can_not_be(values: dict, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        Moon(**values)
