@@ -1,0 +1,97 @@
+"""How uncertain an attitude from unit vectors is: the covariance of its rotation's error.
+
+M. D. Shuster and S. D. Oh, "Three-axis attitude determination from vector observations", Journal of
+Guidance and Control 4 (1981), section "covariance analysis": a star whose direction b has the
+standard deviation sigma in each axis across it tells w (I - b b^T) about the rotation, w = 1 /
+sigma^2, and the inverse of the sum is the covariance of the best estimate. Of an estimate by
+other weights it is H^-1 G H^-1, with H the sum by those weights and G that of their squares times
+sigma^2 (the sandwich form of an estimator's variance).
+
+The declared sigmas are a belief. The residuals of the fit correct it, as far as so few can: the
+variance's scale is the mean of its posterior distribution (scaled inverse chi squared; A. Gelman et
+al., "Bayesian Data Analysis", 3rd edition, section 3.2), in which the belief counts as much as
+`PRIOR_DEGREES` squares of residuals. The mean is larger than the best guess of the scale, and so
+makes up for the long tails that a scale guessed from few squares leaves the errors.
+
+What moves all stars alike leaves no residual; `floor` is added for it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.attitude.quest import AttitudeError
+from cubestack.firmware_model.mcu.costs import Meter
+
+PRIOR_DEGREES = 6
+"""Degrees of freedom by which the declared sigmas count: three stars' residuals are 3, ten's 17."""
+
+_SMALLEST_DETERMINANT = np.float32(2e-6)
+"""Of the information of weights that add up to 1: two stars 0.1 deg apart, as in QUEST."""
+
+_IDENTITY = np.eye(3, dtype=np.float32)
+
+
+def covariance(
+    directions: NDArray[np.float32],
+    residuals: NDArray[np.float32],
+    sigmas: NDArray[np.float32],
+    meter: Meter,
+    *,
+    weights: NDArray[np.float32] | None = None,
+    floor: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> NDArray[np.float32]:
+    """Covariance (3, 3) of the small rotation that separates the true camera axes from the
+    estimated ones, in rad^2, about the camera's axes.
+
+    Args:
+        directions: (n, 3) unit vectors in camera axes of the stars used, n at least 2.
+        residuals: (n,) angles in rad between them and the catalogue's, turned by the attitude.
+        sigmas: (n,) declared standard deviation of a direction, in rad, in each axis across it.
+        meter: charged with every operation.
+        weights: (n,) weights by which the attitude was estimated; None for 1 / sigma^2.
+        floor: standard deviations, in rad about the axes, of errors that no residual shows.
+
+    Raises:
+        AttitudeError: for fewer than two stars, or stars that all lie in one direction.
+    """
+    count = len(directions)
+    if count < 2:
+        raise AttitudeError(f"a covariance needs at least 2 stars, not {count}")
+    variances = sigmas.astype(np.float32) ** 2
+    used = np.float32(1) / variances if weights is None else weights.astype(np.float32)
+    total = np.float32(used.sum())
+    used = used / total
+    bread = _inverse(_information(directions, used, meter), meter)
+    if weights is None:
+        shape = bread / total
+    else:
+        shape = bread @ _information(directions, used * used * variances, meter) @ bread
+        meter.charge(f32_mul=54 + 2 * count, f32_add=36, loop=18)
+    squares = np.float32((residuals.astype(np.float32) ** 2 / variances).sum())
+    # The mean of the posterior, degrees - 2: see above.
+    scale = (np.float32(PRIOR_DEGREES) + squares) / np.float32(PRIOR_DEGREES + 2 * count - 3 - 2)
+    meter.charge(
+        f32_mul=3 * count + 12, f32_add=2 * count + 4, f32_div=3 * count + 1, loop=3 * count
+    )
+    return np.asarray(scale * shape + np.diag(np.square(floor)), np.float32)
+
+
+def _information(
+    directions: NDArray[np.float32], weights: NDArray[np.float32], meter: Meter
+) -> NDArray[np.float32]:
+    """Sum (3, 3) of w (I - b b^T) over the stars."""
+    count = len(directions)
+    meter.charge(f32_mul=9 * count, f32_add=9 * count, ram_read=4 * count, loop=count)
+    b = directions.astype(np.float32)
+    return np.asarray(weights.sum() * _IDENTITY - (b * weights[:, None]).T @ b, np.float32)
+
+
+def _inverse(matrix: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
+    """Inverse of a symmetric positive matrix (3, 3) by its cofactors."""
+    first, second, third = matrix
+    cofactors = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)])
+    determinant = np.float32(first @ cofactors[0])
+    meter.charge(f32_mul=12 + 3 + 6, f32_add=6 + 2, f32_div=1, f32_compare=1, ram_read=12)
+    if not determinant > _SMALLEST_DETERMINANT:
+        raise AttitudeError("the stars all lie in one direction: no rotation about it")
+    return np.asarray(cofactors / determinant, np.float32)
