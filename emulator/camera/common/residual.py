@@ -18,7 +18,7 @@ class Residual:
 
     Attributes:
         shape: rows and columns that the coordinates -1..1 span.
-        across, down: coefficients of Chebyshev's polynomials, px, by powers of x, then of y.
+        across, down: coefficients of Legendre's polynomials, px, by powers of x, then of y.
     """
 
     shape: tuple[int, int]
@@ -29,7 +29,7 @@ class Residual:
         """Displacement (n, 2) at pixel coordinates (n, 2), px; beyond the sensor as at its edge."""
         rows, columns = self.shape
         x, y = np.clip(2 * pixels / (columns - 1, rows - 1) - 1, -1, 1).T
-        both = [np.polynomial.chebyshev.chebval2d(x, y, c) for c in (self.across, self.down)]
+        both = [np.polynomial.legendre.legval2d(x, y, c) for c in (self.across, self.down)]
         return np.stack(both, axis=1)
 
 

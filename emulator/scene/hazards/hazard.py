@@ -29,6 +29,11 @@ class Strength:
     values: tuple[float, ...]
     default: float | None = None
 
+    @property
+    def usual(self) -> float:
+        """The strength where none is said."""
+        return self.values[-1] if self.default is None else self.default
+
 
 def key(default: Any, meaning: str, low: float = -math.inf, high: float = math.inf) -> Any:
     """A field of a hazard: what it is, with its unit, and its least and greatest value."""
@@ -71,6 +76,6 @@ class Hazard:
         ``looking`` says where the camera looks, for hazards that are somewhere.
         """
         del looking
-        whole = cls.__dataclass_fields__[cls.strength.key].type is int
+        whole = cls.__dataclass_fields__[cls.strength.key].type in (int, int | None)
         values: dict[str, Any] = {cls.strength.key: int(strength) if whole else strength}
         return cls(seed=int(generator.integers(2**31)), **values)

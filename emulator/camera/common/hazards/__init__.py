@@ -1,7 +1,24 @@
 """What makes pictures hard in sensor and lens, for all cameras."""
 
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
-from cubestack.emulator.camera.common.hazards.pixels import HotPixels
+from cubestack.emulator.camera.common.hazards.dose import Dose
+from cubestack.emulator.camera.common.hazards.lenses import Defocus, FocalLength, LensResiduals
+from cubestack.emulator.camera.common.hazards.pixels import HotPixels, Response
+from cubestack.emulator.camera.common.hazards.protons import Protons
+from cubestack.emulator.camera.common.hazards.veils import Background, Gradient
 
-HAZARDS: dict[str, type[SensorHazard]] = {hazard.name: hazard for hazard in (HotPixels,)}
+HAZARDS: dict[str, type[SensorHazard]] = {
+    hazard.name: hazard
+    for hazard in (
+        Protons,
+        Dose,
+        HotPixels,
+        Response,
+        Defocus,
+        FocalLength,
+        LensResiduals,
+        Gradient,
+        Background,
+    )
+}
 """All of them by name: what scene files, the command line and documents know."""

@@ -1,0 +1,94 @@
+"""Lenses that are not as the firmware takes them to be: out of focus, longer, crooked."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from cubestack.emulator.camera.common.hazards.contract import Lens, SensorHazard
+from cubestack.emulator.camera.common.residual import Residual
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+CALIBRATED_C = 20.0
+"""Temperature at which lenses are in focus and as long as the firmware takes them to be."""
+
+ORDERS = range(2, 5)
+"""Of the residual's polynomials: lower ones would be a turn, a scale, or a shear of the picture."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Defocus(SensorHazard):
+    """A point's image is wider.
+
+    A cone of light that ends before or behind the sensor is a disc there, as wide as the distance
+    by the f-number; its standard deviation along one axis is a quarter of that. It is given that
+    standard deviation, but its shape is Gaussian.
+    """
+
+    name: ClassVar[str] = "defocus"
+    meaning: ClassVar[str] = "a lens out of focus, by temperature or by the spot's width"
+    strength: ClassVar[Strength] = Strength("sigma_px", "px", (1, 1.5, 2, 3, 4, 6), 3)
+
+    sigma_px: float | None = key(None, "standard deviation of the whole spot, px", 0.3, 20)
+    um_per_k: float = key(0.5, "else: shift of the focus, um for each K away from 20 C", -50, 50)
+
+    def lens(self, lens: Lens, temperature_c: float) -> Lens:
+        """The lens with another spot."""
+        if self.sigma_px is not None:
+            return replace(lens, spot_px=self.sigma_px)
+        disc_um = self.um_per_k * (temperature_c - CALIBRATED_C) / lens.f_number
+        return replace(lens, spot_px=math.hypot(lens.spot_px, disc_um / lens.pitch_um / 4))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FocalLength(SensorHazard):
+    """The picture is larger or smaller about its principal point, distortion and all."""
+
+    name: ClassVar[str] = "focal-length"
+    meaning: ClassVar[str] = "another focal length than calibrated"
+    strength: ClassVar[Strength] = Strength("percent", "%", (0, 0.1, 0.3, 0.5, 1, 3), 1)
+
+    percent: float = key(0.0, "longer at 20 C, per cent", -10, 10)
+    ppm_per_k: float = key(20.0, "longer for each K above 20 C, millionths", -500, 500)
+
+    @classmethod
+    def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
+        """Longer or shorter by this."""
+        return replace(
+            super().placed(strength, looking, generator),
+            percent=strength * float(generator.choice([-1, 1])),
+        )
+
+    def lens(self, lens: Lens, temperature_c: float) -> Lens:
+        """The longer lens."""
+        warm = 1 + self.ppm_per_k * 1e-6 * (temperature_c - CALIBRATED_C)
+        return replace(lens, scale=lens.scale * (1 + self.percent / 100) * warm)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LensResiduals(SensorHazard):
+    """A smooth distortion beside the calibrated one: polynomials of second to fourth order, drawn.
+
+    They are Legendre's, so in the mean over the sensor they neither shift nor scale nor turn it.
+    """
+
+    name: ClassVar[str] = "lens-residuals"
+    meaning: ClassVar[str] = "a smooth distortion that no calibration knows"
+    strength: ClassVar[Strength] = Strength("rms_px", "px", (0, 0.1, 0.2, 0.5, 1, 2), 0.5)
+
+    rms_px: float = key(0.3, "root of the mean squared displacement over the sensor, px", 0, 10)
+
+    def lens(self, lens: Lens, temperature_c: float) -> Lens:
+        """The lens that displaces."""
+        del temperature_c
+        generator = np.random.default_rng([self.seed, 0x2E5])
+        size = ORDERS.stop
+        coefficients = generator.standard_normal((2, size, size))
+        order = np.add.outer(np.arange(size), np.arange(size))
+        coefficients[:, ~np.isin(order, ORDERS)] = 0
+        odd = 2 * np.arange(size) + 1
+        square = (coefficients**2 / np.outer(odd, odd)).sum()
+        coefficients *= self.rms_px / math.sqrt(square)
+        across, down = (tuple(map(tuple, axis)) for axis in coefficients.tolist())
+        return replace(lens, residuals=(*lens.residuals, Residual(lens.shape, across, down)))

@@ -1,0 +1,69 @@
+"""Light that lies over the picture: stand-ins for stray light, by grey values.
+
+Whatever the exposure and the gain, they bring the grey values that they are declared with.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, SensorHazard
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gradient(SensorHazard):
+    """A slope of light from one corner or edge to the opposite one."""
+
+    name: ClassVar[str] = "gradient"
+    meaning: ClassVar[str] = "a slope of stray light across the picture"
+    strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 60), 60)
+
+    counts: float = key(30.0, "grey values at its bright end; 0 at the other one", 0, 255)
+
+    def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
+        """The slope's light."""
+        del generator
+        return _slope(self.seed, exposure.shape) * np.float32(
+            self.counts * exposure.electrons_per_count
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Background(SensorHazard):
+    """An even level, with noise beyond its own shot noise."""
+
+    name: ClassVar[str] = "background"
+    meaning: ClassVar[str] = "an even level of stray light, and noise"
+    strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 80), 20)
+
+    counts: float = key(20.0, "grey values that it adds", 0, 255)
+    sigma: float = key(4.0, "standard deviation of further noise, grey values", 0, 100)
+
+    @classmethod
+    def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
+        """With noise of a fifth of the level."""
+        return replace(super().placed(strength, looking, generator), sigma=strength / 5)
+
+    def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
+        """The level."""
+        del generator
+        level = np.float32(self.counts * exposure.electrons_per_count)
+        return np.full(exposure.shape, level, np.float32)
+
+    def noise(self, exposure: Exposure) -> float:
+        """The further noise."""
+        return self.sigma * exposure.electrons_per_count
+
+
+@lru_cache(maxsize=4)
+def _slope(seed: int, shape: tuple[int, int]) -> Field:
+    """From 0 to 1 in the direction that ``seed`` stands for."""
+    angle = 2 * math.pi * np.random.default_rng([seed, 0x62AD]).random()
+    y, x = np.ogrid[-1 : 1 : shape[0] * 1j, -1 : 1 : shape[1] * 1j]
+    slope = math.cos(angle) * x + math.sin(angle) * y
+    half = abs(math.cos(angle)) + abs(math.sin(angle))
+    return np.asarray((slope / half + 1) / 2, np.float32)

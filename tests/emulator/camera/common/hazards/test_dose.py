@@ -1,0 +1,45 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.hazards.contract import Exposure
+from cubestack.emulator.camera.common.hazards.dose import Dose
+from cubestack.emulator.scene.file import SceneError
+
+WARM = Exposure((512, 1024), 5.6, 0.3856, 27.0, 36.48)
+
+
+def charge(hazard: Dose, exposure: Exposure = WARM, seed: int = 0) -> np.ndarray:
+    image = hazard.charge(exposure, np.random.default_rng(seed))
+    assert image is not None
+    return image
+
+
+def test_mean_dark_current_is_that_of_the_universal_damage_factor() -> None:
+    # Srour and Lo: (1.9 +- 0.6)e5 / (cm3 s) for each MeV/g at 300 K. 1 krad has 2.5e6 MeV/g here.
+    volume_cm3 = 5.6e-4**2 * 3e-4
+    expected = 1.9e5 * 2.5e6 * volume_cm3
+    mean = charge(Dose(krad=1.0)).mean() / WARM.seconds
+    assert expected * 1.3 / 1.9 < mean < expected * 2.5 / 1.9
+
+
+def test_number_grows_with_dose_and_strength_with_temperature_only() -> None:
+    small, large = charge(Dose(krad=0.1)), charge(Dose(krad=1.0))
+    assert np.sum(large > 0) == pytest.approx(10 * np.sum(small > 0), rel=0.1)
+    assert large[large > 0].mean() == pytest.approx(small[small > 0].mean(), rel=0.1)
+    hotter = charge(Dose(krad=1.0), replace(WARM, temperature_c=35.0))
+    np.testing.assert_allclose(hotter, 2 * large, rtol=1e-5)
+
+
+def test_places_are_the_sensor_s_in_every_frame() -> None:
+    first = charge(Dose(krad=1.0, seed=4), seed=1)
+    np.testing.assert_array_equal(first, charge(Dose(krad=1.0, seed=4), seed=2))
+    assert np.any(first != charge(Dose(krad=1.0, seed=5), seed=1))
+
+
+def test_no_dose_is_no_damage() -> None:
+    assert not charge(Dose(krad=0.0)).any()
+    assert Dose(krad=0.0).dark_rise() == 1
+    with pytest.raises(SceneError, match=r"krad of the hazard dose must be in 0..30, not 31"):
+        Dose(krad=31.0)

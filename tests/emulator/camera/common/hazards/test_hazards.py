@@ -1,0 +1,143 @@
+"""All hazards of sensor and lens, in pictures of both star cameras."""
+
+import inspect
+import time
+from dataclasses import fields, replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.hazards import HAZARDS, Background, Gradient, HotPixels
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.common.shutter import RollingShutter
+from cubestack.emulator.camera.mlx75412 import lens as cubestar
+from cubestack.emulator.camera.mlx75412.imager import Corrections, Mlx75412Imager
+from cubestack.emulator.camera.mt9m001 import lens as aramis
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.registers import read_settings
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.sky import PictureScene, SkyScene
+from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+
+SHUTTER = RollingShutter(10**12, Fraction(132_200_000), 2917, 2917)
+ORION = SkyScene.pointing(83.8, -1.0)
+DARK = replace(ORION, mag_limit=-5.0)
+CAMERAS = ("cubestar", "aramis")
+
+
+def picture(
+    camera: str,
+    *hazards: SensorHazard,
+    scene: SkyScene | PictureScene = ORION,
+    readout_ps: int = 10**12,
+    **condition: object,
+) -> np.ndarray:
+    shutter = replace(SHUTTER, readout_ps=readout_ps)
+    if camera == "cubestar":
+        like = replace(cubestar.CONDITION, hazards=hazards, **condition)  # type: ignore[arg-type]
+        return Mlx75412Imager(1).picture(scene, like, shutter, Corrections())
+    like = replace(aramis.CONDITION, hazards=hazards, **condition)  # type: ignore[arg-type]
+    return Mt9m001Imager(1).picture(scene, like, shutter, read_settings(RegisterFile(REGISTERS)))
+
+
+@pytest.mark.parametrize("hazard", HAZARDS.values(), ids=list(HAZARDS))
+def test_each_says_what_it_and_its_keys_are(hazard: type[SensorHazard]) -> None:
+    assert HAZARDS[hazard.name] is hazard
+    assert hazard.meaning
+    assert 5 <= len(hazard.strength.values) <= 7
+    assert hazard.strength.key in {entry.name for entry in fields(hazard)}
+    assert all(entry.metadata["meaning"] for entry in fields(hazard))
+    assert inspect.getdoc(hazard)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("hazard", HAZARDS.values(), ids=list(HAZARDS))
+def test_the_worst_strength_shows_and_repeats(hazard: type[SensorHazard], camera: str) -> None:
+    worst = hazard.placed(hazard.strength.values[-1], None, np.random.default_rng(1))
+    first = picture(camera, worst)
+    np.testing.assert_array_equal(first, picture(camera, worst))
+    assert np.mean(first != picture(camera)) > 1e-4
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"defocus", "response"}))
+def test_the_least_strength_is_none(name: str, camera: str) -> None:
+    hazard = HAZARDS[name]
+    least = hazard.placed(hazard.strength.values[0], None, np.random.default_rng(1))
+    np.testing.assert_array_equal(picture(camera, least), picture(camera))
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("counts", [10.0, 60.0])
+def test_a_gradient_ends_at_its_counts(camera: str, counts: float) -> None:
+    one = picture(camera, Gradient(counts=counts, seed=2), scene=DARK, noise=False).astype(int)
+    added = one - picture(camera, scene=DARK, noise=False)
+    assert added.min() <= 1
+    assert added.max() == pytest.approx(counts, abs=1)
+    assert np.median(added) == pytest.approx(counts / 2, abs=1)
+    across = Gradient(counts=counts, seed=3)
+    assert np.any(picture(camera, across, scene=DARK, noise=False) != one)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_background_has_its_level_and_its_noise(camera: str) -> None:
+    counts = picture(camera, Background(counts=20.0, sigma=4.0), scene=DARK, hot_pixels=0)
+    added = counts.astype(float) - picture(camera, scene=DARK, hot_pixels=0, noise=False)
+    assert added.mean() == pytest.approx(20, abs=1)
+    assert added.std() == pytest.approx(4, abs=0.3)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_hot_pixels_are_those_of_the_key_and_stay(camera: str) -> None:
+    as_key = picture(camera, scene=DARK, hot_pixels=520)
+    as_hazard = picture(camera, HotPixels(count=500), scene=DARK, hot_pixels=20)
+    np.testing.assert_array_equal(as_key, as_hazard)
+    later = picture(camera, HotPixels(count=500), scene=DARK, readout_ps=3 * 10**12)
+    assert np.sum((as_hazard > 30) & (later > 30)) > 0.8 * np.sum(as_hazard > 30) > 40
+
+
+def test_more_hot_pixels_than_pixels_are_refused() -> None:
+    with pytest.raises(SceneError, match="hot_pixels must be at most 524288, not 524289"):
+        replace(cubestar.CONDITION, hazards=(HotPixels(count=289),), hot_pixels=524_000)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_other_frames_have_other_protons_but_the_same_damage(camera: str) -> None:
+    def bright(name: str, readout_ps: int) -> set[int]:
+        hazard = HAZARDS[name].placed(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
+        frame = picture(camera, hazard, scene=DARK, readout_ps=readout_ps, hot_pixels=0)
+        return set(np.flatnonzero(frame > 30).tolist())
+
+    protons, again = bright("protons", 10**12), bright("protons", 2 * 10**12)
+    assert min(len(protons), len(again)) > 50
+    assert len(protons & again) < 0.2 * len(protons)
+    damage, later = bright("dose", 10**12), bright("dose", 2 * 10**12)
+    assert len(damage & later) > 0.8 * len(damage) > 100
+
+
+def test_a_photograph_has_what_happens_in_the_sensor(striped: PictureScene) -> None:
+    own = picture("cubestar", scene=striped)
+    np.testing.assert_array_equal(own, striped.pixels)
+    veiled = picture("cubestar", Background(counts=20.0, sigma=0.0), scene=striped)
+    np.testing.assert_array_equal(veiled, own + 20)
+    noisy = picture("cubestar", Background(counts=20.0, sigma=4.0), scene=striped)
+    assert (noisy.astype(int) - own).std() == pytest.approx(4, rel=0.02)
+    focal = HAZARDS["focal-length"](percent=3.0)  # type: ignore[call-arg]
+    np.testing.assert_array_equal(picture("cubestar", focal, scene=striped), own)
+
+
+@pytest.mark.parametrize("name", ["protons", "hot-pixels"])
+def test_a_frame_with_it_takes_little_longer(name: str) -> None:
+    hazard = HAZARDS[name].placed(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
+
+    def seconds(*hazards: SensorHazard) -> float:
+        times = []
+        for _ in range(5):
+            start = time.process_time()
+            picture("cubestar", *hazards, scene=DARK)
+            times.append(time.process_time() - start)
+        return min(times)
+
+    assert seconds(hazard) - seconds() < 0.1  # measured: below 10 ms

@@ -1,0 +1,90 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+from cubestack.emulator.camera.common.hazards.lenses import Defocus, FocalLength, LensResiduals
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.camera.mt9m001.lens import CONDITION as ARAMIS
+from cubestack.emulator.scene.file import SceneError
+
+GRID = np.stack(np.meshgrid(np.linspace(0, 1023, 41), np.linspace(0, 511, 31)), -1).reshape(-1, 2)
+
+
+def lens(
+    *hazards: SensorHazard, condition: SkyCondition = CONDITION, celsius: float = 20
+) -> Optics:
+    return replace(condition, hazards=hazards, temperature_c=celsius).lens
+
+
+def test_without_a_hazard_the_optics_are_the_very_same() -> None:
+    assert CONDITION.lens is LENS
+    assert lens(Defocus(), FocalLength()) is LENS  # in focus and as long as it should be at 20 C
+
+
+@pytest.mark.parametrize("percent", [-3.0, 0.5, 1.0])
+def test_focal_length_moves_stars_away_from_the_principal_point(percent: float) -> None:
+    stars = LENS.unproject(GRID)
+    centre = np.array([LENS.cx, LENS.cy])
+    moved = lens(FocalLength(percent=percent)).project(stars)
+    np.testing.assert_allclose(moved - centre, (GRID - centre) * (1 + percent / 100), atol=1e-8)
+
+
+def test_focal_length_follows_the_temperature() -> None:
+    warm = lens(FocalLength(ppm_per_k=50.0), celsius=60)
+    assert warm.focal_length_mm == pytest.approx(6.28 * 1.002)
+
+
+def test_focal_lengths_are_placed_on_both_sides() -> None:
+    placed = {FocalLength.placed(1, None, np.random.default_rng(s)).percent for s in range(20)}
+    assert placed == {-1, 1}
+
+
+@pytest.mark.parametrize(("condition", "f", "pitch"), [(CONDITION, 1.256, 5.6), (ARAMIS, 1.2, 5.2)])
+def test_defocus_by_temperature_is_the_cone_s_width(
+    condition: SkyCondition, f: float, pitch: float
+) -> None:
+    # 40 um before the focus; the standard deviation of an even disc, along one axis: radius / 2.
+    blurred = lens(Defocus(um_per_k=1.0), condition=condition, celsius=60)
+    disc = 40 / f / 2 / 2 / pitch
+    own = condition.optics.psf_sigma_px
+    assert blurred.psf_sigma_px == pytest.approx(np.hypot(own, disc), rel=0.01)
+
+
+def test_defocus_by_width_is_the_whole_spot() -> None:
+    assert lens(Defocus(sigma_px=3.0), celsius=60).psf_sigma_px == 3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_residuals_have_their_rms_and_are_no_turn_or_scale(seed: int) -> None:
+    crooked = lens(LensResiduals(rms_px=0.5, seed=seed))
+    y, x = np.mgrid[0:512:8, 0:1024:8]
+    pixels = np.stack([x.ravel(), y.ravel()], 1) + 3.5
+    by = crooked.project(LENS.unproject(pixels)) - pixels
+    assert np.sqrt((by**2).sum(axis=1).mean()) == pytest.approx(0.5, rel=0.01)
+    plane = np.column_stack([pixels, np.ones(len(pixels))])
+    fitted = plane @ np.linalg.lstsq(plane, by, rcond=None)[0]
+    assert np.abs(fitted).max() < 0.02
+
+
+def test_residuals_can_be_undone() -> None:
+    crooked = lens(LensResiduals(rms_px=2.0, seed=1), FocalLength(percent=1.0))
+    np.testing.assert_allclose(crooked.project(crooked.unproject(GRID)), GRID, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("hazard", "values", "refused"),
+    [
+        (Defocus, {"sigma_px": 21.0}, r"sigma_px of the hazard defocus must be in 0.3..20"),
+        (FocalLength, {"percent": 11.0}, r"percent of the hazard focal-length must be in -10..10"),
+        (LensResiduals, {"rms_px": -0.1}, r"rms_px of the hazard lens-residuals must be in 0..10"),
+    ],
+)
+def test_what_can_not_be_is_refused(
+    hazard: type[SensorHazard], values: dict[str, float], refused: str
+) -> None:
+    with pytest.raises(SceneError, match=refused):
+        hazard(**values)  # type: ignore[arg-type]

@@ -1,0 +1,104 @@
+"""Against figures of NIST's PSTAR and of published measurements, not against the formulas."""
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.hazards.contract import Exposure
+from cubestack.emulator.camera.common.hazards.protons import (
+    PAIR_EV,
+    Protons,
+    lost_kev,
+    mean_loss_kev,
+)
+from cubestack.emulator.scene.file import SceneError
+
+CUBESTAR = Exposure((512, 1024), 5.6, 0.3856, 20.0, 36.48)
+ONE = np.ones(1)
+
+
+def drawn(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def charge(hazard: Protons, seed: int = 0, exposure: Exposure = CUBESTAR) -> np.ndarray:
+    image = hazard.charge(exposure, drawn(seed))
+    return np.zeros(exposure.shape, np.float32) if image is None else image
+
+
+# PSTAR, silicon, total stopping power in MeV cm2/g; 2.329 g/cm3.
+@pytest.mark.parametrize(("mev", "pstar"), [(10, 34.6), (50, 9.9), (100, 5.8), (1000, 1.77)])
+def test_mean_loss_is_the_published_stopping_power(mev: float, pstar: float) -> None:
+    assert mean_loss_kev(mev * ONE, ONE)[0] == pytest.approx(pstar * 0.2329, rel=0.03)
+
+
+def test_least_ionising_protons_free_some_fifty_electrons_a_um_in_thin_layers() -> None:
+    # Measured: most probable 0.19 to 0.23 keV/um in 5.6 to 10 um; some 80 pairs in 300 um.
+    many = np.ones(40_000)
+    thin = lost_kev(2500 * many, 8 * many, drawn(1)) / 8
+    counts, edges = np.histogram(thin, 60, (0, 0.6))
+    assert edges[np.argmax(counts)] == pytest.approx(0.19, abs=0.03)
+    thick = np.median(lost_kev(2500 * many, 300 * many, drawn(2))) / 300
+    assert thick * 1000 / PAIR_EV == pytest.approx(80, rel=0.1)
+
+
+def test_slow_protons_free_thousands() -> None:
+    many = np.ones(20_000)
+    electrons = lost_kev(20 * many, 8 * many, drawn(3)) * 1000 / PAIR_EV
+    # 20 MeV: 19.7 MeV cm2/g, of which fast delta rays take a little; 3.65 eV a pair.
+    assert electrons.mean() == pytest.approx(19.7 * 0.2329 * 8 * 1000 / 3.65, rel=0.1)
+    assert electrons.min() > 0
+
+
+def test_as_many_hits_as_rate_area_and_exposure_say() -> None:
+    # 0.1644 cm2 for 0.3856 s at 500 / (cm2 s).
+    assert Protons().mean_hits(CUBESTAR) == pytest.approx(31.7, rel=0.01)
+    quiet = Protons(orbit="quiet")
+    hit = sum(bool(charge(quiet, seed).any()) for seed in range(400))
+    assert hit / 400 == pytest.approx(1 - np.exp(-0.0634), abs=0.04)
+
+
+def test_tracks_are_as_long_as_isotropic_incidence_says() -> None:
+    # Squared cosines of the angle of incidence are even: half of the tracks go more than as far
+    # across as the layer is deep, a tenth three times that.
+    lengths = []
+    for seed in range(600):
+        image = charge(Protons(hits=1, orbit="quiet"), seed)
+        y, x = np.nonzero(image)
+        if len(x):
+            spread = sum(np.cov(axis * 5.6, aweights=image[y, x], ddof=0) for axis in (x, y))
+            # An even line's variance, and that of diffusion and pixels in both axes.
+            lengths.append(np.sqrt(max(12 * (spread - 2 * 2.0**2 - 2 * 5.6**2 / 12), 0)))
+    assert np.median(lengths) == pytest.approx(8, rel=0.2)
+    assert np.quantile(lengths, 0.9) == pytest.approx(24, rel=0.25)
+
+
+def test_charge_of_all_tracks_is_what_they_lost() -> None:
+    hits = 3000
+    total = charge(Protons(hits=hits)).sum()
+    generator = drawn(9)
+    energies = np.clip(60 * 2.5 ** generator.standard_normal(hits), 5, 1e5)
+    paths = 8 / np.maximum(np.sqrt(generator.random(hits)), 0.02)
+    near = (lost_kev(energies, paths, generator) * 1000 / PAIR_EV).sum()
+    # Delta rays leave a few percent more; some charge falls beside the sensor.
+    assert 0.9 * near < total < 1.2 * near
+
+
+def test_the_same_frame_has_the_same_tracks_and_another_has_others() -> None:
+    first = charge(Protons(hits=100), 1)
+    np.testing.assert_array_equal(first, charge(Protons(hits=100), 1))
+    other = charge(Protons(hits=100), 2)
+    assert np.sum((first > 0) & (other > 0)) < 0.05 * np.sum(first > 0)
+    assert Protons(hits=0).charge(CUBESTAR, drawn(0)) is None
+
+
+@pytest.mark.parametrize(
+    ("values", "refused"),
+    [
+        ({"orbit": "moon"}, r"orbit must be one of \['quiet', 'anomaly', 'solar'\], not 'moon'"),
+        ({"hits": -1}, "hits of the hazard protons must be in 0..20000, not -1"),
+        ({"depth_um": 0.0}, "depth_um of the hazard protons must be in 1..50, not 0"),
+    ],
+)
+def test_what_can_not_be_is_refused(values: dict[str, object], refused: str) -> None:
+    with pytest.raises(SceneError, match=refused):
+        Protons(**values)  # type: ignore[arg-type]
