@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cubestack.firmware_model.attitude.field import Field, field_of
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -47,6 +48,11 @@ def camera_parameters(settings: Settings) -> CameraParameters:
         settings.get("setFocalLength", "FocalLength"),
         **{name.lower(): value for name, value in values.items()},
     )
+
+
+def field(settings: Settings) -> Field:
+    """Which directions lie in the picture."""
+    return field_of(camera_parameters(settings), COLUMNS, ROWS)
 
 
 def field_cosine(camera: CameraParameters) -> np.float32:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
+from cubestack.firmware_model.cubestar.matching.triangles import MOST_PAIRS
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
@@ -73,7 +74,8 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         # angle; first entry and number of entries in the pair list
         "pairs of stars": pairs * (4 + 2 + 2),
         "votes": stars * listed * 2,
-        "identities that still stand": stars * listed,
+        # star, older centroid and its star, next of the same star
+        "pairs with the newest star": MOST_PAIRS * (2 + 1 + 2 + 2),
         "agreement of the stars": stars * stars,
         "marks of the reduced catalogue": listed,
         "reduced pair list": _largest_reduction(catalogue) * (2 + 2 + 4),

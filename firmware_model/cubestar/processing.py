@@ -15,15 +15,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.attitude.confirmation import scaled
 from cubestack.firmware_model.attitude.geometry import direction_of, undistort, unit_vectors
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.cubestar import configuration, phases
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection import Detection, SearchEnd
+from cubestack.firmware_model.cubestar.matching import confirmed, voting
 from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
 from cubestack.firmware_model.cubestar.matching.tracking import track
-from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, identify
+from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import IdMode, MatchMode, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
@@ -42,7 +44,9 @@ _OUTCOME_FLAGS = {
     MatchOutcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
     MatchOutcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
     MatchOutcome.MIRRORED: "IDError",
-    MatchOutcome.CHANCE: "IDError",
+    MatchOutcome.UNCONFIRMED: "IDError",
+    MatchOutcome.AMBIGUOUS: "IDError",
+    MatchOutcome.NO_TIME: "IDError",
 }
 
 
@@ -210,13 +214,19 @@ class Processing:
                 radius_deg=self._radius_deg(mode),
             )
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
-        return identify(
+        if self._switches.voting == "algorithm-2":
+            return voting.identify(
+                vectors, catalogue, meter, boresight=boresight, margin_rad=margin
+            )
+        detection = self.results.detection
+        return confirmed.identify(
             vectors,
+            None if detection is None else detection.intensities,
             catalogue,
+            configuration.field(self.state.settings),
             meter,
             boresight=boresight,
             margin_rad=margin,
-            printed=self._switches.voting == "algorithm-2",
         )
 
     def _expected_boresight(self) -> NDArray[np.float32]:
@@ -291,7 +301,8 @@ class Processing:
         inertial = self.catalogue.vectors[identification.stars[kept]]
         weights = identification.votes[kept].astype(np.float32)
         try:
-            quaternion = quest(results.vectors[kept], inertial, weights, self.meter)
+            measured = scaled(results.vectors[kept], 1 / identification.scale, self.meter)
+            quaternion = quest(measured, inertial, weights, self.meter)
         except AttitudeError:
             self._step_back()
             return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")

@@ -54,7 +54,7 @@ def main() -> None:
             for _ in range(frames):
                 rays, stars = centroids_alone(rng, v, false)
                 meter = Meter(CORTEX_M3)
-                found = identify(rays, catalogue, meter, margin_rad=margin_rad, printed=True)
+                found = identify(rays, catalogue, meter, margin_rad=margin_rad)
                 named = found.stars[found.matched] == stars[found.matched]
                 listed = max(1, np.count_nonzero(stars >= 0))
                 rows.append((named.sum() > 2, not named.all(), named.sum() / listed))

@@ -6,8 +6,9 @@ kept stars contradict each other; they can be thinned until every pair of them a
 that share an identity then count as a contradiction, however close they are.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+from math import nan
 from typing import Self
 
 import numpy as np
@@ -27,7 +28,9 @@ class MatchOutcome(Enum):
     TOO_FEW_CENTROIDS = "there were fewer centroids than an attitude needs"
     TOO_FEW_MATCHED = "fewer stars agreed with each other than an attitude needs"
     MIRRORED = "the stars agree with the mirror image of the sky only"
-    CHANCE = "so few stars among so many centroids agree by chance too often"
+    UNCONFIRMED = "no attitude is confirmed by more stars than chance would give"
+    AMBIGUOUS = "two attitudes are confirmed"
+    NO_TIME = "no time was left to try more attitudes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +43,20 @@ class Identification:
         votes: (n,) verification votes of each centroid: other centroids that confirmed the
             identity which it was given before the final selection.
         outcome: how it ended.
+        false_alarm: wrong attitudes to be expected in such a picture that would be confirmed as
+            well; nan where nothing is confirmed by its stars.
+        expected: catalogue stars that the attitude puts into the picture.
+        residuals: (n,) angle in rad between each centroid and its star; nan without identity.
+        scale: tangents of measured field angles over true ones; 1 where the focal length is right.
     """
 
     stars: NDArray[np.int32]
     votes: NDArray[np.uint8]
     outcome: MatchOutcome
+    false_alarm: float = nan
+    expected: int = 0
+    residuals: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
+    scale: float = 1.0
 
     @property
     def matched(self) -> NDArray[np.intp]:

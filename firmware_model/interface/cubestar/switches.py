@@ -10,12 +10,12 @@ class CubeStarSwitches(Switches):
     """Switches of the algorithms; all sections are those of the CubeStar thesis."""
 
     voting: str = switch(
-        "how identities are voted for",
+        "how stars are identified",
         "algorithm-2",
-        "rounds",
+        "confirmed",
         source="section 4.3.3, Algorithm 2",
-        reason="one round leaves wrong stars among false ones; repeated rounds over the same "
-        "entries, and refusing ties, mirror images and chance, leave none",
+        reason="votes name wrong stars among false ones; an attitude that triangles propose is "
+        "believed when chance would confirm it less than once in 100 000 pictures",
     )
     weights: str = switch(
         "what a pixel weighs in its star's centroid",

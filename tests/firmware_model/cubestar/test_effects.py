@@ -417,7 +417,7 @@ def test_set_tracking_mode(unit: Harness) -> None:
 def test_set_id_margin(unit: Harness, sky: Sky) -> None:
     unit.command("setIDMargin", Margin=0.0001)
     unit.shown("IDMargin", Margin=0.0001)
-    unit.command("setFocalLength", FocalLength=6.30)  # angles are wrong by 3 parts in 1000
+    unit.command("setRadialDistortionGains", K1=-0.3, K2=-0.12456)  # places are wrong by pixels
     first(unit, sky)
     unit.command("IDStars")
     assert unit.status() is TaskStatus.IDENTIFICATION_FAILED

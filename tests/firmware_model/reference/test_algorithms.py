@@ -132,7 +132,7 @@ def test_pictures_give_the_same_bits_from_centroid_to_attitude(
         assert bits(program.undistort(expected.centroids, camera)) == bits(points)
         vectors = geometry.unit_vectors(points, camera, METER)
         assert bits(program.unit_vectors(points, camera)) == bits(vectors)
-        identities = identify(vectors, listed, METER, printed=True)
+        identities = identify(vectors, listed, METER)
         assert_same_identities(program.identify(vectors, None, 0.001), identities)
         solve(program, vectors, identities, listed)
         named += identities.outcome is MatchOutcome.IDENTIFIED
@@ -188,8 +188,8 @@ def test_random_centroids_are_identified_alike(
         rotation = rotation.astype(np.float32)
         near = rotation[2]
         expected = [
-            identify(vectors, listed, METER, margin_rad=margin, printed=True),
-            identify(vectors, listed, METER, boresight=near, margin_rad=margin, printed=True),
+            identify(vectors, listed, METER, margin_rad=margin),
+            identify(vectors, listed, METER, boresight=near, margin_rad=margin),
             track(
                 vectors,
                 listed,
@@ -225,7 +225,7 @@ def test_random_centroids_are_identified_alike(
 
 def test_what_is_no_number_harms_neither(program: Algorithms, listed: StarCatalogue) -> None:
     vectors = np.array([[np.nan] * 3, [0, 0, 1], [0.1, 0, 0.995]], np.float32)
-    expected = identify(vectors, listed, METER, printed=True)
+    expected = identify(vectors, listed, METER)
     assert_same_identities(program.identify(vectors, None, 0.001), expected)
     for nothing in (0, 1):
         found = program.track(vectors[:nothing], np.eye(3, dtype=np.float32))

@@ -74,7 +74,7 @@ def test_help(run: Run, command: str | None) -> None:
         (("emulate", "cubestar", "--mcu-addressing"), ("--mcu-addressing", "cubesense")),
         (("emulate", "cubestar", "aramis", "--scene", "a.toml"), ("--scene", "several")),
         (("emulate", "cubestar", "aramis", "--record", "a"), ("--record", "several")),
-        (("emulate", "cubestar", "aramis", "--set", "voting=rounds"), ("--set", "several")),
+        (("emulate", "cubestar", "aramis", "--set", "voting=confirmed"), ("--set", "several")),
         (("emulate", "cubestar", "--i2c", "256"), ("256", "255")),
         (("emulate", "cubestar", "--baud", "0"), ("baud", "0")),
         (("emulate", "cubestar", "--pace", "slow"), ("slow", "fast")),

@@ -112,9 +112,9 @@ def test_a_session_of_each_device_replays(tmp_path, run, device, commands):
 def test_a_recording_has_its_profile_and_without_one_is_of_the_extended(tmp_path, run):
     made, header = (
         tmp_path / "session.rec",
-        '"options":{"profile":"extended","set":"voting=rounds"}',
+        '"options":{"profile":"extended","set":"voting=confirmed"}',
     )
-    said = ("--profile", "extended", "--set", "voting=rounds", "--record", made)
+    said = ("--profile", "extended", "--set", "voting=confirmed", "--record", made)
     commands = "write CaptureAndProcess; read Quaternion; write Exposure 9; read DetectionSummary"
     assert run("shell", "emulated:cubestar", *said, "-c", commands).code == 0
     text = made.read_text()
@@ -124,7 +124,7 @@ def test_a_recording_has_its_profile_and_without_one_is_of_the_extended(tmp_path
     outcome = run("replay", made)
     assert (outcome.code, "no difference" in outcome.out) == (0, True)
     assert "namesnoprofile" in "".join(outcome.err.split())
-    made.write_text(text.replace('"extended","set":"voting=rounds"', '"published"'))
+    made.write_text(text.replace('"extended","set":"voting=confirmed"', '"published"'))
     assert run("replay", made).code == 1
 
 

@@ -109,7 +109,7 @@ def test_a_scene_file_chooses_the_profile_unless_something_else_is_said(tmp_path
         return cubestar.open_board(*scene, switches=switches, **options)
 
     watched = replace(cubestar, open_board=open_board)
-    for options in ({}, {"profile": "published"}, {"set": "voting=rounds"}):
+    for options in ({}, {"profile": "published"}, {"set": "voting=confirmed"}):
         with power_up(watched, path, **options) as device:
             assert given.pop() == CubeStarSwitches.of(*(said | options).values())
             assert device.chosen == said | options
@@ -130,8 +130,8 @@ def test_a_scene_file_chooses_the_profile_unless_something_else_is_said(tmp_path
         ("cubestar", 'profile = "best"', "profile of cubestar must be one of published, extended"),
         ("cubestar", "profile = 3", "profile must be text, not 3"),
         ("cubestar", 'set = "far"', "set: 'far' is not SWITCH=VALUE; switches: voting, weights"),
-        ("cubestar", 'set = "voting=far"', "switch voting must be one of algorithm-2, rounds"),
-        ("aramis", 'set = "voting=rounds"', "set: no switch 'voting'; switches: belief"),
+        ("cubestar", 'set = "voting=far"', "switch voting must be one of algorithm-2, confirmed"),
+        ("aramis", 'set = "voting=confirmed"', "set: no switch 'voting'; switches: belief"),
     ],
 )
 def test_what_a_scene_file_can_not_choose_is_named(

@@ -104,7 +104,7 @@ def charged(picture: NDArray[np.uint8], catalogue: StarCatalogue, meter: Meter) 
         points = undistort(detection.centroids, camera, meter)
     with meter.phase("vectors"):
         vectors = unit_vectors(points, camera, meter)
-    found = identify(vectors, listed, meter, printed=True)
+    found = identify(vectors, listed, meter)
     kept = found.matched
     with meter.phase("attitude"):
         weights = found.votes[kept].astype(np.float32)

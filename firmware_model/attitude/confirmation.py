@@ -1,0 +1,164 @@
+"""Whether an attitude can be believed: the stars that it predicts, beside the measured ones.
+
+An attitude puts catalogue stars into the picture. Those that stand where a star was measured speak
+for it, those that are missing against it. Say N stars are predicted besides those that the attitude
+was made from, and f of them are found. If it is wrong, a predicted star has a measured one in its
+reach by chance: with a probability c, the area of all reaches over that of the picture. If it is
+right, it is seen with a probability s that nobody knows: clouds of light, a high threshold or a
+short exposure hide stars. So every s from 0 to 1 counts alike, and the ratio of the likelihoods is
+
+    L = integral of s^f (1 - s)^(N - f) ds / (c^f (1 - c)^(N - f))
+      = 1 / ((N + 1) * C(N, f) * c^f * (1 - c)^(N - f))
+
+A wrong attitude reaches a ratio of L with a probability of at most 1 / L, whatever L is (Markov's
+inequality, as a ratio's mean over wrong ones is 1). With the number of wrong attitudes that could
+have been met on the way, 1 / L gives the false alarms to be expected in a picture: the measure of
+belief. A likelihood ratio decides so in Lang et al. 2010, "Astrometry.net", section 2.3, with a
+share of seen stars that is set.
+"""
+
+from math import comb, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.mcu.costs import Meter
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.intp]
+
+_HALF, _TWO, _ONE = np.float32(0.5), np.float32(2), np.float32(1)
+
+
+def matched(
+    measured: Floats, predicted: Floats, radius_rad: float, meter: Meter
+) -> tuple[Indices, Indices, Floats]:
+    """Measured (n, 3) and predicted (m, 3) unit vectors that are nearest to each other.
+
+    Returns rows of ``measured``, rows of ``predicted`` (k,) and their distances in rad; at most
+    ``radius_rad``, which must be small. Compared are squares of chords, which single precision
+    resolves better than cosines; most candidates fall out by the first component, as an integer.
+    """
+    count, compared = len(measured) + len(predicted), len(measured) * len(predicted)
+    if compared == 0:
+        nothing = np.zeros(0, np.intp)
+        return nothing, nothing, np.zeros(0, np.float32)
+    apart = predicted[:, None, :] - measured[None, :, :]
+    square = apart * apart
+    chord2 = square.sum(axis=2)
+    reach = np.float32(radius_rad)
+    near = int(np.count_nonzero(square[..., 0] <= reach * reach))
+    meter.charge(
+        f32_mul=count + 3 * near,
+        f32_convert=count,
+        f32_add=5 * near,
+        f32_compare=2 * near,
+        ram_read=compared + 4 * near,
+        i32_add=2 * compared,
+        loop=compared,
+    )
+    rows, nearest = np.arange(len(predicted)), chord2.argmin(axis=1)
+    smallest = chord2[rows, nearest]
+    kept = (chord2.argmin(axis=0)[nearest] == rows) & (smallest <= reach * reach)
+    return nearest[kept], rows[kept], np.sqrt(smallest[kept])
+
+
+def false_alarm(hypotheses: float, expected: int, found: int, chance: float, meter: Meter) -> float:
+    """Wrong attitudes to be expected that are confirmed as well as this one.
+
+    Args:
+        hypotheses: wrong attitudes to be expected among those tried so far; at least as many as
+            were tried where nothing better is known.
+        expected: catalogue stars predicted in the picture, besides those that made the attitude.
+        found: how many of them were found.
+        chance: that a measured star lies in reach of a predicted one by chance; see ``by_chance``.
+        meter: charged with the product, factor by factor.
+    """
+    meter.charge(f32_mul=3 * found + 2, f32_div=found, f32_convert=2 * found, f32_add=2, loop=found)
+    meter.charge(f32_mul=2 * max(expected - found, 1).bit_length())  # (1 - c)^(N - f) by squares
+    found = min(found, expected)
+    ways = (expected + 1) * comb(expected, found)
+    return float(hypotheses * ways * chance**found * (1 - chance) ** (expected - found))
+
+
+def by_chance(spare: int, radius_rad: float, solid_angle_sr: float) -> float:
+    """Probability that one of ``spare`` measured stars, strewn over a picture of a solid angle,
+    lies within a radius of a place."""
+    return min(spare * pi * radius_rad**2 / solid_angle_sr, 0.5)
+
+
+def scaled(directions: Floats, factor: float, meter: Meter) -> Floats:
+    """Unit vectors (n, 3) in camera axes with the tangents of their field angles multiplied by a
+    factor: what another focal length makes of them."""
+    if factor == 1.0:
+        return directions
+    count = len(directions)
+    meter.charge(f32_mul=8 * count, f32_add=2 * count, f32_sqrt=count, f32_div=count, loop=count)
+    longer = directions * np.array([factor, factor, 1.0], np.float32)
+    x, y, z = longer.T
+    lengths: Floats = np.sqrt(x * x + y * y + z * z)
+    return np.asarray(longer / lengths[:, None], np.float32)
+
+
+def correction(
+    measured: Floats, predicted: Floats, meter: Meter, *, with_scale: bool
+) -> tuple[Floats, float]:
+    """Small rotation (3, 3) of the predicted unit vectors (n, 3) and factor for the tangents of the
+    measured ones (n, 3) that bring both together by least squares; without scale the factor is 1.
+
+    Differences are taken as small: some 0.01 rad are left as 0.0001.
+    """
+    x, y, z = predicted.T
+    zero = np.zeros_like(x)
+    columns = [
+        np.concatenate([zero, -z, y]),
+        np.concatenate([z, zero, -x]),
+        np.concatenate([-y, x, zero]),
+    ]
+    if with_scale:
+        a, b, c = measured.T
+        outward = a * a + b * b
+        columns.append(-np.concatenate([a - a * outward, b - b * outward, -c * outward]))
+    design = np.stack(columns)
+    difference = (measured - predicted).T.ravel()
+    normal, right = design @ design.T, design @ difference
+    size, count = len(columns), len(predicted)
+    meter.charge(
+        f32_mul=(3 * size * (size + 3) // 2 + 5) * count + size**3 // 3 + 20,
+        f32_add=(3 * size * (size + 3) // 2 + 6) * count + size**3 // 3 + 20,
+        f32_div=size + 2,
+        ram_read=6 * count,
+        loop=count + 2 * size * size,
+    )
+    normal[np.diag_indices(size)] += np.float32(1e-6)  # a direction that nothing determines: none
+    turn = np.linalg.solve(normal, right)
+    h0, h1, h2 = (float(part) / 2 for part in turn[:3])
+    share = 2 / (1 + h0 * h0 + h1 * h1 + h2 * h2)
+    cross = np.array([[0, -h2, h1], [h2, 0, -h0], [-h1, h0, 0]])
+    rotation = np.eye(3) + share * (cross + cross @ cross)
+    return rotation.astype(np.float32), 1.0 + float(turn[3]) if with_scale else 1.0
+
+
+def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
+    """Direction cosine matrix (3, 3), reference to measured axes, of three unit vectors (3, 3).
+
+    The pair that is widest apart gives it, half of its misfit to each star; the third star decides
+    nothing.
+    """
+    first, second = ((0, 1), (0, 2), (1, 2))[
+        int(np.argmin([measured[0] @ measured[1], measured[0] @ measured[2],
+                       measured[1] @ measured[2]]))
+    ]  # fmt: skip
+    meter.charge(f32_mul=9 + 2 * 24 + 27, f32_add=6 + 2 * 18 + 18, f32_compare=2)
+    meter.charge(f32_sqrt=4, f32_div=4)
+    there = _axes(measured[first], measured[second])
+    return (there.T @ _axes(reference[first], reference[second])).astype(np.float32)
+
+
+def _axes(one: Floats, other: Floats) -> Floats:
+    """Rows: the middle between two unit vectors, their difference, and what is square to both."""
+    middle, apart = one + other, other - one
+    middle = middle / np.sqrt(middle @ middle)
+    apart = apart / np.sqrt(apart @ apart)
+    (a, b, c), (d, e, f) = middle, apart
+    return np.array([middle, apart, [b * f - c * e, c * d - a * f, a * e - b * d]], np.float32)

@@ -1,0 +1,242 @@
+"""Triangles of centroids that agree with triangles of catalogue stars, from the pair list.
+
+An extension. Centroids come in an order, the brightest first. Each new one is paired with all
+before it; every entry of the pair list as wide as such a pair names the new centroid with one of
+its stars, and the older one with the other. Two entries that give the new centroid the same star
+name two older centroids: if these two stars stand as far apart as the centroids do, and turn the
+same way, there is a triangle. So each triple is tried once, all triples of bright centroids before
+any with a fainter one, and a false star spoils only those that it is in. (Pyramid, Mortari et al.
+2004, has the same aim with its order of triples.)
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.attitude.float_functions import arc_cosine
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.mcu.costs import Meter
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.intp]
+
+#: Entries that the newest centroid may have with all others; beyond, its step is not done.
+MOST_PAIRS = 3072
+
+#: Centroids whose triangles the model finds together, for its own speed; later ones follow only if
+#: these give no attitude. The charge is made centroid by centroid.
+_BATCHES = (5, 10, 18, 64)
+
+_SMALLEST_SQUARED_SINE = np.float32(1e-8)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What one more centroid brings.
+
+    Attributes:
+        centroids, stars: (t, 3) triangles, by rank of centroid and index of star; the new centroid
+            is the last, those whose new star has most triangles first.
+        misfit: (t,) largest difference of the sides, in rad.
+        mirrored: (t,) whether they turn the other way.
+        entries: entries of the pair list that the new centroid has with those before it.
+        by_chance: triangles that chance gives in this step to be expected.
+    """
+
+    centroids: Indices
+    stars: Indices
+    misfit: Floats
+    mirrored: NDArray[np.bool_]
+    entries: int
+    by_chance: float
+
+
+def steps(
+    rays: Floats,
+    catalogue: StarCatalogue,
+    tolerance_rad: float,
+    listed: NDArray[np.bool_] | None,
+    meter: Meter,
+    limit: int,
+) -> Iterator[Step]:
+    """Triangles of unit vectors (n, 3) in their order, centroid by centroid.
+
+    Args:
+        rays: brightest first.
+        catalogue: whose pair list is used.
+        tolerance_rad: largest difference of a side.
+        listed: (stars,) which stars count; None is all.
+        meter: charged step by step; phases `distances`, `votes`, `identities`.
+        limit: total of the meter at which this ends.
+    """
+    done = 2
+    for batch in _BATCHES:
+        count = min(batch, len(rays))
+        if count > done:
+            found = _Batch(rays[:count], catalogue, tolerance_rad, listed)
+            for newest in range(done, count):
+                operations = found.operations(newest)
+                spent = sum(cycles(each, meter) for each in operations.values())
+                if found.entries[newest] > MOST_PAIRS or meter.total + spent > limit:
+                    return
+                for phase, each in operations.items():
+                    with meter.phase(phase):
+                        meter.charge(**each)
+                yield found.step(newest)
+            done = count
+
+
+def cycles(operations: dict[str, int], meter: Meter) -> int:
+    """What operations would take, in processor cycles."""
+    return sum(meter.table.operations[name].cycles * n for name, n in operations.items())
+
+
+@lru_cache(maxsize=128)
+def _pairs_of(count: int) -> tuple[Indices, Indices]:
+    """Newer and older one of all pairs of so many centroids, by rising newer one."""
+    return np.tril_indices(count, -1)
+
+
+class _Batch:
+    """All triangles among some centroids, and what work each centroid makes.
+
+    Attributes:
+        entries: (n,) entries of the pair list that each centroid has with all before it, twice,
+            for either may be either star.
+    """
+
+    def __init__(
+        self,
+        rays: Floats,
+        catalogue: StarCatalogue,
+        tolerance_rad: float,
+        listed: NDArray[np.bool_] | None,
+    ) -> None:
+        tolerance, count, stars = np.float32(tolerance_rad), len(rays), len(catalogue)
+        newer, older = _pairs_of(count)
+        cosine = (rays @ rays.T)[newer, older]
+        pair, first, second, misfit = self._look_up(cosine, newer, catalogue, tolerance, listed)
+        # An entry joins the rim, an older centroid with one star, to the hub, the newer one with
+        # the other star.
+        hub = np.concatenate((newer[pair] * stars + first, newer[pair] * stars + second))
+        rim_star = np.concatenate((second, first))
+        order = hub.astype(np.uint16 if count * stars < 1 << 16 else np.int32).argsort(
+            kind="stable"
+        )
+        hub, rim_star = hub[order], rim_star[order]
+        rim = np.concatenate((older[pair], older[pair]))[order]
+        misfit = np.concatenate((misfit, misfit))[order]
+        newest = hub // stars
+        self.entries = np.bincount(newest, minlength=count)
+        # Every two entries of one hub: each with all of the hub's entries before it.
+        before = np.arange(len(hub)) - hub.searchsorted(hub)
+        one = np.arange(len(hub)).repeat(before)
+        other = one - 1 - _counting(before)
+        self._wedges = np.bincount(newest[one], minlength=count)
+        a, b, ia, ib = rim_star[one], rim_star[other], rim[one], rim[other]
+        va, vb = catalogue.vectors[a], catalogue.vectors[b]
+        low, high = np.minimum(ia, ib), np.maximum(ia, ib)
+        side = cosine[high * (high - 1) // 2 + low]
+        sine = np.sqrt(np.maximum(1 - side * side, _SMALLEST_SQUARED_SINE))
+        third = np.abs((va * vb).sum(axis=1) - side) / sine
+        fits = ((third <= tolerance) & (ia != ib)).nonzero()[0]
+        one, other = one[fits], other[fits]
+        self._newest = newest[one]
+        self._centroids = np.stack((ia[fits], ib[fits], self._newest), axis=1)
+        self._stars = np.stack((a[fits], b[fits], hub[one] % stars), axis=1)
+        self._misfit = np.maximum(np.maximum(misfit[one], misfit[other]), third[fits])
+        self._volumes = _volumes(rays, self._centroids), _volumes(catalogue.vectors, self._stars)
+        self._popularity = np.bincount(hub[one], minlength=1)[hub[one]]
+        self._found = np.bincount(self._newest, minlength=count)
+        # Chance: each entry fixes an attitude in two ways; a third star then agrees where two
+        # rings of width 2 e cross, 4 e^2 over the sine of the angle of crossing (2/pi in the mean).
+        density = stars / (4 * np.pi)
+        self._chance = len(hub) / len(newer) * density * 2 * np.pi * tolerance_rad**2
+        self._stars_listed = stars
+
+    def _look_up(
+        self,
+        cosine: Floats,
+        newer: Indices,
+        catalogue: StarCatalogue,
+        tolerance: np.float32,
+        listed: NDArray[np.bool_] | None,
+    ) -> tuple[Indices, Indices, Indices, Floats]:
+        """Pair, both stars and misfit in rad of the entries that are as wide as the pairs."""
+        pairs = catalogue.pairs
+        angle = arc_cosine(np.minimum(cosine, np.float32(1)))
+        start = pairs.angle.searchsorted(angle - tolerance)
+        lengths = np.maximum(pairs.angle.searchsorted(angle + tolerance, side="right") - start, 0)
+        self._walked = np.bincount(newer, lengths)
+        self._steps = len(pairs).bit_length()
+        pair = np.arange(len(start)).repeat(lengths)
+        entry = start[pair] + _counting(lengths)
+        first, second = pairs.first[entry].astype(np.intp), pairs.second[entry].astype(np.intp)
+        misfit = np.abs(pairs.angle[entry] - angle[pair])
+        if listed is None:
+            return pair, first, second, misfit
+        kept = listed[first] & listed[second]
+        return pair[kept], first[kept], second[kept], misfit[kept]
+
+    def operations(self, newest: int) -> dict[str, dict[str, int]]:
+        """What each phase of a step of the part's program executes."""
+        walked, entries = int(self._walked[newest]), int(self.entries[newest])
+        wedges, found = int(self._wedges[newest]), int(self._found[newest])
+        searched = self._steps * newest
+        return {
+            "distances": {  # of the newest centroid to the older ones: angles and their sines
+                "f32_mul": 5 * newest,
+                "f32_add": 5 * newest,
+                "f32_acos": newest,
+                "f32_sqrt": newest,
+                "ram_read": 6 * newest,
+            },
+            "votes": {  # entries of the pair list, each kept with the newest centroid's star
+                "f32_compare": searched + newest + walked,
+                "flash_read": searched + 3 * walked,
+                "i32_add": 3 * searched + 4 * entries,
+                "table_byte": 2 * entries,
+                "ram_write": 2 * entries + self._stars_listed // 2,
+                "loop": searched + walked + entries + self._stars_listed // 2,
+            },
+            "identities": {  # third sides, and which way the triangles turn
+                "f32_mul": 4 * wedges + 19 * found,
+                "f32_add": 3 * wedges + 10 * found,
+                "f32_compare": wedges + found,
+                "flash_read": 6 * wedges + 9 * found,
+                "i32_add": 4 * wedges,
+                "table_byte": wedges,
+                "ram_write": 8 * found,
+                "loop": wedges,
+            },
+        }
+
+    def step(self, newest: int) -> Step:
+        """Triangles of a step."""
+        chosen = (self._newest == newest).nonzero()[0]
+        chosen = chosen[(-self._popularity[chosen]).argsort(kind="stable")]
+        measured, listed = self._volumes
+        return Step(
+            self._centroids[chosen],
+            self._stars[chosen],
+            self._misfit[chosen],
+            measured[chosen] * listed[chosen] < 0,
+            int(self.entries[newest]),
+            newest * (newest - 1) / 2 * float(self._chance),
+        )
+
+
+def _counting(lengths: Indices) -> Indices:
+    """0, 1, ... up to each of ``lengths`` (n,), one after the other."""
+    ends = lengths.cumsum()
+    return np.arange(ends[-1] if len(ends) else 0) - (ends - lengths).repeat(lengths)
+
+
+def _volumes(vectors: Floats, triples: Indices) -> Floats:
+    """Triple products of vectors (n, 3), three rows each as ``triples`` (t, 3) has them."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vectors[triples].transpose(1, 2, 0)
+    volumes: Floats = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return volumes

@@ -1,0 +1,100 @@
+"""Tracking and verification on random skies; each rate has room for chance."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.matching.identification import (
+    CentroidPairs,
+    Identification,
+    MatchOutcome,
+    verify,
+)
+from cubestack.firmware_model.cubestar.matching.tracking import track
+
+from ..sky import meter
+
+Shoot = Callable[..., Any]
+
+
+def check(found: Identification, stars: NDArray[np.int64]) -> tuple[bool, int]:
+    """Whether it is solved, and how many kept identities are wrong."""
+    matched = found.matched
+    wrong = int((found.stars[matched] != stars[matched]).sum())
+    assert (found.outcome is MatchOutcome.IDENTIFIED) == (len(matched) > 0)
+    assert len(set(found.stars[matched].tolist())) == len(matched)
+    return found.outcome is MatchOutcome.IDENTIFIED, wrong
+
+
+def full_shot(shoot: Shoot, seed: int) -> Any:
+    """The first one with at least 8 stars."""
+    rng = np.random.default_rng(seed)
+    return next(s for s in (shoot(rng) for _ in range(20)) if len(s.stars) >= 8)
+
+
+def solved(results: list[tuple[bool, int]], least: float) -> bool:
+    """Whether so large a part is solved, and at most one identity wrong in all."""
+    rate = np.mean([identified for identified, _ in results])
+    return bool(rate >= least) and sum(wrong for _, wrong in results) <= 1
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 0.25])
+def test_tracking_follows(catalogue: StarCatalogue, shoot: Shoot, turn_deg: float) -> None:
+    rng = np.random.default_rng(90)
+    results = []
+    for _ in range(100):
+        shot = shoot(rng, false_stars=3)
+        axis = rng.normal(size=3)
+        turn = Rotation.from_rotvec(np.radians(turn_deg) * axis / np.linalg.norm(axis))
+        last = (turn.as_matrix() @ shot.attitude).astype(np.float32)
+        results.append(check(track(shot.directions, catalogue, last, meter()), shot.stars))
+    assert solved(results, 0.99)
+
+
+def test_tracking_loses_a_turn_beyond_its_reach(catalogue: StarCatalogue, shoot: Shoot) -> None:
+    rng = np.random.default_rng(91)
+    lost = 0
+    for _ in range(40):
+        shot = shoot(rng)
+        turn = Rotation.from_rotvec(np.radians([1.0, 0, 0])).as_matrix()
+        last = (turn @ shot.attitude).astype(np.float32)
+        found = track(shot.directions, catalogue, last, meter())
+        lost += found.outcome is not MatchOutcome.IDENTIFIED
+    assert lost >= 38
+
+
+def test_tracking_needs_two_stars_only(catalogue: StarCatalogue, shoot: Shoot) -> None:
+    rng = np.random.default_rng(92)
+    shot = next(s for s in (shoot(rng, most=2) for _ in range(20)) if len(s.stars) == 2)
+    found = track(shot.directions, catalogue, shot.attitude.astype(np.float32), meter())
+    assert found.stars.tolist() == shot.stars.tolist()
+    assert found.votes.tolist() == [1, 1]
+    one = track(shot.directions[:1], catalogue, shot.attitude.astype(np.float32), meter())
+    assert one.outcome is MatchOutcome.TOO_FEW_CENTROIDS
+
+
+def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:
+    places = np.radians([[0.0, 0.0], [0.2, 0.0], [9.0, 3.0], [-8.0, -4.0]])
+    stars = np.column_stack([np.tan(places), np.ones(4)])
+    stars /= np.linalg.norm(stars, axis=1, keepdims=True)
+    sky = StarCatalogue.build(np.arange(4), stars, np.ones(4), 3.8, 57.3)
+    seen = stars[[1, 2, 3]].astype(np.float32)
+    found = track(seen, sky, np.eye(3, dtype=np.float32), meter())
+    assert found.stars.tolist() == [1, 2, 3]
+
+
+def test_verification_keeps_a_set_that_agrees(catalogue: StarCatalogue, shoot: Shoot) -> None:
+    shot = full_shot(shoot, 93)
+    wrong = shot.stars.astype(np.int32)
+    wrong[0] = (wrong[0] + 50) % 405
+    wrong[1] = wrong[2]
+    pairs = CentroidPairs.measure(shot.directions, meter())
+    votes, kept = verify(pairs, wrong, catalogue.vectors, 0.001, meter())
+    assert kept[:2].tolist() == [-1, -1]
+    assert kept[2:].tolist() == shot.stars[2:].tolist()
+    assert set(votes[2:].tolist()) == {len(wrong) - 3}
