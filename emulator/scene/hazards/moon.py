@@ -65,7 +65,7 @@ class Moon(SkyHazard):
         centre = looking.anywhere(generator)
         phase_deg = math.degrees(math.acos(min(max(2 * strength - 1, -1), 1)))
         sun = aside(centre, 180 - phase_deg, generator)
-        return cls(direction=tuple(centre), sun=tuple(sun))
+        return cls(direction=tuple(centre.tolist()), sun=tuple(sun.tolist()))
 
     @property
     def _centre(self) -> Vectors:

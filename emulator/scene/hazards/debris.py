@@ -1,0 +1,80 @@
+"""Something in orbit that crosses the field during an exposure: a streak as of a star that moves.
+
+It goes along a great circle at a constant rate, as bright all the way. Debris below 1000 km passes
+at 0.1 to 2 deg/s, and shines with V 0 to 6 (assumed; a passing satellite is at V 4 to 6).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards.contract import (
+    Depth,
+    Lights,
+    Looking,
+    SkyHazard,
+    aside,
+    direction,
+)
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+SLOWEST_DEG_S, FASTEST_DEG_S = 0.1, 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Debris(SkyHazard):
+    """One object that moves against the stars."""
+
+    direction: tuple[float, ...] = key(
+        (0.0, 0.0, 1.0), "where it is at ``time_s``: three numbers, or ra and dec in deg"
+    )
+    towards: tuple[float, ...] = key(
+        (1.0, 0.0, 0.0), "a direction on its way, less than half a turn on, likewise"
+    )
+    rate_deg_s: float = key(0.5, "how fast it moves, deg/s", 0, 20)
+    v_mag: float = key(2.0, "its magnitude", -10, 10)
+    time_s: float = key(0.0, "when it is there, s")
+
+    name: ClassVar[str] = "debris"
+    meaning: ClassVar[str] = "an object that crosses the field"
+    strength: ClassVar[Strength] = Strength(
+        "v_mag", "mag", (8.0, 6.0, 4.0, 2.0, 0.0, -2.0, -4.0), 0
+    )
+    depth: ClassVar[Depth] = Depth.ORBIT
+
+    def __post_init__(self) -> None:
+        """Refuse what can not be: SceneError."""
+        super().__post_init__()
+        here, there = direction("direction", self.direction), direction("towards", self.towards)
+        if np.linalg.norm(np.cross(here, there)) < 1e-9:
+            raise SceneError(f"towards of the hazard {self.name} must be another way, not along it")
+
+    @classmethod
+    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+        """One of this magnitude, anywhere in the picture in the exposure's middle."""
+        here = looking.anywhere(generator)
+        rate = math.exp(generator.uniform(math.log(SLOWEST_DEG_S), math.log(FASTEST_DEG_S)))
+        return cls(
+            direction=tuple(here.tolist()),
+            towards=tuple(aside(here, 90.0, generator).tolist()),
+            rate_deg_s=rate,
+            v_mag=strength,
+            time_s=looking.time_s,
+        )
+
+    @property
+    def speed_deg_s(self) -> float:
+        """Its rate."""
+        return self.rate_deg_s
+
+    def lights(self, looking: Looking) -> Lights:
+        """Where it is at the instant."""
+        here, there = direction("direction", self.direction), direction("towards", self.towards)
+        ahead = there - (there @ here) * here
+        ahead /= np.linalg.norm(ahead)
+        angle = math.radians(self.rate_deg_s * (looking.time_s - self.time_s))
+        place = math.cos(angle) * here + math.sin(angle) * ahead
+        return Lights(place[None], np.array([self.v_mag]))

@@ -1,0 +1,92 @@
+"""Planets: lights as bright as the brightest stars, which no catalogue has.
+
+Positions: ``ephemeris``. Magnitudes: the Astronomical Almanac's since 1984 (Meeus, Astronomical
+Algorithms, chapter 41), by distances and phase angle; Saturn with its ring, whose longitude angle
+is taken for the phase angle, which it differs little from.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from cubestack.emulator.scene.hazards import ephemeris
+from cubestack.emulator.scene.hazards.contract import (
+    Depth,
+    Lights,
+    Looking,
+    SkyHazard,
+    Vectors,
+    direction,
+)
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+#: Magnitude at 1 au from Sun and Earth, and its polynomial in the phase angle (deg).
+MAGNITUDES = {
+    "mercury": (-0.42, 0.0380, -0.000273, 0.000002),
+    "venus": (-4.40, 0.0009, 0.000239, -0.00000065),
+    "mars": (-1.52, 0.016),
+    "jupiter": (-9.40, 0.005),
+    "saturn": (-8.88, 0.044),
+    "uranus": (-7.19,),
+    "neptune": (-6.87,),
+}
+
+SATURN_POLE = direction("pole", (40.589, 83.537))
+"""Right ascension and declination of the ring's axis (IAU)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planets(SkyHazard):
+    """All planets at a date, or one bright light somewhere."""
+
+    julian_date: float = key(
+        ephemeris.NEW_YEAR_2026, "Julian date at time 0", ephemeris.FIRST_DATE, ephemeris.LAST_DATE
+    )
+    direction: tuple[float, ...] | None = key(
+        None, "of one planet, instead of all of the date: three numbers, or ra and dec in deg"
+    )
+    v_mag: float = key(-2.5, "magnitude of that one", -5.0, 10.0)
+
+    name: ClassVar[str] = "planets"
+    meaning: ClassVar[str] = "planets among the stars"
+    strength: ClassVar[Strength] = Strength("v_mag", "mag", (6.0, 4.0, 2.0, 0.0, -2.5, -4.5), -2.5)
+    depth: ClassVar[Depth] = Depth.PLANETS
+
+    def __post_init__(self) -> None:
+        """Refuse what can not be: SceneError."""
+        super().__post_init__()
+        if self.direction is not None:
+            direction("direction", self.direction)
+
+    @classmethod
+    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+        """One planet of this magnitude anywhere in the picture."""
+        return cls(direction=tuple(looking.anywhere(generator).tolist()), v_mag=strength)
+
+    def lights(self, looking: Looking) -> Lights:
+        """One light a planet."""
+        if self.direction is not None:
+            return Lights(direction("direction", self.direction)[None], np.array([self.v_mag]))
+        date = self.julian_date + looking.time_s / ephemeris.DAY_S
+        there = np.array([ephemeris.geocentric(planet, date) for planet in MAGNITUDES])
+        earth = ephemeris.heliocentric("earth", date)
+        v_mag = [
+            magnitude(planet, vector + earth, vector)
+            for planet, vector in zip(MAGNITUDES, there, strict=True)
+        ]
+        return Lights(there / np.linalg.norm(there, axis=1, keepdims=True), np.array(v_mag))
+
+
+def magnitude(planet: str, from_sun: Vectors, from_earth: Vectors) -> float:
+    """V magnitude of a planet at these positions (3,), au."""
+    r, distance = float(np.linalg.norm(from_sun)), float(np.linalg.norm(from_earth))
+    cosine = float(from_sun @ from_earth) / (r * distance)
+    phase_deg = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    at_1_au, *terms = MAGNITUDES[planet]
+    v_mag = at_1_au + 5 * np.log10(r * distance)
+    v_mag += sum(term * phase_deg ** (i + 1) for i, term in enumerate(terms))
+    if planet == "saturn":
+        tilt = abs(float(from_earth @ SATURN_POLE)) / distance
+        v_mag += 1.25 * tilt**2 - 2.60 * tilt
+    return float(v_mag)

@@ -1,0 +1,71 @@
+"""Stray light of a bright source outside of the field: what of it gets past the baffle.
+
+A baffle's point source transmittance falls by decades with the source's angle from the boresight
+(measured curves of star trackers are nearly straight on a logarithmic scale up to the angle beyond
+which the source lights nothing that the lens sees). Here it is counted by what the picture shows:
+brightness a steradian of the sky by the source's light, which is 4 N^2 / pi times the irradiance
+ratio behind a lens of the f-number N. Assumed: 1e-7 at 45 deg (an irradiance ratio of 5e-8 at
+f/1.25, of a small baffle), a decade in 15 deg; and across the picture the stray light falls
+exponentially with the angle towards the source, to 1/e in ``slope_deg``.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from cubestack.emulator.scene.hazards.contract import (
+    SUN_V,
+    Brightness,
+    Depth,
+    Looking,
+    SkyHazard,
+    Vectors,
+    angles_rad,
+    direction,
+)
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+REFERENCE_DEG = 45.0
+MOST = 1.0
+"""Transmittance at most, a steradian: even within the field."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SunGlare(SkyHazard):
+    """A source beside the field."""
+
+    direction: tuple[float, ...] = key(
+        (0.0, 0.0, 1.0), "of the source: three numbers, or right ascension and declination in deg"
+    )
+    v_mag: float = key(SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73")
+    transmittance: float = key(1e-7, "brightness a steradian at 45 deg, by its light", 0, 1)
+    decade_deg: float = key(15.0, "angle in which that falls to a tenth, deg", 1, 180)
+    slope_deg: float = key(30.0, "angle across the picture in which it falls to 1/e, deg", 1, 1e6)
+
+    name: ClassVar[str] = "sun-glare"
+    meaning: ClassVar[str] = "stray light of the Sun beside the field"
+    strength: ClassVar[Strength] = Strength(
+        "angle", "deg", (90.0, 70.0, 60.0, 50.0, 45.0, 40.0, 35.0), 45.0
+    )
+    depth: ClassVar[Depth] = Depth.LENS
+
+    def __post_init__(self) -> None:
+        """Refuse what can not be: SceneError."""
+        super().__post_init__()
+        direction("direction", self.direction)
+
+    @classmethod
+    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+        """The Sun at this angle from the boresight, to any side."""
+        return cls(direction=tuple(looking.beside(strength, generator).tolist()))
+
+    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+        """Light that gets to each part of the picture."""
+        source = direction("direction", self.direction)
+        aside_rad = float(angles_rad(looking.boresight[None], source)[0])
+        decades = (math.degrees(aside_rad) - REFERENCE_DEG) / self.decade_deg
+        level = min(self.transmittance * 10**-decades, MOST) * 10 ** (-0.4 * self.v_mag)
+        nearer_deg = np.degrees(aside_rad - angles_rad(vectors, source))
+        return np.asarray(level * np.exp(nearer_deg / self.slope_deg), np.float32)
