@@ -1,12 +1,15 @@
 """What documents say, against what is there."""
 
+import math
 import re
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.emulator.camera.common.hazards import HAZARDS as SENSOR_HAZARDS
 from cubestack.emulator.camera.common.scene_file import load_scene
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
@@ -15,6 +18,7 @@ from cubestack.emulator.ports.tcp import REFUSAL
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import DEVICE_KEYS
+from cubestack.emulator.scene.hazards import SKY_HAZARDS, Hazard
 from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.firmware_model.cubesense.memory import Memory, budget, used
 from cubestack.firmware_model.interface.aramis import Reason
@@ -97,9 +101,32 @@ def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ..
     assert checked >= 3
 
 
+def hazard_rows(hazard: type[Hazard]) -> list[str]:
+    """The rows of a table of all keys of a hazard but the seed."""
+    rows = []
+    for entry in fields(hazard):
+        value, (low, high) = entry.default, entry.metadata["range"]
+        if isinstance(value, tuple):
+            shown = str([float(f"{number:g}") for number in value]).replace(".0", "")
+        else:
+            shown = f"{value:.10g}" if isinstance(value, int | float) else str(value or "none")
+        span = f"{low:.10g} to {high:.10g}" if high < math.inf else ""
+        meaning = entry.metadata["meaning"]
+        if entry.name != "seed":
+            rows.append(f"| `{hazard.name}` | `{entry.name}` | {shown} | {span} | {meaning} |")
+    return rows
+
+
+def test_every_key_of_every_hazard_is_documented() -> None:
+    part = section(text_of("docs/scenes.md"), "Keys of `hazards`")
+    hazards: list[type[Hazard]] = [*SKY_HAZARDS.values(), *SENSOR_HAZARDS.values()]
+    expected = [row for hazard in hazards for row in hazard_rows(hazard)]
+    assert [row for row in part.splitlines() if row.startswith("| `")] == expected
+
+
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
     examples = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
-    device, sky, night, picture, earth, ball = examples
+    device, sky, night, hard, picture, earth, ball = examples
     scene = load(tmp_path, device + sky).scene
     assert {*tomllib.loads(device)} == {*DEVICE_KEYS}
     assert isinstance(scene, SkyScene)
@@ -107,6 +134,9 @@ def test_examples_of_scenes_load(tmp_path: Path) -> None:
     ground = load(tmp_path, night).scene
     assert isinstance(ground, SkyScene)
     assert ground.atmosphere is not None
+    view = load(tmp_path, hard)
+    assert [hazard.name for hazard in view.scene.hazards] == ["moon", "debris", "debris"]
+    assert [hazard.name for hazard in view.condition.hazards] == ["hot-pixels"]
     assert len(load(tmp_path, earth).scene.reflections) == 1
     assert load(tmp_path, ball).scene.glow_km == 0
     assert tomllib.loads(picture)["kind"] == "picture"

@@ -29,7 +29,7 @@ class Debris(SkyHazard):
     """One object that moves against the stars."""
 
     direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0), "where it is at ``time_s``: three numbers, or ra and dec in deg"
+        (0.0, 0.0, 1.0), "where it is at `time_s`: three numbers, or ra and dec in deg"
     )
     towards: tuple[float, ...] = key(
         (1.0, 0.0, 0.0), "a direction on its way, less than half a turn on, likewise"
