@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.camera.common.residual import displaced, restored
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import Target
@@ -76,14 +77,14 @@ class Fisheye:
             return None
         angles = self.error.displaced(angles)
         theta = float(np.hypot(*angles))
-        if theta == 0:
-            return np.array([self.cx, self.cy])
-        stretch = distorted(theta * PIXELS_PER_DEGREE) / theta
-        return np.array([self.cx, self.cy]) + angles * stretch
+        stretch = self.error.scale * distorted(theta * PIXELS_PER_DEGREE) / theta if theta else 0.0
+        pixels = np.array([[self.cx, self.cy]]) + angles * stretch
+        return np.asarray(displaced(pixels, self.error.residuals)[0])
 
     def unproject(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Unit vectors (n, 3) in camera axes of pixel coordinates (n, 2) within the field."""
-        offset = np.asarray(pixels, np.float64) - (self.cx, self.cy)
+        points = restored(np.asarray(pixels, np.float64), self.error.residuals)
+        offset = (points - (self.cx, self.cy)) / self.error.scale
         radius = np.hypot(offset[:, 0], offset[:, 1])
         theta = undistorted(radius) / PIXELS_PER_DEGREE
         angles = self.error.restored(offset * (theta / np.where(radius == 0, 1, radius))[:, None])
@@ -96,7 +97,7 @@ class Fisheye:
         What a pixel covers is as the polynomial says: an error changes it by a few percent.
         """
         rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
-        radius = np.hypot(columns - self.cx, rows - self.cy)
+        radius = np.hypot(columns - self.cx, rows - self.cy) / self.error.scale
         rim = float(distorted(FIELD_DEG * PIXELS_PER_DEGREE))
         lit = np.clip(rim - radius + 0.5, 0, 1)
         index = np.flatnonzero(lit)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.camera.common.residual import Residual
 from cubestack.emulator.scene.earth_sun import Target
 from cubestack.emulator.scene.file import SceneError
 
@@ -58,16 +59,22 @@ class LensError:
             smooth curve goes through them, 0 on the axis and at the rim, and exceeds none.
         decentring_deg: coefficients (p1, p2) of Brown's tangential distortion, deg at the rim, but
             falling off towards it.
+        scale: of the picture about the optical axis, 0.85 to 1.15.
+        residuals: displacements of the picture beside all this.
     """
 
     centre_px: tuple[float, float] = (0.0, 0.0)
     radial_deg: tuple[tuple[float, float], ...] = ()
     decentring_deg: tuple[float, float] = (0.0, 0.0)
+    scale: float = 1.0
+    residuals: tuple[Residual, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a lens that can not be: SceneError."""
         if not max(map(abs, self.centre_px)) <= MOST_PX:
             raise SceneError(f"centre_px must be within {MOST_PX:g} px, not {self.centre_px}")
+        if not 0.85 <= self.scale <= 1.15:
+            raise SceneError(f"scale must be in 0.85..1.15, not {self.scale:g}")
         nodes = [0.0, *(angle for angle, _ in self.radial_deg), FIELD_DEG]
         if not np.all(np.diff(nodes) > 0):
             raise SceneError(

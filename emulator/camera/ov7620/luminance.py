@@ -18,9 +18,17 @@ BLACK = 34
 """Level of no light (published, for both cameras)."""
 
 FULL_SCALE = 255
+F_NUMBER = 2.8  # of the lens (published, section 3.2)
+PITCH_UM = 7.6  # published
+SPOT_PX = 0.6
+"""Standard deviation of a point's image in focus: assumed, as of the Moon in `light`."""
+
 READ_NOISE = 0.7  # grey values (assumed)
 SHOT_NOISE = (1 - READ_NOISE**2) / (FULL_SCALE - BLACK)
 """Variance of one grey value of light: makes one grey value of noise, 48 dB, at full scale."""
+
+ELECTRONS_PER_GREY = 1 / SHOT_NOISE
+"""At gain 1: with it the noise of the light is that of its electrons, by Poisson's law."""
 
 
 def luminance(
@@ -28,6 +36,7 @@ def luminance(
     gain: float,
     generator: np.random.Generator | None,
     stuck: NDArray[np.int64],
+    variance: float = 0.0,
 ) -> NDArray[np.uint8]:
     """Grey values (480, 640) of ``light``, of the same shape.
 
@@ -36,12 +45,13 @@ def luminance(
         gain: amplification.
         generator: source of this frame's noise; None for an ideal sensor.
         stuck: flat indices of pixels at full scale.
+        variance: of further noise, grey values squared at gain 1.
     """
     if generator is None:
         signal = light * np.float32(gain)
     else:
         signal = generator.standard_normal(light.shape, np.float32)
-        signal *= np.sqrt(light * np.float32(SHOT_NOISE) + np.float32(READ_NOISE**2))
+        signal *= np.sqrt(light * np.float32(SHOT_NOISE) + np.float32(READ_NOISE**2 + variance))
         signal += light
         signal *= np.float32(gain)
     signal += np.float32(BLACK + 0.5)

@@ -14,20 +14,32 @@ CubeSense thesis, sections 3.2 and 6.4.1 and appendix A; OV7620 product specific
 - Without black-and-white mode, Y is the mean of two rows.
 """
 
+import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from cubestack.emulator.camera.common.hazards import effects
+from cubestack.emulator.camera.common.hazards.contract import Exposure, Lens
 from cubestack.emulator.camera.common.image_sensor import ImageSensor
 from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.emulator.camera.ov7620.blur import blurred
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.light import scene_light
-from cubestack.emulator.camera.ov7620.luminance import BLACK, luminance, stuck_pixels
+from cubestack.emulator.camera.ov7620.luminance import (
+    BLACK,
+    ELECTRONS_PER_GREY,
+    F_NUMBER,
+    PITCH_UM,
+    SPOT_PX,
+    luminance,
+    stuck_pixels,
+)
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
@@ -41,6 +53,10 @@ AUTO_LEVEL = 100.0
 """Mean grey value that automatic exposure and gain aim at: assumed."""
 
 LONGEST_EXPOSURE, HIGHEST_GAIN = 255, 7.75  # of EXPOSURE and GAIN
+SHAPE = chip.ROWS, chip.COLUMNS
+IN_FOCUS = Lens(F_NUMBER, PITCH_UM, SHAPE, SPOT_PX)
+"""What hazards may change of the lens."""
+
 REMEMBERED = 8
 """Frames kept: more than anybody looks ahead or back."""
 
@@ -98,14 +114,22 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         self.active_columns = chip.COLUMNS
         self._sccb = SccbSlave(chip.REGISTERS.i2c_address, self._write)
         self._frames: OrderedDict[int, _Frame] = OrderedDict()
-        self._light: tuple[EarthSunScene, float, int, LensError, Light] | None = None
+        self._light: tuple[EarthSunScene, float, int, LensError, float, Light] | None = None
 
     @property
     def lens(self) -> LensError:
-        """What is particular to the lens: that of the condition, else the unit's own."""
+        """What is particular to the lens: that of the condition, else the unit's own; hazards."""
         condition = self.condition
         given = condition.sun_lens if self.camera is Target.SUN else condition.nadir_lens
-        return self._own_lens if given is None else given
+        own = self._own_lens if given is None else given
+        basics = self._basics
+        if basics.scale == 1 and not basics.residuals:
+            return own
+        return replace(own, scale=own.scale * basics.scale, residuals=basics.residuals)
+
+    @property
+    def _basics(self) -> Lens:
+        return effects.lens(IN_FOCUS, self.condition.hazards, self.condition.temperature_c)
 
     def _check(self, scene: EarthSunScene, condition: FisheyeCondition) -> None:
         del condition
@@ -237,13 +261,17 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         light = light * np.float32(shutter.exposure_lines)
         if not settings.monochrome:
             light[:-1] = (light[:-1] + light[1:]) / 2
+        # By frame time, so that a frame nobody looked at does not change the next one's noise.
+        seed = [condition.seed, self.camera, shutter.readout_ps]
+        per_count = ELECTRONS_PER_GREY / settings.gain
+        exposure = Exposure(SHAPE, PITCH_UM, shutter.exposure_s, condition.temperature_c, per_count)
+        light = effects.on_light(light, condition.hazards, exposure, seed, ELECTRONS_PER_GREY)
+        variance = effects.variance(condition.hazards, exposure) / ELECTRONS_PER_GREY**2
         generator = None
         if condition.noise:
-            # By frame time, so that a frame nobody looked at does not change the next one's noise.
-            seed = [condition.seed, self.camera, shutter.readout_ps]
             generator = np.random.Generator(np.random.SFC64(seed))
         stuck = stuck_pixels(condition.seed, self.camera, condition.hot_count, condition.hot_pairs)
-        grey = luminance(light, settings.gain, generator, stuck)
+        grey = luminance(light, settings.gain, generator, stuck, variance)
         rows, columns = settings.rows, settings.columns
         window = grey[rows.start : rows.stop, columns.start : columns.stop]
         return np.ascontiguousarray(window[:, ::-1] if settings.mirror else window)
@@ -251,10 +279,14 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def _light_at(self, time_ps: int) -> Light:
         if not np.any(self.scene.rate_deg_s):
             time_ps = 0  # the same at all times
-        key = self.scene, self.condition.bloom_px, time_ps, self.lens
+        # The square of what a lens in focus makes is in the light already.
+        further = math.sqrt(max(self._basics.spot_px**2 - SPOT_PX**2, 0))
+        key = self.scene, self.condition.bloom_px, time_ps, self.lens, further
         if self._light is None or self._light[:-1] != key:
             bloom_px = self.condition.bloom_px
             light = scene_light(self.scene, self.camera, bloom_px, time_ps, self.lens)
+            if further:
+                light = blurred(light, further)
             self._light = *key, light
         return self._light[-1]
 

@@ -7,7 +7,11 @@ from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.view import View, check_temperature
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.scene.earth_sun import EarthSunScene
-from cubestack.emulator.scene.file import refuse_negative, refuse_zero
+from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
+from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
+
+MOST_STUCK = ROWS * COLUMNS // 4
+"""Single pixels and pairs that find a place each."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,11 @@ class FisheyeCondition:
         refuse_zero(self, "bloom_px")
         refuse_negative(self, "hot_pixels", "hot_pairs", "seed")
         check_temperature(self.temperature_c)
+        if self.hot_count + self.hot_pairs > MOST_STUCK:
+            raise SceneError(
+                f"hot_pixels and hot_pairs must be at most {MOST_STUCK} together, "
+                f"not {self.hot_count + self.hot_pairs}"
+            )
 
     @property
     def hot_count(self) -> int:

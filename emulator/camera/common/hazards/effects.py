@@ -57,11 +57,16 @@ def charge(hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Field |
     return total
 
 
-def on_light(light: Field, hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Field:
-    """Electrons in the pixels, where ``light`` (rows, columns) frees its own."""
+def on_light(
+    light: Field, hazards: Hazards, exposure: Exposure, seed: Sequence[int], electrons: float = 1.0
+) -> Field:
+    """Signal (rows, columns) of the pixels, where ``light`` alone gives that much.
+
+    ``electrons`` is what one of its units has.
+    """
     added, uneven = charge(hazards, exposure, seed), response(hazards, exposure.shape)
     if added is not None:
-        light = light + added
+        light = light + added / np.float32(electrons)
     return light if uneven is None else light * uneven
 
 

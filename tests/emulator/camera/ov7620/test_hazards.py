@@ -1,0 +1,152 @@
+"""Hazards of sensor and lens in the pictures of a sun and nadir camera."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from cubestack.emulator.camera.common.hazards import (
+    HAZARDS,
+    Background,
+    Defocus,
+    FocalLength,
+    Gradient,
+    HotPixels,
+    LensResiduals,
+    Protons,
+)
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+from cubestack.emulator.camera.ov7620.blur import blurred
+from cubestack.emulator.camera.ov7620.fisheye import lens_of
+from cubestack.emulator.camera.ov7620.lens_error import NOMINAL
+from cubestack.emulator.camera.ov7620.sensor import Ov7620
+from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.file import SceneError
+
+from .test_sensor import MANUAL, picture, write
+
+EARTH = EarthSunScene(seed=4)
+SUN = EarthSunScene.facing(sun_deg=(50.0, 20.0))
+DARK = replace(EARTH, sun=(0, 0, 1))  # the Earth by night
+
+
+def camera(
+    *hazards: SensorHazard,
+    scene: EarthSunScene = EARTH,
+    which: Target = Target.NADIR,
+    gain: int = 0,
+    **condition: object,
+) -> Ov7620:
+    like = FisheyeCondition(hazards=hazards, **{"noise": False} | condition)  # type: ignore[arg-type]
+    made = Ov7620(scene, which, like)
+    write(made, MANUAL | {"EXPOSURE": 1 if which is Target.SUN else 4, "GAIN": gain})
+    return made
+
+
+def grey(*hazards: SensorHazard, frame: int = 3, **how: object) -> np.ndarray:
+    return picture(camera(*hazards, **how), frame).astype(int)  # type: ignore[arg-type]
+
+
+def centroid(image: np.ndarray) -> np.ndarray:
+    y, x = np.nonzero(image > 150)
+    return np.array([x.mean(), y.mean()])
+
+
+def test_without_hazards_the_lens_is_the_unit_s_own() -> None:
+    assert camera().lens is NOMINAL
+    assert camera(Gradient(), Defocus(sigma_px=3.0)).lens is NOMINAL
+
+
+@pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"dose"}))
+def test_the_worst_strength_shows_and_repeats(name: str) -> None:
+    hazard = HAZARDS[name]
+    worst = hazard.placed(hazard.strength.values[-1], None, np.random.default_rng(1))
+    one = grey(worst)
+    np.testing.assert_array_equal(one, grey(worst))
+    assert np.mean(one != grey()) > 1e-3
+
+
+def test_damage_is_too_little_for_half_a_millisecond() -> None:
+    # 10 krad: 0.7 sources in each hundred pixels, of 4500 electrons a second; 433 a grey value.
+    hazard = HAZARDS["dose"].placed(10, None, np.random.default_rng(1))
+    assert np.abs(grey(hazard) - grey()).max() <= 1
+
+
+@pytest.mark.parametrize("gain", [0, 0x1F])
+def test_a_gradient_ends_at_its_counts_whatever_the_gain(gain: int) -> None:
+    added = grey(Gradient(counts=60.0, seed=1), scene=DARK, gain=gain) - 34
+    assert added.min() <= 1
+    assert added.max() == pytest.approx(60, abs=1)
+
+
+def test_a_background_has_its_level_and_its_noise() -> None:
+    added = grey(Background(counts=20.0, sigma=4.0), scene=DARK, noise=True) - 34
+    assert added.mean() == pytest.approx(20, abs=0.1)
+    assert added.std() == pytest.approx(np.hypot(4, 0.8), rel=0.03)
+
+
+def test_protons_leave_other_tracks_in_each_frame_and_camera() -> None:
+    hit = Protons(hits=100)
+    shots = [grey(hit, scene=DARK, frame=frame, which=w) for frame in (3, 4) for w in Target]
+    places = [set(np.flatnonzero(shot > 40).tolist()) for shot in shots]
+    assert min(map(len, places)) > 50
+    for n, one in enumerate(places):
+        for other in places[:n]:
+            assert len(one & other) < 0.2 * len(one)
+
+
+def test_hot_pixels_are_stuck_as_those_of_the_key() -> None:
+    np.testing.assert_array_equal(
+        grey(HotPixels(count=50), scene=DARK, hot_pixels=9), grey(scene=DARK, hot_pixels=59)
+    )
+    with pytest.raises(SceneError, match="hot_pixels and hot_pairs must be at most 76800 together"):
+        FisheyeCondition(hazards=(HotPixels(count=75_000),), hot_pairs=1801)
+
+
+def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
+    boresight = np.array([369, 250])
+    own, moved = (
+        centroid(grey(*hazards, scene=SUN, which=Target.SUN)) - boresight
+        for hazards in ((), (FocalLength(percent=3.0),))
+    )
+    assert np.hypot(*own) > 120
+    np.testing.assert_allclose(moved, 1.03 * own, atol=0.1)
+
+
+def test_a_longer_lens_has_a_longer_rim() -> None:
+    lens = camera(FocalLength(percent=3.0)).lens
+    lit = [np.count_nonzero(lens_of(Target.NADIR, which).field.lit) for which in (NOMINAL, lens)]
+    # All but what is cut off at the top and bottom edge.
+    assert 1.02 < lit[1] / lit[0] < 1.03**2
+
+
+def test_residuals_displace_and_can_be_undone() -> None:
+    residual = LensResiduals(rms_px=1.0, seed=2)
+    crooked = lens_of(Target.SUN, camera(residual, which=Target.SUN).lens)
+    straight = lens_of(Target.SUN)
+    y, x = np.mgrid[110:390:10, 230:510:10]
+    pixels = np.stack([x.ravel(), y.ravel()], axis=1).astype(float)
+    moved = np.array([crooked.project(v) for v in straight.unproject(pixels)]) - pixels
+    assert 0.5 < np.sqrt((moved**2).sum(axis=1).mean()) < 1.5
+    back = np.array([crooked.project(v) for v in crooked.unproject(pixels)])
+    np.testing.assert_allclose(back, pixels, atol=1e-6)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 3.0])
+def test_defocus_spreads_the_light_and_loses_none(sigma: float) -> None:
+    light = np.zeros((60, 80), np.float32)
+    light[30, 40], light[31, 45] = 1000, 500
+    soft = blurred(light, sigma)
+    assert soft.sum() == pytest.approx(1500, rel=1e-4)
+    # Gaussian and pixel: 1/12 more variance.
+    expected = gaussian_filter(light, np.hypot(sigma, 12**-0.5), truncate=5)
+    np.testing.assert_allclose(soft, expected, atol=0.03 * expected.max())
+
+
+def test_defocus_softens_the_limb() -> None:
+    def steepest(image: np.ndarray) -> float:
+        return float(np.abs(np.diff(image[236])).max())
+
+    assert steepest(grey(Defocus(sigma_px=4.0))) < 0.5 * steepest(grey())
