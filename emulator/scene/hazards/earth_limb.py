@@ -36,6 +36,13 @@ from cubestack.emulator.scene.hazards.sky_glow import S10
 
 AIRGLOW_KM, AIRGLOW_SIGMA_KM, AIRGLOW_S10 = 95.0, 4.0, 145.0
 TOP_KM = AIRGLOW_KM + 5 * AIRGLOW_SIGMA_KM
+DUSK = 0.02
+"""Sine of the Sun's depth below the horizon in which the ground's light falls to 1/e.
+
+With the Earth's own twilight it is a 25 000th of the day's where the Sun is 6 deg down: 3.4 lux
+(Seidelmann, Explanatory Supplement to the Astronomical Almanac, section 9.33).
+"""
+
 SUN_AWAY_DEG = 60.0
 """A random Sun is at least so far from the boresight (assumed): pointing is planned so."""
 
@@ -102,6 +109,7 @@ class EarthLimb(SkyHazard):
         pixels = np.full(len(vectors), looking.pixel_rad, np.float32)
         sight = vectors.astype(np.float32)
         met, light = earth.radiance(sight, pixels, self._nadir, self._sun, np.eye(3))
+        light *= self._night(vectors[met])
         total[met] = light * np.float32(EARTH_RADIANCE)
         angles = angles_rad(vectors, self._nadir)
         if self.airglow:
@@ -112,6 +120,15 @@ class EarthLimb(SkyHazard):
         if self.scatter:
             total += self._scattered(vectors, angles)
         return total
+
+    def _night(self, vectors: Vectors) -> Brightness:
+        """What dusk leaves (n,) of the ground's light where lines of sight meet it: 1 by day."""
+        far = self._distance_km / EARTH_RADIUS_KM
+        ahead = far * (vectors @ self._nadir)
+        to_ground = ahead - np.sqrt(np.maximum(ahead**2 + 1 - far**2, 0))
+        normals = vectors * to_ground[:, None] - far * self._nadir
+        sine = (normals @ self._sun) / np.linalg.norm(normals, axis=1)
+        return np.exp(np.minimum(sine, 0) / DUSK).astype(np.float32)
 
     def _scattered(self, vectors: Vectors, angles: NDArray[np.float64]) -> Brightness:
         """What the lens scatters (n,) of the lit disc: a sum over parts of it."""
@@ -124,6 +141,7 @@ class EarthLimb(SkyHazard):
         met, light = even.radiance(
             parts.astype(np.float32), small, self._nadir, self._sun, np.eye(3)
         )
+        light *= self._night(parts[met])
         total = np.zeros(len(vectors))
         reached = np.flatnonzero(angles < self._radius_rad + OUTER_RAD)
         for part, radiance in zip(parts[met], light, strict=True):

@@ -97,7 +97,7 @@ class SkyGlow(SkyHazard):
         for _ in range(2):  # the Sun's speed differs by 3 % over the year
             missed = (wanted - ephemeris.sun_longitude_deg(date) + 180) % 360 - 180
             date += missed * DAYS_PER_DEG
-        return cls(julian_date=date)
+        return cls(julian_date=float(date))
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
         """Both."""

@@ -1,0 +1,92 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.exposure import looking_along, star_light
+from cubestack.emulator.camera.common.glow import brightness, glow_electrons
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.emulator.scene.hazards import SKY_HAZARDS, Moon, SkyHazard, SunGlare
+from cubestack.emulator.scene.sky import SkyScene
+from tests.emulator.scene.hazards.looks import ORION, SHUTTER
+
+LENSES = [LENS, double_gauss()]
+GLOWING = ["moon", "earth-limb", "sun-glare", "sky-glow"]
+
+
+def placed(name: str, optics: Optics, seed: int) -> SkyHazard:
+    kind = SKY_HAZARDS[name]
+    now = looking_along(ORION.quaternion, optics)
+    return kind.placed(kind.strength.usual, now, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("optics", LENSES, ids=["cubestar", "aramis"])
+@pytest.mark.parametrize("name", GLOWING)
+def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> None:
+    generator = np.random.default_rng(2)
+    now = looking_along(ORION.quaternion, optics)
+    for seed in range(3):
+        hazard = placed(name, optics, seed)
+        picture = glow_electrons([hazard], [now], optics)
+        assert picture is not None
+        x, y = (generator.integers(0, size, 3000) for size in (optics.columns, optics.rows))
+        directions = optics.unproject(np.stack([x, y], axis=1).astype(np.float64))
+        exact = brightness([hazard], now, directions @ now.axes)
+        assert exact is not None
+        # A pixel's share of the sky: the cube of the cosine but for the lens' distortion.
+        corner = optics.unproject(np.stack([x + 1, y], axis=1).astype(np.float64))
+        below = optics.unproject(np.stack([x, y + 1], axis=1).astype(np.float64))
+        solid = np.linalg.norm(np.cross(corner - directions, below - directions), axis=1)
+        right = exact * solid * optics.electrons_per_second(0.0) * optics.even_light[y, x]
+        off = np.abs(picture[y, x] - right) / (right + 1e-3 * right.max() + 1e-9)
+        assert np.median(off) < 0.005
+        assert np.percentile(off, 98) < 0.05  # the rest is blurred, or at the limb
+
+
+def test_nearer_things_hide_farther_ones() -> None:
+    now = looking_along(ORION.quaternion, LENS)
+    behind = Moon(direction=tuple(now.boresight.tolist()))
+    earth = replace(placed("earth-limb", LENS, 0), nadir=behind.direction, airglow=0.0)
+    glare = SunGlare(direction=tuple((-now.boresight).tolist()))
+    vectors = now.boresight[None]
+    alone, both, all_three = (
+        brightness(hazards, now, vectors)
+        for hazards in ([earth], [behind, earth], [behind, earth, glare])
+    )
+    assert alone is not None
+    assert both is not None
+    assert all_three is not None
+    assert both[0] == alone[0]
+    assert all_three[0] >= both[0]
+
+
+def test_even_glow_gives_what_the_sky_gives_on_the_axis() -> None:
+    glare = SunGlare(direction=tuple(looking_along(ORION.quaternion, LENS).boresight.tolist()))
+    even = replace(glare, slope_deg=1e6, transmittance=1e-12, decade_deg=180.0)
+    scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(even,))
+    now = looking_along(ORION.quaternion, LENS)
+    glow = even.glow(now, now.boresight[None])
+    light = star_light(scene, LENS, SHUTTER)
+    px = LENS.project(np.array([[0.0, 0.0, 1.0]]))[0].astype(int)
+    sky = glow[0] * LENS.electrons_per_second(0.0) * LENS.pixel_arcsec2 / 4.2545e10
+    # The distortion's slope on the axis is near 1.
+    assert light[px[1], px[0]] == pytest.approx(sky * SHUTTER.exposure_s, rel=0.02)
+
+
+def test_glow_smears_as_the_camera_turns() -> None:
+    moon = placed("moon", LENS, 1)
+    rate = (0.0, 5.0, 0.0)
+    still, turning = (
+        star_light(SkyScene(ORION.quaternion, r, mag_limit=-2, hazards=(moon,)), LENS, SHUTTER)
+        for r in ((0.0, 0.0, 0.0), rate)
+    )
+    full = still.max() / 2
+    assert (turning > full / 3).sum() > 1.5 * (still > full).sum()
+
+
+def test_without_hazards_nothing_glows() -> None:
+    now = looking_along(ORION.quaternion, LENS)
+    assert glow_electrons([], [now], LENS) is None
+    assert glow_electrons([placed("aberration", LENS, 0)], [now], LENS) is None

@@ -1,0 +1,63 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.exposure import looking, star_light
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards.debris import Debris
+from cubestack.emulator.scene.sky import SkyScene
+from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
+
+MIDDLE = looking(ORION, LENS, SHUTTER)
+
+
+def streak(rate_deg_s: float) -> tuple[np.ndarray, Debris]:
+    """Light of a lone object of V 0 that crosses the boresight along the rows."""
+    hazard = Debris(
+        direction=tuple(NOW.boresight.tolist()),
+        towards=tuple(NOW.axes[0].tolist()),
+        rate_deg_s=rate_deg_s,
+        v_mag=0.0,
+        time_s=MIDDLE.time_s,
+    )
+    scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(hazard,))
+    return star_light(scene, LENS, SHUTTER), hazard
+
+
+@pytest.mark.parametrize("rate_deg_s", [0.0, 0.3, 2.0])
+def test_streak_holds_the_light_of_a_star(rate_deg_s: float) -> None:
+    light, _ = streak(rate_deg_s)
+    right = float(LENS.electrons_per_second(0.0)) * SHUTTER.exposure_s
+    assert light.sum(dtype=np.float64) == pytest.approx(right, rel=2e-3)
+
+
+def test_streak_is_as_long_as_it_moves() -> None:
+    light, hazard = streak(3.0)
+    columns = np.arange(LENS.columns)
+    across = light.sum(axis=0, dtype=np.float64)
+    mean = across @ columns / across.sum()
+    spread = np.sqrt(across @ (columns - mean) ** 2 / across.sum())
+    ends = [
+        hazard.lights(replace(MIDDLE, time_s=MIDDLE.time_s + side)).vectors @ NOW.axes.T
+        for side in (-SHUTTER.exposure_s / 2, SHUTTER.exposure_s / 2)
+    ]
+    first, last = (float(LENS.project(end)[0, 0]) for end in ends)
+    assert mean == pytest.approx((first + last) / 2, abs=0.5)
+    # A uniform bar, and the spot.
+    assert spread == pytest.approx(np.hypot(abs(last - first) / np.sqrt(12), 0.95), rel=0.02)
+
+
+def test_stars_are_no_other_than_without() -> None:
+    _, hazard = streak(1.0)
+    clean = star_light(ORION, LENS, SHUTTER)
+    light = star_light(replace(ORION, hazards=(hazard,)), LENS, SHUTTER)
+    far = np.ones_like(clean, bool)
+    far[:, 400:] = False
+    np.testing.assert_array_equal(light[far], clean[far])
+
+
+def test_refuses_a_way_to_nowhere() -> None:
+    with pytest.raises(SceneError, match="towards of the hazard debris must be another way"):
+        Debris(direction=(1.0, 0.0, 0.0), towards=(2.0, 0.0, 0.0))

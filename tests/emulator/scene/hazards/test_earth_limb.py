@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.exposure import star_light, star_pixels
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.scene.earth import angular_radius_deg
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE
+from cubestack.emulator.scene.hazards.earth_limb import EarthLimb, airglow_s10
+from cubestack.emulator.scene.hazards.moon import Moon
+from cubestack.emulator.scene.hazards.planets import Planets
+from cubestack.emulator.scene.sky import SkyScene
+from tests.emulator.scene.hazards.around import whole_light
+from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
+
+RADIUS_DEG = angular_radius_deg(600.0)
+
+
+def limb(angle_deg: float, *, lit: bool = True, **values: float) -> EarthLimb:
+    """The limb ``angle_deg`` to the right of the boresight, square to the rows."""
+    angle = np.radians(angle_deg + RADIUS_DEG)
+    nadir = np.cos(angle) * NOW.boresight + np.sin(angle) * NOW.axes[0]
+    sun = -nadir if lit else nadir
+    return EarthLimb(nadir=tuple(nadir.tolist()), sun=tuple(sun.tolist()), **values)
+
+
+def beside_boresight(angle_deg: float) -> np.ndarray:
+    angle = np.radians(angle_deg)
+    return np.asarray((np.cos(angle) * NOW.boresight + np.sin(angle) * NOW.axes[0])[None])
+
+
+def test_stars_behind_are_gone_and_no_others() -> None:
+    hazard = limb(5.0)
+    hip, pixels = star_pixels(ORION, LENS, SHUTTER)
+    left, _ = star_pixels(replace(ORION, hazards=(hazard,)), LENS, SHUTTER)
+    nadir = NOW.axes @ np.array(hazard.nadir)
+    behind = LENS.unproject(pixels) @ nadir > np.cos(np.radians(RADIUS_DEG))
+    assert 0 < len(left) < len(hip)
+    assert set(left) == set(hip[~behind])
+
+
+def test_lit_ground_has_the_radiance_of_the_mean_earth() -> None:
+    hazard = limb(-RADIUS_DEG, unevenness=0.0, airglow=0.0)  # straight down, the Sun overhead
+    assert hazard.glow(NOW, NOW.boresight[None])[0] == pytest.approx(EARTH_RADIANCE, rel=2e-3)
+    # 0.3 of the Sun's 1361 W/m2, by pi: the Sun is V -26.74 by 4.2545e10 for an arcsec2.
+    mag = -2.5 * np.log10(EARTH_RADIANCE / 4.2545e10)
+    assert mag == pytest.approx(2.38, abs=0.01)
+
+
+def test_whole_earth_from_far_away() -> None:
+    # At an angle from nadir, Lambert's ground is lit by the cosine of the way there on the sphere.
+    hazard = replace(limb(0, unevenness=0.0, airglow=0.0, glow_km=0.0), altitude_km=40_000.0)
+    nadir = np.array(hazard.nadir)
+    radius = np.radians(angular_radius_deg(40_000.0))
+    angles = np.linspace(0, radius, 10_001)
+    way = np.arcsin(np.sin(angles) / np.sin(radius)) - angles
+    right = np.trapezoid(np.cos(way) * 2 * np.pi * np.sin(angles), angles) * EARTH_RADIANCE
+    light = whole_light(hazard, replace(NOW, pixel_rad=1e-5), nadir, radius * 1.01)
+    assert light == pytest.approx(right, rel=0.01)
+
+
+def test_edge_is_at_the_limb() -> None:
+    hazard = limb(5.0, lit=True, airglow=0.0, glow_km=0.0)
+    inside, outside = (hazard.glow(NOW, beside_boresight(5.0 + d))[0] for d in (0.2, -0.2))
+    assert inside > 1e-3 * EARTH_RADIANCE
+    assert outside == 0
+    light = star_light(SkyScene(ORION.quaternion, mag_limit=-2, hazards=(hazard,)), LENS, SHUTTER)
+    edge = float(LENS.project(beside_boresight(5.0) @ NOW.axes.T)[0, 0])
+    row = light[256]
+    assert row[round(edge) + 8] > 1000 * max(row[round(edge) - 8], 1)
+
+
+def test_night_side_is_dark_but_for_the_airglow() -> None:
+    assert limb(5.0, lit=False, airglow=0.0).glow(NOW, beside_boresight(20.0))[0] < 0.1
+    glows = limb(5.0, lit=False).glow(NOW, np.concatenate([beside_boresight(a) for a in (4, 20)]))
+    assert np.all(glows > 10)
+
+
+def test_airglow_straight_down_and_along_the_limb() -> None:
+    height = np.array([-6378.136, 90.0, 94.0, 130.0])
+    down, limb_90, limb_94, above = airglow_s10(height, np.array([True, False, False, False]))
+    assert down == pytest.approx(145, rel=0.01)
+    # A shell of 10 km: 2 sqrt(2 R h) of way, some 70 times the layer's depth.
+    assert 5000 < limb_94 < 12_000
+    assert 5000 < limb_90 < 12_000
+    assert above == 0
+
+
+def test_light_in_a_lens_falls_off_beside_the_limb() -> None:
+    clean, dirty = limb(5.0, airglow=0.0), limb(5.0, airglow=0.0, scatter=0.01)
+    near, far = (dirty.glow(NOW, beside_boresight(a))[0] for a in (0.0, -25.0))
+    assert clean.glow(NOW, beside_boresight(0.0))[0] == 0
+    assert near > far > 0
+
+
+def test_hides_moon_and_planets() -> None:
+    hazard = limb(5.0, lit=False, airglow=0.0)
+    for angle_deg, shines in ((20.0, False), (-10.0, True)):
+        place = tuple(beside_boresight(angle_deg)[0].tolist())
+        behind = (Planets(direction=place), Moon(direction=place, scatter=0.0), hazard)
+        scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=behind)
+        light = star_light(scene, LENS, SHUTTER)
+        x, y = LENS.project(beside_boresight(angle_deg) @ NOW.axes.T)[0].astype(int)
+        assert bool(light[y - 3 : y + 4, x - 3 : x + 4].max() > 1000) is shines
+
+
+@pytest.mark.parametrize("angle_deg", [45.0, 5.0, 0.0, -10.0])
+def test_is_placed_with_the_limb_at_an_angle(angle_deg: float) -> None:
+    hazard = EarthLimb.placed(angle_deg, NOW, np.random.default_rng(8))
+    to_nadir = np.degrees(np.arccos(np.array(hazard.nadir) @ NOW.boresight))
+    assert to_nadir - RADIUS_DEG == pytest.approx(angle_deg, abs=1e-6)
+    assert hazard.sun is not None
+    assert np.array(hazard.sun) @ NOW.boresight <= 0.5 + 1e-9
+
+
+def test_refuses_what_can_not_be() -> None:
+    with pytest.raises(SceneError, match="altitude_km of the hazard earth-limb must be in 150"):
+        EarthLimb(altitude_km=100)
+    with pytest.raises(SceneError, match="sun must be 3 numbers"):
+        EarthLimb(sun=(0.0, 0.0, 0.0))

@@ -1,0 +1,78 @@
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.exposure import looking, star_light
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.emulator.scene.file import SceneError, made_of, readers_of
+from cubestack.emulator.scene.hazards import SKY_HAZARDS, SkyHazard
+from cubestack.emulator.scene.sky import SkyScene
+from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
+
+KINDS = list(SKY_HAZARDS.values())
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_says_what_it_is(kind: type[SkyHazard]) -> None:
+    assert 4 < len(kind.meaning) < 70
+    assert 5 <= len(kind.strength.values) <= 7
+    assert kind.strength.usual in kind.strength.values
+    assert all("meaning" in entry.metadata for entry in fields(kind))
+    kind()  # every key has a default
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("optics", [LENS, double_gauss()], ids=["cubestar", "aramis"])
+def test_every_strength_renders(kind: type[SkyHazard], optics: Optics) -> None:
+    now = looking(ORION, optics, SHUTTER)
+    for seed, strength in enumerate(kind.strength.values):
+        hazard = kind.placed(strength, now, np.random.default_rng(seed))
+        light = star_light(replace(ORION, hazards=(hazard,)), optics, SHUTTER)
+        assert np.isfinite(light).all()
+        assert light.min() >= 0
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_worst_disturbs_more_than_mildest(kind: type[SkyHazard]) -> None:
+    now = looking(ORION, LENS, SHUTTER)
+    clean = star_light(ORION, LENS, SHUTTER)
+    mild, bad = (
+        sum(
+            float(
+                np.abs(star_light(replace(ORION, hazards=(hazard,)), LENS, SHUTTER) - clean).sum()
+            )
+            for hazard in (kind.placed(s, now, np.random.default_rng(k)) for k in range(3))
+        )
+        for s in (kind.strength.values[0], kind.strength.values[-1])
+    )
+    assert bad > mild
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
+    first, same, other = (
+        kind.placed(kind.strength.usual, NOW, np.random.default_rng(seed)) for seed in (1, 1, 2)
+    )
+    assert first == same
+    assert first != other
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
+    hazard = kind.placed(kind.strength.usual, NOW, np.random.default_rng(4))
+    assert set(readers_of(kind)) == {entry.name for entry in fields(kind)}
+    values = {entry.name: getattr(hazard, entry.name) for entry in fields(kind)}
+    table = {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in values.items()
+        if value is not None
+    }
+    assert made_of(SKY_HAZARDS)({kind.name: table}) == (hazard,)
+
+
+def test_a_scene_takes_hazards_only() -> None:
+    with pytest.raises(SceneError, match="hazards must be hazards of light, not 'moon'"):
+        SkyScene([0, 0, 0, 1], hazards=("moon",))  # type: ignore[arg-type]
