@@ -210,7 +210,9 @@ class Processing:
                 self._rotation(attitude),
                 meter,
                 margin_rad=margin,
-                verified=self._switches.tracking == "verified",
+                field=configuration.field(self.state.settings)
+                if self._switches.tracking == "verified"
+                else None,
                 radius_deg=self._radius_deg(mode),
             )
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()

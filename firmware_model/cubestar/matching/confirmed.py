@@ -11,74 +11,56 @@ lengths are tried, then the whole margin. Whatever is tried counts.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import cos, radians
+from math import acos, degrees
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.confirmation import (
-    by_chance,
-    correction,
-    false_alarm,
-    from_three,
-    matched,
-    scaled,
-)
+from cubestack.firmware_model.attitude.confirmation import from_three, scaled
 from cubestack.firmware_model.attitude.field import Field
-from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.identification import (
-    NONE,
     Identification,
     MatchOutcome,
+    identified,
     unidentified,
+)
+from cubestack.firmware_model.cubestar.matching.prediction import (
+    LARGEST_FALSE_ALARM,
+    LEVELS,
+    Candidate,
+    Picture,
 )
 from cubestack.firmware_model.cubestar.matching.triangles import Step, steps
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, DEFAULT_MARGIN_RAD
 from cubestack.firmware_model.mcu.costs import Meter
 
 Floats = NDArray[np.float32]
-Indices = NDArray[np.intp]
-
-#: False alarms a picture, above which an attitude is refused.
-LARGEST_FALSE_ALARM = 1e-5
 
 #: Time that identification may take, in s, and what is kept of it for the last attitude.
 TIME_LIMIT_S = 0.25
-_RESERVE_S = 0.012
+_RESERVE_S = 0.018
 
 #: Stars that a solution needs.
 FEWEST_STARS = 3
 
-#: Parts of the margin within which stars are looked for: a place that fits well says more.
-_LEVELS = (1.0, 0.5, 0.25)
+#: Attitudes further apart than this are rivals.
+_SAME_DEG = 0.5
 
 
 @dataclass(frozen=True)
-class _Pass:
-    """One search: by what measured tangents are multiplied, part of the margin, centroids."""
+class Pass:
+    """One search: by what tangents of field angles are multiplied, the part of the margin within
+    which sides agree, and how many centroids take part."""
 
-    factor: float
-    part: float
-    most: int
-
-
-_TRIALS = [1 + sign * 0.0025 * step for step in range(1, 13) for sign in (1, -1)]
-PASSES = (_Pass(1.0, 0.4, 64), *(_Pass(f, 0.4, 12) for f in _TRIALS), _Pass(1.0, 1.0, 64))
+    factor: float = 1.0
+    part: float = 0.4
+    most: int = 64
 
 
-@dataclass(frozen=True, eq=False)
-class _Candidate:
-    """An attitude with the stars that confirm it."""
-
-    centroids: Indices
-    stars: Indices
-    residuals: Floats
-    rotation: Floats
-    expected: int
-    factor: float
-    false_alarm: float
+_OTHER_LENSES = [1 + sign * 0.0025 * step for step in range(1, 13) for sign in (1, -1)]
+PASSES = (Pass(), *(Pass(factor, most=10) for factor in _OTHER_LENSES), Pass(part=1.0))
 
 
 def identify(
@@ -89,10 +71,11 @@ def identify(
     meter: Meter,
     *,
     boresight: Floats | None = None,
+    radius_deg: float = CUT_RADIUS_DEG,
     margin_rad: float = DEFAULT_MARGIN_RAD,
     limit_s: float = TIME_LIMIT_S,
     largest_false_alarm: float = LARGEST_FALSE_ALARM,
-    passes: tuple[_Pass, ...] = PASSES,
+    passes: tuple[Pass, ...] = PASSES,
 ) -> Identification:
     """Identify centroids of unit vectors (n, 3): lost in space, or near a `boresight` (3,).
 
@@ -105,7 +88,8 @@ def identify(
         catalogue: stars and pairs.
         field: what of the sky is in the picture.
         meter: charged with every operation.
-        boresight: only stars within `CUT_RADIUS_DEG` of it count.
+        boresight: only stars within `radius_deg` of it count.
+        radius_deg: half the field and what the boresight may be wrong by.
         margin_rad: largest distance of a star from its predicted place.
         limit_s: the part's time, which is not exceeded.
         largest_false_alarm: expected wrong attitudes a picture that are put up with.
@@ -119,156 +103,99 @@ def identify(
     if boresight is not None:
         with meter.phase("reduction"):
             listed = np.zeros(len(catalogue), dtype=bool)
-            listed[catalogue.near(boresight, CUT_RADIUS_DEG, meter)] = True
+            listed[catalogue.near(boresight, radius_deg, meter)] = True
     order = np.arange(count)
     if brightness is not None:
         order = np.lexsort((directions[:, 0], -np.asarray(brightness, np.float32)))
         with meter.phase("distances"):
             meter.charge(i32_add=count * count // 2, loop=count * count // 4)
-    search = _Search(directions[order], catalogue, field, meter, margin_rad, listed, limit)
-    outcome, best = search.run(passes, largest_false_alarm)
-    if best is None:
-        nothing = unidentified(count, outcome)
-        nothing.votes[:] = search.entries > 0
-        return nothing
-    stars = np.full(count, NONE, np.int32)
-    residuals = np.full(count, np.nan, np.float32)
-    votes = np.zeros(count, np.uint8)
-    places = order[best.centroids]
-    stars[places], residuals[places] = best.stars, best.residuals
-    votes[places] = len(places) - 1
-    return Identification(
-        stars, votes, outcome, best.false_alarm, best.expected, residuals, 1 / best.factor
-    )
+    picture = Picture(directions[order], catalogue, field, margin_rad, meter)
+    search = _Search(picture, listed, limit, largest_false_alarm)
+    best = search.run(passes)
+    if isinstance(best, Candidate):
+        return identified(order[best.centroids], best, count)
+    nothing = unidentified(count, best)
+    nothing.votes[:] = search.entries > 0
+    return nothing
 
 
 class _Search:
-    """The search of one picture."""
+    """The search of one picture.
+
+    Attributes:
+        chance: triangles that chance gives, to be expected so far.
+        tried: attitudes tried.
+        entries: entries of the pair list that were as wide as a pair.
+    """
 
     def __init__(
-        self,
-        rays: Floats,
-        catalogue: StarCatalogue,
-        field: Field,
-        meter: Meter,
-        margin_rad: float,
-        listed: NDArray[np.bool_] | None,
-        limit: int,
+        self, picture: Picture, listed: NDArray[np.bool_] | None, limit: int, largest: float
     ) -> None:
-        self._rays, self._catalogue, self._field = rays, catalogue, field
-        self._meter, self._margin, self._listed = meter, margin_rad, listed
-        self._limit = limit
-        self.hypotheses = 0.0
-        self.largest = LARGEST_FALSE_ALARM
+        self._picture, self._listed, self._limit = picture, listed, limit
+        self._largest = largest
+        self.chance = 0.0
         self.tried = self.entries = 0
 
     @property
     def _late(self) -> bool:
-        return self._meter.total >= self._limit
+        return self._picture.meter.total >= self._limit
 
-    def run(
-        self, passes: tuple[_Pass, ...], largest: float
-    ) -> tuple[MatchOutcome, _Candidate | None]:
+    def run(self, passes: tuple[Pass, ...]) -> Candidate | MatchOutcome:
+        """The attitude that is believed, or why there is none."""
+        picture, meter = self._picture, self._picture.meter
         for each in passes:
-            with self._meter.phase("distances"):
-                rays = scaled(self._rays[: each.most], each.factor, self._meter)
-            tolerance = each.part * self._margin
-            seen: list[_Candidate] = []
-            for step in steps(
-                rays, self._catalogue, tolerance, self._listed, self._meter, self._limit
-            ):
-                self.hypotheses += step.by_chance
+            with meter.phase("distances"):
+                rays = scaled(picture.directions[: each.most], each.factor, meter)
+            tolerance = each.part * picture.margin_rad
+            seen: list[Candidate] = []
+            left = len(rays) - 2
+            for step in steps(rays, picture.catalogue, tolerance, self._listed, meter, self._limit):
+                left -= 1
+                self.chance += step.by_chance
                 self.entries += step.entries
-                believed: list[_Candidate] = []
-                for candidate in self._candidates(step, each.factor, tolerance, seen):
-                    if candidate.false_alarm <= largest:
-                        believed.append(candidate)
+                candidates = self._candidates(step, each.factor, tolerance, seen)
+                believed = [one for one in candidates if one.false_alarm <= self._largest]
                 if believed:
                     best = min(believed, key=lambda one: one.false_alarm)
-                    if any(_differ(best, other) for other in believed):
-                        return MatchOutcome.AMBIGUOUS, None
-                    return MatchOutcome.IDENTIFIED, best
-                if self._late:
-                    return MatchOutcome.NO_TIME, None
-            if self._late:
-                return MatchOutcome.NO_TIME, None
-        unconfirmed = MatchOutcome.UNCONFIRMED if self.tried else MatchOutcome.TOO_FEW_MATCHED
-        return unconfirmed, None
+                    rivals = any(_apart_deg(best, other) > _SAME_DEG for other in believed)
+                    return MatchOutcome.AMBIGUOUS if rivals else best
+            if self._late or left > 0:
+                return MatchOutcome.NO_TIME
+        return MatchOutcome.UNCONFIRMED if self.tried else MatchOutcome.TOO_FEW_MATCHED
 
     def _candidates(
-        self, step: Step, factor: float, tolerance: float, seen: list[_Candidate]
-    ) -> Iterator[_Candidate]:
+        self, step: Step, factor: float, tolerance: float, seen: list[Candidate]
+    ) -> Iterator[Candidate]:
         """Attitudes of the triangles of a step; none that one of `seen` stands for already."""
+        picture = self._picture
         for row in np.flatnonzero(~step.mirrored):
             centroids, stars = step.centroids[row], step.stars[row]
-            if any(_stands_for(one, centroids, stars) for one in seen):
-                continue
             if self._late:
                 return
+            if any(_stands_for(one, centroids.tolist(), stars.tolist()) for one in seen):
+                continue
             misfit = min(float(step.misfit[row]) / tolerance, 1.0)
-            part = min(level for level in _LEVELS if level >= misfit)
-            with self._meter.phase("verification"):
-                candidate = self._confirm(centroids, stars, factor, part**3)
+            # Entries and both rings are narrower by this part: its cube of triangles by chance.
+            part = min(level for level in LEVELS if level >= misfit)
+            tries = len(LEVELS) * self.chance * part**3
+            self.tried += 1
+            with picture.meter.phase("verification"):
+                rays = scaled(picture.directions[centroids], factor, picture.meter)
+                rotation = from_three(rays, picture.catalogue.vectors[stars], picture.meter)
+                candidate = picture.confirm(
+                    rotation, FEWEST_STARS, tries, factor=factor, largest=self._largest
+                )
             seen.append(candidate)
             yield candidate
 
-    def _confirm(
-        self, centroids: Indices, stars: Indices, factor: float, share: float
-    ) -> _Candidate:
-        """The attitude of a triangle, refined with every star that is where it predicts."""
-        self.tried += 1
-        meter, vectors, margin = self._meter, self._catalogue.vectors, self._margin
-        rays = scaled(self._rays, factor, meter)
-        rotation = from_three(rays[centroids], vectors[stars], meter)
-        near = self._catalogue.within(rotation[2], self._field.smallest_cosine, meter)
-        count = len(near)
-        ahead = vectors[near]
-        places = turned(ahead, rotation)
-        meter.charge(f32_mul=9 * count, f32_add=6 * count, loop=count)
-        inside = self._field.contains(places, meter, factor)
-        near, ahead, places = near[inside], ahead[inside], places[inside]
-        for radius in (3 * margin, margin):
-            rows, predicted, _ = matched(rays, places, radius, meter)
-            if len(rows) < FEWEST_STARS:
-                break
-            if self._odds(share, len(near), len(rows), _LEVELS[-1]) > self.largest:
-                break
-            turn, change = correction(
-                rays[rows], places[predicted], meter, with_scale=len(rows) >= 5
-            )
-            rotation = turn @ rotation
-            places = turned(ahead, rotation)
-            meter.charge(f32_mul=9 * len(near) + 27, f32_add=6 * len(near) + 18, loop=len(near))
-            if change != 1.0:
-                factor *= change
-                rays = scaled(self._rays, factor, meter)
-        rows, predicted, apart = matched(rays, places, margin, meter)
-        least = np.inf
-        expected = len(near)
-        for level in _LEVELS:
-            found = int(np.count_nonzero(apart <= level * margin))
-            if found < FEWEST_STARS:
-                continue
-            least = min(least, self._odds(share, expected, found, level))
-        return _Candidate(
-            rows, near[predicted].astype(np.intp), apart, rotation, expected, factor, least
-        )
 
-    def _odds(self, share: float, expected: int, found: int, level: float) -> float:
-        """False alarms of an attitude of a triangle whose sides agree so well."""
-        chance = by_chance(len(self._rays) - 3, level * self._margin, self._field.solid_angle_sr)
-        tries = len(_LEVELS) ** 2 * self.hypotheses * share
-        with self._meter.phase("selection"):
-            return false_alarm(tries, expected - 3, found - 3, chance, self._meter)
-
-
-def _stands_for(one: _Candidate, centroids: Indices, stars: Indices) -> bool:
+def _stands_for(one: Candidate, centroids: list[int], stars: list[int]) -> bool:
     """Whether an attitude names these centroids with these stars."""
     named = dict(zip(one.centroids.tolist(), one.stars.tolist(), strict=True))
-    return all(named.get(c) == s for c, s in zip(centroids.tolist(), stars.tolist(), strict=True))
+    return all(named.get(c) == star for c, star in zip(centroids, stars, strict=True))
 
 
-def _differ(one: _Candidate, other: _Candidate) -> bool:
-    """Whether two attitudes are more than 0.5 deg apart."""
-    trace = float((one.rotation * other.rotation).sum())
-    return trace < 1 + 2 * cos(radians(0.5))
+def _apart_deg(one: Candidate, other: Candidate) -> float:
+    """Angle between two attitudes, in degrees."""
+    cosine = (float((one.rotation * other.rotation).sum()) - 1) / 2
+    return degrees(acos(max(-1.0, min(cosine, 1.0))))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.float_functions import arc_cosine
+from cubestack.firmware_model.cubestar.matching.prediction import Candidate
 from cubestack.firmware_model.mcu.costs import Meter
 
 #: Mark of a centroid without identity.
@@ -79,6 +80,24 @@ def unidentified(count: int, outcome: MatchOutcome) -> Identification:
     )
 
 
+def identified(centroids: NDArray[np.intp], confirmed: Candidate, count: int) -> Identification:
+    """Identification of `count` centroids by an attitude that so many of them confirm."""
+    stars = np.full(count, NONE, np.int32)
+    residuals = np.full(count, nan, np.float32)
+    votes = np.zeros(count, np.uint8)
+    stars[centroids], residuals[centroids] = confirmed.stars, confirmed.residuals
+    votes[centroids] = len(centroids) - 1
+    return Identification(
+        stars,
+        votes,
+        MatchOutcome.IDENTIFIED,
+        confirmed.false_alarm,
+        confirmed.expected,
+        residuals,
+        1 / confirmed.factor,
+    )
+
+
 def angles_between(
     a: NDArray[np.float32], b: NDArray[np.float32], meter: Meter
 ) -> NDArray[np.float32]:
@@ -120,7 +139,7 @@ def verify(
     margin_rad: float,
     meter: Meter,
     *,
-    thinned: bool = True,
+    thinned: bool,
 ) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
     """Let every pair of centroids vote for its identities, and keep those that all agree.
 

@@ -3,8 +3,14 @@
 CubeStar thesis, section 4.5. No voting: the stars near the last boresight are turned into camera
 axes with the last attitude, and a centroid within 0.3 deg of one takes its identity, so the camera
 may turn up to 0.3 deg in an iteration and two stars are enough. Assumed: the nearest star is taken
-when several are in reach. An extension: a verification round drops what contradicts the other
-stars, as when a star fainter than the catalogue stands near the predicted place of another.
+when several are in reach.
+
+An extension: the verification round drops what contradicts the other stars, as when a star fainter
+than the catalogue stands near the predicted place of another; those left correct the attitude, and
+this is confirmed as one that a triangle proposes (``prediction``). Two stars propose it here. Wrong
+attitudes to be expected are the pairs of wrong stars: with F centroids that chance puts in reach of
+a predicted star, F^2 / 2 of them, and the part whose sides agree, the margin over the reach. So the
+camera may look elsewhere, or the last attitude be wrong, and neither is believed.
 """
 
 from math import radians, sin
@@ -12,6 +18,8 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.attitude.confirmation import by_chance, correction
+from cubestack.firmware_model.attitude.field import Field
 from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.identification import (
@@ -19,8 +27,14 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     CentroidPairs,
     Identification,
     MatchOutcome,
+    identified,
     unidentified,
     verify,
+)
+from cubestack.firmware_model.cubestar.matching.prediction import (
+    LARGEST_FALSE_ALARM,
+    LEVELS,
+    Picture,
 )
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, DEFAULT_MARGIN_RAD
 from cubestack.firmware_model.mcu.costs import Meter
@@ -38,8 +52,8 @@ def track(
     attitude: NDArray[np.float32],
     meter: Meter,
     *,
+    field: Field | None = None,
     margin_rad: float = DEFAULT_MARGIN_RAD,
-    verified: bool = True,
     radius_deg: float = CUT_RADIUS_DEG,
 ) -> Identification:
     """Identify centroids from the attitude of the iteration before.
@@ -48,9 +62,12 @@ def track(
 
     Args:
         directions: (n, 3) unit vectors of the centroids in camera axes.
+        catalogue: the stars.
         attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
+        meter: charged with every operation.
+        field: what of the sky is in the picture, to verify the stars; None does not, and all of
+            them weigh the same.
         margin_rad: largest difference between a measured and a catalogue angle, in rad.
-        verified: whether the verification round follows; without it all stars weigh the same.
         radius_deg: of the reduced catalogue, about the boresight.
     """
     count = len(directions)
@@ -61,14 +78,36 @@ def track(
     with meter.phase("prediction"):
         kept = _nearest(directions, catalogue.vectors, stars, attitude, meter)
     votes = (kept != NONE).astype(np.uint8)
-    if verified:
+    if field is not None:
         with meter.phase("distances"):
             pairs = CentroidPairs.measure(directions, meter)
         with meter.phase("verification"):
-            votes, kept = verify(pairs, kept, catalogue.vectors, margin_rad, meter)
+            votes, kept = verify(pairs, kept, catalogue.vectors, margin_rad, meter, thinned=True)
     if np.count_nonzero(kept != NONE) < FEWEST_STARS:
         return Identification(np.full_like(kept, NONE), votes, MatchOutcome.TOO_FEW_MATCHED)
-    return Identification(kept, votes, MatchOutcome.IDENTIFIED)
+    if field is None:
+        return Identification(kept, votes, MatchOutcome.IDENTIFIED)
+    with meter.phase("verification"):
+        return _confirmed(Picture(directions, catalogue, field, margin_rad, meter), attitude, kept)
+
+
+def _confirmed(
+    picture: Picture, attitude: NDArray[np.float32], kept: NDArray[np.int32]
+) -> Identification:
+    """The identification that an attitude gives, corrected by the stars (n,) that agree."""
+    meter, named = picture.meter, np.flatnonzero(kept != NONE)
+    places = turned(picture.catalogue.vectors[kept[named]], attitude)
+    turn, _ = correction(picture.directions[named], places, meter, with_scale=False)
+    rotation = (turn @ attitude).astype(np.float32)
+    reach = radians(REACH_DEG)
+    expected = len(picture.catalogue) / (4 * np.pi) * picture.field.solid_angle_sr
+    astray = expected * by_chance(len(kept), reach, picture.field.solid_angle_sr)
+    tries = len(LEVELS) * astray**2 / 2 * min(picture.margin_rad / reach, 1.0)
+    meter.charge(f32_mul=9 * len(named) + 34, f32_add=6 * len(named) + 18, f32_div=1)
+    found = picture.confirm(rotation, FEWEST_STARS, tries)
+    if found.false_alarm > LARGEST_FALSE_ALARM:
+        return unidentified(len(kept), MatchOutcome.UNCONFIRMED)
+    return identified(found.centroids, found, len(kept))
 
 
 def _nearest(

@@ -194,10 +194,11 @@ class _Batch:
                 "f32_sqrt": newest,
                 "ram_read": 6 * newest,
             },
-            "votes": {  # entries of the pair list, each kept with the newest centroid's star
-                "f32_compare": searched + newest + walked,
+            # Entries of the pair list, each kept with the newest centroid's star. Floats that are
+            # not negative are in order as integers, and compared as such.
+            "votes": {
                 "flash_read": searched + 3 * walked,
-                "i32_add": 3 * searched + 4 * entries,
+                "i32_add": 4 * (searched + entries) + walked + newest,
                 "table_byte": 2 * entries,
                 "ram_write": 2 * entries + self._stars_listed // 2,
                 "loop": searched + walked + entries + self._stars_listed // 2,
@@ -205,9 +206,8 @@ class _Batch:
             "identities": {  # third sides, and which way the triangles turn
                 "f32_mul": 4 * wedges + 19 * found,
                 "f32_add": 3 * wedges + 10 * found,
-                "f32_compare": wedges + found,
                 "flash_read": 6 * wedges + 9 * found,
-                "i32_add": 4 * wedges,
+                "i32_add": 5 * wedges + found,
                 "table_byte": wedges,
                 "ram_write": 8 * found,
                 "loop": wedges,

@@ -29,8 +29,8 @@ class CubeStarSwitches(Switches):
         "nearest",
         "verified",
         source="section 4.5",
-        reason="a faint star near another's place is taken for it; the angles between all tracked "
-        "stars tell",
+        reason="a faint star near another's place is taken for it: the angles between all tracked "
+        "stars tell, and how often chance would confirm their attitude",
     )
     pair_limit: str = switch(
         "widest pair of stars in the list, in degrees",

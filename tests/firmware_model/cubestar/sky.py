@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from cubestack.firmware_model.attitude.field import Field, field_of
+from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
@@ -22,6 +24,12 @@ PEAK_DN = 150.0
 def meter() -> Meter:
     """A fresh one of CubeStar's processor."""
     return Meter(CORTEX_M3)
+
+
+def pinhole() -> Field:
+    """The field that ``shoot`` draws: no distortion, the principal point in the middle."""
+    middle = CameraParameters(6.28, FOCAL_PX, FOCAL_PX, 511.5, 255.5, 0, 0, 0, 0)
+    return field_of(middle, COLUMNS, ROWS)
 
 
 @dataclass

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.attitude.confirmation import scaled
-from cubestack.firmware_model.attitude.field import Field, field_of
-from cubestack.firmware_model.attitude.geometry import CameraParameters
+from cubestack.firmware_model.attitude.field import Field
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.confirmed import LARGEST_FALSE_ALARM, identify
+from cubestack.firmware_model.cubestar.matching.confirmed import identify
 from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.matching.prediction import LARGEST_FALSE_ALARM
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 
-from ..sky import meter
+from ..sky import meter, pinhole
 
 Shoot = Callable[..., Any]
 Rays = NDArray[np.float32]
@@ -24,8 +24,7 @@ Rays = NDArray[np.float32]
 
 @pytest.fixture(scope="module")
 def field() -> Field:
-    """The pinhole's that ``shoot`` draws with."""
-    return field_of(CameraParameters(6.28, 1121, 1121, 511.5, 255.5, 0, 0, 0, 0), 1024, 512)
+    return pinhole()
 
 
 @pytest.fixture(scope="module")

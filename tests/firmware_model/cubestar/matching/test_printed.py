@@ -14,7 +14,7 @@ from cubestack.firmware_model.cubestar.matching.identification import MatchOutco
 from cubestack.firmware_model.cubestar.matching.tracking import REACH_DEG, track
 from cubestack.firmware_model.cubestar.matching.voting import DEFAULT_MARGIN_RAD, identify
 
-from ..sky import meter
+from ..sky import meter, pinhole
 
 Shoot = Callable[..., Any]
 
@@ -69,7 +69,9 @@ def test_tracks_what_is_nearest(catalogue: StarCatalogue, shoot: Shoot) -> None:
     aside = directions[0] + np.float32(np.radians(0.2)) * np.cross(directions[0], directions[1])
     directions[0] = aside / np.linalg.norm(aside)
     assert np.degrees(angle(directions[0], shot.directions[0])) < REACH_DEG
-    as_printed = track(directions, catalogue, attitude, meter(), verified=False)
+    as_printed = track(directions, catalogue, attitude, meter())
     assert as_printed.stars.tolist() == shot.stars.tolist()
     assert as_printed.votes.tolist() == [1] * len(directions)
-    assert 0 not in track(directions, catalogue, attitude, meter()).matched
+    field = pinhole()
+    verified = track(directions, catalogue, attitude, meter(), field=field)
+    assert 0 not in verified.matched

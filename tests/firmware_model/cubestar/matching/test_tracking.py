@@ -17,7 +17,7 @@ from cubestack.firmware_model.cubestar.matching.identification import (
 )
 from cubestack.firmware_model.cubestar.matching.tracking import track
 
-from ..sky import meter
+from ..sky import meter, pinhole
 
 Shoot = Callable[..., Any]
 
@@ -52,7 +52,9 @@ def test_tracking_follows(catalogue: StarCatalogue, shoot: Shoot, turn_deg: floa
         axis = rng.normal(size=3)
         turn = Rotation.from_rotvec(np.radians(turn_deg) * axis / np.linalg.norm(axis))
         last = (turn.as_matrix() @ shot.attitude).astype(np.float32)
-        results.append(check(track(shot.directions, catalogue, last, meter()), shot.stars))
+        results.append(
+            check(track(shot.directions, catalogue, last, meter(), field=pinhole()), shot.stars)
+        )
     assert solved(results, 0.99)
 
 
@@ -63,19 +65,34 @@ def test_tracking_loses_a_turn_beyond_its_reach(catalogue: StarCatalogue, shoot:
         shot = shoot(rng)
         turn = Rotation.from_rotvec(np.radians([1.0, 0, 0])).as_matrix()
         last = (turn @ shot.attitude).astype(np.float32)
-        found = track(shot.directions, catalogue, last, meter())
+        found = track(shot.directions, catalogue, last, meter(), field=pinhole())
         lost += found.outcome is not MatchOutcome.IDENTIFIED
     assert lost >= 38
 
 
-def test_tracking_needs_two_stars_only(catalogue: StarCatalogue, shoot: Shoot) -> None:
+def test_two_stars_are_enough_where_no_more_are_predicted(
+    catalogue: StarCatalogue, shoot: Shoot
+) -> None:
     rng = np.random.default_rng(92)
-    shot = next(s for s in (shoot(rng, most=2) for _ in range(20)) if len(s.stars) == 2)
-    found = track(shot.directions, catalogue, shot.attitude.astype(np.float32), meter())
-    assert found.stars.tolist() == shot.stars.tolist()
-    assert found.votes.tolist() == [1, 1]
-    one = track(shot.directions[:1], catalogue, shot.attitude.astype(np.float32), meter())
+    shot = next(s for s in (shoot(rng) for _ in range(99)) if len(s.stars) >= 4)
+    two = catalogue.vectors[shot.stars[:2]].astype(float)
+    sky = StarCatalogue.build(np.arange(2), two, np.ones(2), 3.8, 60)
+    attitude = shot.attitude.astype(np.float32)
+    for known, solved in ((sky, True), (catalogue, False)):
+        found = track(shot.directions[:2], known, attitude, meter(), field=pinhole())
+        assert (found.outcome is MatchOutcome.IDENTIFIED) == solved
+        assert found.votes.tolist() == [solved] * 2
+    one = track(shot.directions[:1], catalogue, attitude, meter())
     assert one.outcome is MatchOutcome.TOO_FEW_CENTROIDS
+
+
+def test_a_wrong_attitude_is_not_followed(catalogue: StarCatalogue, shoot: Shoot) -> None:
+    rng = np.random.default_rng(93)
+    for _ in range(300):
+        shot = shoot(rng, false_stars=15, most=40)
+        elsewhere = Rotation.random(random_state=rng).as_matrix().astype(np.float32)
+        found = track(shot.directions, catalogue, elsewhere, meter(), field=pinhole())
+        assert found.outcome is not MatchOutcome.IDENTIFIED
 
 
 def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:
@@ -84,7 +101,7 @@ def test_tracking_takes_the_nearest_of_several_stars_in_reach() -> None:
     stars /= np.linalg.norm(stars, axis=1, keepdims=True)
     sky = StarCatalogue.build(np.arange(4), stars, np.ones(4), 3.8, 57.3)
     seen = stars[[1, 2, 3]].astype(np.float32)
-    found = track(seen, sky, np.eye(3, dtype=np.float32), meter())
+    found = track(seen, sky, np.eye(3, dtype=np.float32), meter(), field=pinhole())
     assert found.stars.tolist() == [1, 2, 3]
 
 
@@ -94,7 +111,7 @@ def test_verification_keeps_a_set_that_agrees(catalogue: StarCatalogue, shoot: S
     wrong[0] = (wrong[0] + 50) % 405
     wrong[1] = wrong[2]
     pairs = CentroidPairs.measure(shot.directions, meter())
-    votes, kept = verify(pairs, wrong, catalogue.vectors, 0.001, meter())
+    votes, kept = verify(pairs, wrong, catalogue.vectors, 0.001, meter(), thinned=True)
     assert kept[:2].tolist() == [-1, -1]
     assert kept[2:].tolist() == shot.stars[2:].tolist()
     assert set(votes[2:].tolist()) == {len(wrong) - 3}

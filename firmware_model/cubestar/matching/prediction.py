@@ -1,0 +1,155 @@
+"""What an attitude predicts in a picture, and how much of it is there.
+
+An extension; ``attitude.confirmation`` says how the false-alarm probability comes about. The
+attitude is refined with the stars that it predicts, within three margins first, then within one. A
+place that fits within a half or a quarter of the margin says more, so these are tried as well, and
+count as tries.
+"""
+
+from dataclasses import dataclass
+from math import exp, inf, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.attitude.confirmation import (
+    by_chance,
+    correction,
+    false_alarm,
+    matched,
+    scaled,
+)
+from cubestack.firmware_model.attitude.field import Field
+from cubestack.firmware_model.attitude.geometry import turned
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.mcu.costs import Meter
+
+Floats = NDArray[np.float32]
+Indices = NDArray[np.intp]
+
+#: False alarms a picture, above which an attitude is refused.
+LARGEST_FALSE_ALARM = 1e-5
+
+#: Parts of the margin within which stars and sides may agree.
+LEVELS = (0.25, 0.5, 1.0)
+
+#: Stars from which on the focal length is fitted as well.
+STARS_FOR_SCALE = 5
+
+#: Stars in a picture, of those that the catalogue's density gives, below which a Poisson
+#: distribution has more of them than the sky with its empty regions: measured, see the test.
+_UNEVEN = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An attitude with the stars that confirm it.
+
+    Attributes:
+        centroids, stars, residuals: (k,) centroid, catalogue star, and angle between them in rad.
+        rotation: (3, 3) inertial to camera.
+        factor: by which tangents of measured field angles are multiplied.
+        expected: catalogue stars predicted in the picture.
+        false_alarm: expected wrong attitudes that are confirmed as well.
+    """
+
+    centroids: Indices
+    stars: Indices
+    residuals: Floats
+    rotation: Floats
+    factor: float
+    expected: int
+    false_alarm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Centroids and what is known about the picture that they are in.
+
+    Attributes:
+        directions: (n, 3) unit vectors in camera axes, as the calibration makes them.
+        catalogue: stars that may be in it.
+        field: its border.
+        margin_rad: largest distance of a star from its predicted place.
+        meter: charged with every operation.
+    """
+
+    directions: Floats
+    catalogue: StarCatalogue
+    field: Field
+    margin_rad: float
+    meter: Meter
+
+    def confirm(
+        self,
+        rotation: Floats,
+        given: int,
+        tries: float,
+        *,
+        factor: float = 1.0,
+        largest: float = LARGEST_FALSE_ALARM,
+    ) -> Candidate:
+        """Refine an attitude, and say how often chance confirms one so well.
+
+        Args:
+            rotation: (3, 3) inertial to camera.
+            given: stars that the attitude was made from.
+            tries: wrong attitudes to be expected so far that such stars propose.
+            factor: by which tangents of field angles are multiplied.
+            largest: false alarms above which the attitude is not refined, as nothing comes of it.
+        """
+        meter, margin = self.meter, self.margin_rad
+        near, ahead, places = self._predict(rotation, factor)
+        rays = scaled(self.directions, factor, meter)
+        rows, predicted, apart = matched(rays, places, 3 * margin, meter)
+        refined = 0
+        while len(rows) >= given and refined < 2:
+            if self._chance(len(near), len(rows), given, LEVELS[0], tries) > largest:
+                break
+            turn, change = correction(
+                rays[rows], places[predicted], meter, with_scale=len(rows) >= STARS_FOR_SCALE
+            )
+            rotation, refined = turn @ rotation, refined + 1
+            places = turned(ahead, rotation)
+            meter.charge(f32_mul=9 * len(near) + 27, f32_add=6 * len(near) + 18, loop=len(near))
+            if change != 1.0:
+                factor *= change
+                rays = scaled(self.directions, factor, meter)
+            rows, predicted, apart = matched(rays, places, margin, meter)
+        least = inf
+        for level in LEVELS if refined == 2 else ():
+            found = int(np.count_nonzero(apart <= level * margin))
+            if found >= given:
+                least = min(least, self._chance(len(near), found, given, level, tries))
+        stars = near[predicted].astype(np.intp)
+        return Candidate(rows, stars, apart, rotation, factor, len(near), least)
+
+    def _predict(self, rotation: Floats, factor: float) -> tuple[Indices, Floats, Floats]:
+        """Stars (m,) in the picture, and their unit vectors (m, 3) in inertial and camera axes."""
+        meter, vectors = self.meter, self.catalogue.vectors
+        near = self.catalogue.within(rotation[2], self.field.smallest_cosine, meter)
+        ahead = vectors[near]
+        places = turned(ahead, rotation)
+        meter.charge(f32_mul=9 * len(near), f32_add=6 * len(near), loop=len(near))
+        inside = self.field.contains(places, meter, factor)
+        return near[inside].astype(np.intp), ahead[inside], places[inside]
+
+    def _chance(self, expected: int, found: int, given: int, level: float, tries: float) -> float:
+        """False alarms where so many places agree within a part of the margin."""
+        spare = len(self.directions) - given
+        chance = by_chance(spare, level * self.margin_rad, self.field.solid_angle_sr)
+        further, missing = found - given, expected - found
+        with self.meter.phase("selection"):
+            odds = false_alarm(tries * len(LEVELS), further + missing, further, chance, self.meter)
+            # A wrong attitude seldom puts so few stars into the picture that none is missing.
+            return odds if missing > 0 else odds * self._so_few(expected)
+
+    def _so_few(self, expected: int) -> float:
+        """Part of the sky where so few stars, or fewer, are in a picture; at most."""
+        mean = _UNEVEN * len(self.catalogue) / (4 * pi) * self.field.solid_angle_sr
+        self.meter.charge(f32_mul=2 * expected + 20, f32_add=expected, f32_div=expected)
+        term = total = exp(-mean)
+        for number in range(1, expected + 1):
+            term *= mean / number
+            total += term
+        return total
