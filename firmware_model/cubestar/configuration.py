@@ -10,7 +10,9 @@ from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
 from cubestack.firmware_model.node.settings import Settings
 
 
-def detection_config(settings: Settings, *, plain_weights: bool = False) -> DetectionConfig:
+def detection_config(
+    settings: Settings, *, plain_weights: bool = False, background: bool = False
+) -> DetectionConfig:
     """Region, thresholds and limits of the search; see ``DetectionConfig``.
 
     Settings that this hardware can not follow act as the nearest that it can.
@@ -33,6 +35,7 @@ def detection_config(settings: Settings, *, plain_weights: bool = False) -> Dete
         max_invalid=values["MaxInvalidStars"],
         max_noise=values["MaxNoise"],
         plain_weights=plain_weights,
+        background=background,
     )
 
 

@@ -142,7 +142,9 @@ class Processing:
         with self._cycles():
             detection = yield from self.capture.pictures.search(
                 configuration.detection_config(
-                    settings, plain_weights=self._switches.weights == "intensity"
+                    settings,
+                    plain_weights=self._switches.weights == "intensity",
+                    background=self._switches.detection == "background",
                 )
             )
             camera = configuration.camera_parameters(settings)

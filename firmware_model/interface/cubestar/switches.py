@@ -65,6 +65,15 @@ class CubeStarSwitches(Switches):
         reason="lost in space is the sure choice until setIDMode, and a failure costs one step: "
         "tracking, assisted, lost in space",
     )
+    detection: str = switch(
+        "what a star's pixels are brighter than, and which pixels are read",
+        "sampled",
+        "background",
+        source="section 5.3.3: every third pixel of every third row against a fixed threshold; the "
+        "search ends at 20 stars, counted from the top",
+        reason="stray light, noise and hot pixels pass a fixed threshold, the brightest stars may "
+        "stand further down, and faint spots fall between the samples",
+    )
 
 
 #: Those of the default profile.

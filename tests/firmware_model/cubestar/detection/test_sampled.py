@@ -16,7 +16,7 @@ from cubestack.firmware_model.cubestar.detection import (
     detect_stars,
 )
 
-from .sky import meter
+from ..sky import meter
 
 Place = tuple[int, int]
 
@@ -150,7 +150,7 @@ def test_the_random_pictures_reach_every_end() -> None:
                 x_end=50, y_end=50, detection_threshold=10, star_threshold=8, **settings
             )
             ends.add(detect_stars(image, config, meter()).end)
-    assert ends == set(SearchEnd)
+    assert ends == set(SearchEnd) - {SearchEnd.TIME}
 
 
 def drawn(

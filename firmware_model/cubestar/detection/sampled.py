@@ -1,4 +1,4 @@
-"""Finding stars in a picture: image plane search, region growing, centroids.
+"""The published search: image plane search, region growing, centroids.
 
 CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is settled here:
 
@@ -15,141 +15,23 @@ CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is
 - The dark value is the mean of the samples that were not bright enough to start an area.
 - Visited pixels are zeroed during the search and written back from a list at its end, because the
   ground downloads the same picture afterwards.
-
-The search names the pixels that it reads and writes, in its order, and leaves the accesses to
-whoever has the picture: an array here, a memory behind an FPGA elsewhere.
 """
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cubestack.firmware_model.cubestar.detection.contract import (
+    Detection,
+    DetectionConfig,
+    Look,
+    Put,
+    Search,
+    SearchEnd,
+)
 from cubestack.firmware_model.mcu.costs import Meter
-
-
-class DetectionConfigError(ValueError):
-    """A detection setting out of range; `setting` names the field of `DetectionConfig`."""
-
-    def __init__(self, setting: str, requirement: str) -> None:
-        """Say which setting must be what."""
-        super().__init__(f"{setting} must be {requirement}")
-        self.setting = setting
-
-
-class SearchEnd(Enum):
-    """Why a search ended."""
-
-    COMPLETE = "the whole region was searched"
-    STARS = "the list of stars was full"
-    INVALID = "there were too many invalid areas"
-    NOISE = "there were too many noise areas"
-
-
-@dataclass(frozen=True)
-class DetectionConfig:
-    """Settings of telecommands 20 to 23, with the published values as defaults.
-
-    Attributes:
-        step: distance of sampled pixels and rows in px.
-        x_start, x_end, y_start, y_end: region of the samples in px, ends excluded.
-        detection_threshold: a sample above it (and the star threshold) starts an area, DN.
-        star_threshold: a neighbour above it joins the area, DN.
-        min_pixels: smaller areas are noise.
-        max_pixels: larger areas are invalid.
-        grid_size: width of the square around the brightest pixel that gives the centroid, odd.
-        max_stars: the search ends with so many stars.
-        max_invalid: the search ends with more invalid areas.
-        max_noise: the search ends with more noise areas.
-        plain_weights: a pixel weighs its value, else its value above the star threshold.
-    """
-
-    step: int = 3
-    x_start: int = 0
-    x_end: int = 1024
-    y_start: int = 0
-    y_end: int = 512
-    detection_threshold: int = 6
-    star_threshold: int = 6
-    min_pixels: int = 6
-    max_pixels: int = 60
-    grid_size: int = 5
-    max_stars: int = 20
-    max_invalid: int = 50
-    max_noise: int = 255
-    plain_weights: bool = False
-
-    def __post_init__(self) -> None:
-        """Refuse settings with which the search makes no sense."""
-        limits = {
-            **dict.fromkeys(("detection_threshold", "star_threshold"), (0, 255)),
-            **dict.fromkeys(("max_invalid", "max_noise"), (0, 255)),
-            **dict.fromkeys(("step", "min_pixels", "max_stars", "grid_size"), (1, 255)),
-            "max_pixels": (self.min_pixels, 255),
-            "x_end": (self.x_start + 1, 65_535),
-            "y_end": (self.y_start + 1, 65_535),
-            **dict.fromkeys(("x_start", "y_start"), (0, 65_535)),
-        }
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise DetectionConfigError(name, f"{low} to {high}, not {value}")
-        if self.grid_size % 2 == 0:
-            raise DetectionConfigError("grid_size", f"odd, not {self.grid_size}")
-
-    @property
-    def seed_threshold(self) -> int:
-        """What a sample must exceed to start an area, DN."""
-        return max(self.detection_threshold, self.star_threshold)
-
-
-@dataclass(frozen=True, eq=False)
-class Detection:
-    """What a search found, in the order of the search (row by row).
-
-    Attributes:
-        centroids: (n, 2) x and y in px.
-        sizes: (n,) pixels of each area.
-        intensities: (n,) sum of the values of each area's pixels, DN.
-        invalid: areas above the maximum size.
-        noise: areas below the minimum size.
-        dark_value: mean of the sampled background in DN, 0 when nothing was background.
-        end: why the search ended.
-    """
-
-    centroids: NDArray[np.float32]
-    sizes: NDArray[np.uint8]
-    intensities: NDArray[np.uint16]
-    invalid: int
-    noise: int
-    dark_value: int
-    end: SearchEnd
-
-
-@dataclass(frozen=True)
-class Look:
-    """Read pixels one after the other, up to and with the first one above ``above``.
-
-    The answer are the values read, uint8, at most as many as ``offsets``, (n,) int32.
-    """
-
-    offsets: NDArray[np.int32]
-    above: int
-
-
-@dataclass(frozen=True)
-class Put:
-    """Write pixels: ``offsets`` (n,) int32, ``values`` (n,) uint8."""
-
-    offsets: NDArray[np.int32]
-    values: NDArray[np.uint8]
-
-
-Search = Generator[Look | Put, Any, Detection]
-"""A search; whoever runs it performs the accesses and charges them."""
 
 
 @dataclass(frozen=True)
@@ -162,44 +44,8 @@ class _Area:
     looked_at: int
 
 
-def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter) -> Detection:
-    """Find the stars of a picture (rows, columns) of 8-bit values; the picture is not changed.
-
-    Charges what ``search_stars`` charges, and every access to the picture.
-
-    Raises:
-        DetectionConfigError: when the region reaches beyond the picture.
-    """
-    rows, columns = image.shape
-    pixels = image.reshape(-1).copy()
-    search, answer = search_stars(rows, columns, config, meter), None
-    while True:
-        try:
-            access = search.send(answer)
-        except StopIteration as done:
-            detection: Detection = done.value
-            return detection
-        match access:
-            case Look():
-                values = pixels[access.offsets]
-                above = np.flatnonzero(values > access.above)
-                answer = values[: above[0] + 1] if len(above) else values
-                meter.charge(ebi_read=len(answer))
-            case Put():
-                pixels[access.offsets] = access.values
-                meter.charge(ebi_write=len(access.offsets))
-
-
-def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
-    """Find the stars of a picture of so many 8-bit values that is somewhere else.
-
-    Charges all but the accesses that it yields. Phases: `search` and `centroid`. Raises as
-    ``detect_stars`` does.
-    """
-    if config.x_end > columns:
-        raise DetectionConfigError("x_end", f"at most {columns}, not {config.x_end}")
-    if config.y_end > rows:
-        raise DetectionConfigError("y_end", f"at most {rows}, not {config.y_end}")
+def sampled_search(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
+    """Find the stars of a picture of so many 8-bit values; see ``search_stars``."""
     along = np.arange(config.x_start, config.x_end, config.step, dtype=np.int32)
     down = np.arange(config.y_start, config.y_end, config.step, dtype=np.int32)
     samples = (down[:, None] * columns + along).reshape(-1)

@@ -1,0 +1,226 @@
+"""The search above the picture's own background: all pixels, the brightest stars, and true reasons.
+
+1. Samples of the region give level and noise of the sky in cells (`background`).
+2. Row by row, each pixel is compared with the level, plus the star threshold or `SIGMAS` of the
+   noise, whichever is more. What is sharper than a spot is dropped; the rest forms areas (`areas`).
+   A part of the picture that is bright all over is its own background, and nothing is found there.
+3. Areas that are too large, too small, too faint or drawn out are counted and dropped. Of the rest
+   the brightest are kept. Where those of the minimum size are too few, smaller ones fill the list,
+   as in pictures of sharp and faint spots.
+4. Around each brightest pixel a window is read again: its shape decides, and gives the centroid
+   (`spots`).
+
+The time is limited: rows that are not reached by then are not searched, and the search ends so.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubestar.detection import areas, background, spots
+from cubestack.firmware_model.cubestar.detection.areas import Areas, Ints, Runs
+from cubestack.firmware_model.cubestar.detection.background import Background
+from cubestack.firmware_model.cubestar.detection.contract import (
+    Detection,
+    DetectionConfig,
+    Look,
+    PictureStatistics,
+    Search,
+    SearchEnd,
+)
+from cubestack.firmware_model.mcu.costs import Meter
+
+SIGMAS = 4
+"""Noise alone passes it in 17 pixels of a picture, but not in three that touch."""
+
+FEWEST_PIXELS = 3
+"""Smaller areas are never stars, whatever the setting."""
+
+STRETCHED = 5
+"""Ratio of the variances along and across an area from which on it is drawn out; chosen."""
+
+MOST_STARS_FACTOR = 2
+MOST_AREAS = 256
+"""Areas whose shape is looked at, the brightest ones."""
+
+LIMIT_MS = 215
+"""For rows; the centroids of a full list take less than 10 ms more."""
+
+BLOCK = 8
+"""Pixels of a row that share a threshold."""
+
+_BYTE = 255
+
+_PIXEL = {"ram_read": 8, "i32_add": 22, "i32_mul": 4, "loop": 1}
+"""For each bright pixel of a short run: its neighbours, and its part in the area's sums."""
+
+_RUN = {"ram_read": 14, "ram_write": 10, "i32_add": 12, "loop": 3}
+"""For each run: the runs that it touches, and its area."""
+
+
+def background_search(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
+    """Find the stars of a picture of so many 8-bit values; see ``search_stars``."""
+    top, left = config.y_start, config.x_start
+    height, width = config.y_end - top, config.x_end - left
+    start = meter.total
+    corner = top * columns + left
+
+    def offsets(y: Ints, x: Ints) -> NDArray[np.int32]:
+        return (corner + y * columns + x).astype(np.int32)
+
+    with meter.phase("search"):
+        down, across = background.sample_offsets(height, width)
+        read = yield Look(offsets(down[:, None], across[None, :]).reshape(-1))
+        sky = background.estimate(read.reshape(len(down), len(across)), meter)
+        # The program looks at each row when it has read it; the reads cost the same.
+        pixels = yield Look(offsets(np.arange(height)[:, None], np.arange(width)).reshape(-1))
+        bright = _bright(pixels.reshape(height, width), sky, config, meter)
+        limit = start + LIMIT_MS * meter.table.clock_hz // 1000
+        runs, complete = _in_time(areas.runs_of(bright), height, width, limit, meter)
+        found, spikes = _areas(pixels, runs, sky, width, meter)
+        sort = _sorted_out(found, config, meter)
+    with meter.phase("centroid"):
+        # At the border a window repeats the last pixel.
+        grid = np.arange(-spots.HALF, spots.HALF + 1)
+        peak_y, peak_x = np.divmod(found.peaks[sort.candidates], width)
+        y = np.clip(peak_y[:, None] + grid, 0, height - 1)[:, :, None]
+        x = np.clip(peak_x[:, None] + grid, 0, width - 1)[:, None, :]
+        places = offsets(y, x)
+        values = (yield Look(places.reshape(-1))).reshape(places.shape).astype(np.int64)
+        windows = background.UNIT * values - sky.interpolated(sky.levels, y, x)
+        noises = sky.interpolated(sky.noises, peak_y, peak_x)
+        meter.charge(i32_add=4 * values.size, i32_mul=2 * values.size, loop=values.size)
+        kept = np.flatnonzero(~spots.too_sharp(windows, noises))
+        kept = kept[: MOST_STARS_FACTOR * config.max_stars]
+        chosen = sort.candidates[kept]
+        peaks = np.stack([peak_x, peak_y], axis=1)[kept]
+        measured = spots.centre(
+            windows[kept],
+            found.middles[chosen] - peaks,
+            values[kept, spots.HALF, spots.HALF] >= spots.SATURATED_DN,
+            noises[kept],
+            meter,
+        )
+    order = np.argsort(-measured.light, kind="stable")
+    centroids = (measured.places + (peaks + np.array([left, top])).astype(np.float32))[order]
+    return Detection(
+        centroids=centroids.astype(np.float32),
+        sizes=found.sizes[chosen][order].astype(np.uint8),
+        intensities=np.minimum(measured.light, 65_535).astype(np.uint16)[order],
+        invalid=min(sort.large + sort.elongated, _BYTE),
+        noise=min(sort.small, _BYTE),
+        dark_value=round(float(np.mean(sky.levels)) / background.UNIT),
+        end=SearchEnd.COMPLETE if complete else SearchEnd.TIME,
+        errors_px=measured.errors[order],
+        statistics=_statistics(sky, spikes, sort),
+    )
+
+
+def _bright(
+    picture: NDArray[np.uint8], sky: Background, config: DetectionConfig, meter: Meter
+) -> NDArray[np.bool_]:
+    """Pixels above the threshold, of all but the outermost ones."""
+    height, width = picture.shape
+    y, x = np.arange(height)[:, None], np.arange(BLOCK // 2, width + BLOCK, BLOCK)[None, :]
+    setting = background.UNIT * config.star_threshold // 2
+    above = np.maximum(SIGMAS * sky.interpolated(sky.noises, y, x), setting)
+    levels = (sky.interpolated(sky.levels, y, x) + above) // background.UNIT
+    thresholds = np.repeat(np.clip(levels, 0, _BYTE).astype(np.uint8), BLOCK, axis=1)
+    bright: NDArray[np.bool_] = picture > thresholds[:, :width]
+    bright[[0, -1]] = False
+    bright[:, [0, -1]] = False
+    meter.charge(i32_add=picture.size + 12 * levels.size, i32_mul=3 * levels.size)
+    meter.charge(loop=levels.size)
+    return bright
+
+
+def _in_time(runs: Runs, height: int, width: int, limit: int, meter: Meter) -> tuple[Runs, bool]:
+    """The runs of the rows that can be looked at before the meter's total reaches ``limit``."""
+    lengths = runs.ends - runs.begins
+    operations = meter.table.operations
+    pixel, run = (
+        sum(operations[name].cycles * count for name, count in costs.items())
+        for costs in (_PIXEL, _RUN)
+    )
+    short = np.where(lengths <= areas.LONGEST_RUN, lengths, 0)
+    rows = np.bincount(runs.begins // width, run + pixel * short, height)
+    done = int(np.searchsorted(np.cumsum(rows), limit - meter.total, "right"))
+    count = int(np.searchsorted(runs.begins, done * width))
+    pixels = int(short[:count].sum())
+    meter.charge(**{name: times * pixels for name, times in _PIXEL.items()})
+    meter.charge(**{name: times * count for name, times in _RUN.items()})
+    return Runs(runs.begins[:count], runs.ends[:count]), done >= height
+
+
+def _areas(
+    pixels: NDArray[np.uint8], runs: Runs, sky: Background, width: int, meter: Meter
+) -> tuple[Areas, int]:
+    """Areas of ``runs`` without their spikes, and the number of these."""
+    places = runs.places()
+    y, x = np.divmod(places, width)
+    levels = sky.interpolated(sky.levels, y, x)
+    sharp = areas.spikes(pixels, places, width, levels, sky.interpolated(sky.noises, y, x))
+    left = areas.without(runs, places[sharp])
+    labels = areas.join(left, width, meter)
+    signal = background.UNIT * pixels[places].astype(np.int64) - levels
+    kept = ~sharp
+    return areas.measure(left, labels, signal[kept], width), int(sharp.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Sorted:
+    """What became of the areas: indices of the candidates, brightest first, and counts."""
+
+    candidates: Ints
+    large: int
+    small: int
+    elongated: int
+    aligned: float
+    streak_px: float
+
+
+def _sorted_out(found: Areas, config: DetectionConfig, meter: Meter) -> _Sorted:
+    """Tell the areas that may be stars from the others."""
+    xx, yy, xy = found.moments.T
+    spread = np.hypot(xx - yy, 2 * xy)
+    pixel = 1 / 12
+    along, across = (xx + yy + spread) / 2 + pixel, (xx + yy - spread) / 2 + pixel
+    whole = ~found.large
+    small = whole & (found.sizes < FEWEST_PIXELS)
+    drawn_out = whole & ~small & (along > STRETCHED * across)
+    large = found.large | (~drawn_out & (found.sizes > config.max_pixels))
+    faint = found.tops <= background.UNIT * config.detection_threshold
+    brightest = np.argsort(-found.light, kind="stable")
+    brightest = brightest[~(small | drawn_out | large)[brightest]]
+    # Those of the minimum size first; smaller and fainter ones only where they leave room.
+    full = ((found.sizes >= config.min_pixels) & ~faint)[brightest]
+    candidates = np.concatenate([brightest[full], brightest[~full]])[:MOST_AREAS]
+    count = len(found.sizes)
+    meter.charge(i32_add=40 * count, i32_mul=8 * count, i32_div=5 * count, loop=2 * count)
+    meter.charge(ram_read=10 * count + 8 * MOST_AREAS, ram_write=8 * len(candidates))
+    double_angle = ((xx - yy) + 2j * xy)[drawn_out] / np.maximum(spread[drawn_out], 1e-9)
+    some = bool(drawn_out.any())
+    return _Sorted(
+        candidates,
+        int(large.sum()),
+        int(small.sum()),
+        int(drawn_out.sum()),
+        float(np.abs(double_angle.mean())) if some else 0.0,
+        float(np.median(np.sqrt(12 * along[drawn_out]))) if some else 0.0,
+    )
+
+
+def _statistics(sky: Background, spikes: int, sort: _Sorted) -> PictureStatistics:
+    levels = sky.levels / background.UNIT
+    return PictureStatistics(
+        background=float(levels.mean()),
+        background_range=float(levels.max() - levels.min()),
+        noise=float(np.median(sky.noises)) / background.UNIT,
+        saturated=sky.saturated,
+        spikes=spikes,
+        large=sort.large,
+        elongated=sort.elongated,
+        aligned=sort.aligned,
+        streak_px=sort.streak_px,
+    )
