@@ -43,6 +43,7 @@ With the Earth's own twilight it is a 25 000th of the day's where the Sun is 6 d
 (Seidelmann, Explanatory Supplement to the Astronomical Almanac, section 9.33).
 """
 
+PARTS = 400  # of the disc, whose scattered light is added up
 SUN_AWAY_DEG = 60.0
 """A random Sun is at least so far from the boresight (assumed): pointing is planned so."""
 
@@ -128,28 +129,41 @@ class EarthLimb(SkyHazard):
         to_ground = ahead - np.sqrt(np.maximum(ahead**2 + 1 - far**2, 0))
         normals = vectors * to_ground[:, None] - far * self._nadir
         sine = (normals @ self._sun) / np.linalg.norm(normals, axis=1)
-        return np.exp(np.minimum(sine, 0) / DUSK).astype(np.float32)
+        return np.asarray(np.exp(np.minimum(sine, 0) / DUSK), np.float32)
 
     def _scattered(self, vectors: Vectors, angles: NDArray[np.float64]) -> Brightness:
-        """What the lens scatters (n,) of the lit disc: a sum over parts of it."""
-        places, area = _parts(self._radius_rad)
-        across = np.cross(self._nadir, np.eye(3)[np.argmin(np.abs(self._nadir))])
+        """What the lens scatters (n,) of the lit disc, at ``angles`` from nadir."""
+        heights, turns, light = _scattered_light(self)
+        right, down, _ = self._axes
+        turn = np.abs(np.arctan2(vectors @ down, vectors @ right))
+        row = np.interp(angles, heights, np.arange(len(heights)))
+        column = np.interp(turn, turns, np.arange(len(turns)))
+        above = np.minimum(row.astype(np.int64), len(heights) - 2)
+        left = np.minimum(column.astype(np.int64), len(turns) - 2)
+        row, column = row - above, column - left
+        upper = light[above, left] * (1 - column) + light[above, left + 1] * column
+        lower = light[above + 1, left] * (1 - column) + light[above + 1, left + 1] * column
+        return np.asarray(upper * (1 - row) + lower * row, np.float32)
+
+    @property
+    def _axes(self) -> Vectors:
+        """Axes (3, 3) around the third, nadir; the Sun is on the first's side."""
+        across = self._sun - (self._sun @ self._nadir) * self._nadir
+        if np.linalg.norm(across) < 1e-9:
+            across = np.cross(self._nadir, np.eye(3)[np.argmin(np.abs(self._nadir))])
         across /= np.linalg.norm(across)
-        parts = places @ np.stack([across, np.cross(self._nadir, across), self._nadir])
+        return np.stack([across, np.cross(self._nadir, across), self._nadir])
+
+    def ground(self, vectors: Vectors) -> NDArray[np.float64]:
+        """Mean surface brightness (n,) of the ground along ``vectors`` (n, 3) that meet it."""
         even = Earth(self.altitude_km, 0.0, 0.0, 0)
-        small = np.full(len(parts), 1e-6, np.float32)
-        met, light = even.radiance(
-            parts.astype(np.float32), small, self._nadir, self._sun, np.eye(3)
+        small = np.full(len(vectors), 1e-6, np.float32)
+        light = np.zeros(len(vectors))
+        met, shares = even.radiance(
+            vectors.astype(np.float32), small, self._nadir, self._sun, np.eye(3)
         )
-        light *= self._night(parts[met])
-        total = np.zeros(len(vectors))
-        reached = np.flatnonzero(angles < self._radius_rad + OUTER_RAD)
-        for part, radiance in zip(parts[met], light, strict=True):
-            share = aureole(angles_rad(vectors[reached], part), self.scatter)
-            # No closer than the part is wide, which stands for all directions in it.
-            most = aureole(np.array([math.sqrt(area / math.pi)]), self.scatter)[0]
-            total[reached] += np.minimum(share, most) * float(radiance) * area
-        return np.asarray(EARTH_RADIANCE * total, np.float32)
+        light[met] = shares * self._night(vectors[met])
+        return EARTH_RADIANCE * light
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
         """The limb up to the airglow's top."""
@@ -191,11 +205,31 @@ def _airglow_profile() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @lru_cache(maxsize=4)
-def _parts(radius_rad: float) -> tuple[NDArray[np.float64], float]:
-    """Directions (n, 3) of equal parts of a disc around the third axis, and their solid angle."""
-    count = 400
-    cosine = 1 - (np.arange(count) + 0.5) / count * (1 - math.cos(radius_rad))
-    around = np.arange(count) * math.pi * (3 - math.sqrt(5))  # the golden angle spreads them
-    sine = np.sqrt(1 - cosine**2)
-    places = np.stack([sine * np.cos(around), sine * np.sin(around), cosine], axis=1)
-    return places, 2 * math.pi * (1 - math.cos(radius_rad)) / count
+def _scattered_light(
+    limb: EarthLimb,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """What a lens scatters of the lit disc: a map around nadir.
+
+    Returns:
+        Angles (n,) from nadir, angles (m,) around it from the Sun's side, 0 to pi, and surface
+        brightness (n, m): the sum over equal parts of the disc.
+    """
+    radius = math.radians(angular_radius_deg(limb.altitude_km))
+    # The golden angle spreads the parts.
+    cosine = 1 - (np.arange(PARTS) + 0.5) / PARTS * (1 - math.cos(radius))
+    parts = _around(np.arccos(cosine), np.arange(PARTS) * math.pi * (3 - math.sqrt(5)))
+    area = 2 * math.pi * (1 - math.cos(radius)) / PARTS
+    light = limb.ground(parts @ limb._axes) * area
+    heights = np.linspace(0, min(radius + OUTER_RAD, math.pi), 120)
+    turns = np.linspace(0, math.pi, 40)
+    places = _around(np.repeat(heights, len(turns)), np.tile(turns, len(heights)))
+    apart = np.arccos(np.clip(places @ parts.T, -1, 1))
+    # A part stands for all directions in it: none is closer than it is wide.
+    scattered = aureole(np.maximum(apart, math.sqrt(area / math.pi)), limb.scatter) @ light
+    return heights, turns, scattered.reshape(len(heights), len(turns))
+
+
+def _around(heights: NDArray[np.float64], turns: NDArray[np.float64]) -> Vectors:
+    """Unit vectors (n, 3) at angles ``heights`` (n,) from the third axis, ``turns`` around it."""
+    sine = np.sin(heights)
+    return np.stack([sine * np.cos(turns), sine * np.sin(turns), np.cos(heights)], axis=1)

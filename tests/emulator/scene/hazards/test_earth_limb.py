@@ -9,6 +9,7 @@ from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE
 from cubestack.emulator.scene.hazards.earth_limb import EarthLimb, airglow_s10
+from cubestack.emulator.scene.hazards.glare import aureole
 from cubestack.emulator.scene.hazards.moon import Moon
 from cubestack.emulator.scene.hazards.planets import Planets
 from cubestack.emulator.scene.sky import SkyScene
@@ -104,6 +105,20 @@ def test_hides_moon_and_planets() -> None:
         light = star_light(scene, LENS, SHUTTER)
         x, y = LENS.project(beside_boresight(angle_deg) @ NOW.axes.T)[0].astype(int)
         assert bool(light[y - 3 : y + 4, x - 3 : x + 4].max() > 1000) is shines
+
+
+def test_light_in_a_lens_is_the_sum_over_the_ground() -> None:
+    hazard = limb(5.0, airglow=0.0, scatter=0.01)
+    hazard = replace(hazard, sun=tuple((NOW.axes[1] - 0.3 * NOW.boresight).tolist()))
+    generator = np.random.default_rng(6)
+    # Random directions, each for as much of the sphere.
+    sky = generator.standard_normal((400_000, 3))
+    sky /= np.linalg.norm(sky, axis=1, keepdims=True)
+    ground = hazard.ground(sky) * 4 * np.pi / len(sky)
+    for angle_deg in (-5.0, -15.0, -30.0):
+        vector = beside_boresight(angle_deg)
+        right = ground @ aureole(np.arccos(np.clip(sky @ vector[0], -1, 1)), 0.01)
+        assert hazard.glow(NOW, vector)[0] == pytest.approx(right, rel=0.05)
 
 
 @pytest.mark.parametrize("angle_deg", [45.0, 5.0, 0.0, -10.0])
