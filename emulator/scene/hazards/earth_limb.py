@@ -217,7 +217,8 @@ def _scattered_light(
     radius = math.radians(angular_radius_deg(limb.altitude_km))
     # The golden angle spreads the parts.
     cosine = 1 - (np.arange(PARTS) + 0.5) / PARTS * (1 - math.cos(radius))
-    parts = _around(np.arccos(cosine), np.arange(PARTS) * math.pi * (3 - math.sqrt(5)))
+    turned = np.arange(PARTS, dtype=np.float64) * (math.pi * (3 - math.sqrt(5)))
+    parts = _around(np.arccos(cosine), np.asarray(turned))
     area = 2 * math.pi * (1 - math.cos(radius)) / PARTS
     light = limb.ground(parts @ limb._axes) * area
     heights = np.linspace(0, min(radius + OUTER_RAD, math.pi), 120)
