@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result
+from cubestack.host.experiments import hazards
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
 
@@ -48,6 +49,7 @@ class SkyOptions(MeasureOptions):
         0, "stars that are in no catalogue, at random places", whole(0), metavar="N"
     )
     no_noise: bool = option(False, "a sensor without any noise")
+    hazard: tuple[hazards.Asked, ...] = hazards.hazard_option()
     crop: tuple[int, int] = option(
         (0, 0), "with --image: left upper corner of the part that is seen", CORNER, metavar="X,Y"
     )
@@ -59,9 +61,16 @@ class SkyOptions(MeasureOptions):
 
 
 def random_view(
-    options: SkyOptions, condition: "SkyCondition", rng: np.random.Generator, **more: Any
+    options: SkyOptions,
+    condition: "SkyCondition",
+    rng: np.random.Generator,
+    time_s: float = 0.0,
+    **more: Any,
 ) -> "SkyView":
-    """A sky as the options say, at a random pose, and the camera; ``more`` as the scene has it."""
+    """A sky as the options say, at a random pose, and the camera; ``more`` as the scene has it.
+
+    ``time_s`` is about when it will be exposed.
+    """
     from cubestack.emulator.camera.common.view import SkyView
     from cubestack.emulator.scene.attitude import random_quaternion
     from cubestack.emulator.scene.sky import SkyScene
@@ -73,7 +82,8 @@ def random_view(
         seed=int(rng.integers(1 << 31)),
         **more,
     )
-    return SkyView(scene, replace(condition, noise=not options.no_noise, seed=scene.seed))
+    view = SkyView(scene, replace(condition, noise=not options.no_noise, seed=scene.seed))
+    return hazards.with_hazards(view, options.hazard, rng, time_s)
 
 
 def rough_boresight(

@@ -29,6 +29,7 @@ from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.host.clients.aramis.client import Aramis, Star
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
+from cubestack.host.experiments import hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
 
@@ -101,11 +102,12 @@ class AramisOptions(attitudes.SkyOptions):
         """Options of a picture need one, those of the random sky need that."""
         if self.image is None and self.given("crop"):
             raise ValueError("--crop belongs to --image")
-        sky = ("mag_limit", "false_stars", "no_noise", "rate", "roll_rate")
+        hazards.check(self.hazard)
+        sky = ("mag_limit", "false_stars", "no_noise", "hazard", "rate", "roll_rate")
         if not self.is_random and self.given(*sky):
             raise ValueError(
-                "--mag-limit, --false-stars, --no-noise and rates belong to the random sky; "
-                "a scene file has keys for them"
+                "--mag-limit, --false-stars, --no-noise, --hazard and rates belong to the random "
+                "sky; a scene file has keys for them"
             )
 
 
@@ -184,7 +186,7 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
             pristine = emulated.board.catalogue_flash.copy()
             for number in range(options.frames):
                 if number and options.is_random:
-                    emulated.scene = _view(options, condition, rng)
+                    emulated.scene = _view(options, condition, rng, emulated.time_s)
                 flips = 0
                 if options.bit_flips:
                     aramis.deactivate()
@@ -195,7 +197,9 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
                 yield _measure(emulated, options, rng, flips)
 
 
-def _view(options: AramisOptions, condition: "SkyCondition", rng: np.random.Generator) -> "SkyView":
+def _view(
+    options: AramisOptions, condition: "SkyCondition", rng: np.random.Generator, time_s: float = 0.0
+) -> "SkyView":
     from cubestack.emulator.camera.common.scene_file import load_scene
     from cubestack.emulator.camera.common.view import SkyView, View
     from cubestack.emulator.scene.sky import PictureScene
@@ -211,7 +215,7 @@ def _view(options: AramisOptions, condition: "SkyCondition", rng: np.random.Gene
     along = rng.random() * 2 * np.pi
     rate = (options.rate * np.cos(along), options.rate * np.sin(along), options.roll_rate)
     return attitudes.random_view(
-        options, condition, rng, rate_deg_s=rate, false_star_mag=options.false_mags
+        options, condition, rng, time_s, rate_deg_s=rate, false_star_mag=options.false_mags
     )
 
 

@@ -37,6 +37,7 @@ from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.errors import CameraFileError
 from cubestack.host.experiments import attitude as attitudes
+from cubestack.host.experiments import hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
 
@@ -61,6 +62,9 @@ SKIES = 5
 
 START_S = 0.02
 """A firmware of one's own starts clocks and peripherals meanwhile, and hears nothing."""
+
+EXPOSED_S = 0.3
+"""About so long after the command the picture is exposed, which only what moves fast notices."""
 
 _DN = whole(1, 255)
 THRESHOLD = Kind(
@@ -104,10 +108,11 @@ class CubeStarOptions(attitudes.SkyOptions):
         """Options of a picture need one, those of the random sky need that."""
         if self.image is None and self.given("camera", "crop"):
             raise ValueError("--crop and --camera belong to --image")
-        if not self.is_random and self.given("mag_limit", "false_stars", "no_noise"):
+        hazards.check(self.hazard)
+        if not self.is_random and self.given("mag_limit", "false_stars", "no_noise", "hazard"):
             raise ValueError(
-                "--mag-limit, --false-stars and --no-noise belong to the random sky; a scene file "
-                "has the keys mag_limit, false_stars and noise"
+                "--mag-limit, --false-stars, --no-noise and --hazard belong to the random sky; a "
+                "scene file has the keys mag_limit, false_stars, noise and hazards"
             )
 
     @property
@@ -158,7 +163,9 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
             threshold = _threshold(emulated, options)
             for number in range(options.frames):
                 if number and options.is_random:
-                    emulated.scene = attitudes.random_view(options, CONDITION, rng)
+                    emulated.scene = attitudes.random_view(
+                        options, CONDITION, rng, emulated.time_s + EXPOSED_S
+                    )
                 yield _measure(emulated, options, picture_truth, rng, threshold)
 
     def summarise(self, results: Sequence[CubeStarResult], wall_s: float) -> Iterator[str]:

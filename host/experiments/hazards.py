@@ -1,0 +1,100 @@
+"""Hazards as an option: each random frame has those that were asked for, placed in its own sky."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cubestack.host.options import Kind, option
+
+if TYPE_CHECKING:
+    from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.scene.hazards.hazard import Hazard
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A hazard that was asked for.
+
+    Attributes:
+        name: of a hazard.
+        strength: on its scale; None for its usual one.
+    """
+
+    name: str
+    strength: float | None = None
+
+    def __str__(self) -> str:
+        """As it was typed."""
+        return self.name if self.strength is None else f"{self.name}={self.strength:g}"
+
+
+def _asked(given: Any) -> Asked:
+    if isinstance(given, Asked):
+        return given
+    name, equals, strength = given.partition("=")
+    return Asked(name, float(strength) if equals else None)
+
+
+def hazard_option() -> Any:
+    """The field of an experiment's options that takes hazards; ``check`` knows their names."""
+    return option(
+        (),
+        "make every random frame harder, as moon or gradient=60; may be given again "
+        "(see docs/hazards.md)",
+        Kind("NAME or NAME=STRENGTH, as in moon or gradient=60", _asked),
+        metavar="NAME[=STRENGTH]",
+        many=True,
+    )
+
+
+def known() -> "Mapping[str, type[Hazard]]":
+    """All hazards of light, sensor and lens by name."""
+    from cubestack.emulator.camera.common.hazards import HAZARDS
+    from cubestack.emulator.scene.hazards import SKY_HAZARDS
+
+    return {**SKY_HAZARDS, **HAZARDS}
+
+
+def check(asked: Sequence[Asked]) -> None:
+    """Raise ValueError for hazards that there are not, or not of such a strength."""
+    kinds = known() if asked else {}
+    for one in asked:
+        if one.name not in kinds:
+            raise ValueError(f"hazard: there is no {one.name!r}; known: {', '.join(sorted(kinds))}")
+        scale = kinds[one.name].strength
+        low, high = min(scale.values), max(scale.values)
+        if one.strength is not None and not low <= one.strength <= high:
+            raise ValueError(
+                f"hazard: {one.name} goes from {low:g} to {high:g} {scale.unit}".rstrip()
+                + f", not {one.strength:g}"
+            )
+
+
+def with_hazards(
+    view: "SkyView", asked: Sequence[Asked], rng: np.random.Generator, time_s: float = 0.0
+) -> "SkyView":
+    """The view with these hazards in its field; ``time_s`` is about when it will be exposed."""
+    if not asked:
+        return view
+    from cubestack.emulator.camera.common.exposure import looking_along
+    from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+    from cubestack.emulator.scene.hazards.contract import SkyHazard
+
+    scene, condition = view.scene, view.condition
+    looking = looking_along(scene.quaternion, condition.optics, time_s)
+    kinds = known()
+    placed = [
+        kinds[one.name].placed(
+            kinds[one.name].strength.usual if one.strength is None else one.strength, looking, rng
+        )
+        for one in asked
+    ]
+    light = tuple(hazard for hazard in placed if isinstance(hazard, SkyHazard))
+    sensor = tuple(hazard for hazard in placed if isinstance(hazard, SensorHazard))
+    return replace(
+        view,
+        scene=replace(scene, hazards=(*scene.hazards, *light)),
+        condition=replace(condition, hazards=(*condition.hazards, *sensor)),
+    )
