@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.hazards import HAZARDS, Background, Gradient, HotPixels
+from cubestack.emulator.camera.common.hazards import HAZARDS, Background, Dose, Gradient, HotPixels
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.register_file import RegisterFile
 from cubestack.emulator.camera.common.shutter import RollingShutter
@@ -141,3 +141,24 @@ def test_a_frame_with_it_takes_little_longer(name: str) -> None:
         return min(times)
 
     assert seconds(hazard) - seconds() < 0.1  # measured: below 10 ms
+
+
+def test_the_mean_dark_rise_is_the_dark_rows_too() -> None:
+    # 10 krad: four times 1008 counts of 12 bits a second, at 65 C in 0.3856 s.
+    like = replace(cubestar.CONDITION, hazards=(Dose(krad=10.0),), temperature_c=65.0)
+    imager = Mlx75412Imager(1)
+    raw, corrected = (
+        imager.picture(DARK, like, SHUTTER, Corrections(dark=dark)) for dark in (False, True)
+    )
+    assert np.median(raw) == pytest.approx(4 * 1008 * 0.3856 / 16, abs=4)
+    assert np.median(corrected) < 5
+
+
+def test_the_mean_dark_rise_leaves_its_noise() -> None:
+    # Away from the sources: four times the dark current is twice its noise.
+    def sigma(krad: float) -> float:
+        frame = picture("aramis", Dose(krad=krad), Background(sigma=0.0), temperature_c=100.0)
+        away = frame.astype(float) - np.median(frame)
+        return float(away[np.abs(away) <= 7].std())
+
+    assert sigma(10.0) == pytest.approx(2 * sigma(0.0), rel=0.1)
