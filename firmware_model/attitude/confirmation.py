@@ -17,7 +17,8 @@ belief. A likelihood ratio decides so in Lang et al. 2010, "Astrometry.net", sec
 share of seen stars that is set.
 """
 
-from math import comb, pi
+from math import comb, hypot, pi
+from operator import mul
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-_HALF, _TWO, _ONE = np.float32(0.5), np.float32(2), np.float32(1)
+_SIDES = ((0, 1), (0, 2), (1, 2))
 
 
 def matched(
@@ -94,10 +95,11 @@ def scaled(directions: Floats, factor: float, meter: Meter) -> Floats:
         return directions
     count = len(directions)
     meter.charge(f32_mul=8 * count, f32_add=2 * count, f32_sqrt=count, f32_div=count, loop=count)
-    longer = directions * np.array([factor, factor, 1.0], np.float32)
+    longer = directions.copy()
+    longer[:, :2] *= np.float32(factor)
     x, y, z = longer.T
-    lengths: Floats = np.sqrt(x * x + y * y + z * z)
-    return np.asarray(longer / lengths[:, None], np.float32)
+    longer /= np.sqrt(x * x + y * y + z * z)[:, None]
+    return longer
 
 
 def correction(
@@ -109,20 +111,17 @@ def correction(
     Differences are taken as small: some 0.01 rad are left as 0.0001.
     """
     x, y, z = predicted.T
-    zero = np.zeros_like(x)
-    columns = [
-        np.concatenate([zero, -z, y]),
-        np.concatenate([z, zero, -x]),
-        np.concatenate([-y, x, zero]),
-    ]
+    size, count = 4 if with_scale else 3, len(predicted)
+    design = np.zeros((size, 3, count), np.float32)  # what turns about x, y, z and scale change
+    design[0, 1], design[0, 2] = -z, y
+    design[1, 0], design[1, 2] = z, -x
+    design[2, 0], design[2, 1] = -y, x
     if with_scale:
-        a, b, c = measured.T
-        outward = a * a + b * b
-        columns.append(-np.concatenate([a - a * outward, b - b * outward, -c * outward]))
-    design = np.stack(columns)
-    difference = (measured - predicted).T.ravel()
-    normal, right = design @ design.T, design @ difference
-    size, count = len(columns), len(predicted)
+        rays = measured.T
+        design[3] = rays * (rays[0] * rays[0] + rays[1] * rays[1])
+        design[3, :2] -= rays[:2]
+    rows = design.reshape(size, -1)
+    normal, right = rows @ rows.T, rows @ (measured - predicted).T.ravel()
     meter.charge(
         f32_mul=(3 * size * (size + 3) // 2 + 5) * count + size**3 // 3 + 20,
         f32_add=(3 * size * (size + 3) // 2 + 6) * count + size**3 // 3 + 20,
@@ -130,13 +129,19 @@ def correction(
         ram_read=6 * count,
         loop=count + 2 * size * size,
     )
-    normal[np.diag_indices(size)] += np.float32(1e-6)  # a direction that nothing determines: none
-    turn = np.linalg.solve(normal, right)
-    h0, h1, h2 = (float(part) / 2 for part in turn[:3])
-    share = 2 / (1 + h0 * h0 + h1 * h1 + h2 * h2)
-    cross = np.array([[0, -h2, h1], [h2, 0, -h0], [-h1, h0, 0]])
-    rotation = np.eye(3) + share * (cross + cross @ cross)
-    return rotation.astype(np.float32), 1.0 + float(turn[3]) if with_scale else 1.0
+    normal.flat[:: size + 1] += np.float32(1e-6)  # a direction that nothing determines: none
+    solution = np.linalg.solve(normal, right).tolist()
+    a, b, c = (part / 2 for part in solution[:3])
+    share = 2 / (1 + a * a + b * b + c * c)
+    rotation = np.array(
+        [
+            [1 - share * (b * b + c * c), share * (a * b - c), share * (a * c + b)],
+            [share * (a * b + c), 1 - share * (a * a + c * c), share * (b * c - a)],
+            [share * (a * c - b), share * (b * c + a), 1 - share * (a * a + b * b)],
+        ],
+        np.float32,
+    )
+    return rotation, 1.0 + solution[3] if with_scale else 1.0
 
 
 def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
@@ -145,20 +150,18 @@ def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
     The pair that is widest apart gives it, half of its misfit to each star; the third star decides
     nothing.
     """
-    first, second = ((0, 1), (0, 2), (1, 2))[
-        int(np.argmin([measured[0] @ measured[1], measured[0] @ measured[2],
-                       measured[1] @ measured[2]]))
-    ]  # fmt: skip
-    meter.charge(f32_mul=9 + 2 * 24 + 27, f32_add=6 + 2 * 18 + 18, f32_compare=2)
-    meter.charge(f32_sqrt=4, f32_div=4)
-    there = _axes(measured[first], measured[second])
-    return (there.T @ _axes(reference[first], reference[second])).astype(np.float32)
+    meter.charge(f32_mul=9 + 2 * 24 + 27, f32_add=6 + 2 * 18 + 18, f32_sqrt=4, f32_div=4)
+    vectors, known = measured.tolist(), reference.tolist()
+    cosines = {(i, j): sum(map(mul, vectors[i], vectors[j])) for i, j in _SIDES}
+    i, j = min(cosines, key=lambda side: cosines[side])
+    there, here = _axes(vectors[i], vectors[j]), _axes(known[i], known[j])
+    return (there.T @ here).astype(np.float32)
 
 
-def _axes(one: Floats, other: Floats) -> Floats:
+def _axes(one: list[float], other: list[float]) -> NDArray[np.float64]:
     """Rows: the middle between two unit vectors, their difference, and what is square to both."""
-    middle, apart = one + other, other - one
-    middle = middle / np.sqrt(middle @ middle)
-    apart = apart / np.sqrt(apart @ apart)
-    (a, b, c), (d, e, f) = middle, apart
-    return np.array([middle, apart, [b * f - c * e, c * d - a * f, a * e - b * d]], np.float32)
+    middle = [u + v for u, v in zip(one, other, strict=True)]
+    apart = [v - u for u, v in zip(one, other, strict=True)]
+    long, short = hypot(*middle), hypot(*apart)
+    (a, b, c), (d, e, f) = [u / long for u in middle], [u / short for u in apart]
+    return np.array([[a, b, c], [d, e, f], [b * f - c * e, c * d - a * f, a * e - b * d]])

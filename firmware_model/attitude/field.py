@@ -17,14 +17,17 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 Floats = NDArray[np.float32]
 
+#: Parts of a side whose areas are added up to the solid angle.
+_CELLS = 40
+
 
 @dataclass(frozen=True, eq=False)
 class Field:
     """The field of a camera.
 
     Attributes:
-        sides: (4, 3) coefficients 1, t, t^2 of the sides' tangents: left and right (x by y), upper
-            and lower (y by x).
+        sides: (3, 2, 2, 1) coefficients of 1, t, t^2 of the sides' tangents: left and upper, then
+            right and lower one; x is told by y, y by x.
         smallest_cosine: cosine of the angle between the boresight and the farthest corner.
         solid_angle_sr: of the whole picture.
     """
@@ -41,35 +44,46 @@ class Field:
         count = len(directions)
         meter.charge(f32_div=2 * count, f32_mul=8 * count, f32_add=8 * count, f32_compare=4 * count)
         meter.charge(loop=count)
-        depth = directions[:, 2] * np.float32(factor)
-        x, y = directions[:, 0] / depth, directions[:, 1] / depth
-        left, right = (a + y * (b + y * c) for a, b, c in self.sides[:2])
-        upper, lower = (a + x * (b + x * c) for a, b, c in self.sides[2:])
-        inside: NDArray[np.bool_] = (x >= left) & (x <= right) & (y >= upper) & (y <= lower)
+        xy = directions.T[:2] / (directions[:, 2] * np.float32(factor))
+        yx = xy[::-1]
+        constant, linear, square = self.sides
+        lower, upper = constant + yx * (linear + yx * square)
+        inside: NDArray[np.bool_] = ((xy >= lower) & (xy <= upper)).all(axis=0)
         return inside
 
 
 @lru_cache(maxsize=8)
 def field_of(camera: CameraParameters, columns: int, rows: int) -> Field:
     """The field of a camera with so many pixels; made when a camera's parameters change."""
-    meter = Meter(CORTEX_M3)
-    x = np.array([-0.5, columns / 2 - 0.5, columns - 0.5], np.float32)
-    y = np.array([-0.5, rows / 2 - 0.5, rows - 0.5], np.float32)
-    points = np.array([[a, b] for b in y for a in x], np.float32)
-    rays = unit_vectors(undistort(points, camera, meter), camera, meter).astype(np.float64)
-    tangents = (rays[:, :2] / rays[:, 2:]).reshape(3, 3, 2)
-    sides = [np.polyfit(tangents[:, side, 1], tangents[:, side, 0], 2)[::-1] for side in (0, 2)] + [
-        np.polyfit(tangents[side, :, 0], tangents[side, :, 1], 2)[::-1] for side in (0, 2)
-    ]
-    fine = np.linspace(-1, 1, 41) * 0.999
-    grid = np.stack(np.meshgrid(fine * columns / 2 + columns / 2, fine * rows / 2 + rows / 2), 2)
-    grid_rays = unit_vectors(
-        undistort(grid.reshape(-1, 2).astype(np.float32), camera, meter), camera, meter
-    ).astype(np.float64)
-    plane = (grid_rays[:, :2] / grid_rays[:, 2:]).reshape(41, 41, 2)
-    right, down = plane[:-1, 1:] - plane[:-1, :-1], plane[1:, :-1] - plane[:-1, :-1]
-    area = np.abs(right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0])
-    cosine3 = grid_rays[:, 2].reshape(41, 41)[:-1, :-1] ** 3
-    return Field(
-        np.array(sides, np.float32), np.float32(rays[:, 2].min()), float((area * cosine3).sum())
+    x, y = (
+        np.array([-0.5, columns / 2 - 0.5, columns - 0.5]),
+        np.array([-0.5, rows / 2 - 0.5, rows - 0.5]),
     )
+    tangents = _tangents(camera, x, y)
+    sides = [
+        [np.polyfit(tangents[:, k, 1], tangents[:, k, 0], 2), np.polyfit(*tangents[k].T, 2)]
+        for k in (0, 2)
+    ]
+    coefficients = np.moveaxis(np.array(sides, np.float32), 2, 0)[::-1, ..., None]
+    largest = float((tangents**2).sum(axis=2).max())
+    fine = _tangents(
+        camera,
+        np.linspace(-0.5, columns - 0.5, _CELLS + 1),
+        np.linspace(-0.5, rows - 0.5, _CELLS + 1),
+    )
+    right, down = fine[:-1, 1:] - fine[:-1, :-1], fine[1:, :-1] - fine[:-1, :-1]
+    area = np.abs(right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0])
+    middle = (fine[1:, 1:] + fine[:-1, :-1]) / 2
+    solid_angle = float((area / (1 + (middle**2).sum(axis=2)) ** 1.5).sum())
+    return Field(coefficients, np.float32((1 + largest) ** -0.5), solid_angle)
+
+
+def _tangents(
+    camera: CameraParameters, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Tangents (rows, columns, 2) of the field angles of pixels at all of x and y."""
+    meter = Meter(CORTEX_M3)
+    points = np.stack(np.meshgrid(x, y), axis=2).astype(np.float32)
+    rays = unit_vectors(undistort(points.reshape(-1, 2), camera, meter), camera, meter)
+    tangents: NDArray[np.float64] = (rays[:, :2] / rays[:, 2:]).astype(np.float64)
+    return tangents.reshape(len(y), len(x), 2)

@@ -147,7 +147,7 @@ class _Search:
             with meter.phase("distances"):
                 rays = scaled(picture.directions[: each.most], each.factor, meter)
             tolerance = each.part * picture.margin_rad
-            seen: list[Candidate] = []
+            seen: list[dict[int, int]] = []
             left = len(rays) - 2
             for step in steps(rays, picture.catalogue, tolerance, self._listed, meter, self._limit):
                 left -= 1
@@ -164,15 +164,17 @@ class _Search:
         return MatchOutcome.UNCONFIRMED if self.tried else MatchOutcome.TOO_FEW_MATCHED
 
     def _candidates(
-        self, step: Step, factor: float, tolerance: float, seen: list[Candidate]
+        self, step: Step, factor: float, tolerance: float, seen: list[dict[int, int]]
     ) -> Iterator[Candidate]:
-        """Attitudes of the triangles of a step; none that one of `seen` stands for already."""
+        """Attitudes of the triangles of a step, but not of those that one of `seen` has within it:
+        star of each centroid that attitudes tried so far name."""
         picture = self._picture
         for row in np.flatnonzero(~step.mirrored):
             centroids, stars = step.centroids[row], step.stars[row]
             if self._late:
                 return
-            if any(_stands_for(one, centroids.tolist(), stars.tolist()) for one in seen):
+            named = dict(zip(centroids.tolist(), stars.tolist(), strict=True))
+            if any(named.items() <= one.items() for one in seen):
                 continue
             misfit = min(float(step.misfit[row]) / tolerance, 1.0)
             # Entries and both rings are narrower by this part: its cube of triangles by chance.
@@ -185,14 +187,9 @@ class _Search:
                 candidate = picture.confirm(
                     rotation, FEWEST_STARS, tries, factor=factor, largest=self._largest
                 )
-            seen.append(candidate)
+            confirming = zip(candidate.centroids.tolist(), candidate.stars.tolist(), strict=True)
+            seen.append(dict(confirming))
             yield candidate
-
-
-def _stands_for(one: Candidate, centroids: list[int], stars: list[int]) -> bool:
-    """Whether an attitude names these centroids with these stars."""
-    named = dict(zip(one.centroids.tolist(), one.stars.tolist(), strict=True))
-    return all(named.get(c) == star for c, star in zip(centroids, stars, strict=True))
 
 
 def _apart_deg(one: Candidate, other: Candidate) -> float:

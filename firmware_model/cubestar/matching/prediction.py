@@ -7,7 +7,8 @@ count as tries.
 """
 
 from dataclasses import dataclass
-from math import exp, inf, pi
+from functools import lru_cache
+from math import exp, factorial, inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,10 +103,11 @@ class Picture:
         near, ahead, places = self._predict(rotation, factor)
         rays = scaled(self.directions, factor, meter)
         rows, predicted, apart = matched(rays, places, 3 * margin, meter)
-        refined = 0
-        while len(rows) >= given and refined < 2:
+        refined, loose = 0, True
+        while loose and len(rows) >= given and refined < 2:
             if self._chance(len(near), len(rows), given, LEVELS[0], tries) > largest:
                 break
+            loose = bool(apart.max() > margin)
             turn, change = correction(
                 rays[rows], places[predicted], meter, with_scale=len(rows) >= STARS_FOR_SCALE
             )
@@ -116,11 +118,12 @@ class Picture:
                 factor *= change
                 rays = scaled(self.directions, factor, meter)
             rows, predicted, apart = matched(rays, places, margin, meter)
-        least = inf
-        for level in LEVELS if refined == 2 else ():
+        least, most = inf, given - 1
+        for level in LEVELS if refined else ():
             found = int(np.count_nonzero(apart <= level * margin))
-            if found >= given:
+            if found > most:  # the same within a larger reach says less
                 least = min(least, self._chance(len(near), found, given, level, tries))
+                most = found
         stars = near[predicted].astype(np.intp)
         return Candidate(rows, stars, apart, rotation, factor, len(near), least)
 
@@ -141,15 +144,15 @@ class Picture:
         further, missing = found - given, expected - found
         with self.meter.phase("selection"):
             odds = false_alarm(tries * len(LEVELS), further + missing, further, chance, self.meter)
+            if missing > 0:
+                return odds
             # A wrong attitude seldom puts so few stars into the picture that none is missing.
-            return odds if missing > 0 else odds * self._so_few(expected)
+            self.meter.charge(flash_read=1, f32_mul=1)
+            return odds * so_few(expected, len(self.catalogue), self.field.solid_angle_sr)
 
-    def _so_few(self, expected: int) -> float:
-        """Part of the sky where so few stars, or fewer, are in a picture; at most."""
-        mean = _UNEVEN * len(self.catalogue) / (4 * pi) * self.field.solid_angle_sr
-        self.meter.charge(f32_mul=2 * expected + 20, f32_add=expected, f32_div=expected)
-        term = total = exp(-mean)
-        for number in range(1, expected + 1):
-            term *= mean / number
-            total += term
-        return total
+
+@lru_cache(maxsize=256)
+def so_few(expected: int, stars: int, solid_angle_sr: float) -> float:
+    """Part of the sky where so many of all its stars, or fewer, are in a picture; at most."""
+    mean = _UNEVEN * stars / (4 * pi) * solid_angle_sr
+    return exp(-mean) * sum(mean**number / factorial(number) for number in range(expected + 1))

@@ -148,7 +148,10 @@ class _Batch:
         self._centroids = np.stack((ia[fits], ib[fits], self._newest), axis=1)
         self._stars = np.stack((a[fits], b[fits], hub[one] % stars), axis=1)
         self._misfit = np.maximum(np.maximum(misfit[one], misfit[other]), third[fits])
-        self._volumes = _volumes(rays, self._centroids), _volumes(catalogue.vectors, self._stars)
+        volumes = np.linalg.det(
+            np.stack((rays[self._centroids], catalogue.vectors[self._stars]))
+        )  # of the three vectors of each
+        self._mirrored = volumes[0] * volumes[1] < 0
         self._popularity = np.bincount(hub[one], minlength=1)[hub[one]]
         self._found = np.bincount(self._newest, minlength=count)
         # Chance: each entry fixes an attitude in two ways; a third star then agrees where two
@@ -218,12 +221,11 @@ class _Batch:
         """Triangles of a step."""
         chosen = (self._newest == newest).nonzero()[0]
         chosen = chosen[(-self._popularity[chosen]).argsort(kind="stable")]
-        measured, listed = self._volumes
         return Step(
             self._centroids[chosen],
             self._stars[chosen],
             self._misfit[chosen],
-            measured[chosen] * listed[chosen] < 0,
+            self._mirrored[chosen],
             int(self.entries[newest]),
             newest * (newest - 1) / 2 * float(self._chance),
         )
@@ -233,10 +235,3 @@ def _counting(lengths: Indices) -> Indices:
     """0, 1, ... up to each of ``lengths`` (n,), one after the other."""
     ends = lengths.cumsum()
     return np.arange(ends[-1] if len(ends) else 0) - (ends - lengths).repeat(lengths)
-
-
-def _volumes(vectors: Floats, triples: Indices) -> Floats:
-    """Triple products of vectors (n, 3), three rows each as ``triples`` (t, 3) has them."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vectors[triples].transpose(1, 2, 0)
-    volumes: Floats = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-    return volumes
