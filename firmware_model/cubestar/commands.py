@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.firmware_model.cubestar.processing import Processing
+from cubestack.firmware_model.cubestar.processing.chain import Processing
 from cubestack.firmware_model.cubestar.tasks import TASKS
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
@@ -174,13 +174,11 @@ class Commands(CommandExecutor):
     # --- stars --------------------------------------------------------------------------------
 
     def _set_mode(self, command: QueuedCommand) -> None:
-        automatic = self.state.switches.now.transitions == "automatic"
-        if automatic and command.values["IdMode"] == codes.IdMode.LOST_IN_SPACE:
-            self.state.mode = codes.MatchMode.LOST_IN_SPACE
+        self.processing.transitions.commanded(codes.IdMode(command.values["IdMode"]))
 
     def _set_hint(self, _command: QueuedCommand) -> None:
         self.state.retained.hint_present = 1
-        self.state.mode = codes.MatchMode.ASSISTED
+        self.processing.transitions.hinted()
 
     # --- loop ---------------------------------------------------------------------------------
 

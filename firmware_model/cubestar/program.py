@@ -15,7 +15,7 @@ from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.pictures import pictures_of
-from cubestack.firmware_model.cubestar.processing import Processing
+from cubestack.firmware_model.cubestar.processing.chain import Processing
 from cubestack.firmware_model.cubestar.reset_cause import cause_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor

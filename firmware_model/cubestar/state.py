@@ -11,6 +11,7 @@ switch `flash_store` that is paid: each write takes its time, and a worn page ke
 (assumed; the data sheet promises no more than the number). ``FlashStore.writes`` counts them.
 """
 
+import math
 import struct
 from dataclasses import dataclass, fields
 from io import BytesIO
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
 from cubestack.firmware_model.interface.codec import switch_messages
+from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, ResetCause, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
@@ -62,6 +64,15 @@ FLASH_ENDURANCE = 20_000
 
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
 _SWITCHES = INTERFACE.telemetry(switch_messages.SHOWN)
+_QUALITY = INTERFACE.telemetry("Quality")
+
+UNRATED: dict[str, Value] = {
+    **_QUALITY.reset_values(),
+    **dict.fromkeys(("SigmaX", "SigmaY", "SigmaZ"), math.pi),
+    "Scale": 1.0,
+}
+"""Values of telemetry Quality that say nothing; 1 sigma of pi rad tells a filter so."""
+
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF
 
@@ -128,6 +139,7 @@ class Retained:
     image_place: int = 0
     solved: int = 0
     hint_present: int = 0
+    confirmed: int = 0
     cut: int = 0
     imager_off: int = 0
     latch_ups: int = 0
@@ -156,6 +168,8 @@ class State(NodeState):
         switches: those that the program runs with; kept as the settings are, but not in flash.
         retained: counters that survive resets.
         task_status: value of telemetry TaskStatus.
+        quality: of the latest picture, values of telemetry Quality.
+        candidate: an attitude that contradicts the last believed one, and needs a second one.
         reset_cause: why the program started.
         startup_us: time from the reset to the main loop.
     """
@@ -165,7 +179,13 @@ class State(NodeState):
 
     #: Retention registers in use, in bytes.
     RETENTION_SIZE = (
-        len(_MAGIC) + _SETTINGS_BYTES + _SWITCHES.length + _FLAGS.length + _COUNTERS.size
+        len(_MAGIC)
+        + _SETTINGS_BYTES
+        + _SWITCHES.length
+        + _FLAGS.length
+        + _COUNTERS.size
+        + _QUALITY.length
+        + Attitude.LAYOUT.size
     )
 
     def __init__(
@@ -184,6 +204,8 @@ class State(NodeState):
         self.settings = Settings(INTERFACE, SETTING_COMMANDS)
         self.switches = RunningSwitches(switches)
         self.retained = Retained()
+        self.quality = dict(UNRATED)
+        self.candidate: Attitude | None = None
         self.task_status = TaskStatus.POWERING_UP
         self.reset_cause = ResetCause.UNDETERMINED
         self.startup_us = 0
@@ -195,7 +217,10 @@ class State(NodeState):
             self.switches.now = switch_messages.switches_shown(CubeStarSwitches, values)
             flags = _FLAGS.unpack(data.read(_FLAGS.length))
             self.flags = {name for name, raised in flags.items() if raised}
-            self.retained = Retained(*self._COUNTERS.unpack(data.read()))
+            self.retained = Retained(*self._COUNTERS.unpack(data.read(self._COUNTERS.size)))
+            self.quality = _QUALITY.unpack(data.read(_QUALITY.length))
+            candidate = Attitude.unpack(data.read())
+            self.candidate = candidate if candidate.matched else None
         else:
             self.load_config()
 
@@ -205,6 +230,7 @@ class State(NodeState):
         The part's program would keep these values there all the time, so that a watchdog's reset
         finds them too.
         """
+        candidate = self.candidate
         counters = [getattr(self.retained, field.name) & _U64 for field in fields(Retained)]
         self.hardware.retention[: self.RETENTION_SIZE] = (
             self._MAGIC
@@ -212,11 +238,14 @@ class State(NodeState):
             + _SWITCHES.pack(**switch_messages.shown_values(self.switches.now))
             + _FLAGS.pack(**self.flag_values())
             + self._COUNTERS.pack(*counters)
+            + _QUALITY.pack(**self.quality)
+            + (bytes(Attitude.LAYOUT.size) if candidate is None else candidate.pack())
         )
 
     def forget(self) -> None:
         """Return to the values after power-up; supplies that were cut are still to be restored."""
         self.retained = Retained(cut=self.retained.cut)
+        self.quality, self.candidate = dict(UNRATED), None
         self.flags.clear()
         self.switches.forget()
         self.load_config()

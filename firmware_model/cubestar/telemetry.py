@@ -123,6 +123,7 @@ class Telemetry:
             "AttitudeQuaternion": self._attitude_quaternion,
             "PerformanceParameters": self._performance,
             "Results": self._counts,
+            "Quality": lambda: state.quality,
             SHOWN: lambda: shown_values(state.switches.now),
             **self._stars.sources,
         }

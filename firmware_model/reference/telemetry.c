@@ -288,6 +288,16 @@ static void attitude_quaternion(uint8_t *data)
     PUT(AttitudeQuaternion, Valid, retained.solved);
 }
 
+/* As profile published leaves it: nothing is rated, which 1 sigma of pi rad says. */
+static void quality(uint8_t *data)
+{
+    const double unknown = 3.14159265358979;
+    PUT(Quality, SigmaX, unknown);
+    PUT(Quality, SigmaY, unknown);
+    PUT(Quality, SigmaZ, unknown);
+    PUT(Quality, Scale, 1.0);
+}
+
 /* --- all -------------------------------------------------------------------------------------- */
 
 static const struct {
@@ -315,6 +325,7 @@ static const struct {
     {CUBESTAR_TLM_SphereicalCoordinates, spherical},
     {CUBESTAR_TLM_AttitudeData, attitude_data},
     {CUBESTAR_TLM_AttitudeQuaternion, attitude_quaternion},
+    {CUBESTAR_TLM_Quality, quality},
 };
 
 /* What the tables say of settings and of the steps' times. */

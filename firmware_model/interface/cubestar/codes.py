@@ -119,3 +119,21 @@ class SwitchState(IntEnum):
 
     OFF = 0
     ON = 1
+
+
+class Reason(IntEnum):
+    """Why the latest picture gave no attitude, or that it did; telemetry Quality."""
+
+    NOT_RATED = 0
+    SOLVED = 1
+    NO_PICTURE = 2
+    TOO_FEW_STARS = 3
+    STRAY_LIGHT = 4
+    SATURATED = 5
+    RADIATION = 6
+    SMEAR = 7
+    UNCONFIRMED = 8
+    AMBIGUOUS = 9
+    MIRRORED = 10
+    NO_TIME = 11
+    CONTRADICTION = 12

@@ -57,13 +57,21 @@ class CubeStarSwitches(Switches):
         reason="a page takes 20 ms to erase and stands 20 000 times, 5.6 hours of the loop",
     )
     transitions: str = switch(
-        "how the mode flag changes",
+        "how the mode flag changes, and which attitude is believed",
         "automatic",
-        "commanded",
+        "confirmed",
         source="sections 5.3.4 and 6.1: the flag follows the attitude determination, and is soon "
         "tracking; after a failure (not printed): lost in space",
-        reason="lost in space is the sure choice until setIDMode, and a failure costs one step: "
-        "tracking, assisted, lost in space",
+        reason="a search is as wide as the body can have turned, and an attitude that contradicts "
+        "the last one has to be sure or found twice",
+    )
+    estimate: str = switch(
+        "what a star weighs in the attitude",
+        "votes",
+        "inverse-variance",
+        source="section 5.3.4: the votes of the verification round",
+        reason="bright stars are measured better than faint ones; the weights give the attitude's "
+        "covariance too",
     )
     detection: str = switch(
         "what a star's pixels are brighter than, and which pixels are read",

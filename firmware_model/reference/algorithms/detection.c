@@ -1,7 +1,7 @@
 /* Image plane search, region growing and centroids.
  *
  * CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is settled as in
- * firmware_model/cubestar/detection.py.
+ * firmware_model/cubestar/detection/sampled.py.
  *
  * SPDX-License-Identifier: BSD-2-Clause
  */

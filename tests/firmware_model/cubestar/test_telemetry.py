@@ -28,6 +28,7 @@ SUPPORTED = [message.name for message in INTERFACE.telemetries if message.suppor
 #: Frames that other tests of this folder enumerate, by the test that does.
 ELSEWHERE = {
     "Profile": "test_effects",
+    "Quality": "test_quality",
     **dict.fromkeys(
         ("StarPositions", "BodyUnitVectors", "IDStarsDetails", "InertialUnitVectors", "NumIdStars",
          "StarDetails", "HipparcosNumber", "DetectionSummary", "BestStarIndex", "Star1Details",

@@ -190,14 +190,7 @@ def test_random_centroids_are_identified_alike(
         expected = [
             identify(vectors, listed, METER, margin_rad=margin),
             identify(vectors, listed, METER, boresight=near, margin_rad=margin),
-            track(
-                vectors,
-                listed,
-                rotation,
-                METER,
-                verified=False,
-                radius_deg=float(PUBLISHED.reduction),
-            ),
+            track(vectors, listed, rotation, METER, radius_deg=float(PUBLISHED.reduction)),
         ]
         found = [
             program.identify(vectors, None, margin),

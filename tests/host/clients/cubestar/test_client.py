@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.scene.attitude import pointing_from_matrix
-from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError, MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar import (
+    INTERFACE,
+    AckError,
+    MatchMode,
+    Reason,
+    TaskStatus,
+)
 from cubestack.host.clients.cubestar.client import COLUMNS, ROWS, Attitude, CubeStar, Star
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
@@ -69,6 +75,24 @@ def test_attitude(cubestar: CubeStar, node: Any) -> None:
     assert attitude.image_time_s == 34.567
     node.values["AttitudeData"] = {"Qbar0": 0.6, "Qbar3": -0.8}
     np.testing.assert_allclose(cubestar.coarse_quaternion(), [0.6, 0, 0, -0.8], atol=5e-5)
+
+
+def test_quality_is_a_covariance(cubestar: CubeStar, node: Any) -> None:
+    node.values["Quality"] = {
+        **{"SigmaX": 1e-4, "SigmaY": 2e-4, "SigmaZ": 5e-4, "Scale": 1.01, "LogFalseAlarm": -9.0},
+        **{"CorrelationXY": 0.5, "CorrelationXZ": -0.25, "CorrelationYZ": 0.0},
+        **{"FrameCounter": 12, "Reason": Reason.SOLVED, "Matched": 7, "Expected": 9, "Valid": True},
+    }
+    quality = cubestar.quality()
+    assert (quality.valid, quality.reason, quality.frame) == (True, Reason.SOLVED, 12)
+    assert (quality.matched, quality.expected) == (7, 9)
+    assert quality.false_alarm == pytest.approx(1e-9)
+    np.testing.assert_allclose(quality.sigmas_rad, [1e-4, 2e-4, 5e-4], rtol=1e-6)
+    np.testing.assert_allclose(quality.covariance[0], [1e-8, 1e-8, -1.25e-8], rtol=1e-5)
+    np.testing.assert_array_equal(quality.covariance, quality.covariance.T)
+    node.values["Quality"] |= {"CorrelationXZ": -1.5}
+    with pytest.raises(BadAnswerError, match="correlations within 1"):
+        cubestar.quality()
 
 
 def test_download(cubestar: CubeStar, node: Any) -> None:

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 
-from .harness import Harness
-from .sky import Sky, attitude_of, error_deg, take
+from ..harness import Harness
+from ..sky import Sky, attitude_of, error_deg, take
 
 
 def mode_flag(unit: Harness) -> MatchMode:
@@ -77,7 +77,7 @@ def test_stars_weigh_as_much_as_they_were_confirmed(
         return np.array([0, 0, 0, 1], np.float32)
 
     sky = take(unit.catalogue, pose)
-    monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", weigh)
+    monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.estimate.quest", weigh)
     process(unit, sky.picture)
     details = [unit.telemetry("IDStarsDetails") for _ in sky.stars]
     measured, inertial, weights = given
@@ -130,7 +130,7 @@ def test_stars_without_attitude(unit: Harness, monkeypatch: pytest.MonkeyPatch, 
     def refuse(*_arguments: object) -> None:
         raise AttitudeError("the vectors all point the same way")
 
-    monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.quest", refuse)
+    monkeypatch.setattr("cubestack.firmware_model.cubestar.processing.estimate.quest", refuse)
     process(unit, sky.picture)
     assert unit.status() is TaskStatus.CALCULATION_FAILED
     assert unit.flags() == {"QuestindexError"}
@@ -170,7 +170,6 @@ def test_a_wrong_hint_leads_to_lost_in_space(tracking: Harness, sky: Sky, pose: 
     assert mode_flag(tracking) is MatchMode.LOST_IN_SPACE
     values = process(tracking, sky.picture)
     assert (values["Valid"], values["Mode"]) == (True, MatchMode.LOST_IN_SPACE)
-    assert "IDModeError" not in tracking.flags()  # there was a hint
 
 
 def test_a_new_hint_replaces_the_attitude(tracking: Harness, sky: Sky, pose: Rotation) -> None:
@@ -208,19 +207,6 @@ def test_tracking_follows_up_to_its_rate(
     else:
         assert "RateExceeded" in tracking.flags()
         assert mode_flag(tracking) is MatchMode.ASSISTED
-
-
-@pytest.mark.parametrize("profile", ["extended"])
-def test_failures_lead_one_step_back_each(tracking: Harness, sky: Sky) -> None:
-    process(tracking, sky.picture)
-    two_stars = DARK.copy()
-    two_stars[100:104, 100:104] = two_stars[300:304, 700:704] = 80
-    for expected in (MatchMode.ASSISTED, MatchMode.LOST_IN_SPACE, MatchMode.LOST_IN_SPACE):
-        process(tracking, two_stars)
-        assert mode_flag(tracking) is expected
-    values = process(tracking, sky.picture)
-    assert (values["Valid"], values["Mode"]) == (True, MatchMode.LOST_IN_SPACE)
-    assert mode_flag(tracking) is MatchMode.TRACKING
 
 
 def test_two_stars_are_enough_for_tracking(tracking: Harness, sky: Sky, pose: Rotation) -> None:

@@ -1,0 +1,239 @@
+"""The chain from picture to attitude: detection, matching and QUEST, with the time of each step.
+
+CubeStar thesis, sections 5.3.3 to 5.3.5. Which search identifies a picture is decided in
+``transitions``; why a picture gives no attitude, in ``reasons``.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cubestack.firmware_model.attitude.geometry import undistort, unit_vectors
+from cubestack.firmware_model.attitude.quest import AttitudeError, dcm
+from cubestack.firmware_model.cubestar import configuration, phases
+from cubestack.firmware_model.cubestar.capture import ImageCapture
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.detection import SearchEnd
+from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.processing import quality
+from cubestack.firmware_model.cubestar.processing.estimate import Estimate, by_errors, by_votes
+from cubestack.firmware_model.cubestar.processing.identify import (
+    FEWEST_STARS,
+    OUTCOME_FLAGS,
+    Searches,
+)
+from cubestack.firmware_model.cubestar.processing.reasons import reason_of
+from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.cubestar.processing.transitions import Transitions, transitions_of
+from cubestack.firmware_model.cubestar.state import UNRATED, Attitude, State
+from cubestack.firmware_model.interface.cubestar.codes import Reason, TaskStatus
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
+
+_SEARCH_FLAGS = {
+    SearchEnd.STARS: "MaxStarsDetection",
+    SearchEnd.INVALID: "MaxInvalidStarsDetectionError",
+    SearchEnd.NOISE: "MaxNoiseDetected",
+}
+
+
+@dataclass(eq=False)
+class Processing:
+    """The processing functions, what they found in the latest picture, and how long each took.
+
+    Attributes:
+        latest_ms, longest_ms: time of each step by name, since the last reset.
+    """
+
+    meter: Meter
+    state: State
+    capture: ImageCapture
+    catalogue: StarCatalogue
+    results: Results = field(default_factory=Results)
+    latest_ms: dict[str, float] = field(default_factory=dict)
+    longest_ms: dict[str, float] = field(default_factory=dict)
+
+    def process(self) -> Routine[bool]:
+        """Detect, identify and estimate; False when a step failed."""
+        identified = (yield from self.detect()) and (yield from self.identify())
+        return identified and (yield from self.estimate())
+
+    def capture_and_process(self) -> Routine[None]:
+        """Capture a picture and process it; without one there is nothing to report."""
+        if (yield from self.capture.get_image()):
+            yield from self.process()
+        else:
+            self.discard_results()
+            self._tell(Reason.NO_PICTURE)
+
+    @property
+    def transitions(self) -> Transitions:
+        """The rules by which the mode flag changes."""
+        return transitions_of(self.state, self.meter)
+
+    @property
+    def _switches(self) -> CubeStarSwitches:
+        return self.state.switches.now
+
+    @contextmanager
+    def _cycles(self) -> Iterator[None]:
+        """Record the cycle counter's difference for every phase that the block charges."""
+        before = dict(self.meter.phases)
+        yield
+        for name, cycles in self.meter.phases.items():
+            if spent := cycles - before.get(name, 0):
+                self._record(name, 1_000_000 * spent // self.meter.table.clock_hz)
+
+    def _record(self, name: str, duration_us: int) -> None:
+        self.latest_ms[name] = duration_us / 1000
+        self.longest_ms[name] = max(self.longest_ms.get(name, 0.0), duration_us / 1000)
+
+    def _fail(self, status: TaskStatus, flag: str) -> bool:
+        self.state.task_status = status
+        self.state.raise_flag(flag)
+        return False
+
+    def discard_results(self) -> None:
+        """There is nothing to report about the latest picture."""
+        self.results = Results()
+        self._withdraw()
+
+    def _withdraw(self) -> None:
+        self.state.retained.solved = 0
+        self.state.quality = dict(UNRATED)
+
+    def _tell(self, reason: Reason) -> None:
+        """Telemetry Quality says why there is no attitude, if the switches want it rated."""
+        if self._switches.estimate != "votes":
+            self.state.quality = quality.told(self.results, reason)
+
+    def _tell_outcome(self, outcome: MatchOutcome) -> None:
+        detection = self.results.detection
+        self._tell(reason_of(None if detection is None else detection.statistics, outcome))
+
+    # --- detection ----------------------------------------------------------------------------
+
+    def detect(self) -> Routine[bool]:
+        """Find the stars of the picture and their camera unit vectors."""
+        self.discard_results()
+        retained, settings = self.state.retained, self.state.settings
+        if not retained.image_present:
+            self._tell(Reason.NO_PICTURE)
+            return self._fail(TaskStatus.DETECTION_FAILED, "StatusError")
+        self.state.task_status = TaskStatus.DETECTING
+        started_us: int = yield ReadTimer()
+        with self._cycles():
+            detection = yield from self.capture.pictures.search(
+                configuration.detection_config(
+                    settings,
+                    plain_weights=self._switches.weights == "intensity",
+                    background=self._switches.detection == "background",
+                )
+            )
+            camera = configuration.camera_parameters(settings)
+            with self.meter.phase("correction"):
+                points = undistort(detection.centroids, camera, self.meter)
+            with self.meter.phase("vectors"):
+                vectors = unit_vectors(points, camera, self.meter)
+        self._record("detection", (yield from phases.end(self.state, "detect_us", started_us)))
+        if detection.end in _SEARCH_FLAGS:
+            self.state.raise_flag(_SEARCH_FLAGS[detection.end])
+        if len(vectors) < FEWEST_STARS:
+            self.state.raise_flag("LessThanThreeStarsDetected")
+        self.results = Results(
+            detection, points, vectors, frame=retained.frame, image_ms=retained.image_ms
+        )
+        found = len(vectors) > 0
+        if not found:
+            self._tell_outcome(MatchOutcome.TOO_FEW_CENTROIDS)
+        self.state.task_status = TaskStatus.DETECTED if found else TaskStatus.DETECTION_FAILED
+        return found
+
+    # --- identification -----------------------------------------------------------------------
+
+    def identify(self) -> Routine[bool]:
+        """Find the catalogue star of each detected one."""
+        results = self.results
+        results.identification, results.best = None, []
+        self._withdraw()
+        if results.detection is None:
+            return self._fail(TaskStatus.IDENTIFICATION_FAILED, "StatusError")
+        self.state.task_status = TaskStatus.IDENTIFYING
+        started_us: int = yield ReadTimer()
+        with self._cycles():
+            results.mode = self.transitions.choose()
+            searches = Searches(self.state, self.catalogue, self.meter)
+            identification = searches.run(results, self.transitions.cone_deg())
+        self._record("identification", (yield from phases.end(self.state, "match_us", started_us)))
+        if identification.outcome is not MatchOutcome.IDENTIFIED:
+            searches.explain(results, identification)
+            self.transitions.failed(results.mode)
+            self._tell_outcome(identification.outcome)
+            return self._fail(
+                TaskStatus.IDENTIFICATION_FAILED, OUTCOME_FLAGS[identification.outcome]
+            )
+        results.identification = identification
+        self.state.task_status = TaskStatus.IDENTIFIED
+        return True
+
+    # --- attitude -----------------------------------------------------------------------------
+
+    def select_best(self) -> Routine[bool]:
+        """Select the three identified stars with the most votes, brighter ones first in a tie."""
+        results = self.results
+        if results.identification is None or results.detection is None:
+            self.state.raise_flag("StatusError")
+            return False
+        started_us: int = yield ReadTimer()
+        votes, intensity = results.identification.votes, results.detection.intensities
+        identified = results.identification.matched
+        order = np.lexsort((-intensity[identified].astype(int), -votes[identified].astype(int)))
+        results.best = [int(star) for star in identified[order[:3]]]
+        looked_at = 3 * len(identified)  # one pass for each of the three
+        self.meter.charge(ram_read=2 * looked_at, i32_add=2 * looked_at, loop=looked_at)
+        ended_us: int = yield ReadTimer()
+        self._record("best", ended_us - started_us)
+        return True
+
+    def estimate(self) -> Routine[bool]:
+        """Estimate the attitude from the identified stars; False too where it is not believed."""
+        results, identification = self.results, self.results.identification
+        if identification is None:
+            return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
+        self.state.task_status = TaskStatus.CALCULATING
+        started_us: int = yield ReadTimer()
+        try:
+            found = self._solve(identification)
+        except AttitudeError:
+            self.transitions.failed(results.mode)
+            self._tell_outcome(MatchOutcome.TOO_FEW_MATCHED)
+            return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
+        page = self._switches.flash_store == "page"
+        stored = dcm(found.quaternion, self.meter) if page else None
+        attitude = Attitude(
+            found.quaternion, results.frame, results.image_ms, found.stars, results.mode, stored
+        )
+        believed = self.transitions.believes(attitude, identification.false_alarm)
+        self._record("attitude", (yield from phases.end(self.state, "attitude_us", started_us)))
+        if found.rating is not None:
+            reason = Reason.SOLVED if believed else Reason.CONTRADICTION
+            self.state.quality = quality.rated(results, identification, found.rating, reason)
+        if not believed:
+            return self._fail(TaskStatus.CALCULATION_FAILED, "IDError")
+        self.state.attitude = attitude
+        self.transitions.solved()
+        self.state.retained.hint_present = 0
+        self.state.retained.solved = 1
+        self.state.task_status = TaskStatus.CALCULATED
+        return True
+
+    def _solve(self, identification: Identification) -> Estimate:
+        """The attitude by the weights that the switches say. Raises AttitudeError."""
+        stars = self.catalogue.vectors
+        if self._switches.estimate == "votes":
+            return by_votes(self.results, identification, stars, self.meter)
+        camera = configuration.camera_parameters(self.state.settings)
+        return by_errors(self.results, identification, stars, camera, self.meter)

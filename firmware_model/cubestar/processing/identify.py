@@ -1,0 +1,114 @@
+"""The search that a mode asks for, and what its failure says: CubeStar thesis, section 5.3.4."""
+
+from math import acos, degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.attitude.geometry import direction_of
+from cubestack.firmware_model.attitude.quest import dcm
+from cubestack.firmware_model.cubestar import configuration
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.matching import confirmed, voting
+from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.matching.tracking import track
+from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
+from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.cubestar.state import Attitude, State
+from cubestack.firmware_model.interface.cubestar.codes import MatchMode
+from cubestack.firmware_model.mcu.costs import Meter
+
+FEWEST_STARS = 3
+"""Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4)."""
+
+OUTCOME_FLAGS = {
+    MatchOutcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
+    MatchOutcome.TOO_FEW_MATCHED: "LessThanThreeStarsID",
+    MatchOutcome.MIRRORED: "IDError",
+    MatchOutcome.UNCONFIRMED: "IDError",
+    MatchOutcome.AMBIGUOUS: "IDError",
+    MatchOutcome.NO_TIME: "IDError",
+}
+
+
+class Searches:
+    """Lost in space, assisted and tracking, with what the switches make of them."""
+
+    def __init__(self, state: State, catalogue: StarCatalogue, meter: Meter) -> None:
+        """Search ``catalogue`` with the settings and the attitude of ``state``."""
+        self._state, self._catalogue, self._meter = state, catalogue, meter
+
+    def run(self, results: Results, cone_deg: float) -> Identification:
+        """Identify the stars of ``results`` in its mode; ``cone_deg``: how far the boresight may be
+        from the expected one."""
+        state, meter, switches = self._state, self._meter, self._state.switches.now
+        mode, vectors, attitude = results.mode, results.vectors, self._state.attitude
+        margin = float(state.settings.get("setIDMargin", "Margin"))
+        field = configuration.field(state.settings)
+        catalogue = self._catalogue.limited(float(switches.pair_limit))
+        if mode is MatchMode.TRACKING and attitude is not None:
+            return track(
+                vectors,
+                catalogue,
+                self._rotation(attitude),
+                meter,
+                margin_rad=margin,
+                field=field if switches.tracking == "verified" else None,
+                radius_deg=self._radius_deg(mode),
+            )
+        boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
+        if switches.voting == "algorithm-2":
+            return voting.identify(
+                vectors, catalogue, meter, boresight=boresight, margin_rad=margin
+            )
+        return confirmed.identify(
+            vectors,
+            None if results.detection is None else results.detection.intensities,
+            catalogue,
+            field,
+            meter,
+            boresight=boresight,
+            margin_rad=margin,
+            radius_deg=degrees(acos(self._edge)) + cone_deg,
+        )
+
+    def explain(self, results: Results, identification: Identification) -> None:
+        """Raise the flags that say more about a failure than its outcome."""
+        raise_flag = self._state.raise_flag
+        too_few = identification.outcome is MatchOutcome.TOO_FEW_MATCHED
+        if too_few and not identification.votes.any():
+            raise_flag("IDSearchError")
+        mode = results.mode
+        if mode is MatchMode.LOST_IN_SPACE:
+            return
+        if mode is MatchMode.TRACKING and too_few:
+            raise_flag("RateExceeded")
+        boresight = self._expected_boresight()
+        in_field = self._catalogue.within(boresight, self._edge, self._meter)
+        if len(in_field) < FEWEST_STARS:
+            raise_flag("LessThanThreeStarsInFoV")
+        if not len(self._catalogue.near(boresight, self._radius_deg(mode), self._meter)):
+            raise_flag("ReducedIDListSizeError")
+
+    def _expected_boresight(self) -> NDArray[np.float32]:
+        """The hint until the first fix after it, then the boresight of the latest attitude."""
+        attitude = self._state.attitude
+        if attitude is None or self._state.retained.hint_present:
+            hint = self._state.settings.all("setTrackingMode")
+            return direction_of(hint["RightAscension"], hint["Declination"], self._meter)
+        return np.asarray(self._rotation(attitude)[2])
+
+    def _rotation(self, attitude: Attitude) -> NDArray[np.float32]:
+        """Direction cosine matrix of the latest attitude, from flash if it is there."""
+        if attitude.rotation is None:
+            return dcm(attitude.quaternion, self._meter)
+        self._meter.charge(flash_read=9)
+        return attitude.rotation
+
+    @property
+    def _edge(self) -> np.float32:
+        return configuration.field_cosine(configuration.camera_parameters(self._state.settings))
+
+    def _radius_deg(self, mode: MatchMode) -> float:
+        tracking = mode is MatchMode.TRACKING
+        return float(self._state.switches.now.reduction) if tracking else CUT_RADIUS_DEG

@@ -1,0 +1,89 @@
+"""Telemetry Quality: why there is no attitude, and how good one is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
+from cubestack.firmware_model.cubestar.matching.identification import MatchOutcome
+from cubestack.firmware_model.cubestar.processing.reasons import reason_of
+from cubestack.firmware_model.cubestar.state import UNRATED
+from cubestack.firmware_model.interface.cubestar import Reason
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+
+from ..harness import Harness
+from ..sky import Sky, attitude_of, draw, take
+
+CLEAR = PictureStatistics(5.0, 2.0, 0.5, 5e-5, 20, 0, 0, 0.0, 0.0)
+
+
+@pytest.fixture
+def extended(catalogue: StarCatalogue) -> Harness:
+    return Harness(catalogue, CubeStarSwitches.of("extended"))
+
+
+def quality(unit: Harness, picture: np.ndarray) -> dict[str, float]:
+    unit.picture = picture
+    unit.command("CaptureAndProcess")
+    return unit.telemetry("Quality")
+
+
+@pytest.mark.parametrize(
+    ("measured", "reason"),
+    [
+        ({}, Reason.UNCONFIRMED),
+        ({"saturated": 0.01}, Reason.SATURATED),
+        ({"background_range": 30.0}, Reason.STRAY_LIGHT),
+        ({"background": 120.0}, Reason.STRAY_LIGHT),
+        ({"background_range": 30.0, "spikes": 500}, Reason.STRAY_LIGHT),
+        ({"spikes": 500}, Reason.RADIATION),
+        ({"elongated": 6, "aligned": 0.2}, Reason.RADIATION),
+        ({"elongated": 6, "aligned": 0.9}, Reason.SMEAR),
+        ({"elongated": 2, "aligned": 0.9}, Reason.UNCONFIRMED),
+    ],
+)
+def test_the_picture_speaks_before_the_failure(measured: dict[str, float], reason: Reason) -> None:
+    picture = replace(CLEAR, **measured)  # type: ignore[arg-type]
+    assert reason_of(picture, MatchOutcome.UNCONFIRMED) is reason
+
+
+@pytest.mark.parametrize("outcome", [o for o in MatchOutcome if o is not MatchOutcome.IDENTIFIED])
+def test_each_failure_has_a_reason(outcome: MatchOutcome) -> None:
+    said = reason_of(CLEAR, outcome)
+    assert said not in (Reason.NOT_RATED, Reason.SOLVED)
+    assert reason_of(None, outcome) is said
+
+
+@pytest.mark.parametrize("profile", ["published"])
+def test_as_published_nothing_is_rated(unit: Harness, sky: Sky) -> None:
+    assert unit.telemetry("Quality") == pytest.approx(UNRATED, rel=1e-6)
+    assert quality(unit, sky.picture) == pytest.approx(UNRATED, rel=1e-6)
+
+
+def test_failures_say_why(extended: Harness, catalogue: StarCatalogue, pose: Rotation) -> None:
+    values = quality(extended, np.zeros((512, 1024), np.uint8))
+    assert (values["Valid"], values["Reason"]) == (False, Reason.TOO_FEW_STARS)
+    assert [values[f"Sigma{axis}"] for axis in "XYZ"] == pytest.approx([np.pi] * 3)
+    mirrored = draw(catalogue.vectors * np.array([1, 1, -1], np.float32), pose)
+    assert not quality(extended, mirrored.picture)["Valid"]
+    extended.frame_us = None
+    assert quality(extended, mirrored.picture)["Reason"] == Reason.NO_PICTURE
+
+
+def test_errors_are_as_large_as_claimed(extended: Harness, catalogue: StarCatalogue) -> None:
+    ratios = []
+    for true in Rotation.random(40, rng=np.random.default_rng(11)):
+        values = quality(extended, take(catalogue, true).picture)
+        if not values["Valid"]:
+            continue
+        assert values["Matched"] <= values["Expected"]
+        assert values["LogFalseAlarm"] <= -5
+        assert values["Scale"] == pytest.approx(1, abs=2e-3)
+        measured = attitude_of(extended.telemetry("AttitudeQuaternion"))
+        error = (measured * true.inv()).as_rotvec()
+        ratios.append(error / [values[f"Sigma{axis}"] for axis in "XYZ"])
+    assert len(ratios) > 35
+    assert np.mean(np.abs(ratios) < 3) >= 0.99

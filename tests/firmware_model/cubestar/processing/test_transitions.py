@@ -1,0 +1,177 @@
+"""Every way between lost in space, assisted and tracking, in virtual time."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.processing import transitions
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
+from cubestack.firmware_model.interface.cubestar.codes import Reason
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+
+from ..harness import Harness
+from ..sky import Sky, attitude_of, error_deg, take
+
+DARK = np.zeros((512, 1024), np.uint8)
+LOST, ASSISTED, TRACKING = MatchMode.LOST_IN_SPACE, MatchMode.ASSISTED, MatchMode.TRACKING
+
+
+@pytest.fixture
+def tracking(catalogue: StarCatalogue) -> Harness:
+    """The program that may use what it knows."""
+    unit = Harness(catalogue, CubeStarSwitches.of("extended"))
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    return unit
+
+
+def seen(unit: Harness, pose: Rotation | None, wait_s: float = 0.0) -> tuple[MatchMode, Reason]:
+    """Search that a picture taken after ``wait_s`` was identified by, and what came of it."""
+    unit.run(until_us=unit.now_us + round(1e6 * wait_s))
+    unit.picture = two_stars() if pose is None else take(unit.catalogue, pose).picture
+    unit.command("CaptureAndProcess")
+    quality = unit.telemetry("Quality")
+    assert quality["Valid"] == (quality["Reason"] == Reason.SOLVED)
+    assert quality["Valid"] == unit.telemetry("AttitudeQuaternion")["Valid"]
+    return unit.program.commands.processing.results.mode, Reason(quality["Reason"])
+
+
+def two_stars() -> np.ndarray:
+    """Spots that no search makes an attitude of."""
+    picture = DARK.copy()
+    picture[100:104, 100:104] = picture[300:304, 700:704] = 80
+    return picture
+
+
+def mode_flag(unit: Harness) -> MatchMode:
+    return MatchMode(unit.telemetry("LoopStatus")["ModeFlag"])
+
+
+def turned(pose: Rotation, degrees: float) -> Rotation:
+    return Rotation.from_euler("x", degrees, degrees=True) * pose
+
+
+def hint(unit: Harness, pose: Rotation) -> None:
+    x, y, z = pose.inv().as_matrix()[:, 2]
+    unit.command(
+        "setTrackingMode",
+        RightAscension=np.arctan2(y, x),
+        Declination=np.arctan2(z, np.hypot(x, y)),
+    )
+
+
+def test_a_fix_leads_to_tracking_and_failures_back_in_steps(
+    tracking: Harness, pose: Rotation
+) -> None:
+    assert seen(tracking, pose) == (LOST, Reason.SOLVED)
+    assert mode_flag(tracking) is TRACKING
+    assert seen(tracking, turned(pose, 0.2)) == (TRACKING, Reason.SOLVED)
+    assert seen(tracking, None)[0] is TRACKING
+    assert mode_flag(tracking) is ASSISTED
+    assert seen(tracking, None)[0] is ASSISTED
+    assert mode_flag(tracking) is ASSISTED
+    assert seen(tracking, turned(pose, 1.5)) == (ASSISTED, Reason.SOLVED)
+    assert mode_flag(tracking) is TRACKING
+
+
+@pytest.mark.parametrize("failures", [0, 1])
+def test_a_base_is_too_old_when_the_body_can_be_outside_of_the_cone(
+    tracking: Harness, pose: Rotation, failures: int
+) -> None:
+    seen(tracking, pose)
+    for _ in range(failures):
+        seen(tracking, None)
+    assert seen(tracking, turned(pose, 4.5), wait_s=5.0) == (LOST, Reason.SOLVED)
+
+
+def test_a_hint_is_used_once(tracking: Harness, pose: Rotation) -> None:
+    seen(tracking, pose)
+    elsewhere = turned(pose, 90)
+    hint(tracking, turned(elsewhere, 3))
+    assert seen(tracking, elsewhere) == (ASSISTED, Reason.SOLVED)
+    hint(tracking, pose)
+    assert seen(tracking, elsewhere)[0] is ASSISTED
+    assert seen(tracking, elsewhere) == (LOST, Reason.SOLVED)
+
+
+def test_a_contradiction_needs_a_second_fix(
+    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transitions, "SURE", 0.0)  # nothing is
+    seen(tracking, pose)
+    before = tracking.telemetry("AttitudeQuaternion")
+    elsewhere = turned(pose, 60)
+    for failure in (TRACKING, ASSISTED):
+        assert seen(tracking, None)[0] is failure
+    tracking.run(until_us=tracking.now_us + 5_000_000)
+    assert seen(tracking, elsewhere) == (LOST, Reason.CONTRADICTION)
+    assert tracking.telemetry("AttitudeQuaternion") == before | {"Valid": False}
+    assert mode_flag(tracking) is LOST
+    values = tracking.telemetry("Quality")
+    assert values["SigmaX"] == pytest.approx(np.pi)
+    assert seen(tracking, elsewhere) == (LOST, Reason.SOLVED)
+    assert error_deg(attitude_of(tracking.telemetry("AttitudeQuaternion")), elsewhere) < 0.02
+    assert seen(tracking, elsewhere) == (TRACKING, Reason.SOLVED)
+
+
+def test_another_contradiction_replaces_the_candidate(
+    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transitions, "SURE", 0.0)
+    seen(tracking, pose)
+    for pose_after in (turned(pose, 60), turned(pose, -70)):
+        assert seen(tracking, pose_after, wait_s=5.0) == (LOST, Reason.CONTRADICTION)
+    assert seen(tracking, turned(pose, 2)) == (LOST, Reason.SOLVED)  # the base was right
+    assert tracking.program.state.candidate is None
+
+
+def test_a_sure_fix_needs_no_second_one(tracking: Harness, pose: Rotation) -> None:
+    seen(tracking, pose)
+    assert seen(tracking, turned(pose, 60), wait_s=5.0) == (LOST, Reason.SOLVED)
+    assert tracking.telemetry("Quality")["LogFalseAlarm"] < np.log10(transitions.SURE)
+
+
+def test_a_base_contradicts_nothing_after_half_a_turn(
+    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transitions, "SURE", 0.0)
+    seen(tracking, pose)
+    assert seen(tracking, turned(pose, 170), wait_s=181.0) == (LOST, Reason.SOLVED)
+    assert "IDModeError" in tracking.flags()
+
+
+def test_commanded_lost_in_space_judges_each_picture_alone(
+    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transitions, "SURE", 0.0)
+    seen(tracking, pose)
+    tracking.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
+    for degrees in (60, -50, 10):
+        assert seen(tracking, turned(pose, degrees)) == (LOST, Reason.SOLVED)
+    tracking.command("setIDMode", IdMode=IdMode.TRACKING)
+    assert seen(tracking, turned(pose, 10.2)) == (TRACKING, Reason.SOLVED)
+
+
+def test_nothing_is_known_after_a_power_cycle(
+    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transitions, "SURE", 0.0)
+    seen(tracking, pose)
+    tracking.power_on()  # the attitude is in flash
+    tracking.command("setIDMode", IdMode=IdMode.TRACKING)
+    assert seen(tracking, turned(pose, 60)) == (LOST, Reason.SOLVED)
+
+
+def test_a_candidate_and_the_quality_survive_the_loop_s_reset(
+    tracking: Harness, pose: Rotation, sky: Sky, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transitions, "SURE", 0.0)
+    seen(tracking, pose)
+    seen(tracking, turned(pose, 60), wait_s=5.0)
+    quality, candidate = tracking.telemetry("Quality"), tracking.program.state.candidate
+    tracking.command("MCUReset")
+    after = tracking.program.state.candidate
+    assert candidate is not None
+    assert after is not None
+    assert after.pack() == candidate.pack()
+    assert tracking.telemetry("Quality") == quality
