@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from cubestack.emulator.camera.common.exposure import looking_along, star_light
 from cubestack.emulator.camera.common.glow import brightness, glow_electrons
@@ -84,6 +85,22 @@ def test_glow_smears_as_the_camera_turns() -> None:
     )
     full = still.max() / 2
     assert (turning > full / 3).sum() > 1.5 * (still > full).sum()
+
+
+@pytest.mark.parametrize("sigma_px", [0.9, 3.0])
+def test_lens_blurs_the_edge_as_it_does_a_star(sigma_px: float) -> None:
+    optics = replace(LENS, psf_sigma_px=sigma_px)
+    now = looking_along(ORION.quaternion, optics)
+    moon = Moon(direction=tuple(now.boresight.tolist()), scatter=0.0)
+    light = glow_electrons([moon], [now], optics)
+    sharp = glow_electrons([moon], [now], replace(optics, psf_sigma_px=1e-3))
+    assert light is not None
+    assert sharp is not None
+    assert light.sum(dtype=np.float64) == pytest.approx(sharp.sum(dtype=np.float64), rel=1e-3)
+    window = np.s_[146:206, 509:569]  # around the principal point
+    blurred = gaussian_filter(sharp[window].astype(np.float64), sigma_px)
+    assert sharp[window].max() > 0.9 * sharp.max()
+    np.testing.assert_allclose(light[window], blurred, rtol=0, atol=0.005 * sharp.max())
 
 
 def test_without_hazards_nothing_glows() -> None:

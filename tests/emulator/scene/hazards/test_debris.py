@@ -44,7 +44,9 @@ def test_streak_is_as_long_as_it_moves() -> None:
         for side in (-SHUTTER.exposure_s / 2, SHUTTER.exposure_s / 2)
     ]
     first, last = (float(LENS.project(end)[0, 0]) for end in ends)
-    assert mean == pytest.approx((first + last) / 2, abs=0.5)
+    middle = float(LENS.project(np.array([[0.0, 0.0, 1.0]]))[0, 0])
+    assert mean == pytest.approx(middle, abs=0.5)
+    assert (first + last) / 2 == pytest.approx(middle, abs=0.5)
     # A uniform bar, and the spot.
     assert spread == pytest.approx(np.hypot(abs(last - first) / np.sqrt(12), 0.95), rel=0.02)
 

@@ -42,6 +42,12 @@ def test_stars_behind_are_gone_and_no_others() -> None:
     assert set(left) == set(hip[~behind])
 
 
+def test_no_starlight_comes_through_the_ground() -> None:
+    dark = EarthLimb(nadir=tuple(NOW.boresight.tolist()), sun=tuple(NOW.boresight.tolist()))
+    light = star_light(replace(ORION, hazards=(replace(dark, airglow=0.0),)), LENS, SHUTTER)
+    assert light.max() < 0.1
+
+
 def test_lit_ground_has_the_radiance_of_the_mean_earth() -> None:
     hazard = limb(-RADIUS_DEG, unevenness=0.0, airglow=0.0)  # straight down, the Sun overhead
     assert hazard.glow(NOW, NOW.boresight[None])[0] == pytest.approx(EARTH_RADIANCE, rel=2e-3)
