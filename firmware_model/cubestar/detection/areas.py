@@ -10,8 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.mcu.costs import Meter
-
 LONGEST_RUN = 32
 """Pixels of a row: longer ones belong to the Moon, the limb, or a streak too long to be used."""
 
@@ -90,7 +88,7 @@ def without(runs: Runs, places: Ints) -> Runs:
     return Runs(begins[some], ends[some])
 
 
-def join(runs: Runs, width: int, meter: Meter) -> Ints:
+def join(runs: Runs, width: int) -> Ints:
     """Number of each run's area (n,), areas in the order of their first runs."""
     begins, ends = runs.begins, runs.ends
     # Runs of the row below touch that end behind, and begin before, this one moved down by a row;
@@ -110,8 +108,6 @@ def join(runs: Runs, width: int, meter: Meter) -> Ints:
         np.minimum.at(labels, high, low)
         while not np.array_equal(labels, labels[labels]):
             labels = labels[labels]
-    looks = len(begins) + len(above)
-    meter.charge(ram_read=6 * looks, ram_write=2 * looks, i32_add=4 * looks, loop=looks)
     areas: Ints = np.unique(labels, return_inverse=True)[1].reshape(-1)
     return areas
 

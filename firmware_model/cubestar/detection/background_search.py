@@ -40,23 +40,33 @@ FEWEST_PIXELS = 3
 STRETCHED = 5
 """Ratio of the variances along and across an area from which on it is drawn out; chosen."""
 
+WIDEST_PX = 2.3
+"""Standard deviation of the widest spot out of focus. The Moon's disc has 2.8 px without its glare;
+areas of more than the maximum size are stars only if they are narrower."""
+
 MOST_STARS_FACTOR = 2
 MOST_AREAS = 256
 """Areas whose shape is looked at, the brightest ones."""
 
-LIMIT_MS = 215
-"""For rows; the centroids of a full list take less than 10 ms more."""
+LIMIT_MS = 205
+"""For all rows; the centroids of a full list take less than 20 ms more."""
 
 BLOCK = 8
 """Pixels of a row that share a threshold."""
 
 _BYTE = 255
 
-_PIXEL = {"ram_read": 8, "i32_add": 22, "i32_mul": 4, "loop": 1}
-"""For each bright pixel of a short run: its neighbours, and its part in the area's sums."""
+_TEST = {"ram_read": 5, "i32_add": 10, "loop": 1}
+"""Costs of a bright pixel of a short run: is it sharper than a spot?"""
 
-_RUN = {"ram_read": 14, "ram_write": 10, "i32_add": 12, "loop": 3}
-"""For each run: the runs that it touches, and its area."""
+_PIXEL = {"ram_read": 3, "i32_add": 12, "i32_mul": 4}
+"""Of one that is not: its part in the sums of its area."""
+
+_RUN = {"ram_read": 20, "ram_write": 12, "i32_add": 18, "loop": 4}
+"""Of a run: the runs that it touches, and its area."""
+
+_AREA = {"ram_read": 14, "ram_write": 8, "i32_add": 40, "i32_mul": 8, "i32_div": 5, "loop": 2}
+"""Of an area that is not too small: its moments, and its place in the list."""
 
 
 def background_search(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
@@ -77,8 +87,7 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         pixels = yield Look(offsets(np.arange(height)[:, None], np.arange(width)).reshape(-1))
         bright = _bright(pixels.reshape(height, width), sky, config, meter)
         limit = start + LIMIT_MS * meter.table.clock_hz // 1000
-        runs, complete = _in_time(areas.runs_of(bright), height, width, limit, meter)
-        found, spikes = _areas(pixels, runs, sky, width, meter)
+        found, spikes, complete = _areas(pixels, bright, sky, limit, meter)
         sort = _sorted_out(found, config, meter)
     with meter.phase("centroid"):
         # At the border a window repeats the last pixel.
@@ -95,25 +104,22 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         kept = kept[: MOST_STARS_FACTOR * config.max_stars]
         chosen = sort.candidates[kept]
         peaks = np.stack([peak_x, peak_y], axis=1)[kept]
-        measured = spots.centre(
-            windows[kept],
-            found.middles[chosen] - peaks,
-            values[kept, spots.HALF, spots.HALF] >= spots.SATURATED_DN,
-            noises[kept],
-            meter,
-        )
+        windows, noises, starts = windows[kept], noises[kept], found.middles[chosen] - peaks
+        saturated = values[kept, spots.HALF, spots.HALF] >= spots.SATURATED_DN
+        width_px = spots.usual_width(windows, starts, saturated, meter)
+        measured = spots.centre(windows, starts, saturated, noises, width_px, meter)
     order = np.argsort(-measured.light, kind="stable")
     centroids = (measured.places + (peaks + np.array([left, top])).astype(np.float32))[order]
     return Detection(
         centroids=centroids.astype(np.float32),
-        sizes=found.sizes[chosen][order].astype(np.uint8),
+        sizes=np.minimum(found.sizes[chosen][order], _BYTE).astype(np.uint8),
         intensities=np.minimum(measured.light, 65_535).astype(np.uint16)[order],
         invalid=min(sort.large + sort.elongated, _BYTE),
         noise=min(sort.small, _BYTE),
         dark_value=round(float(np.mean(sky.levels)) / background.UNIT),
         end=SearchEnd.COMPLETE if complete else SearchEnd.TIME,
         errors_px=measured.errors[order],
-        statistics=_statistics(sky, spikes, sort),
+        statistics=_statistics(sky, spikes, sort, width_px),
     )
 
 
@@ -130,42 +136,45 @@ def _bright(
     bright: NDArray[np.bool_] = picture > thresholds[:, :width]
     bright[[0, -1]] = False
     bright[:, [0, -1]] = False
-    meter.charge(i32_add=picture.size + 12 * levels.size, i32_mul=3 * levels.size)
-    meter.charge(loop=levels.size)
+    # A comparison and a branch for each pixel; the threshold steps on with each block, and its
+    # step is worked out for each row of a cell.
+    steps = height * sky.levels.shape[1]
+    meter.charge(i32_add=2 * picture.size + 6 * levels.size + 12 * steps, loop=levels.size + steps)
+    meter.charge(ram_read=4 * steps, i32_mul=4 * steps)
     return bright
 
 
-def _in_time(runs: Runs, height: int, width: int, limit: int, meter: Meter) -> tuple[Runs, bool]:
-    """The runs of the rows that can be looked at before the meter's total reaches ``limit``."""
-    lengths = runs.ends - runs.begins
-    operations = meter.table.operations
-    pixel, run = (
-        sum(operations[name].cycles * count for name, count in costs.items())
-        for costs in (_PIXEL, _RUN)
-    )
-    short = np.where(lengths <= areas.LONGEST_RUN, lengths, 0)
-    rows = np.bincount(runs.begins // width, run + pixel * short, height)
-    done = int(np.searchsorted(np.cumsum(rows), limit - meter.total, "right"))
-    count = int(np.searchsorted(runs.begins, done * width))
-    pixels = int(short[:count].sum())
-    meter.charge(**{name: times * pixels for name, times in _PIXEL.items()})
-    meter.charge(**{name: times * count for name, times in _RUN.items()})
-    return Runs(runs.begins[:count], runs.ends[:count]), done >= height
-
-
 def _areas(
-    pixels: NDArray[np.uint8], runs: Runs, sky: Background, width: int, meter: Meter
-) -> tuple[Areas, int]:
-    """Areas of ``runs`` without their spikes, and the number of these."""
+    pixels: NDArray[np.uint8], bright: NDArray[np.bool_], sky: Background, limit: int, meter: Meter
+) -> tuple[Areas, int, bool]:
+    """Areas without spikes, the number of these, and whether the time sufficed for all rows.
+
+    It must not take longer than until the meter's total reaches ``limit``.
+    """
+    height, width = bright.shape
+    runs = areas.runs_of(bright)
     places = runs.places()
     y, x = np.divmod(places, width)
     levels = sky.interpolated(sky.levels, y, x)
     sharp = areas.spikes(pixels, places, width, levels, sky.interpolated(sky.noises, y, x))
     left = areas.without(runs, places[sharp])
-    labels = areas.join(left, width, meter)
-    signal = background.UNIT * pixels[places].astype(np.int64) - levels
-    kept = ~sharp
-    return areas.measure(left, labels, signal[kept], width), int(sharp.sum())
+    kept = places[~sharp]
+
+    def by_row(offsets: Ints, costs: dict[str, int]) -> NDArray[np.float64]:
+        cycles = sum(meter.table.operations[name].cycles * n for name, n in costs.items())
+        return np.asarray(cycles * np.bincount(offsets // width, minlength=height), np.float64)
+
+    spent = by_row(places, _TEST) + by_row(kept, _PIXEL) + by_row(left.begins, _RUN)
+    spent += by_row(kept, _AREA) / FEWEST_PIXELS  # so many areas at most
+    done = int(np.searchsorted(np.cumsum(spent), limit - meter.total, "right"))
+    left = Runs(left.begins[left.begins < done * width], left.ends[left.begins < done * width])
+    signal = (background.UNIT * pixels[places].astype(np.int64) - levels)[~sharp]
+    signal = signal[kept < done * width]
+    tested = int(np.count_nonzero(y < done))
+    for count, costs in ((tested, _TEST), (len(signal), _PIXEL), (len(left.begins), _RUN)):
+        meter.charge(**{name: count * times for name, times in costs.items()})
+    measured = areas.measure(left, areas.join(left, width), signal, width)
+    return measured, tested - len(signal), done >= height
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,16 +198,16 @@ def _sorted_out(found: Areas, config: DetectionConfig, meter: Meter) -> _Sorted:
     whole = ~found.large
     small = whole & (found.sizes < FEWEST_PIXELS)
     drawn_out = whole & ~small & (along > STRETCHED * across)
-    large = found.large | (~drawn_out & (found.sizes > config.max_pixels))
+    wide = along + across > 2 * WIDEST_PX**2
+    large = found.large | (~drawn_out & wide & (found.sizes > config.max_pixels))
     faint = found.tops <= background.UNIT * config.detection_threshold
     brightest = np.argsort(-found.light, kind="stable")
     brightest = brightest[~(small | drawn_out | large)[brightest]]
     # Those of the minimum size first; smaller and fainter ones only where they leave room.
     full = ((found.sizes >= config.min_pixels) & ~faint)[brightest]
     candidates = np.concatenate([brightest[full], brightest[~full]])[:MOST_AREAS]
-    count = len(found.sizes)
-    meter.charge(i32_add=40 * count, i32_mul=8 * count, i32_div=5 * count, loop=2 * count)
-    meter.charge(ram_read=10 * count + 8 * MOST_AREAS, ram_write=8 * len(candidates))
+    looked_at = int(np.count_nonzero(found.sizes >= FEWEST_PIXELS))
+    meter.charge(**{name: looked_at * times for name, times in _AREA.items()})
     double_angle = ((xx - yy) + 2j * xy)[drawn_out] / np.maximum(spread[drawn_out], 1e-9)
     some = bool(drawn_out.any())
     return _Sorted(
@@ -211,7 +220,7 @@ def _sorted_out(found: Areas, config: DetectionConfig, meter: Meter) -> _Sorted:
     )
 
 
-def _statistics(sky: Background, spikes: int, sort: _Sorted) -> PictureStatistics:
+def _statistics(sky: Background, spikes: int, sort: _Sorted, spot_px: float) -> PictureStatistics:
     levels = sky.levels / background.UNIT
     return PictureStatistics(
         background=float(levels.mean()),
@@ -223,4 +232,5 @@ def _statistics(sky: Background, spikes: int, sort: _Sorted) -> PictureStatistic
         elongated=sort.elongated,
         aligned=sort.aligned,
         streak_px=sort.streak_px,
+        spot_px=spot_px,
     )

@@ -114,6 +114,8 @@ class PictureStatistics:
         elongated: areas drawn out in one direction: streaks, tracks of particles.
         aligned: how far these share their direction, 0 to 1: streaks of stars do, tracks do not.
         streak_px: median length of these in px; 0 without any.
+        spot_px: standard deviation of a star's spot in px, the pixel's own width in it; the usual
+            one where fewer than three stars tell.
     """
 
     background: float
@@ -125,6 +127,7 @@ class PictureStatistics:
     elongated: int
     aligned: float
     streak_px: float
+    spot_px: float
 
 
 def _unknown() -> NDArray[np.float32]:

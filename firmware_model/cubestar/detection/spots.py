@@ -1,8 +1,10 @@
 """Which bright spots are stars, and where exactly: shape tests and weighted centroids.
 
-A centroid is the place about which the signal, weighed with a Gaussian of the spot's own width,
-balances: unbiased where a window cuts the spot, and as accurate as a fit of the spot. The program
-works in whole numbers with a table of weights; only the last division is in floating point.
+A centroid is the place about which the signal, weighed with a Gaussian of the spots' own width,
+balances: unbiased where a window cuts the spot, and as accurate as a fit of the spot. The width is
+the median of those of the picture's stars. What stands out above the Gaussian, a hot pixel or a
+neighbour, is replaced by it. The program works in whole numbers with a table of weights; only the
+last division is in floating point.
 
 Expected errors: Cramer-Rao bounds of a Gaussian spot of width s and light F. Noise n in each pixel
 makes n s^2 sqrt(8 pi) / F, the light's own noise s / sqrt(electrons).
@@ -18,15 +20,26 @@ from cubestack.firmware_model.mcu.costs import Meter
 HALF = 4
 """Windows reach so many pixels to each side of the brightest one."""
 
-SPOT_SIGMA_PX = 0.9
-WIDE_SIGMA_PX = 1.8
-"""Widths of the weights: of a star's spot; of a saturated one's, whose middle is flat."""
+WIDE_SIGMA_PX = 1.5
+"""Width of the weights of a saturated spot, whose middle is flat, and of those that measure it."""
 
+USUAL_SIGMA_PX = 0.95
+"""Width of a star's spot and a pixel together, where too few stars tell it."""
+
+SIGMA_RANGE_PX = 0.5, 2.0
+FEWEST_SPOTS = 3
 SATURATED_DN = 250
 ROUNDS = 4
 SHARPEST = 0.6
 """Largest share of the brightest pixel in the 3 x 3 around it: 0.22 in a spot of sigma 0.9 px, 0.54
 in one of 0.45 px, and more in what particles and hot pixels leave; chosen."""
+
+STANDS_OUT = 0.15
+"""Share of a spot's height by which a pixel may exceed its Gaussian, beside four times the noise:
+what a spot is that is no Gaussian; chosen."""
+
+DISTURBED_PX = 0.5
+"""Expected error in px for each part of the light that was replaced: measured."""
 
 ELECTRONS_PER_DN = 36.5
 """MLX75412: 2.28 electrons per count of 12 bits, whose upper 8 are here."""
@@ -38,9 +51,14 @@ SATURATED_ERROR_PX = 0.04
 _PARTS = 64
 """Of a pixel: places between which the weights are tabulated."""
 
-_LARGEST = 255
+_ONE = 256
+"""Weight in the middle."""
 
-Windows = NDArray[np.int64]
+_CELLS = _PARTS * np.arange(-HALF, HALF + 1)
+
+Ints = NDArray[np.int64]
+Reals = NDArray[np.float64]
+Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,60 +70,132 @@ class Spots:
     errors: NDArray[np.float32]
 
 
-def too_sharp(windows: Windows, noises: NDArray[np.int64]) -> NDArray[np.bool_]:
+def too_sharp(windows: Ints, noises: Ints) -> NDArray[np.bool_]:
     """Which windows' middles are sharper than a spot; signal (n, 9, 9) and noise in 1/16 DN."""
     near = windows[:, HALF - 1 : HALF + 2, HALF - 1 : HALF + 2].sum(axis=(1, 2))
     sharp: NDArray[np.bool_] = windows[:, HALF, HALF] - noises > SHARPEST * near
     return sharp
 
 
-def _weights(distances: Windows, wide: NDArray[np.bool_]) -> Windows:
-    """Tabulated weights of ``distances`` (n, 9) in 1/64 px."""
-    sigma = np.where(wide, WIDE_SIGMA_PX, SPOT_SIGMA_PX)[:, None]
-    weights: Windows = np.rint(_LARGEST * np.exp(-((distances / _PARTS / sigma) ** 2) / 2)).astype(
-        np.int64
-    )
-    return weights
+def usual_width(windows: Ints, starts: Reals, saturated: Marks, meter: Meter) -> float:
+    """Standard deviation of a spot in px: the median of those in ``windows``, brightest first.
+
+    A spot of variance v has 1 / (1/v + 1/w) under weights of variance w.
+    """
+    some = np.flatnonzero(~saturated)
+    some = some[: max(FEWEST_SPOTS, len(some) // 2)]
+    if len(some) < FEWEST_SPOTS:
+        return USUAL_SIGMA_PX
+    around = _Weights.about(_in_parts(starts[some]), np.full(len(some), WIDE_SIGMA_PX))
+    variance = float(np.median(around.variances(windows[some])))
+    _charge(len(some), 1, meter)
+    free = 1 / max(1 / max(variance, 0.1) - 1 / WIDE_SIGMA_PX**2, 0.1)
+    return float(np.clip(np.sqrt(free), *SIGMA_RANGE_PX))
 
 
 def centre(
-    windows: Windows,
-    starts: NDArray[np.float64],
-    saturated: NDArray[np.bool_],
-    noises: NDArray[np.int64],
-    meter: Meter,
+    windows: Ints, starts: Reals, saturated: Marks, noises: Ints, sigma: float, meter: Meter
 ) -> Spots:
-    """Centroids of ``windows``: signal (n, 9, 9) in 1/16 DN, looked for from ``starts`` (n, 2)."""
-    cells = _PARTS * np.arange(-HALF, HALF + 1)
-    at = np.rint(np.clip(starts, -1.5, 1.5) * _PARTS).astype(np.int64)
+    """Centroids of ``windows``: signal (n, 9, 9) in 1/16 DN, looked for from ``starts`` (n, 2).
+
+    Args:
+        windows: around the brightest pixel of each spot.
+        starts: from the windows' middles, in px.
+        saturated: whose flat middle says nothing; weighed more widely (n,).
+        noises: of a pixel in 1/16 DN (n,).
+        sigma: of a spot in px.
+        meter: what is charged.
+    """
+    spread = np.where(saturated, np.maximum(WIDE_SIGMA_PX, sigma), sigma)
+    # Weighed with its own width, a spot moves by half of what is missing.
+    gain = 1 + (spread / sigma) ** -2
+    at, clean = _in_parts(starts), windows
     for turn in range(ROUNDS):
-        across, down = (cells - at[:, axis, None] for axis in (0, 1))
-        wx, wy = _weights(across, saturated), _weights(down, saturated)
-        by_row = (windows * wx[:, None, :]).sum(axis=2)
-        total = np.maximum((by_row * wy).sum(axis=1), 1)
-        sum_x = (((windows * (wx * across)[:, None, :]).sum(axis=2)) * wy).sum(axis=1)
-        sum_y = (by_row * wy * down).sum(axis=1)
-        # A Gaussian in its own weights moves by half of what is missing; a wider weight by more.
-        gain = np.where(saturated, 1.25, 2.0)[:, None]
-        step = gain * np.stack([sum_x, sum_y], axis=1) / total[:, None]
+        around = _Weights.about(at, spread)
+        if turn:
+            clean = np.where(
+                saturated[:, None, None], windows, around.cleaned(clean, windows, noises)
+            )
+        step = gain[:, None] * around.means(clean)
         if turn < ROUNDS - 1:
             at = np.clip(at + np.rint(step).astype(np.int64), -2 * _PARTS, 2 * _PARTS)
+    _charge(len(windows), ROUNDS, meter)
     places = np.clip((at + step) / _PARTS, -2.5, 2.5)
-    light = np.maximum(windows.sum(axis=(1, 2)) / 16, 1)
-    noise = noises / 16
+    light = np.maximum(clean.sum(axis=(1, 2)) / 16, 1)
+    disturbed = around.sums(np.abs(windows - clean)) / np.maximum(around.sums(clean), 1)
     errors = np.sqrt(
-        (noise * SPOT_SIGMA_PX**2 * np.sqrt(8 * np.pi) / light) ** 2
-        + SPOT_SIGMA_PX**2 / (ELECTRONS_PER_DN * light)
+        (noises / 16 * sigma**2 * np.sqrt(8 * np.pi) / light) ** 2
+        + sigma**2 / (ELECTRONS_PER_DN * light)
         + np.where(saturated, SATURATED_ERROR_PX, LEAST_ERROR_PX) ** 2
+        + (DISTURBED_PX * disturbed) ** 2
     )
-    pixels = ROUNDS * len(windows) * (2 * HALF + 1) ** 2
-    meter.charge(ram_read=2 * pixels, i32_mul=2 * pixels, i32_add=3 * pixels, loop=pixels)
-    meter.charge(
-        i32_div=2 * ROUNDS * len(windows),
-        f32_convert=6 * len(windows),
-        f32_div=5 * len(windows),
-        f32_add=5 * len(windows),
-        f32_mul=5 * len(windows),
-        f32_sqrt=len(windows),
-    )
+    count = len(windows)
+    meter.charge(f32_convert=6 * count, f32_div=6 * count, f32_add=6 * count, f32_sqrt=count)
+    meter.charge(f32_mul=6 * count)
     return Spots(places.astype(np.float32), light.astype(np.float32), errors.astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class _Weights:
+    """Gaussian weights about a place in each window, and distances from it in 1/64 px: (n, 9)."""
+
+    wx: Ints
+    wy: Ints
+    across: Ints
+    down: Ints
+
+    @classmethod
+    def about(cls, at: Ints, sigmas: Reals) -> "_Weights":
+        """Weights of ``sigmas`` (n,) px about the places ``at`` (n, 2) in 1/64 px."""
+        away = [_CELLS - at[:, axis, None] for axis in (0, 1)]
+        wx, wy = (
+            np.rint(_ONE * np.exp(-((d / _PARTS / sigmas[:, None]) ** 2) / 2)).astype(np.int64)
+            for d in away
+        )
+        return cls(wx, wy, *away)
+
+    def sums(self, windows: Ints) -> Ints:
+        """Weighted sums (n,)."""
+        return _weighed(windows, self.wx, self.wy)
+
+    def means(self, windows: Ints) -> Reals:
+        """Weighted mean places (n, 2) in 1/64 px, from where the weights are largest."""
+        x = _weighed(windows, self.wx * self.across, self.wy)
+        y = _weighed(windows, self.wx, self.wy * self.down)
+        return np.stack([x, y], axis=1) / np.maximum(self.sums(windows), 1)[:, None]
+
+    def variances(self, windows: Ints) -> Reals:
+        """Mean (n,) of the weighted variances in x and y, in px^2."""
+        x = _weighed(windows, self.wx * self.across**2, self.wy)
+        y = _weighed(windows, self.wx, self.wy * self.down**2)
+        squares = (x + y) / np.maximum(self.sums(windows), 1)
+        variances: Reals = (squares - (self.means(windows) ** 2).sum(axis=1)) / (2 * _PARTS**2)
+        return variances
+
+    def cleaned(self, clean: Ints, windows: Ints, noises: Ints) -> Ints:
+        """``windows`` with the Gaussian that fits ``clean`` where they stand out above it."""
+        shape = (self.wy[:, :, None] * self.wx[:, None, :]) / _ONE**2
+        height = np.maximum((shape * clean).sum(axis=(1, 2)) / (shape**2).sum(axis=(1, 2)), 0)
+        spots = shape * height[:, None, None]
+        light_noise = np.sqrt(16 * spots / ELECTRONS_PER_DN)
+        reach = 4 * (noises[:, None, None] + light_noise) + STANDS_OUT * height[:, None, None]
+        cleaned: Ints = np.where(windows > spots + reach, spots, windows).astype(np.int64)
+        return cleaned
+
+
+def _weighed(windows: Ints, wx: Ints, wy: Ints) -> Ints:
+    by_row = (windows * wx[:, None, :]).sum(axis=2)
+    total: Ints = (by_row * wy).sum(axis=1)
+    return total
+
+
+def _in_parts(places: Reals) -> Ints:
+    parts: Ints = np.rint(np.clip(places, -1.5, 1.5) * _PARTS).astype(np.int64)
+    return parts
+
+
+def _charge(windows: int, rounds: int, meter: Meter) -> None:
+    """Charge sums of so many windows: a weight, a comparison and three products for each pixel."""
+    pixels = rounds * windows * (2 * HALF + 1) ** 2
+    meter.charge(ram_read=3 * pixels, i32_mul=4 * pixels, i32_add=5 * pixels, loop=pixels)
+    meter.charge(i32_div=4 * rounds * windows)
