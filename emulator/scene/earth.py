@@ -9,6 +9,7 @@ Axes: vectors towards the Earth's centre, the Sun and along each line of sight s
 Radiance 1 is that of the mean surface with the Sun in its zenith.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,12 +42,15 @@ class Earth:
         unevenness: standard deviation of the surface's brightness, relative to its mean.
         glow_km: height in which the limb's glow falls to 1/e; 0 for none.
         seed: of the surface.
+        shine: brightness (n,) of the surface at unit vectors (n, 3) of its own axes, by the mean's;
+            None: even.
     """
 
     altitude_km: float
     unevenness: float
     glow_km: float
     seed: int
+    shine: Callable[[Values], Values] | None = None
 
     @property
     def distance(self) -> float:
@@ -84,6 +88,8 @@ class Earth:
         light *= self._share(cosine, pixel_rad[hit], radius)
         if self.unevenness:
             light *= np.maximum(1 + self._pattern(normal, axes), 0)
+        if self.shine is not None:
+            light *= self.shine(normal @ axes.astype(np.float32))
         return hit, light
 
     def _normal(self, sight: Values, cosine: Values, nadir: NDArray[np.float64]) -> Values:

@@ -16,6 +16,7 @@ from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angl
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
+from cubestack.emulator.scene.hazards import Clouds, EarthHazard
 from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
@@ -117,7 +118,7 @@ class EarthSunScene:
         unevenness: standard deviation of the Earth's brightness, relative (assumed).
         glow_km: scale height of the glow above the limb; 0 for none (assumed).
         reflections: false lights.
-        hazards: what else gives light, in scene axes.
+        hazards: what else gives light, in scene axes; some say where Earth and Sun stand.
         seed: of the Earth's surface.
     """
 
@@ -145,6 +146,12 @@ class EarthSunScene:
         refuse_zero(self, "altitude_km")
         refuse_negative(self, "unevenness", "glow_km", "seed")
         refuse_strangers(self.hazards)
+        radius = np.radians(angular_radius_deg(self.altitude_km))
+        for hazard in self.hazards:
+            if isinstance(hazard, EarthHazard):
+                stand = hazard.stand(np.asarray(self.nadir), np.asarray(self.sun), float(radius))
+                for name, vector in zip(("nadir", "sun"), stand, strict=True):
+                    object.__setattr__(self, name, vector)
 
     @classmethod
     def facing(
@@ -167,7 +174,9 @@ class EarthSunScene:
     @property
     def earth(self) -> Earth:
         """The Earth below."""
-        return Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed)
+        clouds = [hazard.shine for hazard in self.hazards if isinstance(hazard, Clouds)]
+        shine = clouds[-1] if clouds else None
+        return Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed, shine)
 
     def axes(self, camera: Target, time_ps: int) -> NDArray[np.float64]:
         """Rotation (3, 3) from scene axes to a camera's axes at a time."""

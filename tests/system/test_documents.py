@@ -18,7 +18,7 @@ from cubestack.emulator.ports.tcp import REFUSAL
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import DEVICE_KEYS
-from cubestack.emulator.scene.hazards import SKY_HAZARDS, Hazard
+from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS, Hazard
 from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.firmware_model.cubesense.memory import Memory, budget, used
 from cubestack.firmware_model.interface.aramis import Reason
@@ -119,7 +119,8 @@ def hazard_rows(hazard: type[Hazard]) -> list[str]:
 
 def test_every_key_of_every_hazard_is_documented() -> None:
     part = section(text_of("docs/scenes.md"), "Keys of `hazards`")
-    hazards: list[type[Hazard]] = [*SKY_HAZARDS.values(), *SENSOR_HAZARDS.values()]
+    light = [*SKY_HAZARDS.values(), *EARTH_HAZARDS.values()]
+    hazards: list[type[Hazard]] = [*light, *SENSOR_HAZARDS.values()]
     expected = [row for hazard in hazards for row in hazard_rows(hazard)]
     assert [row for row in part.splitlines() if row.startswith("| `")] == expected
 

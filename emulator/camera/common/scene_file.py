@@ -166,12 +166,15 @@ def _sky(
     return SkyView(scene, replace(condition, **file.values_for(condition, values)))
 
 
-def read_hazards(values: dict[str, Any]) -> tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]:
+def read_hazards(
+    values: dict[str, Any], others: Mapping[str, type[SkyHazard]] = MappingProxyType({})
+) -> tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]:
     """Hazards of light, and those of sensor and lens, of the tables under ``hazards``.
 
     Takes that key out of ``values``. The seed of a hazard is the file's, if it says no other.
+    ``others`` are kinds that not every scene has.
     """
-    kinds: dict[str, type[Hazard]] = {**SKY_HAZARDS, **SENSOR_HAZARDS}
+    kinds: dict[str, type[Hazard]] = {**SKY_HAZARDS, **others, **SENSOR_HAZARDS}
     reader = file.made_of(kinds, seed=values.get("seed", 0))
     hazards = file.read_table({"hazards": values.pop("hazards", {})}, {"hazards": reader})
     return tuple(h for h in hazards["hazards"] if isinstance(h, SkyHazard)), tuple(

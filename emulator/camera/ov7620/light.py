@@ -1,4 +1,4 @@
-"""Light of a scene through CubeSense's fisheyes: Earth, Sun, Moon and reflections on the pixels.
+"""Light of a scene through CubeSense's fisheyes: Earth, Sun and all hazards on the pixels.
 
 CubeSense thesis, section 3.1.2.2 (the ND 4 filter on the sun side), section 5.1.3.2 (the Sun's
 image is 8 px in radius on the boresight and 6 px near the rim, for its 0.27 deg), section 5.1.4
@@ -9,18 +9,31 @@ The thesis explains the Sun's size by charge that flows over from full pixels in
 Here its image is a round Gaussian spot of light, wider than the Sun and saturated in its middle, of
 the published size. The nadir camera, without a filter, makes a far brighter spot of it.
 
+Hazards shine as bright as they are by the Earth, whose radiance 1 is 4.75e9 stars of V = 0 a
+steradian. The Sun's spot, made as large as published, has a hundred times the light that it would
+have by that. Hazards that do not say where the Sun is have the scene's.
+
 A picture is taken as of one instant: what is neglected is the satellite's turn during a read-out.
 """
 
 import math
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.camera.ov7620.fisheye import PIXELS_PER_DEGREE, Fisheye, lens_of
-from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
+from cubestack.emulator.camera.common.glow import brightness
+from cubestack.emulator.camera.ov7620.blur import blurred
+from cubestack.emulator.camera.ov7620.fisheye import Fisheye, lens_of
+from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
+from cubestack.emulator.camera.ov7620.luminance import SPOT_PX
 from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.hazards import Ghosts, Looking, Moon, SkyHazard
+from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE, Depth, Vectors
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 
 USUAL_EXPOSURE = {Target.SUN: 1, Target.NADIR: 4}
@@ -52,11 +65,6 @@ much as :func:`_slant_transmission` says at the rim.
 PIXEL_MM, BACK_FOCAL_MM = 7.6e-3, 2.77
 """Appendix A.1 and A.3."""
 
-MOON_RADIANCE = 0.4
-"""Full Moon by the mean Earth: albedo 0.12 by 0.3."""
-
-MOON_RADIUS_DEG = 0.26
-MOON_SPOT_PX = 0.6  # assumed: its disc, 0.75 px in radius, and the sharp lens
 FAINTEST = 1e-3
 """Light that is left out, grey values a line time."""
 
@@ -86,9 +94,7 @@ def scene_light(
     light.ravel()[lens.field.index[seen]] = radiance
     if not scene.hidden(scene.sun):
         _add_sun(light, lens, bloom_px, camera, sun)
-    if scene.moon is not None and not scene.hidden(scene.moon):
-        moon = scene.seen(scene.moon, camera, time_ps)
-        _add_moon(light, lens, moon, earth_level * MOON_RADIANCE * (1 - float(moon @ sun)) / 2)
+    _add_hazards(light, lens, scene, camera, time_ps)
     for reflection in scene.reflections:
         if reflection.camera == camera:
             centre = lens.project(vector_from_angles(reflection.alpha_deg, reflection.beta_deg))
@@ -110,23 +116,94 @@ def _add_sun(
     peak = SUN_EDGE * math.exp(1 / (2 * SUN_SPOT**2))
     unfiltered = peak / FILTER[Target.SUN] / _usual_lines(Target.SUN)
     transmission = _slant_transmission(FILTER[camera], math.dist(centre, (lens.cx, lens.cy)))
-    _add_spot(light, centre, SUN_SPOT * bloom_px, unfiltered * transmission)
+    _add_spot(light, centre, SUN_SPOT * bloom_px, unfiltered * float(transmission))
 
 
-def _slant_transmission(straight: float, radius_px: float) -> float:
-    """Transmission of a filter behind the lens for light that reaches ``radius_px``.
+def _slant_transmission(straight: float, radius_px: ArrayLike) -> NDArray[np.float64]:
+    """Transmission (...) of a filter behind the lens for light that reaches ``radius_px`` (...).
 
     Assumed: the path through the filter is as oblique as the line from the centre of the last lens
     element, and not refracted. At the rim a fifth of the filtered light is left.
     """
-    return float(straight ** math.hypot(1, radius_px * PIXEL_MM / BACK_FOCAL_MM))
+    slant = np.hypot(1, np.asarray(radius_px) * PIXEL_MM / BACK_FOCAL_MM)
+    return np.asarray(straight**slant)
 
 
-def _add_moon(light: Light, lens: Fisheye, vector: NDArray[np.float64], level: float) -> None:
-    centre = lens.project(vector)
-    if centre is not None:
-        area_px = math.pi * (MOON_RADIUS_DEG * PIXELS_PER_DEGREE) ** 2
-        _add_spot(light, centre, MOON_SPOT_PX, level * area_px / (2 * math.pi * MOON_SPOT_PX**2))
+@dataclass(frozen=True, kw_only=True)
+class _Disc(SkyHazard):
+    """The scene's Earth, as far as it hides hazards."""
+
+    nadir: tuple[float, ...]
+    radius_rad: float
+
+    name: ClassVar[str] = "earth"
+    depth: ClassVar[Depth] = Depth.EARTH
+
+    def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
+        """What is behind it."""
+        del looking
+        return np.asarray(vectors @ np.array(self.nadir) > math.cos(self.radius_rad))
+
+
+def _hazards(scene: EarthSunScene) -> list[SkyHazard]:
+    """Those of the scene, with its Sun; its Moon is one too."""
+    found = list(scene.hazards)
+    if scene.moon is not None:
+        found.append(Moon(direction=tuple(np.asarray(scene.moon).tolist()), scatter=0.0))
+    sun = tuple(np.asarray(scene.sun).tolist())
+    found = [
+        replace(hazard, sun=sun)  # type: ignore[call-arg]
+        if getattr(hazard, "sun", sun) is None
+        else hazard
+        for hazard in found
+    ]
+    if scene.hidden(scene.sun):
+        found = [hazard for hazard in found if not isinstance(hazard, Ghosts)]
+    return found
+
+
+def _add_hazards(
+    light: Light, lens: Fisheye, scene: EarthSunScene, camera: Target, time_ps: int
+) -> None:
+    """Add glow and points of light, in place."""
+    hazards = _hazards(scene)
+    if not hazards:
+        return
+    field, straight = lens.field, FILTER[camera]
+    looking = Looking(
+        scene.axes(camera, time_ps),
+        2 * FIELD_DEG,
+        2 * FIELD_DEG,
+        FIELD_DEG,
+        float(field.pixel_rad.max()),
+        time_ps / PS_PER_S,
+    )
+    radius = math.radians(angular_radius_deg(scene.altitude_km))
+    earth = _Disc(nadir=tuple(np.asarray(scene.nadir).tolist()), radius_rad=radius)
+    level = EARTH_LEVEL / _usual_lines(Target.NADIR) / EARTH_RADIANCE
+    vectors = field.vectors.astype(np.float64) @ looking.axes
+    for hazard in hazards:
+        points = hazard.lights(looking)
+        if points is None:
+            continue
+        behind = earth.hidden(looking, points.vectors) & (hazard.depth < earth.depth)
+        for vector, v_mag in zip(points.vectors[~behind], points.v_mag[~behind], strict=True):
+            centre = lens.project(looking.axes @ vector)
+            if centre is not None:
+                at = math.dist(centre, (lens.cx, lens.cy))
+                flux = 10 ** (-0.4 * v_mag) / looking.pixel_rad**2
+                peak = flux * level / (2 * math.pi * SPOT_PX**2)
+                _add_spot(light, centre, SPOT_PX, peak * float(_slant_transmission(straight, at)))
+    glow = brightness([*hazards, earth], looking, vectors)
+    if glow is None:
+        return
+    places = np.divmod(field.index, COLUMNS)
+    away = np.hypot(places[1] - lens.cx, places[0] - lens.cy)
+    glow *= (_slant_transmission(straight, away) * level).astype(np.float32) * field.lit
+    if glow.max() > FAINTEST:
+        added = np.zeros_like(light)
+        added.ravel()[field.index] = glow
+        light += blurred(added, SPOT_PX)
 
 
 def _add_spot(light: Light, centre: NDArray[np.float64], sigma_px: float, peak: float) -> None:

@@ -20,6 +20,8 @@
     at_deg = [20.0, -10.0]         # alpha and beta
     radius_px = 4.0
     level = 200.0                  # grey values above black
+    [hazards.clouds]               # see docs/scenes.md
+    contrast = 0.8
 
 Directions are in scene axes, the satellite's body axes at time 0. Each key goes to the scene or to
 the cameras' condition, whichever has it; ``seed`` to both.
@@ -29,12 +31,14 @@ The ball of the nadir sensor's bench is another kind, "ball", with the arguments
 from pathlib import Path
 from typing import Any
 
+from cubestack.emulator.camera.common.scene_file import read_hazards
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene import file
 from cubestack.emulator.scene.ball import ball_scene
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
+from cubestack.emulator.scene.hazards import EARTH_HAZARDS
 
 
 def load_earth_sun_scene(path: Path) -> EarthSunView:
@@ -56,9 +60,10 @@ def _view(table: dict[str, Any]) -> EarthSunView:
     for name in ("sun", "nadir"):
         if name in values and angles[f"{name}_deg"]:
             raise file.SceneError(f"give either {name} or {name}_deg, not both")
-    condition = FisheyeCondition(**file.values_for(FisheyeCondition, values))
-    scene = EarthSunScene.facing(**angles, **file.values_for(EarthSunScene, values))
-    return EarthSunView(scene, condition)
+    light, of_sensor = read_hazards(values, EARTH_HAZARDS)
+    condition = FisheyeCondition(**file.values_for(FisheyeCondition, values), hazards=of_sensor)
+    values = file.values_for(EarthSunScene, values)
+    return EarthSunView(EarthSunScene.facing(**angles, **values, hazards=light), condition)
 
 
 def _mounting(value: Any) -> Mounting:
@@ -126,6 +131,7 @@ _SCENE: file.Readers = {
     "hot_pairs": file.whole,
     "noise": file.flag,
     "seed": file.whole,
+    "hazards": dict,
 }
 _BALL_SCENE: file.Readers = {
     "angle_deg": file.several(2, file.number),

@@ -1,12 +1,21 @@
 """Hazards of light: what makes real skies hard for star and Earth sensors; one module a kind.
 
-``SKY_HAZARDS`` is the one list of them, by name.
+``SKY_HAZARDS`` is the one list of those that any camera may meet, by name; ``EARTH_HAZARDS`` that
+of those which need an Earth below the satellite.
 """
 
 from cubestack.emulator.scene.hazards.aberration import Aberration
 from cubestack.emulator.scene.hazards.contract import Lights, Looking, SkyHazard
 from cubestack.emulator.scene.hazards.debris import Debris
+from cubestack.emulator.scene.hazards.earth_below import (
+    Clouds,
+    EarthHazard,
+    EarthInSunCamera,
+    Terminator,
+)
 from cubestack.emulator.scene.hazards.earth_limb import EarthLimb
+from cubestack.emulator.scene.hazards.ghosts import Ghosts
+from cubestack.emulator.scene.hazards.glint import Glint
 from cubestack.emulator.scene.hazards.hazard import Hazard, Strength
 from cubestack.emulator.scene.hazards.moon import Moon
 from cubestack.emulator.scene.hazards.planets import Planets
@@ -14,10 +23,16 @@ from cubestack.emulator.scene.hazards.sky_glow import SkyGlow
 from cubestack.emulator.scene.hazards.sun_glare import SunGlare
 
 __all__ = [
+    "EARTH_HAZARDS",
     "SKY_HAZARDS",
     "Aberration",
+    "Clouds",
     "Debris",
+    "EarthHazard",
+    "EarthInSunCamera",
     "EarthLimb",
+    "Ghosts",
+    "Glint",
     "Hazard",
     "Lights",
     "Looking",
@@ -27,8 +42,14 @@ __all__ = [
     "SkyHazard",
     "Strength",
     "SunGlare",
+    "Terminator",
 ]
 
 SKY_HAZARDS: dict[str, type[SkyHazard]] = {
-    kind.name: kind for kind in (Moon, Planets, EarthLimb, SunGlare, SkyGlow, Debris, Aberration)
+    kind.name: kind
+    for kind in (Moon, Planets, EarthLimb, SunGlare, SkyGlow, Debris, Aberration, Ghosts, Glint)
+}
+
+EARTH_HAZARDS: dict[str, type[EarthHazard]] = {
+    kind.name: kind for kind in (Clouds, Terminator, EarthInSunCamera)
 }

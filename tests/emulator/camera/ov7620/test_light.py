@@ -7,6 +7,9 @@ from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistorted
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE, scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
+from cubestack.emulator.scene.hazards import Ghosts, Glint, Moon
+from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE
+from cubestack.emulator.scene.hazards.glint import SUN_SURFACE
 from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
 
 SUN, NADIR = Target.SUN, Target.NADIR
@@ -119,11 +122,12 @@ def test_moon_is_small_and_has_phases() -> None:
         picture = levels(EarthSunScene(sun=sun, moon=(1, 0, 0), nadir=(-1, 0, 0)), NADIR)
         return float((picture - 34)[226:247, 582:603].sum())
 
-    full, along = moon((-0.999, 0.04, 0)), np.radians(150)
-    assert 50 < full < 120
-    assert moon((0, 1, 0)) == pytest.approx(full / 2, rel=0.01)
-    crescent = moon((-np.cos(along), np.sin(along), 0))
-    assert crescent == pytest.approx(full * (1 - np.cos(np.radians(30))) / 2, rel=0.01)
+    full = moon((-0.999, 0.04, 0))
+    # Allen: V = -12.73 full and -10.1 half; 4.75e9 stars a steradian are as bright as the Earth,
+    # and at 90 deg a pixel covers 0.36 by 0.55 deg.
+    stars, pixel_sr = 10 ** (0.4 * (12.73 - 0.026 * 2.3)), np.radians(0.3565) * np.radians(0.549)
+    assert full == pytest.approx(120.4 * stars / pixel_sr / 4.75e9, rel=0.15)
+    assert moon((0, 1, 0)) == pytest.approx(full * 10 ** (-0.4 * 2.54), rel=0.15)
     hidden = EarthSunScene(moon=(0, 0, 1))
     np.testing.assert_array_equal(levels(hidden, NADIR), levels(replace(hidden, moon=None), NADIR))
 
@@ -138,6 +142,37 @@ def test_reflection_is_an_even_disc_in_its_own_camera() -> None:
     centre = LENSES[SUN].unproject([bright(light, 90)[1]])[0]
     assert np.degrees(np.arctan2(centre[1], centre[0])) == pytest.approx(-56.3, abs=0.5)
     np.testing.assert_array_equal(levels(scene, NADIR), levels(plain, NADIR))
+
+
+def test_a_glow_is_as_bright_as_it_is_by_the_earth() -> None:
+    """A patch of the radiance 1, in both cameras: published transmission 1e-4."""
+    glint = Glint(surface=EARTH_RADIANCE / SUN_SURFACE, count=1, seed=4)
+    dark = EarthSunScene(nadir=(0, 1, 0), sun=(0, 1, 0.1), hazards=(glint,))
+    assert (levels(dark, NADIR) - 34)[radius(NADIR) < 226].max() == pytest.approx(120.4, rel=0.02)
+    assert (levels(dark, SUN) - 34).max() < 120.4 / 4 * 1e-4
+    mirror = replace(dark, hazards=(replace(glint, surface=1.0),))
+    # The Sun's surface is 154 000 times as bright as the Earth; a fifth to all of the filter's.
+    assert 90 < (levels(mirror, SUN) - 34).max() < 461
+
+
+def test_the_earth_hides_what_is_behind_it_and_not_what_is_in_the_lens() -> None:
+    behind = EarthSunScene(hazards=(Moon(direction=(0.0, 0.0, 1.0)),))
+    plain = levels(replace(behind, hazards=()), NADIR)
+    assert np.abs(levels(behind, NADIR) - plain).max() < 0.5  # what the lens would scatter
+    patch = replace(behind, hazards=(Glint(),))
+    assert (levels(patch, NADIR) - plain).max() > 100
+
+
+def test_a_hazard_without_a_sun_has_that_of_the_scene() -> None:
+    scene = EarthSunScene.facing(nadir_deg=(70, 0), sun_deg=None, sun=(-0.5, 0.0, 1.0))
+    ghosts = levels(replace(scene, hazards=(Ghosts(seed=2),)), NADIR)
+    told = levels(replace(scene, hazards=(Ghosts(seed=2, sun=(-0.5, 0.0, 1.0)),)), NADIR)
+    np.testing.assert_allclose(ghosts, told, rtol=1e-5)
+    assert (ghosts - levels(scene, NADIR)).max() > 10
+    set_sun = replace(scene, sun=scene.nadir, hazards=(Ghosts(),))
+    np.testing.assert_array_equal(
+        levels(set_sun, NADIR), levels(replace(set_sun, hazards=()), NADIR)
+    )
 
 
 def test_picture_is_that_of_its_instant() -> None:

@@ -9,6 +9,7 @@ from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth_sun import Reflection, Target
+from cubestack.emulator.scene.hazards import Clouds, Terminator
 
 from ..files import check_refused, save
 
@@ -132,3 +133,23 @@ def test_the_ball_of_the_bench(tmp_path: Path) -> None:
         ("nadir = [0, 0, 1]", "unknown key 'nadir'; allowed are angle_deg"),
     ):
         check_refused(load_earth_sun_scene, save(tmp_path, f'kind = "ball"\n{wrong}'), complaint)
+
+
+def test_hazards_go_to_scene_or_cameras(tmp_path: Path) -> None:
+    text = """
+    kind = "earth-sun"
+    seed = 5
+    [hazards.terminator]
+    phase_deg = 110.0
+    [hazards.clouds]
+    contrast = 0.5
+    seed = 9
+    [hazards.gradient]
+    """
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    view = load_earth_sun_scene(path)
+    light, sensor = view.scene.hazards, view.condition.hazards
+    assert light == (Terminator(phase_deg=110.0, seed=5), Clouds(contrast=0.5, seed=9))
+    assert [hazard.name for hazard in sensor] == ["gradient"]
+    assert view.scene.sun @ -view.scene.nadir == pytest.approx(np.cos(np.radians(110)))

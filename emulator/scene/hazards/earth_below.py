@@ -1,0 +1,132 @@
+"""Hazards of an Earth that is part of the scene: its clouds, its night, its place beside the Sun.
+
+They matter to scenes with an Earth below the satellite only. Albedos: thick clouds 0.6, the sea
+under clear air 0.12, the whole Earth 0.3 (Allen's Astrophysical Quantities, 4th edition, section
+11.5; the sea's with the air above it). How clouds are spread is assumed: a seeded sum of waves on
+the surface, cut at a level.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from statistics import NormalDist
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
+from cubestack.emulator.scene.hazards.contract import Depth, Looking, SkyHazard, Vectors
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+CLOUD, CLEAR = 0.6 / 0.3, 0.12 / 0.3
+"""Brightness by that of the mean Earth."""
+
+WAVES, LONGEST_KM, SHORTEST_KM = 32, 4000.0, 80.0
+EDGE = 0.15
+"""Width of a cloud's edge, in standard deviations of the waves' sum."""
+
+
+class EarthHazard(SkyHazard):
+    """One that says how Earth and Sun stand; by itself it leaves them."""
+
+    def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
+        """Directions (3,) of the Earth's centre and of the Sun; the Earth has this radius."""
+        del radius_rad
+        return nadir, sun
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clouds(EarthHazard):
+    """Clouds over a sea."""
+
+    contrast: float = key(1.0, "1: white clouds on a dark sea; 0: even", 0, 1)
+    cover: float = key(0.5, "share of the surface under clouds", 0.01, 0.99)
+
+    name: ClassVar[str] = "clouds"
+    meaning: ClassVar[str] = "clouds on the Earth below"
+    strength: ClassVar[Strength] = Strength("contrast", "", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
+    depth: ClassVar[Depth] = Depth.EARTH
+
+    def shine(self, places: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Brightness (n,) of the surface at unit vectors (n, 3) of its own axes, by the mean's."""
+        vectors, phases = self._waves
+        total = np.zeros(len(places), np.float32)
+        for vector, phase in zip(vectors, phases, strict=True):
+            total += np.cos(places @ vector + phase)
+        total *= np.float32(np.sqrt(2 / WAVES))
+        level = NormalDist().inv_cdf(1 - self.cover)
+        share = np.clip((total - np.float32(level)) / np.float32(EDGE) + np.float32(0.5), 0, 1)
+        relative = CLEAR + (CLOUD - CLEAR) * share
+        return np.asarray(1 + self.contrast * (relative - 1), np.float32)
+
+    @cached_property
+    def _waves(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Wave vectors (WAVES, 3) in 1 / Earth radius and phases (WAVES,)."""
+        generator = np.random.default_rng([self.seed, 0xC10D])
+        towards = generator.standard_normal((WAVES, 3))
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        length_km = np.geomspace(LONGEST_KM, SHORTEST_KM, WAVES)
+        vectors = towards * (2 * np.pi * EARTH_RADIUS_KM / length_km)[:, None]
+        phases = generator.uniform(0, 2 * np.pi, WAVES)
+        return vectors.astype(np.float32), phases.astype(np.float32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terminator(EarthHazard):
+    """Where the Sun stands, by how much of the Earth below is lit."""
+
+    phase_deg: float = key(90.0, "angle at the Earth from satellite to Sun; 0: full", 0, 180)
+    towards_deg: float = key(0.0, "direction of the Sun around the nadir", -360, 360)
+
+    name: ClassVar[str] = "terminator"
+    meaning: ClassVar[str] = "night on a part of the Earth below"
+    strength: ClassVar[Strength] = Strength(
+        "phase_deg", "deg", (0.0, 30.0, 60.0, 90.0, 110.0, 130.0, 150.0), 90.0
+    )
+    depth: ClassVar[Depth] = Depth.EARTH
+
+    @classmethod
+    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+        """This phase, the Sun to any side."""
+        del looking
+        return cls(phase_deg=strength, towards_deg=float(generator.uniform(0, 360)))
+
+    def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
+        """The Sun moves."""
+        del sun, radius_rad
+        return nadir, _turned(-nadir, np.radians(self.phase_deg), np.radians(self.towards_deg))
+
+
+@dataclass(frozen=True, kw_only=True)
+class EarthInSunCamera(EarthHazard):
+    """The Earth in the Sun camera's field, close to the Sun, or in front of it."""
+
+    above_deg: float = key(5.0, "of the Sun above the limb; below 0 it has set", -90, 120)
+    towards_deg: float = key(0.0, "direction of the Earth around the Sun", -360, 360)
+
+    name: ClassVar[str] = "earth-in-sun-camera"
+    meaning: ClassVar[str] = "the Earth beside the Sun, or in front of it"
+    strength: ClassVar[Strength] = Strength(
+        "above_deg", "deg", (60.0, 20.0, 5.0, 1.0, 0.3, -1.0), 1.0
+    )
+    depth: ClassVar[Depth] = Depth.EARTH
+
+    @classmethod
+    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+        """The limb at this angle from the Sun, to any side."""
+        del looking
+        return cls(above_deg=strength, towards_deg=float(generator.uniform(0, 360)))
+
+    def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
+        """The Earth moves."""
+        del nadir
+        away = radius_rad + np.radians(self.above_deg)
+        return _turned(sun, min(float(away), np.pi), np.radians(self.towards_deg)), sun
+
+
+def _turned(centre: Vectors, away_rad: float, around_rad: float) -> Vectors:
+    """The unit vector (3,) at an angle from ``centre``, to a side."""
+    one = np.cross(centre, np.eye(3)[np.argmin(np.abs(centre))])
+    one /= np.linalg.norm(one)
+    side = np.cos(around_rad) * one + np.sin(around_rad) * np.cross(centre, one)
+    return np.asarray(np.cos(away_rad) * centre + np.sin(away_rad) * side)

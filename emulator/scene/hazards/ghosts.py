@@ -1,0 +1,102 @@
+"""Reflections of the Sun in a lens: faint images across the optical axis, and veiling glare.
+
+Light that is reflected by two surfaces of a lens makes a ghost: out of focus, on the line through
+the optical axis and the Sun, mostly beyond the axis. A coated surface reflects half a per cent to
+one (Smith, Modern Optical Engineering, section 7.9), so a ghost has up to 1e-4 of the light. Where
+ghosts lie and how wide they are is drawn: assumed. Only a Sun within the field makes them.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
+from cubestack.emulator.scene.hazards.contract import (
+    SUN_V,
+    Brightness,
+    Depth,
+    Looking,
+    Ring,
+    SkyHazard,
+    Vectors,
+    angles_rad,
+    direction,
+)
+from cubestack.emulator.scene.hazards.glare import SHARE, aureole
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+PLACES = (-1.1, 0.5)
+"""Where a ghost may lie, by the Sun's angle from the axis; below 0 beyond the axis."""
+
+WIDTHS = (0.005, 0.03)
+"""Standard deviation of a ghost's light, by the half field."""
+
+REACH_SIGMAS = 4.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ghosts(SkyHazard):
+    """What the lens makes of the Sun beside its image."""
+
+    sun: tuple[float, ...] | None = key(
+        None, "direction of the Sun; without it, the scene's, or none where a scene has none"
+    )
+    share: float = key(1e-4, "of the Sun's light that the brightest ghost has", 0, 1)
+    count: int = key(5, "ghosts, each with half of the light of the one before", 0, 50)
+    scatter: float = key(SHARE, "share of the Sun's light that the lens scatters", 0, 0.2)
+
+    name: ClassVar[str] = "ghosts"
+    meaning: ClassVar[str] = "reflections of the Sun in the lens, and its glare"
+    strength: ClassVar[Strength] = Strength(
+        "share", "of the Sun's light", (1e-7, 1e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3), 1e-4
+    )
+    depth: ClassVar[Depth] = Depth.LENS
+
+    def __post_init__(self) -> None:
+        """Refuse what can not be: SceneError."""
+        super().__post_init__()
+        if self.sun is not None:
+            direction("sun", self.sun)
+
+    @classmethod
+    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+        """Of a Sun anywhere in the picture, with this share of its light in the brightest one."""
+        sun = tuple(looking.anywhere(generator).tolist())
+        return cls(share=strength, sun=sun, seed=int(generator.integers(2**31)))
+
+    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+        """All ghosts, and the light scattered around the Sun."""
+        total = np.zeros(len(vectors), np.float32)
+        if self.sun is None:
+            return total
+        sun = direction("sun", self.sun)
+        if np.degrees(angles_rad(sun[None], looking.boresight)[0]) > looking.half_field_deg:
+            return total
+        light = 10 ** (-0.4 * SUN_V)
+        if self.scatter:
+            total += (light * aureole(angles_rad(vectors, sun), self.scatter)).astype(np.float32)
+        for number, (centre, sigma) in enumerate(self._places(looking, sun)):
+            angles = angles_rad(vectors, centre)
+            near = np.flatnonzero(angles < REACH_SIGMAS * sigma)
+            peak = light * self.share / 2**number / (2 * np.pi * sigma**2)
+            total[near] += peak * np.exp(-0.5 * (angles[near] / sigma) ** 2)
+        return total
+
+    def rings(self, looking: Looking) -> tuple[Ring, ...]:
+        """The ghosts."""
+        if self.sun is None:
+            return ()
+        places = self._places(looking, direction("sun", self.sun))
+        return tuple(Ring(centre, 0.0, REACH_SIGMAS * sigma) for centre, sigma in places)
+
+    def _places(self, looking: Looking, sun: Vectors) -> list[tuple[Vectors, float]]:
+        """Centre (3,) and standard deviation in radians of each ghost."""
+        generator = np.random.default_rng([self.seed, 0x6057])
+        angles = np.array(angles_from_vector(looking.axes @ sun))
+        places = generator.uniform(*PLACES, self.count)
+        widths = np.radians(looking.half_field_deg * generator.uniform(*WIDTHS, self.count))
+        return [
+            (np.asarray(vector_from_angles(*(place * angles)) @ looking.axes), float(width))
+            for place, width in zip(places, widths, strict=True)
+        ]

@@ -1,0 +1,82 @@
+"""Glint: sunlit structure of the satellite at the border of the field, always at the same place.
+
+Brightness is counted by the Sun's surface: a mirror shows 1 of it, glass 0.04 (Fresnel), a white
+surface that scatters it 1.5e-5 (albedo 0.7). Each patch is a bar with sharp ends; their places,
+lengths and widths are drawn: assumed.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.hazards.contract import (
+    SUN_V,
+    Brightness,
+    Depth,
+    Looking,
+    Ring,
+    SkyHazard,
+    Vectors,
+)
+from cubestack.emulator.scene.hazards.hazard import Strength, key
+
+SUN_RADIUS_RAD = math.radians(0.2666)
+SUN_SURFACE = 10 ** (-0.4 * SUN_V) / (math.pi * SUN_RADIUS_RAD**2)
+"""Brightness of the Sun's disc, V = 0 stars a steradian."""
+
+PLACES = (0.7, 0.98)
+LENGTHS, WIDTHS = (0.01, 0.15), (0.004, 0.02)
+"""Distance from the boresight, half length and half width of a patch, by the half field."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glint(SkyHazard):
+    """Bright patches that stand still in the picture."""
+
+    surface: float = key(1e-4, "brightness by that of the Sun's surface", 0, 1)
+    count: int = key(2, "patches", 0, 50)
+
+    name: ClassVar[str] = "glint"
+    meaning: ClassVar[str] = "sunlit structure at the border of the field"
+    strength: ClassVar[Strength] = Strength(
+        "surface", "of the Sun's surface", (1e-7, 1e-6, 1e-5, 1e-4, 1e-2, 0.1, 1.0), 1e-4
+    )
+    depth: ClassVar[Depth] = Depth.LENS
+
+    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+        """The patches, each with an edge of a pixel."""
+        total = np.zeros(len(vectors), np.float32)
+        for centre, along, across, length, width in self._patches(looking):
+            near = np.flatnonzero(vectors @ centre > math.cos(length + width + looking.pixel_rad))
+            beside = [np.abs(vectors[near] @ side) for side in (along, across)]
+            share = np.ones(len(near))
+            for distance, half in zip(beside, (length, width), strict=True):
+                share *= np.clip((half - distance) / looking.pixel_rad + 0.5, 0, 1)
+            total[near] = np.maximum(total[near], self.surface * SUN_SURFACE * share)
+        return total
+
+    def rings(self, looking: Looking) -> tuple[Ring, ...]:
+        """The patches."""
+        patches = self._patches(looking)
+        return tuple(Ring(centre, 0.0, length + width) for centre, _, _, length, width in patches)
+
+    def _patches(self, looking: Looking) -> list[tuple[Vectors, Vectors, Vectors, float, float]]:
+        """Centre, two sides (3,) each, half length and half width in radians of each patch."""
+        generator = np.random.default_rng([self.seed, 0x611E7])
+        patches = []
+        for _ in range(self.count):
+            around, turn = generator.uniform(0, 2 * math.pi, 2)
+            away = looking.half_field_deg * generator.uniform(*PLACES)
+            camera = vector_from_angles(away * math.cos(around), away * math.sin(around))
+            one = np.cross(camera, np.eye(3)[np.argmin(np.abs(camera))])
+            one /= np.linalg.norm(one)
+            other = np.cross(camera, one)
+            along = math.cos(turn) * one + math.sin(turn) * other
+            sizes = [looking.half_field_deg * generator.uniform(*of) for of in (LENGTHS, WIDTHS)]
+            length, width = (math.radians(size) for size in sizes)
+            axes = [v @ looking.axes for v in (camera, along, np.cross(camera, along))]
+            patches.append((*axes, length, width))
+        return patches
