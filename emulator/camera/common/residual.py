@@ -18,7 +18,7 @@ class Residual:
 
     Attributes:
         shape: rows and columns that the coordinates -1..1 span.
-        across, down: coefficients of Legendre's polynomials, px, by powers of x, then of y.
+        across, down: their coefficients, px: for each power of x, those of the powers of y.
     """
 
     shape: tuple[int, int]
@@ -26,27 +26,44 @@ class Residual:
     down: Coefficients
 
     def at(self, pixels: Pixels) -> Pixels:
-        """Displacement (n, 2) at pixel coordinates (n, 2), px; beyond the sensor as at its edge."""
+        """Displacement (n, 2) of what is seen at ``pixels`` (n, 2); outside, as at the edge."""
         rows, columns = self.shape
         x, y = np.clip(2 * pixels / (columns - 1, rows - 1) - 1, -1, 1).T
-        both = [np.polynomial.legendre.legval2d(x, y, c) for c in (self.across, self.down)]
-        return np.stack(both, axis=1)
+        return np.stack([_horner(x, y, self.across), _horner(x, y, self.down)], axis=1)
 
 
 def displaced(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
-    """Where points are imaged that belong at ``pixels`` (n, 2)."""
+    """Where points are seen that belong at ``pixels`` (n, 2), to 1e-11 px if that changes slowly.
+
+    NaN stays NaN.
+    """
     for residual in residuals:
-        pixels = pixels + residual.at(pixels)
+        belongs, pixels = pixels, pixels + residual.at(pixels)
+        for _ in range(_INVERSION_STEPS):
+            missed = belongs + residual.at(pixels) - pixels
+            pixels = pixels + missed
+            if not np.any(np.abs(missed) > _INVERSION_PX):
+                break
     return pixels
 
 
 def restored(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
-    """Inverse of `displaced`, to 1e-11 px for displacements that change slowly."""
+    """Inverse of `displaced`; the quick one of the two, for all pixels of a picture."""
     for residual in reversed(residuals):
-        seen = pixels
-        for _ in range(_INVERSION_STEPS):
-            missed = seen - (pixels + residual.at(pixels))
-            pixels = pixels + missed
-            if not np.abs(missed).max(initial=0) > _INVERSION_PX:
-                break
+        pixels = pixels - residual.at(pixels)
     return pixels
+
+
+def _horner(x: Pixels, y: Pixels, coefficients: Coefficients) -> Pixels:
+    """The polynomial's values (n,); coefficients that are 0 at the end of a row cost nothing."""
+    total = np.zeros_like(x)
+    for row in reversed(coefficients):
+        total *= x
+        while row and row[-1] == 0:
+            row = row[:-1]
+        inner = np.zeros_like(y)
+        for coefficient in reversed(row):
+            inner *= y
+            inner += coefficient
+        total += inner
+    return total

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.polynomial.legendre import leg2poly
 
 from cubestack.emulator.camera.common.hazards.contract import Lens, SensorHazard
 from cubestack.emulator.camera.common.residual import Residual
@@ -90,5 +91,7 @@ class LensResiduals(SensorHazard):
         odd = 2 * np.arange(size) + 1
         square = (coefficients**2 / np.outer(odd, odd)).sum()
         coefficients *= self.rms_px / math.sqrt(square)
-        across, down = (tuple(map(tuple, axis)) for axis in coefficients.tolist())
+        # The columns of this matrix are Legendre's polynomials.
+        powers = np.array([np.pad(leg2poly(row), (0, size))[:size] for row in np.eye(size)]).T
+        across, down = (tuple(map(tuple, (powers @ c @ powers.T).tolist())) for c in coefficients)
         return replace(lens, residuals=(*lens.residuals, Residual(lens.shape, across, down)))

@@ -6,6 +6,7 @@ import pytest
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.hazards.lenses import Defocus, FocalLength, LensResiduals
 from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.residual import displaced
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.camera.mt9m001.lens import CONDITION as ARAMIS
@@ -73,6 +74,12 @@ def test_residuals_have_their_rms_and_are_no_turn_or_scale(seed: int) -> None:
 def test_residuals_can_be_undone() -> None:
     crooked = lens(LensResiduals(rms_px=2.0, seed=1), FocalLength(percent=1.0))
     np.testing.assert_allclose(crooked.project(crooked.unproject(GRID)), GRID, atol=1e-9)
+
+
+def test_what_the_lens_can_not_image_stops_no_other_star() -> None:
+    residuals = lens(LensResiduals(rms_px=2.0, seed=1)).residuals
+    with_nan = np.concatenate([[[np.nan, np.nan]], GRID])
+    np.testing.assert_array_equal(displaced(with_nan, residuals)[1:], displaced(GRID, residuals))
 
 
 @pytest.mark.parametrize(
