@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result
-from cubestack.host.experiments import hazards
+from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
 

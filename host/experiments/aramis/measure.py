@@ -29,7 +29,7 @@ from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.host.clients.aramis.client import Aramis, Star
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
-from cubestack.host.experiments import hazards
+from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
 

@@ -37,7 +37,7 @@ from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.errors import CameraFileError
 from cubestack.host.experiments import attitude as attitudes
-from cubestack.host.experiments import hazards
+from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
 

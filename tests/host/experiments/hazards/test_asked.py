@@ -8,7 +8,7 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.experiments.cubestar.measure import CubeStarOptions
-from cubestack.host.experiments.hazards import Asked, known, with_hazards
+from cubestack.host.experiments.hazards.asked import Asked, known, with_hazards
 
 VIEW = SkyView(SkyScene.pointing(84, -1), CONDITION)
 

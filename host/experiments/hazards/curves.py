@@ -1,0 +1,133 @@
+"""How often a sensor is right, refuses, or is wrong, against the strength of each hazard.
+
+The results come end to end: scene, camera, electronics, firmware, serial line, host. A result is
+right as `cubestack measure` judges it; wrong is one that the sensor calls valid and that is not.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from math import sqrt
+from multiprocessing import get_context
+from typing import Any
+
+from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.devices.registry import devices
+from cubestack.host.experiments.hazards.asked import Asked, known
+from cubestack.host.experiments.measure import experiment_of, measure
+
+CONFIDENCE_Z = 1.96  # of 95 %
+
+
+@dataclass(frozen=True)
+class Job:
+    """Frames of one device with one hazard; by itself a run of `cubestack measure`."""
+
+    device: str
+    profile: str
+    hazard: str
+    strength: float
+    frames: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Point(Job):
+    """What a job gave.
+
+    Attributes:
+        right, refused, wrong: how many frames ended so.
+        reasons: of the refused ones, as the device gives them, with their number.
+    """
+
+    right: int
+    refused: int
+    wrong: int
+    reasons: Mapping[str, int]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def wilson(count: int, of: int, z: float = CONFIDENCE_Z) -> tuple[float, float]:
+    """Limits of a rate, 0 to 1, of which ``count`` of ``of`` were seen: Wilson 1927, JASA 22, 209.
+
+    All that there can be where nothing was seen.
+    """
+    if of == 0:
+        return 0.0, 1.0
+    rate, z2 = count / of, z * z
+    middle = rate + z2 / (2 * of)
+    half = z * sqrt(rate * (1 - rate) / of + z2 / (4 * of * of))
+    low, high = (middle - half) / (1 + z2 / of), (middle + half) / (1 + z2 / of)
+    return (0.0 if count == 0 else low), (1.0 if count == of else high)
+
+
+def devices_with_hazards() -> list[str]:
+    """Names of the devices whose experiment takes hazards."""
+    return [
+        device.name
+        for device in devices()
+        if device.experiment is not None and "hazard" in device.experiment().options.declared()
+    ]
+
+
+def hazards_of(device: AnyDevice) -> list[str]:
+    """Names of the hazards that its experiment takes, in alphabetical order."""
+    options: Any = experiment_of(device).options
+    found = []
+    for name in sorted(known()):
+        try:
+            options(hazard=(Asked(name),))
+        except ValueError:  # not of this device
+            continue
+        found.append(name)
+    return found
+
+
+def jobs_of(
+    device: str, names: Sequence[str], frames: int, seed: int, profile: str
+) -> Iterator[Job]:
+    """One for each strength of each hazard; of no names, of all of the device.
+
+    ValueError for a hazard that the device has not.
+    """
+    own = hazards_of(registered(device))
+    for name in names:
+        if name not in own:
+            raise ValueError(f"hazard: {device} has no {name!r}; known: {', '.join(own)}")
+    for name in names or own:
+        for strength in known()[name].strength.values:
+            yield Job(device, profile, name, strength, frames, seed)
+
+
+def perform(job: Job) -> Point:
+    """Run one job, in whatever process."""
+    options: dict[str, Any] = {"frames": job.frames, "seed": job.seed, "profile": job.profile}
+    ended: Counter[str] = Counter()
+    reasons: Counter[str] = Counter()
+    for each in measure(job.device, hazard=(Asked(job.hazard, job.strength),), **options):
+        result: Any = each
+        solved = getattr(result, "solved", result.right is not False)
+        ended["right" if result.right else "wrong" if solved else "refused"] += 1
+        if not solved:
+            reasons[str(getattr(result, "reason", None) or result.ending)] += 1
+    counts = (ended["right"], ended["refused"], ended["wrong"])
+    return Point(**asdict(job), **dict(zip(("right", "refused", "wrong"), counts, strict=True)),
+                 reasons=dict(reasons.most_common()))  # fmt: skip
+
+
+def run(jobs: Sequence[Job], workers: int) -> Iterator[Point]:
+    """Points of the jobs, in their order, each as soon as it and all before it are there."""
+    if workers == 1:
+        yield from map(perform, jobs)
+        return
+    # A process of its own each: forking one that shows progress in a thread can hang.
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        try:
+            yield from pool.map(perform, jobs)
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,51 @@
+"""`cubestack hazards`: lists, tables, and a folder of pictures and curves."""
+
+import json
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from cubestack.host.cli.main import main
+
+
+def test_the_list_has_every_hazard_with_its_scale(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["hazards", "--list"]) == 0
+    listed = capsys.readouterr().out
+    assert "moon" in listed
+    assert "hits" in listed
+
+
+def test_a_folder_gets_pictures_curves_and_points(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", str(tmp_path)]
+    assert main(["hazards", "cubestar", *arguments, "--json"]) == 0
+    printed = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    lines = (tmp_path / "points.jsonl").read_text("utf-8").splitlines()
+    assert [json.loads(line) for line in lines] == printed
+    assert {point["strength"] for point in printed} >= {0, 60}
+    with Image.open(tmp_path / "gradient-cubestar.png") as sample:
+        assert sample.size == (640, 320)
+    with Image.open(tmp_path / "gradient-curve.png") as curve:
+        assert curve.width > 300
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["cubestar", "--hazard", "rain"], "cubestar has no 'rain'; known: aberration"),
+        (["nobody"], "no device 'nobody'; known: cubestar"),
+    ],
+)
+def test_what_there_is_not_is_one_line(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["hazards", *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_is_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out").write_text("", "utf-8")
+    assert main(["hazards", "cubestar", "--out", str(tmp_path / "out")]) == 2
+    assert "is a file; a folder would be right" in capsys.readouterr().err
