@@ -21,6 +21,7 @@ from rich.table import Table
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.cli.arguments import whole
 from cubestack.host.experiments.hazards import curves
+from cubestack.host.experiments.hazards.asked import known
 from cubestack.host.terminal import console, progress, say
 
 
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _list() -> None:
     table = Table("hazard", "what it is", "strength")
-    for name, kind in sorted(curves.known().items()):
+    for name, kind in sorted(known().items()):
         values = ", ".join(f"{value:g}" for value in kind.strength.values)
         table.add_row(name, kind.meaning, f"{kind.strength.key}: {values} {kind.strength.unit}")
     console.print(table)

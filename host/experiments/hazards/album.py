@@ -57,6 +57,4 @@ def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
     results = experiment.run(Opener(found, opened=kept.append), options)
     next(results)  # while more could come, the device is there
     client = kept[0].client
-    picture = client.picture(next(iter(client.picture_sources), None))
-    results.close()
-    return picture
+    return client.picture(next(iter(client.picture_sources), None))

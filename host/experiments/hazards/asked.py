@@ -75,14 +75,15 @@ def check(asked: Sequence[Asked]) -> None:
 def with_hazards(
     view: "SkyView", asked: Sequence[Asked], rng: np.random.Generator, time_s: float = 0.0
 ) -> "SkyView":
-    """The view with these hazards in its field; ``time_s`` is about when it will be exposed."""
-    if not asked:
-        return view
+    """The view of a sky with these hazards; ``time_s`` is about when it will be exposed."""
     from cubestack.emulator.camera.common.exposure import looking_along
     from cubestack.emulator.camera.common.hazards.contract import SensorHazard
     from cubestack.emulator.scene.hazards.contract import SkyHazard
+    from cubestack.emulator.scene.sky import SkyScene
 
     scene, condition = view.scene, view.condition
+    if not asked or not isinstance(scene, SkyScene):
+        return view
     looking = looking_along(scene.quaternion, condition.optics, time_s)
     kinds = known()
     placed = [

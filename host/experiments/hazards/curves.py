@@ -115,9 +115,13 @@ def perform(job: Job) -> Point:
         ended["right" if result.right else "wrong" if solved else "refused"] += 1
         if not solved:
             reasons[str(getattr(result, "reason", None) or result.ending)] += 1
-    counts = (ended["right"], ended["refused"], ended["wrong"])
-    return Point(**asdict(job), **dict(zip(("right", "refused", "wrong"), counts, strict=True)),
-                 reasons=dict(reasons.most_common()))  # fmt: skip
+    return Point(
+        **asdict(job),
+        right=ended["right"],
+        refused=ended["refused"],
+        wrong=ended["wrong"],
+        reasons=dict(reasons.most_common()),
+    )
 
 
 def run(jobs: Sequence[Job], workers: int) -> Iterator[Point]:
