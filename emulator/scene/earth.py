@@ -44,6 +44,7 @@ class Earth:
         seed: of the surface.
         shine: brightness (n,) of the surface at unit vectors (n, 3) of its own axes, by the mean's;
             None: even.
+        glow_heights: scale heights after which the glow is left out.
     """
 
     altitude_km: float
@@ -51,6 +52,7 @@ class Earth:
     glow_km: float
     seed: int
     shine: Callable[[Values], Values] | None = None
+    glow_heights: float = GLOW_HEIGHTS
 
     @property
     def distance(self) -> float:
@@ -80,7 +82,7 @@ class Earth:
         """
         radius = np.radians(angular_radius_deg(self.altitude_km))
         towards_earth = vectors @ nadir.astype(np.float32)
-        reach = float(pixel_rad.max()) + GLOW_HEIGHTS * self._glow / self._rise(radius)
+        reach = float(pixel_rad.max()) + self.glow_heights * self._glow / self._rise(radius)
         hit = np.flatnonzero(towards_earth > np.cos(radius + reach))
         cosine, sight = towards_earth[hit], vectors[hit]
         normal = self._normal(sight, cosine, nadir)

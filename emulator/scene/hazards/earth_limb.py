@@ -1,12 +1,14 @@
 """The Earth in front of the stars: its lit or dark disc, the air along the limb, the airglow above.
 
-Disc and scattered light are those of ``emulator.scene.earth``. Airglow is a layer 95 km up, the
-height of the green line of oxygen, with a Gaussian profile of 4 km (half-width 10 km) that gives
-145 S10 to an observer on the ground, straight up (Benn and Ellison 1998, New Astronomy Reviews 42,
-503: Sun's minimum). Along the limb the line of sight is in it for some 500 km, and in front of the
-night side it is seen as well. Left out: city lights, lightning, moonlit ground, aurora, the bending
-and reddening of starlight in the air; and light that the lens scatters, unless ``scatter`` says so:
-without a baffle a hundredth of the lit Earth's light drowns all stars of the picture.
+Disc and scattered light are those of ``emulator.scene.earth``, with the scale height of the air in
+which it is thin enough to be seen through (7 km, US Standard Atmosphere, 30 to 80 km). Airglow is a
+layer 95 km up, the height of the green line of oxygen, with a Gaussian profile of 4 km (half-width
+10 km) that gives 145 S10 to an observer on the ground, straight up (Benn and Ellison 1998, New
+Astronomy Reviews 42, 503: Sun's minimum). Along the limb the line of sight is in it for some 500
+km, and in front of the night side it is seen as well. Left out: city lights, lightning, moonlit
+ground, aurora, the bending and reddening of starlight in the air; and light that the lens scatters,
+unless ``scatter`` says so: without a baffle a hundredth of the lit Earth's light drowns all stars
+of the picture.
 """
 
 import math
@@ -36,6 +38,9 @@ from cubestack.emulator.scene.hazards.sky_glow import S10
 
 AIRGLOW_KM, AIRGLOW_SIGMA_KM, AIRGLOW_S10 = 95.0, 4.0, 145.0
 TOP_KM = AIRGLOW_KM + 5 * AIRGLOW_SIGMA_KM
+GLOW_HEIGHTS = 20.0
+"""After which the lit air is as dark as the sky: star trackers see a millionth of the ground."""
+
 DUSK = 0.02
 """Sine of the Sun's depth below the horizon in which the ground's light falls to 1/e.
 
@@ -60,7 +65,7 @@ class EarthLimb(SkyHazard):
     )
     altitude_km: float = key(600.0, "of the satellite", 150, 40_000)
     unevenness: float = key(0.1, "standard deviation of the surface's brightness, relative", 0, 1)
-    glow_km: float = key(10.0, "height in which the lit air's glow falls to 1/e; 0 for none", 0, 50)
+    glow_km: float = key(7.0, "height in which the lit air's glow falls to 1/e; 0 for none", 0, 50)
     airglow: float = key(1.0, "airglow by what is published", 0, 100)
     scatter: float = key(0.0, "share of its light that the lens scatters", 0, 0.2)
 
@@ -106,7 +111,9 @@ class EarthLimb(SkyHazard):
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
         """Surface, lit air, airglow and what the lens scatters of the surface."""
         total = np.zeros(len(vectors), np.float32)
-        earth = Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed)
+        earth = Earth(
+            self.altitude_km, self.unevenness, self.glow_km, self.seed, glow_heights=GLOW_HEIGHTS
+        )
         pixels = np.full(len(vectors), looking.pixel_rad, np.float32)
         sight = vectors.astype(np.float32)
         met, light = earth.radiance(sight, pixels, self._nadir, self._sun, np.eye(3))
@@ -167,7 +174,8 @@ class EarthLimb(SkyHazard):
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
         """The limb up to the airglow's top."""
-        top = math.asin(min((EARTH_RADIUS_KM + TOP_KM) / self._distance_km, 1))
+        top_km = EARTH_RADIUS_KM + max(TOP_KM, GLOW_HEIGHTS * self.glow_km)
+        top = math.asin(min(top_km / self._distance_km, 1))
         inner = self._radius_rad - 2 * looking.pixel_rad
         return (Ring(self._nadir, inner, max(top, self._radius_rad + 2 * looking.pixel_rad)),)
 
