@@ -28,6 +28,9 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 
 T = TypeVar("T")
 
+HALF_FALSE = 2
+"""With a local threshold so many times MaxStars are kept: half of them may be no stars."""
+
 
 @lru_cache(maxsize=4)
 def _lens(fov_deg: float, only_round: bool) -> Field:
@@ -42,13 +45,15 @@ def configuration(
     search, matching = settings.all("SetDetection"), settings.all("SetIdentification")
     field = settings.all("SetField")
     lens = _lens(float(field["FieldOfView"]), bool(field["Round"]))
+    local = switches.detection == "local"
     detection = pipeline.Detection(
         sigmas=float(search["Sigmas"]),
         spikes=SpikeRemoval(search["Spikes"]),
         needed=int(search["Needed"]),
         min_pixels=int(search["MinPixels"]),
         max_pixels=int(search["MaxPixels"]),
-        max_stars=int(search["MaxStars"]),
+        max_stars=int(search["MaxStars"]) * (HALF_FALSE if local else 1),
+        local=local,
         subtract=bool(search["Subtract"]) and switches.weights == "above-mean",
     )
     sigma_rad = float(matching["Noise"]) * lens.scale[1]
@@ -162,9 +167,14 @@ class Measuring:
             solution = pipeline.solve(
                 picture, past, settings, database, self._meter, hint, exposure
             )
-            result.mean = past.mean(self._meter)
-            result.threshold = past.threshold(settings.detection.sigmas, self._meter)
-            result.pictures = len(past.sums)
+            light = solution.measured.light
+            if light is None:
+                result.mean = past.mean(self._meter)
+                result.threshold = past.threshold(settings.detection.sigmas, self._meter)
+                result.pictures = len(past.sums)
+            else:
+                result.mean, result.threshold = round(light.level), round(light.threshold)
+                result.pictures = 1
         yield Pay()
         result.solution, result.outcome = solution, solution.outcome
         result.reason = solution.reason

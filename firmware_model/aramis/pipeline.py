@@ -13,14 +13,25 @@ from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.detection.background import Background
-from cubestack.firmware_model.aramis.detection.regions import find_regions, locate_stars
-from cubestack.firmware_model.aramis.detection.smear import is_drawn_out, smear_px
+from cubestack.firmware_model.aramis.detection.local import brighter, measure_sky
+from cubestack.firmware_model.aramis.detection.regions import (
+    NO_REGIONS,
+    find_regions,
+    locate_stars,
+)
+from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
 from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
+from cubestack.firmware_model.aramis.detection.spots import find_spots
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import identify
-from cubestack.firmware_model.aramis.solution import Profile, Solution, StarList, unsolved
-from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
+from cubestack.firmware_model.aramis.reasons import is_hit, true_reason
+from cubestack.firmware_model.aramis.solution import Light, Profile, Solution, StarList, unsolved
+from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
+
+
+SPIKE_SIGMAS = 8.0
+"""A pixel is far above its surroundings from so many standard deviations on."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +45,8 @@ class Detection:
         min_pixels, max_pixels: size of a star (assumed; the thesis has no limits).
         max_stars: the brightest are kept, 3 to 255 (assumed).
         subtract: whether the mean level is taken off before weighing (an extension).
+        local: whether every place has its own threshold, and stars are told by their shape (an
+            extension).
     """
 
     sigmas: float = 2.0
@@ -43,6 +56,7 @@ class Detection:
     max_pixels: int = 2500
     max_stars: int = 30
     subtract: bool = False
+    local: bool = False
 
     def __post_init__(self) -> None:
         """Refuse settings with which nothing can be found."""
@@ -67,7 +81,9 @@ PUBLISHED = Configuration()
 
 VERIFIED = replace(
     PUBLISHED,
-    detection=Detection(spikes=SpikeRemoval.CENTRE, subtract=True),
+    detection=Detection(
+        spikes=SpikeRemoval.CENTRE, min_pixels=1, max_stars=60, subtract=True, local=True
+    ),
     profile=Profile(sigma_rad=5.6e-5, verify=True),
 )
 """An extension: further stars must confirm the attitude; noise of 0.15 px is expected."""
@@ -121,33 +137,59 @@ def solve(
 ) -> Solution:
     """Attitude of a picture (rows, columns), or why there is none.
 
-    The picture is added to ``background``. ``hint`` (3,) is a rough unit vector of the boresight in
-    inertial axes; None: lost in space. ``exposure_rows``: how long each row was exposed, in times
-    of a row; None: the rows were exposed all at once.
+    Without a local threshold the picture is added to ``background``. ``hint`` (3,) is a rough unit
+    vector of the boresight in inertial axes; None: lost in space. ``exposure_rows``: how long each
+    row was exposed, in times of a row; None: the rows were exposed all at once.
 
     Raises:
         ValueError: for a picture of another size than the configuration's.
     """
-    stars = detect(picture, background, configuration.field, configuration.detection, meter)
-    if stars is None:
-        nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
-        return unsolved(Reason.TOO_MANY_PIXELS, nothing)
+    field, profile = configuration.field, configuration.profile
+    until = meter.total + profile.within_ms * meter.table.clock_hz / 1000
+    if configuration.detection.local:
+        stars = detect_locally(picture, field, configuration.detection, meter)
+    else:
+        found = detect(picture, background, field, configuration.detection, meter)
+        if found is None:
+            nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
+            return unsolved(Reason.TOO_MANY_PIXELS, nothing)
+        stars = found
     if exposure_rows is not None:
-        stars = replace(stars, skew_px=stars.smear_px * configuration.field.rows / exposure_rows)
-    solution = identify(stars, configuration.field, configuration.profile, database, meter, hint)
-    return explain(solution, picture, configuration, meter)
+        stars = replace(stars, skew_px=stars.smear_px * field.rows / exposure_rows)
+    if is_hit(stars, field):
+        return unsolved(Reason.RADIATION, stars)
+    solution = identify(stars, field, profile, database, meter, hint, until)
+    return replace(solution, reason=true_reason(solution, field))
 
 
-def explain(
-    solution: Solution, picture: NDArray[np.uint8], configuration: Configuration, meter: Meter
-) -> Solution:
-    """The solution; with verification, the reason why there is none may be streaks in the picture.
+def detect_locally(
+    picture: NDArray[np.uint8], field: Field, settings: Detection, meter: Meter
+) -> StarList:
+    """Stars of a picture (rows, columns) in the field, and what else it shows.
 
-    Phase `verification`.
+    Phases: `threshold`, `spikes`, `centroids`.
     """
-    failed = solution.outcome is MeasurementOutcome.NONE
-    if not (configuration.profile.verify and failed) or solution.reason is Reason.SMEAR:
-        return solution
-    with meter.phase("verification"):
-        drawn_out = is_drawn_out(picture, configuration.field, meter)
-    return replace(solution, reason=Reason.SMEAR) if drawn_out else solution
+    with meter.phase("threshold"):
+        sky = measure_sky(picture, field, meter)
+        above = settings.sigmas * sky.noise
+        mask = brighter(picture, sky.levels + above, meter) & field.mask
+        far = brighter(picture, sky.levels + SPIKE_SIGMAS * sky.noise, meter) & field.mask
+    large = remove_spikes(mask, settings.spikes, settings.needed, meter)
+    spikes = int(np.count_nonzero(far & ~large))
+    with meter.phase("centroids"):
+        regions = find_regions(large & field.mask, meter)
+        if regions is None:
+            regions = NO_REGIONS
+        sizes = settings.min_pixels, settings.max_pixels
+        spots = find_spots(picture, regions, sky.deviation, sizes, meter)
+        spots = spots.of(field.inside(spots.centroids, meter))
+        spots, smear_px = without_tracks(spots, field, meter)
+        threshold = sky.level + settings.sigmas * sky.deviation
+        light = Light(
+            sky.level, threshold, sky.deviation, sky.spread, sky.blind, spots.widest, spikes,
+            spots.rejected,
+        )  # fmt: skip
+        kept = spots.of(np.arange(min(len(spots), settings.max_stars)))
+    return StarList(
+        kept.centroids, kept.brightness, smear_px, sigma_px=kept.sigma_px, light=light
+    )

@@ -32,14 +32,16 @@ class Profile:
             section 5.8 where the sides are checked.
         hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (an
             extension).
-        side_tolerance_rad: largest difference of a side, with verification or a rough direction;
-            three sigma of a difference of two stars' places by default.
+        side_tolerance_rad: largest difference of a side near a rough direction; three sigma of a
+            difference of two stars' places by default.
         verify: whether an attitude must be confirmed by further stars; what follows is only then.
-        tolerance_rad: distance within which a star confirms.
-        largest_chance: an attitude is confirmed when chance would do it less often.
-        spread_rad: stars that confirm are at least so far from their middle, root mean square.
-        triples, triple_stars: triples tried at most, and of how many of the brightest stars.
-        candidates: of a triple, tried at most; pivots only serve to leave no more.
+        tolerance_rad: distance within which a star speaks for an attitude at first.
+        largest_chance: an attitude is believed when so many wrong ones, at most, would be confirmed
+            as well in a picture.
+        largest_sigma_rad: an attitude is refused whose turn about the boresight has a larger
+            standard deviation.
+        within_ms: of processor time from the picture on; then identification is given up. Beside
+            it a second holds the longest wait for a frame, 233 ms, and the catalogue's check.
         smear_px: where stars are drawn out farther, that is why there is no attitude.
         skew_px: stars that also moved farther from row to row are refused.
         moved_px: stars that moved farther from row to row are also refused when they leave too much
@@ -56,11 +58,9 @@ class Profile:
     verify: bool = False
     tolerance_rad: float = 1.2e-3
     side_tolerance_rad: float = 7e-4
-    largest_chance: float = 1e-4
-    spread_rad: float = 0.03
-    triples: int = 120
-    triple_stars: int = 10
-    candidates: int = 40
+    largest_chance: float = 1e-5
+    largest_sigma_rad: float = 1.5e-3
+    within_ms: float = 650.0
     hint_tolerance_deg: float = 6.0
     smear_px: float = 4.0
     skew_px: float = 4.0
@@ -76,16 +76,38 @@ class Profile:
             tolerance_rad=(1e-5, 0.05),
             side_tolerance_rad=(1e-6, 0.05),
             largest_chance=(0, 1),
-            spread_rad=(0, 1),
-            triples=(1, 1000),
-            triple_stars=(3, 64),
-            candidates=(1, 1000),
+            largest_sigma_rad=(0, 1),
+            within_ms=(1, 10_000),
             hint_tolerance_deg=(0, 180),
             smear_px=(1, 1000),
             skew_px=(0, 1000),
             moved_px=(0, 1000),
             motion_sigma_rad=(0, 0.1),
         )
+
+
+@dataclass(frozen=True)
+class Light:
+    """What a picture has beside stars.
+
+    Attributes:
+        level, threshold: of the sky, and of a bright pixel; medians over the field, in counts.
+        noise: standard deviation of a pixel.
+        spread: of the level over the field.
+        blind: share of the field that is too bright for stars, 0 to 1.
+        widest: pixels of the largest bright region.
+        spikes: pixels far above their surroundings that are too few to be a star.
+        rejected: regions whose shape no star has.
+    """
+
+    level: float
+    threshold: float
+    noise: float
+    spread: float
+    blind: float
+    widest: int
+    spikes: int
+    rejected: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,16 +119,43 @@ class StarList:
         brightness: (n,) sum of grey levels, falling, float32.
         smear_px: length of the streaks that motion made of them.
         skew_px: how far they moved while the rows were exposed one after the other.
+        sigma_px: (n,) expected errors of the centroids, each axis; None: the profile's.
+        light: what the picture has beside them; None with a threshold for the whole picture.
     """
 
     centroids: Floats
     brightness: Floats
     smear_px: float = 0.0
     skew_px: float = 0.0
+    sigma_px: Floats | None = None
+    light: Light | None = None
 
     def __len__(self) -> int:
         """Number of stars."""
         return len(self.centroids)
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """What a confirmed attitude is worth.
+
+    Attributes:
+        covariance: (3, 3) of small turns about the camera's axes, in rad squared.
+        residual_px: root mean square distance of its stars from their places, each axis.
+        false_alarm: wrong attitudes to be expected that would be confirmed as well.
+        scale: focal length that the stars show, beside the one that is set.
+    """
+
+    covariance: Floats
+    residual_px: float
+    false_alarm: float
+    scale: float
+
+    @property
+    def sigma_rad(self) -> Floats:
+        """(3,) standard deviations about the camera's axes."""
+        sigma: Floats = np.sqrt(np.diagonal(self.covariance)).astype(np.float32)
+        return sigma
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +171,7 @@ class Solution:
         candidates, pivots: of the last triple: triangles left, and pivot triangles used.
         triples: tried.
         expected: catalogue stars in the field by the attitude, 0 without verification.
+        quality: of a confirmed attitude.
     """
 
     outcome: MeasurementOutcome
@@ -133,6 +183,7 @@ class Solution:
     pivots: int = 0
     triples: int = 0
     expected: int = 0
+    quality: Quality | None = None
 
 
 def unsolved(reason: Reason, measured: StarList, **counts: int) -> Solution:

@@ -28,6 +28,9 @@ _U16, _U32 = 0xFFFF, 0xFFFF_FFFF
 
 Values = dict[str, Any]
 
+LEAST_FALSE_ALARM = 1e-30
+"""What is less probable is told as this."""
+
 
 def body_quaternion(rotation: Floats, attitude: Floats) -> Floats:
     """Inertial to body (4,): camera to body, after inertial to camera; all scalar last."""
@@ -86,6 +89,7 @@ class Telemetry:
             "LoopStatus": self._loop_status,
             "DetectionSummary": self._detection_summary,
             "IdentificationSummary": self._identification_summary,
+            "Quality": self._quality,
             "StarDetails": self._star_details,
             "SupplyStatus": self._supply_status,
             SHOWN: lambda: shown_values(state.switches.now),
@@ -195,6 +199,36 @@ class Telemetry:
             "Triples": found.triples,
             "Expected": found.expected,
             "Matched": int((found.stars >= 0).sum()),
+        }
+
+    def _quality(self) -> Values:
+        latest, found = self._state.measurement, self._state.measurement.solution
+        values = INTERFACE.telemetry("Quality").reset_values() | {"Reason": latest.reason}
+        if found is not None and found.measured.light is not None:
+            light = found.measured.light
+            values |= {
+                "Background": light.level,
+                "Noise": light.noise,
+                "Spread": light.spread,
+                "Blind": light.blind,
+                "Spikes": light.spikes,
+                "Rejected": light.rejected,
+            }
+        if found is None or found.quality is None:
+            return values
+        quality, (x, y, z) = found.quality, found.quality.sigma_rad
+        (_, xy, xz), (_, _, yz), _ = quality.covariance
+        self._meter.charge(f32_sqrt=3, f32_mul=3, f32_div=3, f32_atan2=1)
+        return values | {
+            "Valid": int(latest.valid),
+            "FalseAlarm": np.log10(np.float32(max(quality.false_alarm, LEAST_FALSE_ALARM))),
+            "Matched": int((found.stars >= 0).sum()),
+            "Expected": found.expected,
+            "Residual": quality.residual_px,
+            **{"SigmaX": x, "SigmaY": y, "SigmaZ": z},
+            **{"CorrelationXY": xy / (x * y), "CorrelationXZ": xz / (x * z)},
+            "CorrelationYZ": yz / (y * z),
+            "Scale": quality.scale,
         }
 
     def _star_details(self) -> Values:

@@ -36,6 +36,9 @@ class Regions:
     count: int
 
 
+NO_REGIONS = Regions(*(np.zeros(0, np.intp) for _ in range(3)), 0)
+
+
 def find_regions(mask: Mask, meter: Meter) -> Regions | None:
     """Regions of a mask (rows, columns); None when it has more than `MOST_RUNS` runs of pixels.
 

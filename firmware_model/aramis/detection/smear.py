@@ -2,20 +2,16 @@
 
 A star that moves during the exposure leaves a streak. Its second moments along and across differ by
 the square of the streak's length over twelve, as those of a line do, whatever the star's own width.
-A long streak of a faint star is lost among the noise of single pixels, and even of blocks of them;
-but as all streaks of a turn lie the same way, they show together: the blocks of the picture are
-alike to those some way off in that one direction. Stars at rest are alike to nothing. Blocks are
-compared in integers, as the processor has no floats.
+Streaks of a turn lie the same way: along one direction, or around the boresight. Tracks of protons
+lie in all directions; they are no stars.
 """
-
-from math import cos, pi, sin, sqrt
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
+from cubestack.firmware_model.aramis.arrays import Floats, Indices
 from cubestack.firmware_model.aramis.detection.regions import Regions
+from cubestack.firmware_model.aramis.detection.spots import Spots
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -25,49 +21,15 @@ LARGEST = 10
 UPPER_QUARTILE = 75
 """Of the lengths: long streaks fall apart, and their pieces are shorter."""
 
-BLOCK = 8
-"""Pixels along a side of a block."""
+FEWEST_LONG = 3
+"""Streaks that tell a motion; at least half of the brightest spots must be any."""
 
-NEAREST, FARTHEST = 3, 8
-"""Blocks compared are so far apart: farther than a star at rest is wide, nearer than a streak is
-long that has to be found."""
+ALIGNED = 2.6
+"""Streaks times the square of the length of the mean of their directions, doubled, as unit vectors:
+chance exceeds it once in thirteen."""
 
-DIRECTIONS = 24
-"""Looked along, over half a turn."""
-
-CLIPPED_SIGMAS = 4.0
-"""A block counts as no brighter than that, so that no bright star outshines the streaks."""
-
-SURROUNDINGS = 6
-"""Blocks to either side that a block's brightness is taken against: light that is spread wider is
-no streak."""
-
-ALIKE_SIGMAS = 5.5
-"""Of what chance makes, above the median direction: stars at rest stay near 4, streaks of 95 px are
-above 7."""
-
-QUARTILES_APART = 1.349
-"""Between the quartiles of a normal distribution, in standard deviations."""
-
-UNIT = 1024
-"""Of a block's brightness, for one sigma: sums of products of a whole picture then fit the
-Blackfin's 40-bit accumulator."""
-
-Ints = NDArray[np.int32]
-
-
-def _lags() -> tuple[tuple[frozenset[tuple[int, int]], ...], tuple[tuple[int, int], ...]]:
-    """Rows and columns between compared blocks: of each direction, and all without repetition."""
-    reach = range(NEAREST, FARTHEST + 1)
-    angles = [pi * number / DIRECTIONS for number in range(DIRECTIONS)]
-    directions = tuple(
-        frozenset((round(far * sin(angle)), round(far * cos(angle))) for far in reach)
-        for angle in angles
-    )
-    return directions, tuple(sorted(frozenset().union(*directions)))
-
-
-ALONG, LAGS = _lags()
+TRACK_PX = 6.0
+"""Beside stars at rest, what is longer is a track."""
 
 
 def smear_px(picture: NDArray[np.uint8], regions: Regions, floor: int, meter: Meter) -> float:
@@ -80,70 +42,25 @@ def smear_px(picture: NDArray[np.uint8], regions: Regions, floor: int, meter: Me
     return float(np.percentile(lengths, UPPER_QUARTILE)) if lengths else 0.0
 
 
-def is_drawn_out(picture: NDArray[np.uint8], field: Field, meter: Meter) -> bool:
-    """Whether a picture (rows, columns) has streaks of some 60 px or more, however faint.
-
-    Blocks near the edge of the field do not count.
-    """
-    inside: Mask = np.all(_blocks(field.mask), axis=(1, 3))
-    inside &= _box(inside.astype(np.int32)) == (2 * SURROUNDINGS + 1) ** 2
-    count = int(inside.sum())
-    if count == 0:
-        return False
-    bright = _brightness(picture, inside, meter).astype(np.int64)
-    chance = int(np.vdot(bright, bright)) / sqrt(count)
-    rows, columns = bright.shape
-    alike = {}
-    for down, across in LAGS:
-        left, right = max(0, -across), columns - max(0, across)
-        here = bright[: rows - down, left:right]
-        there = bright[down:, left + across : right + across]
-        alike[down, across] = int(np.vdot(here, there))
-    steps = count * (1 + len(LAGS))
-    meter.charge(ram_read=2 * steps, i32_mul=steps, i32_add=steps, loop=steps)
-    meter.charge(f32_add=DIRECTIONS * FARTHEST, f32_div=DIRECTIONS, f32_compare=DIRECTIONS)
-    directions = [sum(alike[lag] for lag in lags) / sqrt(len(lags)) for lags in ALONG]
-    # Light that a glow leaves is alike in all directions.
-    return max(directions) - float(np.median(directions)) > ALIKE_SIGMAS * chance
+def without_tracks(spots: Spots, field: Field, meter: Meter) -> tuple[Spots, float]:
+    """Spots without tracks, and how far motion drew the stars out, in px: 0 at rest."""
+    bright = spots.length_px[: 2 * LARGEST]
+    long = np.flatnonzero(bright > 0)
+    places = spots.centroids[long] - np.array(field.centre, np.float32)
+    around = np.arctan2(places[:, 1], places[:, 0])
+    angles = 2 * spots.angle[long]
+    count = len(long)
+    meter.charge(f32_sin=4 * count, f32_atan2=count, f32_add=6 * count, f32_sqrt=2)
+    aligned = max(_mean_length(angles), _mean_length(angles - 2 * around))
+    many = count >= max(FEWEST_LONG, len(bright) / 2)
+    if many and count * aligned**2 > ALIGNED:
+        return spots, float(np.percentile(bright, UPPER_QUARTILE))
+    return spots.of(spots.length_px <= TRACK_PX), 0.0
 
 
-def _brightness(picture: NDArray[np.uint8], inside: Mask, meter: Meter) -> Ints:
-    """How much brighter each block is than those around it, in 1 / `UNIT` sigma; 0 outside."""
-    sums = _blocks(picture).sum(axis=(1, 3), dtype=np.int32)
-    clipped = _clipped(sums, inside)
-    level = _box(clipped) // (2 * SURROUNDINGS + 1) ** 2
-    blocks = sums.size
-    # Quartiles are found by halving the range of 16 bits, twice; then the boxes.
-    steps = picture.size + (2 * 16 + 8) * blocks
-    meter.charge(pixel_read=picture.size, i32_add=steps, ram_write=4 * blocks, loop=steps)
-    meter.charge(i32_div=3 * blocks, i32_mul=2 * blocks)
-    return np.where(inside, _clipped(clipped - level, inside), np.int32(0))
-
-
-def _clipped(values: Ints, inside: Mask) -> Ints:
-    """Values (rows, columns) less the median, in 1 / `UNIT` sigma of those inside, clipped."""
-    low, middle, high = np.percentile(values[inside], (25, 50, 75), method="lower").astype(np.int32)
-    scale = round(UNIT * QUARTILES_APART)
-    scaled = (values - middle) * scale // max(high - low, 1)
-    most = int(UNIT * CLIPPED_SIGMAS)
-    return np.asarray(np.clip(scaled, -most, most), np.int32)
-
-
-def _box(values: Ints) -> Ints:
-    """Sum over the square of `SURROUNDINGS` to all sides of each value (rows, columns)."""
-    for axis in (0, 1):
-        sums = np.cumsum(np.insert(values, 0, 0, axis=axis), axis=axis, dtype=np.int32)
-        places = np.arange(values.shape[axis])
-        last = np.minimum(places + SURROUNDINGS + 1, len(places))
-        first = np.maximum(places - SURROUNDINGS, 0)
-        values = sums.take(last, axis) - sums.take(first, axis)
-    return values
-
-
-def _blocks(pixels: NDArray[Any]) -> NDArray[Any]:
-    """View (rows, BLOCK, columns, BLOCK) without what is left over at the edges."""
-    rows, columns = (size // BLOCK for size in pixels.shape)
-    return pixels[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
+def _mean_length(angles: Floats) -> float:
+    """Length of the mean of unit vectors with those angles, 0 without any."""
+    return float(np.hypot(np.cos(angles).mean(), np.sin(angles).mean())) if len(angles) else 0.0
 
 
 def _lengths(regions: Regions, weights: Floats, meter: Meter) -> list[float]:

@@ -60,6 +60,14 @@ class Reason(IntEnum):
     """The boresight is far from the rough direction."""
     SMEAR = 11
     """Motion drew the stars out."""
+    STRAY_LIGHT = 12
+    """The sky is bright, or not evenly so."""
+    SATURATED = 13
+    """Parts of the field are too bright for stars: the Moon, the Earth."""
+    RADIATION = 14
+    """Too many pixels are hit by particles or hot."""
+    NO_TIME = 15
+    """The time of a measurement was over before an attitude was confirmed."""
     NOT_ACTIVE = 16
     CAMERA_OFF = 17
     """Its supply is switched off (latch-up action)."""

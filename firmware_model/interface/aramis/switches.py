@@ -57,6 +57,15 @@ class AramisSwitches(Switches):
         reason="the plain grey level pulls the centroid towards the middle of the region; "
         "SetDetection turns Subtract off",
     )
+    detection: str = switch(
+        "what a bright pixel is above",
+        "whole-picture",
+        "local",
+        source="section 3.5",
+        reason="stray light, the Moon, the Earth's limb or hot pixels leave no threshold for the "
+        "whole picture; each place has its own, stars are told by their shape, and twice MaxStars "
+        "are kept",
+    )
 
 
 #: Those of the default profile.

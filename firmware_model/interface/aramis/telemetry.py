@@ -36,6 +36,9 @@ PHASES = {
 }
 
 
+_AXES = {"X": "x, to the right", "Y": "y, down", "Z": "z, the boresight"}
+
+
 def _quaternion(meaning: str) -> tuple[Field, ...]:
     return tuple(
         f32(f"Q{index}", f"{name} part, {meaning}")
@@ -181,6 +184,37 @@ _REPORTS = (
     ),
 )
 
+_QUALITY = Message(
+    211, "Quality", "what the latest attitude is worth, and what its picture was like"
+).of(
+    u8("Valid", "1: the latest picture gave an attitude that further stars confirm"),
+    enum8("Reason", "why", choices=codes.Reason),
+    f32(
+        "FalseAlarm",
+        "logarithm to base 10 of the wrong attitudes to be expected in a picture that would be "
+        "confirmed as well",
+    ),
+    u8("Matched", "stars that agree with it"),
+    u8("Expected", "catalogue stars that it puts into the field"),
+    f32("Residual", "root mean square distance of these stars from their places, each axis", "px"),
+    *(
+        f32(f"Sigma{axis}", f"standard deviation of the turn about {which}", "rad")
+        for axis, which in _AXES.items()
+    ),
+    *(
+        f32(f"Correlation{axes}", f"of the turns about {axes[0]} and {axes[1]}, -1 to 1")
+        for axes in ("XY", "XZ", "YZ")
+    ),
+    f32("Scale", "focal length that the stars show, beside that of SetField"),
+    f32("Background", "level of the sky, median over the field; 0 with detection=whole-picture", "DN"),
+    f32("Noise", "standard deviation of a pixel there", "DN"),
+    f32("Spread", "of the level over the field, between its 5th and 95th percentile", "DN"),
+    f32("Blind", "part of the field that is too bright for stars, 0 to 1"),
+    u32("Spikes", "bright pixels that belong to no star"),
+    u16("Rejected", "bright regions whose shape no star has"),
+)
+"""Beside the thesis: of `belief=confirmed`, and from Background on of `detection=local`."""
+
 #: Telemetry frame of each setting telecommand, which shows its parameters: ID and name.
 _SHOWN = {
     "SetExposure": (220, "Exposure"),
@@ -210,6 +244,7 @@ TELEMETRY = (
     *_RESULTS,
     *(replace(message, extension=True) for message in _REPORTS),
     SWITCHES_SHOWN,
+    replace(_QUALITY, extension=True),
     *sorted(
         (_setting(command) for command in TELECOMMANDS if command.name in _SHOWN),
         key=lambda message: message.id,

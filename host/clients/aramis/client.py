@@ -69,6 +69,43 @@ class Star:
     hipparcos: int | None
 
 
+@dataclass(frozen=True)
+class Quality:
+    """What the latest attitude is worth, and what its picture was like; angles about x, y, z.
+
+    Attributes:
+        valid: the latest picture gave an attitude that further stars confirm; without one, all
+            figures of the attitude are 0.
+        reason: why.
+        log10_false_alarm: wrong attitudes to be expected that would be confirmed as well.
+        matched, expected: stars that agree, of so many of the catalogue in the field.
+        residual_px: root mean square distance of these stars from their places, each axis.
+        sigma_deg: (3,) standard deviations.
+        correlation: (3, 3) of the three turns.
+        scale: focal length that the stars show, beside the one that is set.
+        background, noise, spread: level of the sky in counts, a pixel's noise, and how far the
+            level changes over the field.
+        blind: part of the field that is too bright for stars, 0 to 1.
+        spikes, rejected: bright pixels of no star, and regions that are no stars by their shape.
+    """
+
+    valid: bool
+    reason: aramis.Reason
+    log10_false_alarm: float
+    matched: int
+    expected: int
+    residual_px: float
+    sigma_deg: NDArray[np.float64]
+    correlation: NDArray[np.float64]
+    scale: float
+    background: float
+    noise: float
+    spread: float
+    blind: float
+    spikes: int
+    rejected: int
+
+
 class Aramis(DeviceClient):
     """A star tracker behind a client. Errors are those of the client, and the ones named here.
 
@@ -220,6 +257,28 @@ class Aramis(DeviceClient):
             )
             for number, record in self._records("StarDetails", detected).items()
         ]
+
+    def quality(self) -> Quality:
+        """What the latest attitude is worth, and what its picture was like."""
+        values = self.client.telemetry("Quality")
+        xy, xz, yz = (float(values[f"Correlation{axes}"]) for axes in ("XY", "XZ", "YZ"))
+        return Quality(
+            valid=bool(values["Valid"]),
+            reason=aramis.Reason(int(values["Reason"])),
+            log10_false_alarm=float(values["FalseAlarm"]),
+            matched=int(values["Matched"]),
+            expected=int(values["Expected"]),
+            residual_px=float(values["Residual"]),
+            sigma_deg=np.degrees([float(values[f"Sigma{axis}"]) for axis in "XYZ"]),
+            correlation=np.array([[1, xy, xz], [xy, 1, yz], [xz, yz, 1]], np.float64),
+            scale=float(values["Scale"]),
+            background=float(values["Background"]),
+            noise=float(values["Noise"]),
+            spread=float(values["Spread"]),
+            blind=float(values["Blind"]),
+            spikes=int(values["Spikes"]),
+            rejected=int(values["Rejected"]),
+        )
 
     def phase_times(self) -> dict[str, float]:
         """Time of each step of the latest measurement in ms, by its name in small letters."""
