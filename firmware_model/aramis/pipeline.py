@@ -14,11 +14,7 @@ from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.local import brighter, measure_sky
-from cubestack.firmware_model.aramis.detection.regions import (
-    NO_REGIONS,
-    find_regions,
-    locate_stars,
-)
+from cubestack.firmware_model.aramis.detection.regions import NO_REGIONS, find_regions, locate_stars
 from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
 from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
 from cubestack.firmware_model.aramis.detection.spots import find_spots
@@ -28,7 +24,6 @@ from cubestack.firmware_model.aramis.reasons import is_hit, true_reason
 from cubestack.firmware_model.aramis.solution import Light, Profile, Solution, StarList, unsolved
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
-
 
 SPIKE_SIGMAS = 8.0
 """A pixel is far above its surroundings from so many standard deviations on."""
@@ -89,6 +84,13 @@ VERIFIED = replace(
 """An extension: further stars must confirm the attitude; noise of 0.15 px is expected."""
 
 
+def _check_size(picture: NDArray[np.uint8], field: Field) -> None:
+    if picture.shape != (field.rows, field.columns):
+        raise ValueError(
+            f"a picture must have {field.rows} rows of {field.columns} pixels, not {picture.shape}"
+        )
+
+
 def detect(
     picture: NDArray[np.uint8],
     background: Background,
@@ -103,10 +105,7 @@ def detect(
     Raises:
         ValueError: for a picture of another size than the field's.
     """
-    if picture.shape != (field.rows, field.columns):
-        raise ValueError(
-            f"a picture must have {field.rows} rows of {field.columns} pixels, not {picture.shape}"
-        )
+    _check_size(picture, field)
     with meter.phase("threshold"):
         background.add(picture, field, meter)
         level = background.threshold(settings.sigmas, meter)
@@ -168,7 +167,11 @@ def detect_locally(
     """Stars of a picture (rows, columns) in the field, and what else it shows.
 
     Phases: `threshold`, `spikes`, `centroids`.
+
+    Raises:
+        ValueError: for a picture of another size than the field's.
     """
+    _check_size(picture, field)
     with meter.phase("threshold"):
         sky = measure_sky(picture, field, meter)
         above = settings.sigmas * sky.noise
@@ -190,6 +193,4 @@ def detect_locally(
             spots.rejected,
         )  # fmt: skip
         kept = spots.of(np.arange(min(len(spots), settings.max_stars)))
-    return StarList(
-        kept.centroids, kept.brightness, smear_px, sigma_px=kept.sigma_px, light=light
-    )
+    return StarList(kept.centroids, kept.brightness, smear_px, sigma_px=kept.sigma_px, light=light)

@@ -1,4 +1,4 @@
-"""Why a picture gave no attitude, by what was measured in it. An extension of the thesis' section 2.2.
+"""Why a picture gave no attitude, by what was measured in it: an extension of section 2.2.
 
 Light that spoils a picture is told by its own traces: too bright for stars, a level that is high or
 changes over the field, bright pixels that are no stars. Only without any of them the search for the

@@ -189,4 +189,6 @@ class Solution:
 def unsolved(reason: Reason, measured: StarList, **counts: int) -> Solution:
     """A solution without attitude."""
     nothing = np.full(len(measured), NONE, dtype=np.int32)
-    return Solution(MeasurementOutcome.NONE, reason, None, nothing, measured, **counts)
+    return Solution(
+        MeasurementOutcome.NONE, reason, None, nothing, measured, quality=None, **counts
+    )

@@ -136,7 +136,7 @@ def _middles(blocks: int, size: int) -> NDArray[np.intp]:
     return np.minimum(np.arange(blocks) * BLOCK + BLOCK // 2, size - 1)
 
 
-def _around(values: NDArray[np.floating]) -> NDArray[np.floating]:  # type: ignore[type-arg]
+def _around(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """Each value (b, c) and its eight neighbours, (9, b, c)."""
     padded = np.pad(values, 1, mode="edge")
     rows, columns = values.shape

@@ -36,7 +36,8 @@ class Regions:
     count: int
 
 
-NO_REGIONS = Regions(*(np.zeros(0, np.intp) for _ in range(3)), 0)
+_NONE = np.zeros(0, np.intp)
+NO_REGIONS = Regions(_NONE, _NONE, _NONE, 0)
 
 
 def find_regions(mask: Mask, meter: Meter) -> Regions | None:

@@ -7,12 +7,12 @@ outshines its neighbours more than any spot can is hot, and takes their level. T
 star is that of its ring, which a gradient does not move.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.arrays import Floats, Mask
+from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.detection.regions import Regions
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -34,8 +34,13 @@ MOST_LIT = 4
 SHOT = 0.12
 """Variance of a pixel in counts squared that each count of light brings: that of 8 electrons."""
 
-FLOOR_PX = 0.07
-"""Error of a centroid that light does not explain: pixels, threshold, close doubles (measured)."""
+FLOOR_PX, FLOOR_SHARE = 0.01, 0.008
+"""Error of a centroid that light does not explain: pixels, and faint neighbours of wide spots as a
+share of the root of the area (measured)."""
+
+CUT, CUT_AREA, CUT_LEVEL = 2.2, 75.0, 4.0
+"""Where a spot is cut off depends on its noise too, which adds variance, the more so the smaller
+and fainter it is: measured over spots of 1.5 to 6 px, levels of 2 to 200 counts and gradients."""
 
 FULL = 250
 """Counts from which a pixel is full, and its region's centroid less sure."""
@@ -56,6 +61,7 @@ class Spots:
         sigma_px: (n,) expected error of the centroids, each axis.
         length_px: (n,) of the streak that motion could have made of it.
         angle: (n,) direction of that streak, 0 to pi.
+        areas: (n,) pixels of them.
         rejected: regions that are no stars by their shape.
         widest: pixels of the largest region.
     """
@@ -65,6 +71,7 @@ class Spots:
     sigma_px: Floats
     length_px: Floats
     angle: Floats
+    areas: Indices
     rejected: int
     widest: int
 
@@ -72,18 +79,21 @@ class Spots:
         """Number of stars."""
         return len(self.centroids)
 
-    def of(self, chosen: NDArray[np.intp] | Mask) -> "Spots":
+    def of(self, chosen: Indices | Mask) -> "Spots":
         """Only the chosen ones."""
-        kept = (self.centroids, self.brightness, self.sigma_px, self.length_px, self.angle)
-        return Spots(*(values[chosen] for values in kept), self.rejected, self.widest)
+        return replace(
+            self,
+            centroids=self.centroids[chosen],
+            brightness=self.brightness[chosen],
+            sigma_px=self.sigma_px[chosen],
+            length_px=self.length_px[chosen],
+            angle=self.angle[chosen],
+            areas=self.areas[chosen],
+        )
 
 
 def find_spots(
-    picture: NDArray[np.uint8],
-    regions: Regions,
-    noise: float,
-    sizes: tuple[int, int],
-    meter: Meter,
+    picture: NDArray[np.uint8], regions: Regions, noise: float, sizes: tuple[int, int], meter: Meter
 ) -> Spots:
     """Stars among the regions of a picture (rows, columns) whose pixels have so much noise.
 
@@ -100,7 +110,7 @@ def find_spots(
     left_out = count - len(names)
     if not len(names):
         empty = np.zeros(0, _F)
-        return Spots(np.zeros((0, 2), _F), empty, empty, empty, empty, left_out, widest)
+        return Spots(np.zeros((0, 2), _F), empty, empty, empty, empty, areas[:0], left_out, widest)
     grey = _without_hot(picture, rows, columns, noise, meter).astype(_F)
     box = _Boxes.of(rows, columns, labels, len(names))
     sky, lit = box.ring(picture, np.bincount(labels, grey) / areas[names], meter)
@@ -117,7 +127,11 @@ def find_spots(
     full = np.bincount(labels, grey >= FULL)
     # Each pixel's noise moves the centroid by its distance; light has its own.
     lever = np.bincount(labels, (x * x + y * y) / 2 * _F(noise**2)) + SHOT * total * (xx + yy) / 2
-    sigma = np.sqrt(lever / total**2 + FLOOR_PX**2 * (1 + full / 25)).astype(_F)
+    size = areas[names]
+    faint = (noise * size / total) ** 2
+    lever *= (CUT + CUT_AREA / size) * (1 + CUT_LEVEL * faint)
+    floor = (FLOOR_PX + FLOOR_SHARE * np.sqrt(size)) ** 2 * (1 + full / 25)
+    sigma = np.sqrt(lever / total**2 + floor).astype(_F)
     apart = np.sqrt((xx - yy) ** 2 + 4 * xy**2)
     narrow = np.maximum((xx + yy - apart) / 2, _F(1 / 12))
     length = np.where(apart > (LONG_RATIO - 1) * narrow, np.sqrt(12 * apart), _F(0)).astype(_F)
@@ -125,24 +139,19 @@ def find_spots(
     light = len(pixels)
     meter.charge(pixel_read=light, i32_add=14 * light, i32_mul=9 * light, loop=light)
     found = len(names)
-    meter.charge(f32_convert=8 * found, f32_div=8 * found, f32_sqrt=3 * found, f32_atan2=found)
-    meter.charge(f32_mul=14 * found, f32_add=12 * found, f32_compare=4 * found, loop=found)
+    meter.charge(f32_convert=8 * found, f32_div=10 * found, f32_sqrt=4 * found, f32_atan2=found)
+    meter.charge(f32_mul=20 * found, f32_add=15 * found, f32_compare=4 * found, loop=found)
     stars = np.flatnonzero((lit <= MOST_LIT) & (total > 3 * noise))
     order = stars[np.argsort(-total[stars], kind="stable")]
     steps = len(order) * max(len(order), 1).bit_length()
     meter.charge(f32_compare=steps, ram_read=steps, ram_write=steps, loop=steps)
     centroids = np.stack([box.left + across, box.top + down], axis=1).astype(_F)
     left_out += found - len(order)
-    kept = (values[order] for values in (centroids, total, sigma, length, angle))
-    return Spots(*kept, left_out, widest)
+    return Spots(centroids, total, sigma, length, angle, size, left_out, widest).of(order)
 
 
 def _without_hot(
-    picture: NDArray[np.uint8],
-    rows: NDArray[np.intp],
-    columns: NDArray[np.intp],
-    noise: float,
-    meter: Meter,
+    picture: NDArray[np.uint8], rows: Indices, columns: Indices, noise: float, meter: Meter
 ) -> NDArray[np.int32]:
     """Grey levels at (p,) pixels; where one is far above all but one neighbour, the third level."""
     padded = np.pad(picture, 1, mode="edge")
@@ -166,19 +175,13 @@ def _without_hot(
 class _Boxes:
     """Rectangles around regions: first and last rows and columns (n,)."""
 
-    top: NDArray[np.intp]
-    bottom: NDArray[np.intp]
-    left: NDArray[np.intp]
-    right: NDArray[np.intp]
+    top: Indices
+    bottom: Indices
+    left: Indices
+    right: Indices
 
     @classmethod
-    def of(
-        cls,
-        rows: NDArray[np.intp],
-        columns: NDArray[np.intp],
-        labels: NDArray[np.intp],
-        count: int,
-    ) -> "_Boxes":
+    def of(cls, rows: Indices, columns: Indices, labels: Indices, count: int) -> "_Boxes":
         """Of pixels (p,) whose regions are numbered 0 to count - 1."""
         far = 1 << 30
         top, left = np.full(count, far), np.full(count, far)
@@ -191,7 +194,7 @@ class _Boxes:
 
     def ring(
         self, picture: NDArray[np.uint8], means: NDArray[np.float64], meter: Meter
-    ) -> tuple[Floats, NDArray[np.intp]]:
+    ) -> tuple[Floats, Indices]:
         """Level of the sky around each region (n,), and how many places of its ring are lit.
 
         ``means``: (n,) of the regions' own grey levels.

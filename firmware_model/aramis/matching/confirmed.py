@@ -55,7 +55,7 @@ FEWEST_STARS = 4
 FLOOR_RAD, FLOOR_ROLL_RAD = 3e-6, 2e-5
 """Of the attitude's angles across and about the boresight: pixels, single precision (assumed)."""
 
-FLOOR_PX = 0.05
+FLOOR_PX = 0.03
 """Error of a star's place beside its centroid's: lens, catalogue (assumed)."""
 
 
@@ -93,16 +93,18 @@ def identify_surely(
     until: float,
 ) -> Solution:
     """Identify measured stars, the brightest first; see ``identification.identify``."""
-    if measured.sigma_px is None:
-        sigma = np.full(len(measured), profile.sigma_rad / field.scale[1], np.float32)
-        measured = replace(measured, sigma_px=sigma)
+    sigma_px = measured.sigma_px
+    if sigma_px is None:
+        sigma_px = np.full(len(measured), profile.sigma_rad / field.scale[1], np.float32)
     smeared = measured.smear_px > profile.smear_px
     if smeared and measured.skew_px > profile.skew_px:
         return unsolved(Reason.SMEAR, measured)
     if len(measured) < FEWEST_STARS:
         return unsolved(Reason.SMEAR if smeared else Reason.TOO_FEW_STARS, measured)
     vectors = field.directions(measured.centroids, meter)
-    solution = _Search(measured, vectors, field, profile, database, hint, meter, until).run()
+    solution = _Search(
+        measured, vectors, sigma_px, field, profile, database, hint, meter, until
+    ).run()
     if smeared and solution.outcome is MeasurementOutcome.NONE:
         return replace(solution, reason=Reason.SMEAR)
     return solution
@@ -113,12 +115,14 @@ class _Search:
     """One picture's identification with confirmation.
 
     Attributes:
+        vectors, sigma_px: (n, 3) directions of the measured stars, (n,) errors in px, each axis.
         hint: (3,) rough unit vector of the boresight; None: lost in space.
         until: cycles of the meter at which time is over.
     """
 
     measured: StarList
     vectors: Floats
+    sigma_px: Floats
     field: Field
     profile: Profile
     database: Database
@@ -148,18 +152,13 @@ class _Search:
         return TripleSearch(
             self.vectors,
             self.measured.centroids,
-            self._sigma_rad,
+            (self.sigma_px * self.field.scale[1]).astype(np.float32),
             self.field,
             self.database,
             self.profile.tolerance_rad / self.field.scale[1],
             faces,
             self.meter,
         )
-
-    @property
-    def _sigma_rad(self) -> Floats:
-        """(n,) errors of the directions."""
-        return (self.measured.sigma_px * np.float32(self.field.scale[1])).astype(np.float32)
 
     def _far_from_hint(self, turn: Floats) -> bool:
         if self.hint is None:
@@ -196,9 +195,7 @@ class _Search:
             measured, rows, apart = confirmation.matched(vectors, predicted, reach_rad, self.meter)
             if len(measured) < FEWEST_STARS:
                 return None
-            chance = confirmation.by_chance(
-                len(vectors) - 3, reach_rad, self.field.solid_angle_sr
-            )
+            chance = confirmation.by_chance(len(vectors) - 3, reach_rad, self.field.solid_angle_sr)
             tried = found.hypotheses * (SCALES if scale != 1.0 else 1)
             expected = len(seen)
             alarms = confirmation.false_alarm(
@@ -212,7 +209,7 @@ class _Search:
 
     def _reach(self, measured: Indices) -> float:
         """Within it stars agree, by the errors of those that already do."""
-        typical = float(np.sqrt(np.mean(self.measured.sigma_px[measured] ** 2)))
+        typical = float(np.sqrt(np.mean(self.sigma_px[measured] ** 2)))
         self.meter.charge(f32_mul=len(measured), f32_add=len(measured), f32_sqrt=1, f32_div=1)
         reach_rad = max(NEAREST_PX, REACH_SIGMAS * typical) * self.field.scale[1]
         return min(reach_rad, self.profile.tolerance_rad)
@@ -222,7 +219,7 @@ class _Search:
     ) -> Floats | None:
         """Quaternion of directions (k, 3) of measured stars, weighted by their errors."""
         if weights is None:
-            weights = np.float32(1) / (self.measured.sigma_px[measured] ** 2 + FLOOR_PX**2)
+            weights = np.float32(1) / (self.sigma_px[measured] ** 2 + FLOOR_PX**2)
         with self.meter.phase("attitude"):
             self.meter.charge(f32_mul=len(measured), f32_div=len(measured))
             try:
@@ -254,16 +251,19 @@ class _Search:
         if straight is None:
             return unsolved(Reason.SMEAR, self.measured, **counts)
         turn = dcm(straight, self.meter)
-        errors = np.sqrt(self.measured.sigma_px[fit.measured] ** 2 + FLOOR_PX**2)
+        errors = np.sqrt(self.sigma_px[fit.measured] ** 2 + FLOOR_PX**2)
         predicted = turned(self.database.vectors[fit.stars], turn)
         apart = fit.vectors - predicted
-        found = covariance(
-            predicted,
-            np.sqrt((apart * apart).sum(axis=1)),
-            (errors * self.field.scale[1]).astype(np.float32),
-            self.meter,
-            floor=(FLOOR_RAD, FLOOR_RAD, FLOOR_ROLL_RAD),
-        )
+        try:
+            found = covariance(
+                predicted,
+                np.sqrt((apart * apart).sum(axis=1)),
+                (errors * self.field.scale[1]).astype(np.float32),
+                self.meter,
+                floor=(FLOOR_RAD, FLOOR_RAD, FLOOR_ROLL_RAD),
+            )
+        except AttitudeError:
+            return unsolved(Reason.UNCONFIRMED, self.measured, **counts)
         quality = Quality(found, fit.residual_px, fit.false_alarm, fit.scale)
         if quality.sigma_rad[2] > self.profile.largest_sigma_rad:
             return unsolved(Reason.UNCONFIRMED, self.measured, **counts)

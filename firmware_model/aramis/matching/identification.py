@@ -19,8 +19,8 @@ from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.assignment import assign, assign_plainly
-from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.matching.confirmed import identify_surely
+from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.matching.triples import Match, match_triple
 from cubestack.firmware_model.aramis.matching.verification import sides_agree
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList, unsolved
@@ -126,11 +126,7 @@ class _Search:
         with self.meter.phase("verification"):
             return sides_agree(measured, known, self.profile.side_tolerance_rad, self.meter)
 
-    def _attitude(
-        self,
-        measured: Indices,
-        identities: Indices,
-    ) -> Floats | None:
+    def _attitude(self, measured: Indices, identities: Indices) -> Floats | None:
         """Of identified stars, all of the same weight."""
         body, reference = self.vectors[measured], self.database.vectors[identities]
         weights = np.ones(len(measured), dtype=np.float32)
@@ -159,6 +155,5 @@ class _Search:
     ) -> Solution:
         stars = np.full(len(self.measured), NONE, dtype=np.int32)
         stars[measured] = identities
-        return Solution(
-            MeasurementOutcome.CONCLUSIVE, reason, quaternion, stars, self.measured, **counts
-        )
+        outcome = MeasurementOutcome.CONCLUSIVE
+        return Solution(outcome, reason, quaternion, stars, self.measured, quality=None, **counts)

@@ -133,4 +133,5 @@ def _gains(slopes: Floats, units: Floats, corners: Floats, sigma_rad: Floats) ->
     moved = np.stack([da + dc, db - da, -db - dc], axis=1)
     along = (moved * corners).sum(axis=2)
     squares = (moved * moved).sum(axis=2) - along * along
-    return np.sqrt(np.maximum((squares * sigma_rad**2).sum(axis=1), np.float32(0)))
+    gains: Floats = np.sqrt(np.maximum((squares * sigma_rad**2).sum(axis=1), np.float32(0)))
+    return gains

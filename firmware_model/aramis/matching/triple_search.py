@@ -148,7 +148,9 @@ class TripleSearch:
         )
         owner, stars = owner[kept], self.database.stars[triangles[kept]].astype(np.intp)
         stars = np.take_along_axis(stars, _ORDERS[orders], axis=1)
-        shrunk = corners[owner] * np.stack([1 / scales, 1 / scales, np.ones_like(scales)], 1)[:, None]
+        shrunk = (
+            corners[owner] * np.stack([1 / scales, 1 / scales, np.ones_like(scales)], 1)[:, None]
+        )
         shrunk /= np.sqrt((shrunk * shrunk).sum(axis=2, keepdims=True))
         turns = _triad(shrunk.astype(_F), self.database.vectors[stars])
         agreeing, near = self._agreeing(turns, scales)
@@ -289,7 +291,7 @@ class TripleSearch:
         self.meter.charge(f32_convert=2 * near, loop=near)
 
 
-def _sense(corners: NDArray[np.floating]) -> Mask:  # type: ignore[type-arg]
+def _sense(corners: NDArray[np.floating]) -> Mask:
     """Whether triangles of directions (n, 3, 3) turn to the left."""
     first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
     volume = np.einsum("ni,ni->n", first, np.cross(second, third))
@@ -298,7 +300,8 @@ def _sense(corners: NDArray[np.floating]) -> Mask:  # type: ignore[type-arg]
 
 def _triad(measured: Floats, known: Floats) -> Floats:
     """Rotations (k, 3, 3) that turn triangles of unit vectors (k, 3, 3) into measured ones."""
-    return np.einsum("nai,naj->nij", _frame(measured), _frame(known)).astype(_F)
+    turns: Floats = np.einsum("nai,naj->nij", _frame(measured), _frame(known)).astype(_F)
+    return turns
 
 
 def _frame(corners: Floats) -> Floats:
@@ -308,4 +311,5 @@ def _frame(corners: Floats) -> Floats:
     edge = 2 * corners[:, 0] - corners[:, 1] - corners[:, 2]
     normal = np.cross(middle, edge)
     normal /= np.sqrt((normal * normal).sum(axis=1, keepdims=True))
-    return np.stack([middle, normal, np.cross(middle, normal)], axis=1)
+    axes: Floats = np.stack([middle, normal, np.cross(middle, normal)], axis=1)
+    return axes

@@ -1,4 +1,4 @@
-"""Whether a triangle near a rough direction is the right one. An extension: the thesis has no check.
+"""Whether a triangle near a rough direction is the right one. An extension: the thesis checks none.
 
 The three sides must agree one by one, because area and moment leave one measure of a triangle free;
 so must its sense of rotation.

@@ -191,8 +191,7 @@ _QUALITY = Message(
     enum8("Reason", "why", choices=codes.Reason),
     f32(
         "FalseAlarm",
-        "logarithm to base 10 of the wrong attitudes to be expected in a picture that would be "
-        "confirmed as well",
+        "log10 of the number of wrong attitudes that are expected to be confirmed as well",
     ),
     u8("Matched", "stars that agree with it"),
     u8("Expected", "catalogue stars that it puts into the field"),
@@ -206,7 +205,11 @@ _QUALITY = Message(
         for axes in ("XY", "XZ", "YZ")
     ),
     f32("Scale", "focal length that the stars show, beside that of SetField"),
-    f32("Background", "level of the sky, median over the field; 0 with detection=whole-picture", "DN"),
+    f32(
+        "Background",
+        "level of the sky, median over the field; 0 with detection=whole-picture",
+        "DN",
+    ),
     f32("Noise", "standard deviation of a pixel there", "DN"),
     f32("Spread", "of the level over the field, between its 5th and 95th percentile", "DN"),
     f32("Blind", "part of the field that is too bright for stars, 0 to 1"),

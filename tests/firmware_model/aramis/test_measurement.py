@@ -36,7 +36,9 @@ def test_every_setting_arrives() -> None:
     settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 1, "Verify": 0, "HintTolerance": 9})
     found = configuration(settings, EXTENDED)
     assert (found.field.fov_deg, found.field.round) == (18.0, False)
-    assert found.detection == Detection(3.5, SpikeRemoval.WINDOW, 9, 4, 99, 12, subtract=False)
+    assert found.detection == Detection(
+        3.5, SpikeRemoval.WINDOW, 9, 4, 99, 24, subtract=False, local=True
+    )
     profile = found.profile
     assert profile.sigma_rad == pytest.approx(0.5 / 3232.64, rel=1e-4)
     assert (profile.pivots, profile.verify, profile.hint_tolerance_deg) == (1, False, 9)
@@ -88,7 +90,7 @@ def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
         (Profile, {"sigma_rad": 0.0}, "sigma_rad must be 1e-07 to 0.01, not 0.0"),
         (Profile, {"sigma_rad": float("nan")}, "sigma_rad must be"),
         (Profile, {"pivots": 4}, "pivots must be 0 to 3, not 4"),
-        (Profile, {"triple_stars": 2}, "triple_stars must be 3 to 64, not 2"),
+        (Profile, {"within_ms": 0.5}, "within_ms must be 1 to 10000, not 0.5"),
         (Profile, {"largest_chance": -1.0}, "largest_chance must be 0 to 1, not -1.0"),
     ],
 )

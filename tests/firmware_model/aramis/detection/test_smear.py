@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.regions import find_regions
-from cubestack.firmware_model.aramis.detection.smear import is_drawn_out, smear_px
+from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
+from cubestack.firmware_model.aramis.detection.spots import Spots
 from cubestack.firmware_model.aramis.matching.identification import identify
-from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, explain
-from cubestack.firmware_model.aramis.solution import StarList, unsolved
+from cubestack.firmware_model.aramis.pipeline import VERIFIED, detect_locally
+from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
 from ..sky import FIELD, database, meter, picture
@@ -44,12 +45,30 @@ def test_length_of_bright_streaks(length: float, angle_deg: float) -> None:
     assert found_px == pytest.approx(length, abs=1.5)
 
 
+def found(image: NDArray[np.uint8]) -> StarList:
+    return detect_locally(image, FIELD, VERIFIED.detection, meter())
+
+
 @pytest.mark.parametrize("angle_deg", [0, 40, 90, 160])
-def test_faint_streaks_show_together(angle_deg: float) -> None:
-    """A star that is bright enough at rest has no bright pixel left."""
-    image = swept(95, angle_deg, light=800)
-    assert np.count_nonzero(image > 12) < 50
-    assert is_drawn_out(image, FIELD, meter())
+@pytest.mark.parametrize("length", [8.0, 20.0, 60.0])
+def test_streaks_that_lie_the_same_way_are_motion(length: float, angle_deg: float) -> None:
+    stars = found(swept(length, angle_deg, light=200 * length))
+    assert stars.smear_px == pytest.approx(length, rel=0.2)
+    assert len(stars) == 12
+
+
+def test_streaks_around_the_boresight_are_motion() -> None:
+    places = np.array([[300, 0], [0, 300], [-300, 0], [0, -300], [200, 200]], np.float32)
+    spots = long_spots(places + FIELD.centre, np.arctan2(places[:, 1], places[:, 0]) + np.pi / 2)
+    kept, smear = without_tracks(spots, FIELD, meter())
+    assert (len(kept), smear) == (5, pytest.approx(12))
+
+
+def test_tracks_in_all_directions_are_left_out() -> None:
+    rng = np.random.default_rng(1)
+    spots = long_spots(FIELD.centre + rng.uniform(-300, 300, (20, 2)), rng.uniform(0, np.pi, 20))
+    kept, smear = without_tracks(spots, FIELD, meter())
+    assert (len(kept), smear) == (0, 0)
 
 
 def test_stars_at_rest_are_not_drawn_out() -> None:
@@ -57,23 +76,30 @@ def test_stars_at_rest_are_not_drawn_out() -> None:
     y, x = np.mgrid[: FIELD.rows, : FIELD.columns]
     glow = 30 * np.exp(-((x - 400) ** 2 + (y - 200) ** 2) / (2 * 300.0**2))
     for light, background in ((0, 0), (8000, 0), (0, 0.05 * x), (800, 0.05 * x), (800, glow)):
-        assert not is_drawn_out(swept(0, 0, light, background=background), FIELD, meter())
+        stars = found(swept(0, 0, light, background=background))
+        assert stars.smear_px == 0
+        assert len(stars) == (12 if light else 0)
 
 
-def test_a_picture_without_noise_is_not_drawn_out() -> None:
-    for level in (0, 7, 255):
-        image = np.full((FIELD.rows, FIELD.columns), level, dtype=np.uint8)
-        assert not is_drawn_out(image, FIELD, meter())
-    assert smear_px(image, find_regions(image > 255, meter()), 0, meter()) == 0  # type: ignore[arg-type]
+def test_without_regions_nothing_is_drawn_out() -> None:
+    image = np.zeros((FIELD.rows, FIELD.columns), np.uint8)
+    assert smear_px(image, find_regions(image > 0, meter()), 0, meter()) == 0  # type: ignore[arg-type]
 
 
-def test_streaks_explain_why_there_is_no_attitude() -> None:
-    nothing = StarList(np.zeros((0, 2), np.float32), np.zeros(0, np.float32))
-    failed = unsolved(Reason.TOO_FEW_STARS, nothing)
-    streaks, rest = swept(95, 40, light=800), swept(0, 0, light=800)
-    cases = (streaks, VERIFIED), (rest, VERIFIED), (streaks, PUBLISHED)
-    reasons = [explain(failed, image, way, meter()).reason for image, way in cases]
-    assert reasons == [Reason.SMEAR, Reason.TOO_FEW_STARS, Reason.TOO_FEW_STARS]
+def long_spots(places: NDArray[Any], angles: NDArray[Any]) -> Spots:
+    """Streaks of 12 px."""
+    count = len(places)
+    ones = np.ones(count, np.float32)
+    return Spots(
+        places.astype(np.float32),
+        100 * ones,
+        ones,
+        12 * ones,
+        (angles % np.pi).astype(np.float32),
+        20 * ones,
+        0,
+        0,
+    )
 
 
 def test_smear_is_the_reason_when_there_is_no_attitude() -> None:
@@ -92,17 +118,3 @@ def test_a_skewed_picture_is_refused_and_a_smeared_one_is_not() -> None:
         assert found.outcome is outcome
     still = StarList(made.centroids, made.brightness, 2.0, 9.0)
     assert identify(still, FIELD, VERIFIED.profile, database(), meter()).quaternion is not None
-
-
-def test_a_picture_is_compared_in_integers() -> None:
-    spent = meter()
-    is_drawn_out(swept(95, 40, light=800), FIELD, spent)
-    assert spent.counts["i32_mul"] > 1_000_000
-    assert sum(count for name, count in spent.counts.items() if name.startswith("f32")) < 1000
-
-
-@pytest.mark.parametrize("level", [1, 40])
-def test_a_level_added_to_all_pixels_changes_nothing(level: int) -> None:
-    for image in (swept(95, 40, light=800), swept(0, 0, light=800)):
-        lighter = np.minimum(image.astype(int) + level, 255).astype(np.uint8)
-        assert is_drawn_out(lighter, FIELD, meter()) == is_drawn_out(image, FIELD, meter())

@@ -63,6 +63,28 @@ def aramis(node: FakeAramis) -> Aramis:
     return Aramis(NodeClient(UartLink(node), INTERFACE))
 
 
+def test_quality(node: FakeAramis, aramis: Aramis) -> None:
+    node.values["Quality"] = {
+        "Valid": 1,
+        "Reason": codes.Reason.CONFIRMED,
+        "FalseAlarm": -12.5,
+        "Matched": 9,
+        "Expected": 11,
+        "Residual": 0.125,
+        **{"SigmaX": 1e-5, "SigmaY": 2e-5, "SigmaZ": 1e-4},
+        **{"CorrelationXY": 0.25, "CorrelationXZ": -0.5, "CorrelationYZ": 0.125},
+        **{"Scale": 1.0, "Background": 2.5, "Noise": 1.5, "Spread": 3.0, "Blind": 0.25},
+        **{"Spikes": 70_000, "Rejected": 3},
+    }
+    found = aramis.quality()
+    assert (found.valid, found.reason) == (True, codes.Reason.CONFIRMED)
+    np.testing.assert_allclose(np.radians(found.sigma_deg), [1e-5, 2e-5, 1e-4], rtol=1e-5)
+    np.testing.assert_array_equal(found.correlation, found.correlation.T)
+    assert found.correlation[0].tolist() == [1, 0.25, -0.5]
+    assert (found.log10_false_alarm, found.residual_px, found.blind) == (-12.5, 0.125, 0.25)
+    assert (found.matched, found.expected, found.spikes, found.rejected) == (9, 11, 70_000, 3)
+
+
 def test_activation_returns_the_catalogue_s_state(node: FakeAramis, aramis: Aramis) -> None:
     node.busy = 3
     assert aramis.activate() is CatalogueState.GOOD

@@ -1,0 +1,105 @@
+"""Attitudes that further stars confirm: what is believed, how sure it is, and when it is over."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.aramis.matching.identification import identify
+from cubestack.firmware_model.aramis.pipeline import VERIFIED
+from cubestack.firmware_model.aramis.solution import Solution, StarList
+from cubestack.firmware_model.interface.aramis import Reason
+
+from ..sky import FIELD, Light, Picture, database, errors_deg, meter, pictures
+
+PROFILE = VERIFIED.profile
+
+
+def found(made: Picture, stars: StarList | None = None, noise_px: float = 0.1) -> Solution:
+    stars = stars or made.stars
+    sigma = np.full(len(stars), noise_px, np.float32)
+    return identify(replace(stars, sigma_px=sigma), FIELD, PROFILE, database(), meter())
+
+
+@pytest.mark.parametrize("false_stars", [5, 10, 15, 20])
+def test_bright_false_stars_do_not_matter(false_stars: int) -> None:
+    light = Light(false_stars=false_stars, false_mags=(0.0, 4.0), most=60)
+    right = 0
+    for made in pictures(30, false_stars, light):
+        solution = found(made)
+        if solution.quaternion is not None:
+            assert max(errors_deg(solution.quaternion, made.attitude)) < 0.1
+            right += 1
+    assert right >= 28
+
+
+@pytest.mark.parametrize("noise_px", [0.05, 0.2, 0.5])
+def test_its_errors_are_what_it_claims(noise_px: float) -> None:
+    inside = []
+    for made in pictures(60, 7, Light(noise_px=noise_px)):
+        solution = found(made, noise_px=noise_px)
+        if solution.quaternion is None:
+            continue
+        assert solution.quality is not None
+        turn = Rotation.from_quat(solution.quaternion.astype(np.float64)) * made.attitude.inv()
+        inside.append(np.abs(turn.as_rotvec()) < solution.quality.sigma_rad)
+    assert len(inside) > 50
+    assert 0.55 < np.mean(inside) < 0.85
+
+
+def test_mirrored_stars_are_not_believed() -> None:
+    for made in pictures(15, 8):
+        mirrored = (made.stars.centroids * [-1, 1] + [FIELD.columns - 1, 0]).astype(np.float32)
+        solution = found(made, replace(made.stars, centroids=mirrored))
+        assert (solution.quaternion, solution.reason) == (None, Reason.UNCONFIRMED)
+
+
+@pytest.mark.parametrize("scale", [0.97, 0.99, 1.005, 1.03])
+def test_another_focal_length_is_told_and_does_no_harm(scale: float) -> None:
+    centre = np.array(FIELD.centre, np.float32)
+    for made in pictures(6, 9):
+        moved = ((made.stars.centroids - centre) * scale + centre).astype(np.float32)
+        solution = found(made, replace(made.stars, centroids=moved))
+        assert solution.quality is not None
+        assert solution.quality.scale == pytest.approx(scale, abs=5e-4)
+        assert max(errors_deg(solution.quaternion, made.attitude)) < 0.1
+
+
+def test_a_focal_length_that_is_right_is_left_alone() -> None:
+    scales = [found(made).quality.scale for made in pictures(15, 10)]  # type: ignore[union-attr]
+    assert scales.count(1.0) >= 13
+
+
+def test_few_stars_of_many_that_should_be_there_are_not_believed() -> None:
+    """Four that fit, eight expected: chance does that too often beside twenty other lights."""
+    for made in pictures(5, 11, Light(false_stars=20, most=60)):
+        known = np.flatnonzero(np.isin(made.hip, database().numbers))[:4]
+        false = np.flatnonzero(made.hip == 0)
+        kept = np.sort(np.concatenate([known, false]))
+        stars = StarList(made.stars.centroids[kept], made.stars.brightness[kept])
+        assert found(made, stars).reason is Reason.UNCONFIRMED
+
+
+def test_it_is_given_up_when_time_is_over() -> None:
+    (made,) = pictures(1, 12, Light(mag_limit=-2.0, false_stars=40, most=60))
+    spent = meter()
+    short = replace(PROFILE, within_ms=20.0)
+    solution = identify(made.stars, FIELD, short, database(), spent)
+    assert solution.reason is Reason.NO_TIME
+    assert 0.02 <= spent.table.seconds(spent.total) < 0.03
+
+
+def test_the_whole_search_has_time_enough() -> None:
+    (made,) = pictures(1, 13, Light(mag_limit=-2.0, false_stars=60, most=60))
+    spent = meter()
+    solution = identify(made.stars, FIELD, PROFILE, database(), spent)
+    assert solution.reason is Reason.UNCONFIRMED
+    assert spent.table.seconds(spent.total) < 0.45
+
+
+def test_a_turn_that_is_in_doubt_is_refused() -> None:
+    made = pictures(1, 14)[0]
+    strict = replace(PROFILE, largest_sigma_rad=1e-6)
+    solution = identify(made.stars, FIELD, strict, database(), meter())
+    assert (solution.quaternion, solution.reason) == (None, Reason.UNCONFIRMED)
