@@ -32,7 +32,7 @@ from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
-NEAREST_PX = 0.7
+NEAREST_PX = 0.4
 """A star within so many pixels of its place agrees however sure both are."""
 
 REACH_SIGMAS = 4.0
@@ -196,7 +196,7 @@ class _Search:
             if len(measured) < FEWEST_STARS:
                 return None
             chance = confirmation.by_chance(len(vectors) - 3, reach_rad, self.field.solid_angle_sr)
-            tried = found.hypotheses * (SCALES if scale != 1.0 else 1)
+            tried = found.by_chance * (SCALES if scale != 1.0 else 1)
             expected = len(seen)
             alarms = confirmation.false_alarm(
                 tried, max(expected - 3, 0), len(measured) - 3, chance, self.meter

@@ -49,6 +49,10 @@ MOST_STRETCHED_TRIPLES = 80
 MOST_STRETCHED = 120_000
 """As `MOST_LISTED`, where the focal length may be another."""
 
+WRONG_SHARE = 0.005
+"""Of the triangles within the bounds of area and moment, at most so many agree in their sides by
+chance: 0.0006 to 0.004 at errors of 0.05 to 1 px (measured with mirrored stars)."""
+
 SMALLEST_AREA = 2e-4
 """Of chords: flatter triples leave the sense of rotation and the turn open."""
 
@@ -81,7 +85,7 @@ class Hypothesis:
         turn: (3, 3) direction cosine matrix, inertial to camera.
         measured, stars: (3,) measured stars, and those of the database.
         triples: triples tried, this one included.
-        hypotheses: attitudes tried, this one included.
+        by_chance: wrong attitudes to be expected among those tried.
         scale: focal length beside the one that is set.
     """
 
@@ -89,7 +93,7 @@ class Hypothesis:
     measured: Indices
     stars: Indices
     triples: int
-    hypotheses: int
+    by_chance: float
     scale: float
 
 
@@ -111,8 +115,9 @@ class TripleSearch:
         sigma_rad: (n,) their errors, each axis.
         reach_px: a catalogue star is where one was measured within so many pixels.
         faces: (f,) which faces count; None: all.
-        triples, hypotheses: tried so far.
-        matches: triangles of the database that fitted so far.
+        triples: tried so far.
+        matches: triangles of the database within the bounds so far.
+        by_chance: wrong attitudes to be expected among those tried so far.
     """
 
     vectors: Floats
@@ -124,8 +129,8 @@ class TripleSearch:
     faces: Mask | None
     meter: Meter
     triples: int = 0
-    hypotheses: int = 0
     matches: int = 0
+    by_chance: float = 0.0
 
     def run(self, fewest: int) -> Iterator[Hypothesis | None]:
         """Attitudes with so many stars that agree, and None now and then: time to look at time."""
@@ -157,17 +162,18 @@ class TripleSearch:
         triple = hypothesis = 0
         for index in np.flatnonzero(agreeing >= fewest).tolist():
             upto = int(owner[index]) + 1
-            self._charge(listed[triple:upto], looked_at[triple:upto], near[hypothesis : index + 1])
+            tried = near[hypothesis : index + 1]
+            self._charge(listed[triple:upto], looked_at[triple:upto], tried, stretch)
             triple, hypothesis = upto, index + 1
             yield Hypothesis(
                 turns[index],
                 batch[owner[index]],
                 stars[index],
                 self.triples,
-                self.hypotheses,
+                self.by_chance,
                 float(scales[index]),
             )
-        self._charge(listed[triple:], looked_at[triple:], near[hypothesis:])
+        self._charge(listed[triple:], looked_at[triple:], near[hypothesis:], stretch)
         yield None
 
     def _listed(
@@ -223,12 +229,16 @@ class TripleSearch:
         return which, orders, scales
 
     def _charge(
-        self, listed: NDArray[np.int_], looked_at: NDArray[np.int_], near: NDArray[np.int_]
+        self,
+        listed: NDArray[np.int_],
+        looked_at: NDArray[np.int_],
+        near: NDArray[np.int_],
+        stretch: float,
     ) -> None:
-        """Charge triples (n,) and the attitudes (k,) that they suggested."""
+        """Charge and count triples (n,) and the attitudes (k,) that they suggested."""
         self.triples += len(listed)
-        self.hypotheses += len(near)
         self.matches += int(listed.sum())
+        self.by_chance += len(near) if stretch else WRONG_SHARE * int(listed.sum())
         with self.meter.phase("triangles"):
             Triangles.charge(len(listed), self.meter)
         with self.meter.phase("search"):

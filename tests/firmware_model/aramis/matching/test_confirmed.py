@@ -71,10 +71,9 @@ def test_a_focal_length_that_is_right_is_left_alone() -> None:
     assert scales.count(1.0) >= 13
 
 
-def test_few_stars_of_many_that_should_be_there_are_not_believed() -> None:
-    """Four that fit, eight expected: chance does that too often beside twenty other lights."""
+def test_a_triangle_alone_is_not_believed() -> None:
     for made in pictures(5, 11, Light(false_stars=20, most=60)):
-        known = np.flatnonzero(np.isin(made.hip, database().numbers))[:4]
+        known = np.flatnonzero(np.isin(made.hip, database().numbers))[:3]
         false = np.flatnonzero(made.hip == 0)
         kept = np.sort(np.concatenate([known, false]))
         stars = StarList(made.stars.centroids[kept], made.stars.brightness[kept])
