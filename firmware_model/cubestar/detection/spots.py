@@ -34,6 +34,22 @@ SHARPEST = 0.6
 """Largest share of the brightest pixel in the 3 x 3 around it: 0.22 in a spot of sigma 0.9 px, 0.54
 in one of 0.45 px, and more in what particles and hot pixels leave; chosen."""
 
+MOST_WIDTHS, USUAL_SHARE = 24, 0.6
+"""So many of the brightest round spots tell the usual width, and so many parts of them have it at
+most: chosen."""
+
+ROUND = 0.05
+"""Share of a spot that may stand out above the Gaussian of its own width where it tells the usual
+one; chosen."""
+
+NARROW, NARROW_SATURATED, WIDE = 0.65, 0.9, 1.9
+"""Parts of the usual width between which a spot is a star's: a saturated one is wider. Of protons'
+tracks half are narrower, of stars none; haze is wider."""
+
+MOST_DISTURBED = 0.5
+"""Share of a star's light that may stand out: with 20 000 hot pixels it is 0.4 for one star in a
+hundred, and more for half of the protons' tracks."""
+
 STANDS_OUT = 0.15
 """Share of a spot's height by which a pixel may exceed its Gaussian, beside four times the noise:
 what a spot is that is no Gaussian; chosen."""
@@ -77,20 +93,36 @@ def too_sharp(windows: Ints, noises: Ints) -> NDArray[np.bool_]:
     return sharp
 
 
-def usual_width(windows: Ints, starts: Reals, saturated: Marks, meter: Meter) -> float:
-    """Standard deviation of a spot in px: the median of those in ``windows``, brightest first.
+def shapes(
+    windows: Ints, starts: Reals, saturated: Marks, noises: Ints, meter: Meter
+) -> tuple[Marks, float]:
+    """Which ``windows`` have a star in them, and the width of the stars' spots in px.
 
-    A spot of variance v has 1 / (1/v + 1/w) under weights of variance w.
+    A spot of variance v has 1 / (1/v + 1/w) under weights of variance w. The usual width is that of
+    the brightest round spots: particles leave narrow ones, haze faint and wide ones. For the
+    arguments see ``centre``; the brightest window comes first.
     """
-    some = np.flatnonzero(~saturated)
-    some = some[: max(FEWEST_SPOTS, len(some) // 2)]
-    if len(some) < FEWEST_SPOTS:
-        return USUAL_SIGMA_PX
-    around = _Weights.about(_in_parts(starts[some]), np.full(len(some), WIDE_SIGMA_PX))
-    variance = float(np.median(around.variances(windows[some])))
-    _charge(len(some), 1, meter)
-    free = 1 / max(1 / max(variance, 0.1) - 1 / WIDE_SIGMA_PX**2, 0.1)
-    return float(np.clip(np.sqrt(free), *SIGMA_RANGE_PX))
+    at, count = _in_parts(starts), len(windows)
+    variances = _Weights.about(at, np.full(count, WIDE_SIGMA_PX)).variances(windows)
+    free = 1 / np.maximum(1 / np.maximum(variances, 0.05) - 1 / WIDE_SIGMA_PX**2, 0.05)
+    own = np.sqrt(np.clip(free, 0.1, None))
+    round_ones = (_disturbed(windows, at, own, noises) < ROUND) & ~saturated
+    usual = USUAL_SIGMA_PX
+    if np.count_nonzero(round_ones) >= FEWEST_SPOTS:
+        widths = own[round_ones][:MOST_WIDTHS]
+        usual = float(np.clip(np.quantile(widths, USUAL_SHARE), *SIGMA_RANGE_PX))
+    disturbed = _disturbed(windows, at, np.full(count, usual), noises)
+    star = own > usual * np.where(saturated, NARROW_SATURATED, NARROW)
+    star &= saturated | ((disturbed < MOST_DISTURBED) & (own < usual * WIDE))
+    _charge(count, 5, meter)
+    return star, usual
+
+
+def _disturbed(windows: Ints, at: Ints, sigmas: Reals, noises: Ints) -> Reals:
+    """Weighted share (n,) of the light that stands out above a Gaussian of ``sigmas`` (n,) px."""
+    around = _Weights.about(at, np.clip(sigmas, *SIGMA_RANGE_PX))
+    clean = around.cleaned(windows, windows, noises)
+    return around.share(windows, around.cleaned(clean, windows, noises))
 
 
 def centre(
@@ -122,7 +154,7 @@ def centre(
     _charge(len(windows), ROUNDS, meter)
     places = np.clip((at + step) / _PARTS, -2.5, 2.5)
     light = np.maximum(clean.sum(axis=(1, 2)) / 16, 1)
-    disturbed = around.sums(np.abs(windows - clean)) / np.maximum(around.sums(clean), 1)
+    disturbed = around.share(windows, clean)
     errors = np.sqrt(
         (noises / 16 * sigma**2 * np.sqrt(8 * np.pi) / light) ** 2
         + sigma**2 / (ELECTRONS_PER_DN * light)
@@ -171,6 +203,11 @@ class _Weights:
         squares = (x + y) / np.maximum(self.sums(windows), 1)
         variances: Reals = (squares - (self.means(windows) ** 2).sum(axis=1)) / (2 * _PARTS**2)
         return variances
+
+    def share(self, windows: Ints, clean: Ints) -> Reals:
+        """Weighted light (n,) that was taken out of ``windows``, in parts of what is left."""
+        share: Reals = self.sums(windows - clean) / np.maximum(self.sums(clean), 1)
+        return share
 
     def cleaned(self, clean: Ints, windows: Ints, noises: Ints) -> Ints:
         """``windows`` with the Gaussian that fits ``clean`` where they stand out above it."""
