@@ -4,10 +4,11 @@ Axes and errors: D = A_measured A_truth^T, with A the rotation from inertial to 
 across is the angle between the boresights, the error about them atan2(D01 - D10, D00 + D11).
 """
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -131,6 +132,46 @@ def compare(
     }
 
 
+def axis_errors_deg(
+    measured: NDArray[np.floating[Any]], truth: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Errors (3,) about the camera's axes, of quaternions (4,); for small ones, in degrees."""
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion
+
+    d = matrix_from_quaternion(measured) @ matrix_from_quaternion(truth).T
+    return np.degrees([d[1, 2] - d[2, 1], d[2, 0] - d[0, 2], d[0, 1] - d[1, 0]]) / 2
+
+
+class Rated(Protocol):
+    """How good a sensor says that its latest attitude is."""
+
+    @property
+    def valid(self) -> bool:
+        """Whether there is one that is rated."""
+
+    @property
+    def false_alarm(self) -> float:
+        """Wrong attitudes to be expected that are confirmed as well."""
+
+    @property
+    def sigmas_rad(self) -> NDArray[np.float64]:
+        """Standard deviations (3,) about the camera's axes."""
+
+
+def claims(
+    rated: Rated | None, measured: NDArray[np.float64] | None, truth: NDArray[np.float64] | None
+) -> dict[str, Any]:
+    """The fields of an ``AttitudeResult`` that say what the sensor claims, beside its errors."""
+    known = rated if rated is not None and rated.valid and measured is not None else None
+    return {
+        "false_alarm": None if known is None else float(known.false_alarm),
+        "sigma_deg": None if known is None else np.degrees(known.sigmas_rad).tolist(),
+        "error_deg": None
+        if measured is None or truth is None
+        else axis_errors_deg(measured, truth).tolist(),
+    }
+
+
 def _listed(quaternion: NDArray[np.float64] | None) -> list[float] | None:
     return None if quaternion is None else [float(part) for part in quaternion]
 
@@ -167,6 +208,9 @@ class AttitudeResult(Result):
         mode: "lis", "assisted" or "tracking": how it was found, or looked for.
         error_cross_deg, error_roll_deg: across and about the boresight.
         truth, quaternion: inertial to camera, scalar last; None without attitude.
+        reason: why there is no attitude, by a sensor that says so, else None.
+        false_alarm: wrong attitudes to be expected that are confirmed as well; None if not rated.
+        sigma_deg, error_deg: claimed standard deviations, and errors, about the camera's axes.
         phase_ms: virtual time of each step; wall_ms is wall time.
         status: how it ended, and names of the error flags.
     """
@@ -181,6 +225,10 @@ class AttitudeResult(Result):
     error_roll_deg: float | None
     truth: list[float] | None
     quaternion: list[float] | None
+    reason: str | None
+    false_alarm: float | None
+    sigma_deg: list[float] | None
+    error_deg: list[float] | None
     phase_ms: dict[str, float]
     wall_ms: float
     status: str
@@ -199,6 +247,9 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
     """Attitudes of a star tracker, each beside the truth."""
 
     title = "attitude over the serial line, beside the truth; errors in arcsec"
+    limits_ms: ClassVar[Mapping[str, float]] = {}
+    """What each step of the processing may take in the worst case, by its name in ``phase_ms``."""
+
     columns = ("frame", "right", "stars", "matched", "wrong", "cross", "roll", "status and flags")
 
     def count(self, options: SkyOptionsT) -> int:
@@ -220,15 +271,20 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         )
 
     def summarise(self, results: Sequence[AttitudeResultT], wall_s: float) -> Iterator[str]:
-        """Rates over all frames; over the right ones 95th percentiles of errors, mean time."""
+        """Rates over all frames; why the others were refused; over the right ones 95th percentiles
+        of errors, mean time; how the claims did; the longest step."""
         right = [result for result in results if result.right]
         judged = sum(result.right is not None for result in results)
         solved = sum(result.solved for result in results)
+        wrong = sum(result.solved and result.right is False for result in results)
         count = max(1, len(results))
         yield (
             f"of {len(results)}: {100 * solved / count:.1f} % solved, "
-            f"{100 * len(right) / count:.1f} % right, {wall_s:.1f} s wall time"
+            f"{100 * len(right) / count:.1f} % right, {wrong} wrong, {wall_s:.1f} s wall time"
         )
+        reasons = Counter(r.reason for r in results if not r.solved and r.reason is not None)
+        if reasons:
+            yield "refused: " + ", ".join(f"{number} {name}" for name, number in reasons.items())
         if right:
             # Some devices tell the time of the whole measurement.
             times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
@@ -239,8 +295,29 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
                 f"across, {arcsec(percentile_95(result.error_roll_deg for result in right))} "
                 f"about the boresight{time}"
             )
+        inside = [
+            [abs(error) / sigma for error, sigma in zip(r.error_deg, r.sigma_deg, strict=True)]
+            for r in results
+            if r.error_deg is not None and r.sigma_deg is not None
+        ]
+        if inside:
+            shares = [100 * float(np.mean(np.array(inside) < limit)) for limit in (1, 3)]
+            yield (
+                f"of the errors about the axes {shares[0]:.0f} % are within the claimed sigma, "
+                f"{shares[1]:.1f} % within three"
+            )
+        if longest := self.longest(results):
+            yield longest
         if judged and len(right) < POOR * judged:
             yield f"what may help: {self.advice(results)}"
+
+    def longest(self, results: Sequence[AttitudeResultT]) -> str:
+        """The worst case of each step of the processing, beside what it may take; one phrase."""
+        shown = [
+            f"{name} {max((r.phase_ms.get(name, 0.0) for r in results), default=0.0):.1f} of {ms:g}"
+            for name, ms in self.limits_ms.items()
+        ]
+        return f"longest, ms: {', '.join(shown)}" if shown else ""
 
     def advice(self, results: Sequence[AttitudeResultT]) -> str:
         """What to change where few results are right; one phrase."""

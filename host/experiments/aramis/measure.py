@@ -115,6 +115,7 @@ class AramisOptions(attitudes.SkyOptions):
 _KEYS = (
     *("solved", "right", "outcome", "reason", "centroids", "matched", "wrong"),
     *("candidates", "pivots", "triples", "mode", "error_cross_deg", "error_roll_deg"),
+    *("false_alarm", "sigma_deg", "error_deg"),
     *("far", "truth", "quaternion", "image_time_s", "flips", "corrected", "lost"),
     *("phase_ms", "wall_ms", "status"),
 )
@@ -125,7 +126,7 @@ class AramisResult(attitudes.AttitudeResult):
     """Attributes are those of the JSON output.
 
     Attributes:
-        outcome, reason: how the identification ended.
+        outcome: how the identification ended.
         candidates, pivots, triples: of the identification.
         far: whether the middle of the triangle, the first three stars with an identity, is more
             than a field's diameter from the boresight: wrong as appendix E of the thesis counts;
@@ -135,7 +136,6 @@ class AramisResult(attitudes.AttitudeResult):
     """
 
     outcome: str
-    reason: str
     candidates: int
     pivots: int
     triples: int
@@ -249,8 +249,10 @@ def _measure(
     flags = client.telemetry("ErrorFlags")
     stars = aramis.stars() if found.valid and truth is not None else []
     named = [star for star in stars if star.hipparcos is not None]
+    measured = found.quaternion if found.valid else None
     return AramisResult(
-        **attitudes.compare(found.quaternion if found.valid else None, truth),
+        **attitudes.compare(measured, truth),
+        **attitudes.claims(None, measured, truth),
         outcome=found.outcome.name.lower(),
         reason=found.reason.name.lower(),
         centroids=found.detected,

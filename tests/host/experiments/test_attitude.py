@@ -1,11 +1,24 @@
 """Attitudes beside the truth: verdict, errors, hints and wrong stars."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
+from cubestack.emulator.scene.attitude import (
+    matrix_from_quaternion,
+    propagate,
+    quaternion_from_pointing,
+)
 from cubestack.emulator.scene.hipparcos import load_sky
-from cubestack.host.experiments.attitude import compare, count_wrong, is_right, rough_boresight
+from cubestack.host.experiments.attitude import (
+    axis_errors_deg,
+    claims,
+    compare,
+    count_wrong,
+    is_right,
+    rough_boresight,
+)
 
 TRUTH = quaternion_from_pointing(84.0, -1.0, 20.0)
 
@@ -44,3 +57,17 @@ def test_stars_that_the_truth_puts_elsewhere_are_counted() -> None:
     assert count_wrong(numbers, seen, TRUTH) == 0
     assert count_wrong(numbers, seen[[0, 2, 1]], TRUTH) == 2
     assert count_wrong([], np.empty((0, 3)), TRUTH) == 0
+
+
+def test_errors_about_the_axes_are_those_of_a_small_turn() -> None:
+    turned = propagate(TRUTH, (0.01, -0.02, 0.03), 1.0)
+    assert np.abs(axis_errors_deg(turned, TRUTH)) == pytest.approx([0.01, 0.02, 0.03], rel=1e-3)
+
+
+def test_claims_stand_beside_errors_only_where_both_are_known() -> None:
+    rated = SimpleNamespace(valid=True, false_alarm=1e-9, sigmas_rad=np.radians([1.0, 2.0, 3.0]))
+    both = claims(rated, TRUTH, TRUTH)
+    assert both["sigma_deg"] == pytest.approx([1, 2, 3])
+    assert both["error_deg"] == pytest.approx([0, 0, 0], abs=1e-12)
+    assert claims(rated, None, TRUTH) == dict.fromkeys(both)
+    assert claims(None, TRUTH, None) == dict.fromkeys(both)
