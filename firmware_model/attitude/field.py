@@ -61,7 +61,10 @@ def field_of(camera: CameraParameters, columns: int, rows: int) -> Field:
     )
     tangents = _tangents(camera, x, y)
     sides = [
-        [np.polyfit(tangents[:, k, 1], tangents[:, k, 0], 2), np.polyfit(*tangents[k].T, 2)]
+        [
+            np.polyfit(tangents[:, k, 1], tangents[:, k, 0], 2),
+            np.polyfit(tangents[k, :, 0], tangents[k, :, 1], 2),
+        ]
         for k in (0, 2)
     ]
     coefficients = np.moveaxis(np.array(sides, np.float32), 2, 0)[::-1, ..., None]

@@ -29,7 +29,7 @@ Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
 #: False alarms a picture, above which an attitude is refused.
-LARGEST_FALSE_ALARM = 1e-5
+LARGEST_FALSE_ALARM = 1e-4
 
 #: Parts of the margin within which stars and sides may agree.
 LEVELS = (0.25, 0.5, 1.0)

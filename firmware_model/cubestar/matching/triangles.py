@@ -30,6 +30,10 @@ MOST_PAIRS = 3072
 #: these give no attitude. The charge is made centroid by centroid.
 _BATCHES = (5, 10, 18, 64)
 
+#: Triangles that chance gives over those of even stars in a round field: measured in random
+#: pictures. In a field twice as wide as high rings cross at smaller angles, and real stars cluster.
+_UNEVEN = 2.5
+
 _SMALLEST_SQUARED_SINE = np.float32(1e-8)
 
 
@@ -142,7 +146,7 @@ class _Batch:
         side = cosine[high * (high - 1) // 2 + low]
         sine = np.sqrt(np.maximum(1 - side * side, _SMALLEST_SQUARED_SINE))
         third = np.abs((va * vb).sum(axis=1) - side) / sine
-        fits = ((third <= tolerance) & (ia != ib)).nonzero()[0]
+        fits = ((third <= tolerance) & (ia != ib) & (a != b)).nonzero()[0]
         one, other = one[fits], other[fits]
         self._newest = newest[one]
         self._centroids = np.stack((ia[fits], ib[fits], self._newest), axis=1)
@@ -156,7 +160,7 @@ class _Batch:
         self._found = np.bincount(self._newest, minlength=count)
         # Chance: each entry fixes an attitude in two ways; a third star then agrees where two
         # rings of width 2 e cross, 4 e^2 over the sine of the angle of crossing (2/pi in the mean).
-        density = stars / (4 * np.pi)
+        density = _UNEVEN * stars / (4 * np.pi)
         self._chance = len(hub) / len(newer) * density * 2 * np.pi * tolerance_rad**2
         self._stars_listed = stars
 
@@ -210,7 +214,7 @@ class _Batch:
                 "f32_mul": 4 * wedges + 19 * found,
                 "f32_add": 3 * wedges + 10 * found,
                 "flash_read": 6 * wedges + 9 * found,
-                "i32_add": 5 * wedges + found,
+                "i32_add": 6 * wedges + found,
                 "table_byte": wedges,
                 "ram_write": 8 * found,
                 "loop": wedges,

@@ -15,7 +15,7 @@ class CubeStarSwitches(Switches):
         "confirmed",
         source="section 4.3.3, Algorithm 2",
         reason="votes name wrong stars among false ones; an attitude that triangles propose is "
-        "believed when chance would confirm it less than once in 100 000 pictures",
+        "believed when chance would confirm it less than once in 10 000 pictures",
     )
     weights: str = switch(
         "what a pixel weighs in its star's centroid",

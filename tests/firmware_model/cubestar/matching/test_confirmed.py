@@ -1,6 +1,7 @@
 """Identification by confirmation on random skies; each rate has room for chance."""
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.attitude.confirmation import scaled
 from cubestack.firmware_model.attitude.field import Field
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.confirmed import identify
+from cubestack.firmware_model.cubestar.matching.confirmed import Pass, identify
 from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
 from cubestack.firmware_model.cubestar.matching.prediction import LARGEST_FALSE_ALARM
+from cubestack.firmware_model.cubestar.matching.triangles import steps
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 
 from ..sky import meter, pinhole
@@ -188,3 +190,48 @@ def test_it_ends_in_time(name: Name, shoot: Shoot) -> None:
     easy, shot = meter(), shoot(rng)
     name(shot.directions, on=easy)
     assert CORTEX_M3.seconds(easy.total) < 0.1
+
+
+def test_triangles_are_those_that_trying_all_finds(catalogue: StarCatalogue) -> None:
+    rng = np.random.default_rng(97)
+    tolerance, count = 0.001, 10
+    vectors = catalogue.vectors.astype(float)
+    listed = np.arccos(np.clip(vectors @ vectors.T, -1, 1))
+    np.fill_diagonal(listed, 9.0)
+    chance = seen = 0.0
+    for _ in range(12):
+        rays = random_rays(rng, count)
+        apart = np.arccos(np.clip(rays.astype(float) @ rays.T.astype(float), -1, 1))
+        wanted = set()
+        for i, j, k in combinations(range(count), 3):
+            a, b = np.nonzero(np.abs(listed - apart[i, j]) <= tolerance)
+            for p, q in zip(a, b, strict=True):
+                fits = np.abs(listed[p] - apart[i, k]) <= tolerance
+                fits &= np.abs(listed[q] - apart[j, k]) <= tolerance
+                wanted |= {((i, p), (j, q), (k, r)) for r in np.flatnonzero(fits)}
+        found = set()
+        for step in steps(rays, catalogue, tolerance, None, meter(), 1 << 62):
+            chance += step.by_chance
+            seen += np.count_nonzero(~step.mirrored)
+            for centroids, stars in zip(step.centroids, step.stars, strict=True):
+                found.add(tuple(sorted(zip(centroids.tolist(), stars.tolist(), strict=True))))
+        assert len(found ^ wanted) <= 1  # a side at the tolerance may round either way
+    assert 0.4 < seen / chance < 1.2  # these stars do not cluster
+
+
+def test_few_random_pictures_are_believed_and_no_more_than_said(name: Name) -> None:
+    rng = np.random.default_rng(98)
+    believed = 0
+    for _ in range(150):
+        loose = name(random_rays(rng, 8), largest_false_alarm=0.05, passes=(Pass(),))
+        believed += len(loose.matched) > 0
+    assert believed <= 15  # twice what is said
+
+
+def test_two_centroids_side_by_side_are_no_one_star(name: Name, shoot: Shoot) -> None:
+    rng = np.random.default_rng(99)
+    shot = next(s for s in (shoot(rng) for _ in range(20)) if 8 <= len(s.stars) <= 18)
+    twin = shot.directions[3] + np.array([3e-4, 0, 0], dtype=np.float32)
+    rays = np.vstack([shot.directions, twin / np.linalg.norm(twin)]).astype(np.float32)
+    found = name(rays)
+    assert sorted(found.stars[found.matched].tolist()) == sorted(shot.stars.tolist())
