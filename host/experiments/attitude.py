@@ -8,11 +8,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.host.clients.quality import AttitudeQuality
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result
 from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import MeasureOptions
@@ -142,24 +143,10 @@ def axis_errors_deg(
     return np.degrees([d[1, 2] - d[2, 1], d[2, 0] - d[0, 2], d[0, 1] - d[1, 0]]) / 2
 
 
-class Rated(Protocol):
-    """How good a sensor says that its latest attitude is."""
-
-    @property
-    def valid(self) -> bool:
-        """Whether there is one that is rated."""
-
-    @property
-    def false_alarm(self) -> float:
-        """Wrong attitudes to be expected that are confirmed as well."""
-
-    @property
-    def sigmas_rad(self) -> NDArray[np.float64]:
-        """Standard deviations (3,) about the camera's axes."""
-
-
 def claims(
-    rated: Rated | None, measured: NDArray[np.float64] | None, truth: NDArray[np.float64] | None
+    rated: AttitudeQuality | None,
+    measured: NDArray[np.float64] | None,
+    truth: NDArray[np.float64] | None,
 ) -> dict[str, Any]:
     """The fields of an ``AttitudeResult`` that say what the sensor claims, beside its errors."""
     known = rated if rated is not None and rated.valid and measured is not None else None

@@ -17,6 +17,7 @@ from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, MS_PER_DAY, C
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.clients.contract import Columns, DeviceClient, Progress
+from cubestack.host.clients.quality import AttitudeQuality, common
 from cubestack.host.clients.quaternions import attitude_columns, unit_quaternion
 from cubestack.host.errors import StepFailedError, TargetError
 
@@ -69,40 +70,22 @@ class Star:
     hipparcos: int | None
 
 
-@dataclass(frozen=True)
-class Quality:
-    """What the latest attitude is worth, and what its picture was like; angles about x, y, z.
+@dataclass(frozen=True, kw_only=True)
+class Quality(AttitudeQuality):
+    """What the latest attitude is worth, and what its picture was like.
+
+    Without an attitude that further stars confirm, all figures of the attitude are 0.
 
     Attributes:
-        valid: the latest picture gave an attitude that further stars confirm; without one, all
-            figures of the attitude are 0.
-        reason: why.
-        log10_false_alarm: wrong attitudes to be expected that would be confirmed as well.
-        matched, expected: stars that agree, of so many of the catalogue in the field.
-        residual_px: root mean square distance of these stars from their places, each axis.
-        sigma_deg: (3,) standard deviations.
-        correlation: (3, 3) of the three turns.
-        scale: focal length that the stars show, beside the one that is set.
-        background, noise, spread: level of the sky in counts, a pixel's noise, and how far the
-            level changes over the field.
+        residual_px: root mean square distance of the stars from their places, each axis.
+        spread_dn: how far the level of the sky changes over the field.
         blind: part of the field that is too bright for stars, 0 to 1.
-        spikes, rejected: bright pixels of no star, and regions that are no stars by their shape.
+        rejected: regions that are no stars by their shape.
     """
 
-    valid: bool
-    reason: aramis.Reason
-    log10_false_alarm: float
-    matched: int
-    expected: int
     residual_px: float
-    sigma_deg: NDArray[np.float64]
-    correlation: NDArray[np.float64]
-    scale: float
-    background: float
-    noise: float
-    spread: float
+    spread_dn: float
     blind: float
-    spikes: int
     rejected: int
 
 
@@ -261,22 +244,12 @@ class Aramis(DeviceClient):
     def quality(self) -> Quality:
         """What the latest attitude is worth, and what its picture was like."""
         values = self.client.telemetry("Quality")
-        xy, xz, yz = (float(values[f"Correlation{axes}"]) for axes in ("XY", "XZ", "YZ"))
         return Quality(
-            valid=bool(values["Valid"]),
+            **common(values, "FalseAlarm"),
             reason=aramis.Reason(int(values["Reason"])),
-            log10_false_alarm=float(values["FalseAlarm"]),
-            matched=int(values["Matched"]),
-            expected=int(values["Expected"]),
             residual_px=float(values["Residual"]),
-            sigma_deg=np.degrees([float(values[f"Sigma{axis}"]) for axis in "XYZ"]),
-            correlation=np.array([[1, xy, xz], [xy, 1, yz], [xz, yz, 1]], np.float64),
-            scale=float(values["Scale"]),
-            background=float(values["Background"]),
-            noise=float(values["Noise"]),
-            spread=float(values["Spread"]),
+            spread_dn=float(values["Spread"]),
             blind=float(values["Blind"]),
-            spikes=int(values["Spikes"]),
             rejected=int(values["Rejected"]),
         )
 

@@ -20,6 +20,7 @@ from cubestack.firmware_model.interface.cubestar import (
     TaskStatus,
 )
 from cubestack.host.clients.contract import Columns, DeviceClient, Progress
+from cubestack.host.clients.quality import AttitudeQuality, common
 from cubestack.host.clients.quaternions import attitude_columns, pointing_deg, unit_quaternion
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
@@ -61,46 +62,25 @@ class Attitude:
         return pointing_deg(self.quaternion)[1]
 
 
-@dataclass(frozen=True)
-class Quality:
+@dataclass(frozen=True, kw_only=True)
+class Quality(AttitudeQuality):
     """How good the latest picture's attitude is, as the node rates it (profile ``extended``).
 
+    Where nothing is known, the covariance has pi^2 on its diagonal.
+
     Attributes:
-        valid: the latest picture gave an attitude, and this rates it.
-        reason: why there is none, or SOLVED.
         frame: number of the picture since power-up.
-        covariance: float64 (3, 3), rad^2: of the small rotation that separates true and reported
-            camera axes, about the camera's x, y and z; pi^2 on the diagonal where nothing is known.
-        false_alarm: expected number of attitudes that chance would confirm as well.
-        matched, expected: stars that the attitude rests on, and that it puts in the picture.
         residual_rad: root mean square of the stars' residuals in each axis.
-        scale: measured focal length over the one that is set.
-        background_dn, background_range_dn, noise_dn: the sky's brightness, its largest
-            difference, and the standard deviation of a pixel.
+        background_range_dn: largest difference of the sky's brightness.
         saturated: share of the picture at the end of the scale, 0 to 1.
-        spikes, elongated: bright pixels that are no spots, areas drawn out to streaks.
+        elongated: areas drawn out to streaks.
     """
 
-    valid: bool
-    reason: Reason
     frame: int
-    covariance: NDArray[np.float64]
-    false_alarm: float
-    matched: int
-    expected: int
     residual_rad: float
-    scale: float
-    background_dn: float
     background_range_dn: float
-    noise_dn: float
     saturated: float
-    spikes: int
     elongated: int
-
-    @property
-    def sigmas_rad(self) -> NDArray[np.float64]:
-        """Standard deviations (3,) about the camera's x, y and z."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
 @dataclass(frozen=True)
@@ -235,30 +215,13 @@ class CubeStar(DeviceClient):
     def quality(self) -> Quality:
         """How good the latest picture's attitude is; raises BadAnswerError for what none can be."""
         values = self.client.telemetry("Quality")
-        sigmas = np.array([float(values[f"Sigma{axis}"]) for axis in "XYZ"])
-        correlations = np.eye(3)
-        for one, other in ((0, 1), (0, 2), (1, 2)):
-            value = float(values[f"Correlation{'XYZ'[one]}{'XYZ'[other]}"])
-            correlations[one, other] = correlations[other, one] = value
-        if not (np.all(sigmas > 0) and np.all(np.abs(correlations) <= 1)):
-            raise BadAnswerError(
-                f"telemetry Quality: sigmas must be above 0 and correlations within 1, not {values}"
-            )
         return Quality(
-            valid=bool(values["Valid"]),
+            **common(values, "LogFalseAlarm"),
             reason=Reason(int(values["Reason"])),
             frame=int(values["FrameCounter"]),
-            covariance=correlations * np.outer(sigmas, sigmas),
-            false_alarm=10.0 ** float(values["LogFalseAlarm"]),
-            matched=int(values["Matched"]),
-            expected=int(values["Expected"]),
             residual_rad=float(values["Residual"]),
-            scale=float(values["Scale"]),
-            background_dn=float(values["Background"]),
             background_range_dn=float(values["BackgroundRange"]),
-            noise_dn=float(values["Noise"]),
             saturated=float(values["Saturated"]),
-            spikes=int(values["Spikes"]),
             elongated=int(values["Elongated"]),
         )
 

@@ -252,7 +252,7 @@ def _measure(
     measured = found.quaternion if found.valid else None
     return AramisResult(
         **attitudes.compare(measured, truth),
-        **attitudes.claims(None, measured, truth),
+        **attitudes.claims(aramis.quality(), measured, truth),
         outcome=found.outcome.name.lower(),
         reason=found.reason.name.lower(),
         centroids=found.detected,

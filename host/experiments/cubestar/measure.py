@@ -24,6 +24,7 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -295,7 +296,7 @@ def _measure(
     )
 
 
-def _words(reason: Reason) -> str:
+def _words(reason: IntEnum) -> str:
     return reason.name.lower().replace("_", " ")
 
 

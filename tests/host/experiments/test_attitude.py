@@ -1,7 +1,5 @@
 """Attitudes beside the truth: verdict, errors, hints and wrong stars."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,8 @@ from cubestack.emulator.scene.attitude import (
     quaternion_from_pointing,
 )
 from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.firmware_model.interface.cubestar.codes import Reason
+from cubestack.host.clients.quality import AttitudeQuality, common
 from cubestack.host.experiments.attitude import (
     axis_errors_deg,
     claims,
@@ -65,7 +65,12 @@ def test_errors_about_the_axes_are_those_of_a_small_turn() -> None:
 
 
 def test_claims_stand_beside_errors_only_where_both_are_known() -> None:
-    rated = SimpleNamespace(valid=True, false_alarm=1e-9, sigmas_rad=np.radians([1.0, 2.0, 3.0]))
+    values = dict.fromkeys(("CorrelationXY", "CorrelationXZ", "CorrelationYZ"), 0.0)
+    values |= {f"Sigma{axis}": np.radians(n) for n, axis in enumerate("XYZ", 1)}
+    values |= dict.fromkeys(("Matched", "Expected", "Background", "Noise", "Spikes"), 1.0)
+    found = common({**values, "Valid": True, "Scale": 1.0, "Log": -9.0}, "Log")
+    rated = AttitudeQuality(reason=Reason.SOLVED, **found)
+    assert rated.false_alarm == pytest.approx(1e-9)
     both = claims(rated, TRUTH, TRUTH)
     assert both["sigma_deg"] == pytest.approx([1, 2, 3])
     assert both["error_deg"] == pytest.approx([0, 0, 0], abs=1e-12)

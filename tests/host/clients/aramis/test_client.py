@@ -78,10 +78,12 @@ def test_quality(node: FakeAramis, aramis: Aramis) -> None:
     }
     found = aramis.quality()
     assert (found.valid, found.reason) == (True, codes.Reason.CONFIRMED)
-    np.testing.assert_allclose(np.radians(found.sigma_deg), [1e-5, 2e-5, 1e-4], rtol=1e-5)
-    np.testing.assert_array_equal(found.correlation, found.correlation.T)
-    assert found.correlation[0].tolist() == [1, 0.25, -0.5]
-    assert (found.log10_false_alarm, found.residual_px, found.blind) == (-12.5, 0.125, 0.25)
+    np.testing.assert_allclose(found.sigmas_rad, [1e-5, 2e-5, 1e-4], rtol=1e-5)
+    np.testing.assert_array_equal(found.covariance, found.covariance.T)
+    correlation = found.covariance / np.outer(found.sigmas_rad, found.sigmas_rad)
+    np.testing.assert_allclose(correlation[0], [1, 0.25, -0.5], rtol=1e-6)
+    assert found.false_alarm == pytest.approx(10**-12.5, rel=1e-6)
+    assert (found.residual_px, found.blind) == (0.125, 0.25)
     assert (found.matched, found.expected, found.spikes, found.rejected) == (9, 11, 70_000, 3)
 
 

@@ -1,0 +1,73 @@
+"""How good a star tracker says that its latest attitude is: what both have in common."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.codec.field import Value
+from cubestack.host.errors import BadAnswerError
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttitudeQuality:
+    """What a filter needs of an attitude, and why there is none.
+
+    Attributes:
+        valid: the latest picture gave an attitude, and this rates it.
+        reason: why there is none, or that there is one.
+        covariance: float64 (3, 3), rad^2: of the small rotation that separates true and reported
+            camera axes, about the camera's x, y and z.
+        false_alarm: expected number of attitudes that chance would confirm as well.
+        matched, expected: stars that the attitude rests on, and that it puts in the picture.
+        scale: measured focal length over the one that is set.
+        background_dn, noise_dn: the sky's brightness, and the standard deviation of a pixel.
+        spikes: bright pixels that are no stars: hot ones, particles.
+    """
+
+    valid: bool
+    reason: IntEnum
+    covariance: NDArray[np.float64]
+    false_alarm: float
+    matched: int
+    expected: int
+    scale: float
+    background_dn: float
+    noise_dn: float
+    spikes: int
+
+    @property
+    def sigmas_rad(self) -> NDArray[np.float64]:
+        """Standard deviations (3,) about the camera's x, y and z."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+def common(values: Mapping[str, Value], false_alarm: str) -> dict[str, Any]:
+    """Attributes of ``AttitudeQuality`` but the reason, of a telemetry frame's fields.
+
+    ``false_alarm`` names the field with its decimal logarithm. Raises BadAnswerError for sigmas
+    below 0 and correlations beyond 1.
+    """
+    sigmas = np.array([float(values[f"Sigma{axis}"]) for axis in "XYZ"])
+    correlations = np.eye(3)
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        value = float(values[f"Correlation{'XYZ'[one]}{'XYZ'[other]}"])
+        correlations[one, other] = correlations[other, one] = value
+    if not (np.all(sigmas >= 0) and np.all(np.abs(correlations) <= 1)):
+        raise BadAnswerError(
+            f"telemetry Quality: sigmas must be 0 or more and correlations within 1, not {values}"
+        )
+    return {
+        "valid": bool(values["Valid"]),
+        "covariance": correlations * np.outer(sigmas, sigmas),
+        "false_alarm": 10.0 ** float(values[false_alarm]),
+        "matched": int(values["Matched"]),
+        "expected": int(values["Expected"]),
+        "scale": float(values["Scale"]),
+        "background_dn": float(values["Background"]),
+        "noise_dn": float(values["Noise"]),
+        "spikes": int(values["Spikes"]),
+    }
