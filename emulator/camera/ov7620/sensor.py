@@ -128,8 +128,13 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         return replace(own, scale=own.scale * basics.scale, residuals=basics.residuals)
 
     @property
+    def _hazards(self) -> effects.Hazards:
+        """Those of the condition, drawn for this camera."""
+        return tuple(replace(h, seed=h.seed ^ self.camera) for h in self.condition.hazards)
+
+    @property
     def _basics(self) -> Lens:
-        return effects.lens(IN_FOCUS, self.condition.hazards, self.condition.temperature_c)
+        return effects.lens(IN_FOCUS, self._hazards, self.condition.temperature_c)
 
     def _check(self, scene: EarthSunScene, condition: FisheyeCondition) -> None:
         del condition
@@ -257,6 +262,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     def _picture(self, frame: _Frame) -> Grey:
         condition, settings, shutter = self.condition, frame.settings, frame.shutter
+        hazards = self._hazards
         light = self._light_at(shutter.mid_exposure_ps((chip.ROWS - 1) / 2))
         light = light * np.float32(shutter.exposure_lines)
         if not settings.monochrome:
@@ -265,8 +271,8 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         seed = [condition.seed, self.camera, shutter.readout_ps]
         per_count = ELECTRONS_PER_GREY / settings.gain
         exposure = Exposure(SHAPE, PITCH_UM, shutter.exposure_s, condition.temperature_c, per_count)
-        light = effects.on_light(light, condition.hazards, exposure, seed, ELECTRONS_PER_GREY)
-        variance = effects.variance(condition.hazards, exposure) / ELECTRONS_PER_GREY**2
+        light = effects.on_light(light, hazards, exposure, seed, ELECTRONS_PER_GREY)
+        variance = effects.variance(hazards, exposure) / ELECTRONS_PER_GREY**2
         generator = None
         if condition.noise:
             generator = np.random.Generator(np.random.SFC64(seed))
@@ -291,7 +297,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         return self._light[-1]
 
     def _wanted(self, time_ps: int) -> float:
-        """Line times of exposure at gain 1 that bring the picture's mean to the level aimed at."""
+        """Line times of exposure at gain 1 that bring the mean light to the level aimed at."""
         mean = float(self._light_at(time_ps).mean())
         return (AUTO_LEVEL - BLACK) / max(mean, 1e-6)
 

@@ -27,7 +27,7 @@ class FisheyeCondition:
         seed: of noise and hot pixels.
         nadir_lens, sun_lens: what is particular to a camera's lens; None: the unit's own.
         temperature_c: of lens and sensor, -60 to 125; only hazards depend on it.
-        hazards: what else is wrong with lenses and sensors, the same with both cameras.
+        hazards: what else is wrong with lenses and sensors, drawn for each camera.
     """
 
     bloom_px: float = 7.0  # chosen between the published 8 and 6

@@ -105,6 +105,13 @@ def test_hot_pixels_are_stuck_as_those_of_the_key() -> None:
         FisheyeCondition(hazards=(HotPixels(count=75_000),), hot_pairs=1801)
 
 
+def test_each_camera_has_a_draw_of_its_own() -> None:
+    slopes = [grey(Gradient(seed=6), scene=DARK, which=which) for which in Target]
+    assert np.abs(slopes[0] - slopes[1]).max() > 5
+    residuals = [camera(LensResiduals(seed=6), which=which).lens.residuals for which in Target]
+    assert residuals[0] != residuals[1]
+
+
 def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
     boresight = np.array([369, 250])
     own, moved = (
