@@ -5,8 +5,9 @@ of the catalogue are in the picture, and where; ``attitude.confirmation`` tells 
 confirms one so well. The first that is below `LARGEST_FALSE_ALARM` a picture is taken, unless
 another one of the same centroids is too.
 
-Sides are compared within two fifths of the margin first. If that confirms nothing, other focal
-lengths are tried, then the whole margin. Whatever is tried counts.
+Sides are compared within two fifths of the margin first. If that confirms nothing, the picture is
+looked at in a mirror, which can only tell why; then other focal lengths are tried, then the whole
+margin. Whatever is tried counts.
 """
 
 from collections.abc import Iterator
@@ -52,15 +53,21 @@ _SAME_DEG = 0.5
 @dataclass(frozen=True)
 class Pass:
     """One search: by what tangents of field angles are multiplied, the part of the margin within
-    which sides agree, and how many centroids take part."""
+    which sides agree, how many centroids take part, and whether the picture is seen in a mirror."""
 
     factor: float = 1.0
     part: float = 0.4
     most: int = 64
+    mirrored: bool = False
 
 
 _OTHER_LENSES = [1 + sign * 0.0025 * step for step in range(1, 13) for sign in (1, -1)]
-PASSES = (Pass(), *(Pass(factor, most=10) for factor in _OTHER_LENSES), Pass(part=1.0))
+PASSES = (
+    Pass(),
+    Pass(most=10, mirrored=True),
+    *(Pass(factor, most=10) for factor in _OTHER_LENSES),
+    Pass(part=1.0),
+)
 
 
 def identify(
@@ -142,8 +149,9 @@ class _Search:
 
     def run(self, passes: tuple[Pass, ...]) -> Candidate | MatchOutcome:
         """The attitude that is believed, or why there is none."""
-        picture, meter = self._picture, self._picture.meter
+        meter = self._picture.meter
         for each in passes:
+            picture = self._picture.mirrored() if each.mirrored else self._picture
             with meter.phase("distances"):
                 rays = scaled(picture.directions[: each.most], each.factor, meter)
             tolerance = each.part * picture.margin_rad
@@ -153,22 +161,28 @@ class _Search:
                 left -= 1
                 self.chance += step.by_chance
                 self.entries += step.entries
-                candidates = self._candidates(step, each.factor, tolerance, seen)
+                candidates = self._candidates(step, picture, each.factor, tolerance, seen)
                 believed = [one for one in candidates if one.false_alarm <= self._largest]
                 if believed:
                     best = min(believed, key=lambda one: one.false_alarm)
                     rivals = any(_apart_deg(best, other) > _SAME_DEG for other in believed)
+                    if each.mirrored:
+                        return MatchOutcome.MIRRORED
                     return MatchOutcome.AMBIGUOUS if rivals else best
             if self._late or left > 0:
                 return MatchOutcome.NO_TIME
         return MatchOutcome.UNCONFIRMED if self.tried else MatchOutcome.TOO_FEW_MATCHED
 
     def _candidates(
-        self, step: Step, factor: float, tolerance: float, seen: list[dict[int, int]]
+        self,
+        step: Step,
+        picture: Picture,
+        factor: float,
+        tolerance: float,
+        seen: list[dict[int, int]],
     ) -> Iterator[Candidate]:
         """Attitudes of the triangles of a step, but not of those that one of `seen` has within it:
         star of each centroid that attitudes tried so far name."""
-        picture = self._picture
         for row in np.flatnonzero(~step.mirrored):
             centroids, stars = step.centroids[row], step.stars[row]
             if self._late:

@@ -6,9 +6,10 @@ place that fits within a half or a quarter of the margin says more, so these are
 count as tries.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import exp, factorial, inf, pi
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,10 @@ class Picture:
     field: Field
     margin_rad: float
     meter: Meter
+
+    def mirrored(self) -> Self:
+        """This picture with left and right exchanged about the boresight."""
+        return replace(self, directions=self.directions * np.array([-1, 1, 1], np.float32))
 
     def confirm(
         self,
