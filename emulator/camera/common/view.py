@@ -58,6 +58,7 @@ class SkyCondition:
         if self.hot_count > pixels:
             raise SceneError(f"hot_pixels must be at most {pixels}, not {self.hot_count}")
         check_temperature(self.temperature_c)
+        effects.lens(self.optics.basics, self.hazards, self.temperature_c)
 
     @property
     def hot_count(self) -> int:

@@ -34,14 +34,13 @@ from cubestack.emulator.camera.ov7620.light import scene_light
 from cubestack.emulator.camera.ov7620.luminance import (
     BLACK,
     ELECTRONS_PER_GREY,
-    F_NUMBER,
     PITCH_UM,
     SPOT_PX,
     luminance,
     stuck_pixels,
 )
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
-from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.camera.ov7620.view import IN_FOCUS, EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.firmware_model.interface.cameras import ov7620 as chip
 
@@ -54,9 +53,6 @@ AUTO_LEVEL = 100.0
 
 LONGEST_EXPOSURE, HIGHEST_GAIN = 255, 7.75  # of EXPOSURE and GAIN
 SHAPE = chip.ROWS, chip.COLUMNS
-IN_FOCUS = Lens(F_NUMBER, PITCH_UM, SHAPE, SPOT_PX)
-"""What hazards may change of the lens."""
-
 REMEMBERED = 8
 """Frames kept: more than anybody looks ahead or back."""
 

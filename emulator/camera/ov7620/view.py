@@ -3,15 +3,19 @@
 from dataclasses import dataclass
 
 from cubestack.emulator.camera.common.hazards import effects
-from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+from cubestack.emulator.camera.common.hazards.contract import Lens, SensorHazard
 from cubestack.emulator.camera.common.view import View, check_temperature
 from cubestack.emulator.camera.ov7620.lens_error import LensError
+from cubestack.emulator.camera.ov7620.luminance import F_NUMBER, PITCH_UM, SPOT_PX
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
 MOST_STUCK = ROWS * COLUMNS // 4
 """Single pixels and pairs that find a place each."""
+
+IN_FOCUS = Lens(F_NUMBER, PITCH_UM, (ROWS, COLUMNS), SPOT_PX)
+"""What hazards may change of the lens."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,7 @@ class FisheyeCondition:
         refuse_zero(self, "bloom_px")
         refuse_negative(self, "hot_pixels", "hot_pairs", "seed")
         check_temperature(self.temperature_c)
+        effects.lens(IN_FOCUS, self.hazards, self.temperature_c)
         if self.hot_count + self.hot_pairs > MOST_STUCK:
             raise SceneError(
                 f"hot_pixels and hot_pairs must be at most {MOST_STUCK} together, "

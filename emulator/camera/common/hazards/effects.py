@@ -12,15 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, Lens, SensorHazard
+from cubestack.emulator.scene.file import SceneError
+
+WIDEST_PX = 20.0  # standard deviation of a spot, assumed: few stars would still show
+SHORTEST, LONGEST = 0.85, 1.15
+"""Focal length by the usual one: no lens in use differs more."""
 
 Hazards = tuple[SensorHazard, ...]
 Grey = NDArray[np.uint8]
 
 
 def lens(own: Lens, hazards: Hazards, temperature_c: float) -> Lens:
-    """The lens ``own`` as they make it."""
+    """The lens ``own`` as they make it; SceneError where they go too far together."""
     for hazard in hazards:
         own = hazard.lens(own, temperature_c)
+    if own.spot_px > WIDEST_PX:
+        raise SceneError(
+            f"the hazards' spot at {temperature_c:g} C must be at most {WIDEST_PX:g} px, "
+            f"not {own.spot_px:.3g}"
+        )
+    if not SHORTEST <= own.scale <= LONGEST:
+        raise SceneError(
+            f"the hazards' focal length at {temperature_c:g} C must be {SHORTEST:g} to "
+            f"{LONGEST:g} of the usual one, not {own.scale:.3g}"
+        )
     return own
 
 

@@ -10,6 +10,7 @@ from cubestack.emulator.camera.common.residual import displaced
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.camera.mt9m001.lens import CONDITION as ARAMIS
+from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.file import SceneError
 
 GRID = np.stack(np.meshgrid(np.linspace(0, 1023, 41), np.linspace(0, 511, 31)), -1).reshape(-1, 2)
@@ -74,6 +75,16 @@ def test_residuals_have_their_rms_and_are_no_turn_or_scale(seed: int) -> None:
 def test_residuals_can_be_undone() -> None:
     crooked = lens(LensResiduals(rms_px=2.0, seed=1), FocalLength(percent=1.0))
     np.testing.assert_allclose(crooked.project(crooked.unproject(GRID)), GRID, atol=1e-9)
+
+
+def test_hazards_that_go_too_far_together_are_refused() -> None:
+    with pytest.raises(SceneError, match=r"spot at 60 C must be at most 20 px, not 71"):
+        replace(CONDITION, hazards=(Defocus(um_per_k=50.0),), temperature_c=60.0)
+    twice = (FocalLength(percent=10.0), FocalLength(percent=5.0))
+    with pytest.raises(SceneError, match=r"must be 0.85 to 1.15 of the usual one, not 1.1[56]"):
+        replace(CONDITION, hazards=twice)
+    with pytest.raises(SceneError, match=r"must be 0.85 to 1.15 of the usual one, not 1.1[56]"):
+        FisheyeCondition(hazards=twice)
 
 
 def test_what_the_lens_can_not_image_stops_no_other_star() -> None:
