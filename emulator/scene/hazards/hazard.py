@@ -18,7 +18,7 @@ class Strength:
     """The scale on which a hazard is swept.
 
     Attributes:
-        key: the field that is swept.
+        key: what is swept: a field, or what ``placed`` makes of it.
         unit: of its values, empty for a plain number.
         values: from harmless to worst.
         default: that of a hazard asked for without a strength; None: the last of ``values``.
