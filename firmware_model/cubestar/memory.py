@@ -10,10 +10,18 @@ modelled, so flash and RAM must leave room for it.
 import numpy as np
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.detection.background import CELL
+from cubestack.firmware_model.cubestar.detection.background_search import (
+    MOST_AREAS,
+    MOST_SHAPES,
+    MOST_STARS_FACTOR,
+)
+from cubestack.firmware_model.cubestar.detection.spots import HALF
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
 from cubestack.firmware_model.cubestar.matching.triangles import MOST_PAIRS
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
@@ -71,6 +79,7 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         # place in the picture (19 bits) and value (8 bits) in one word
         "area that is grown": pixels * 4,
         "recursion of region growing": pixels * GROW_FRAME_BYTES,
+        **_background_search(),
         # angle; first entry and number of entries in the pair list
         "pairs of stars": pairs * (4 + 2 + 2),
         "votes": stars * listed * 2,
@@ -98,6 +107,34 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
         ),
         Buffer("settings, flags and counters", Memory.RETENTION, State.RETENTION_SIZE),
     )
+
+
+def _background_search() -> dict[str, int]:
+    """Buffers of the search above the background, by name."""
+    cells = -(-ROWS // CELL) * -(-COLUMNS // CELL)
+    runs = COLUMNS // 2  # of a row, at most
+    window = (2 * HALF + 1) ** 2
+    return {
+        "level and noise of the background": cells * (2 + 2),
+        "histogram of a cell": 256 * 2,
+        # the next one is read into the oldest
+        "three rows of the picture": 3 * COLUMNS,
+        # first and last column, area
+        "runs of two rows": 2 * runs * (2 + 2 + 2),
+        # pixels, first place, brightest place and signal; light, two first and three second moments
+        "areas that may go on": runs * (2 + 4 + 4 + 2 + 6 * 4),
+        # pixels, brightest place, light, place
+        "brightest areas": MOST_AREAS * (2 + 4 + 4 + 2 * 4),
+        # signal; the same cleaned, weights
+        "window around a star": window * (2 + 2 + 2),
+        # width, noise, start and marks of those whose shape is looked at
+        "shapes of areas": MOST_SHAPES * (2 + 2 + 2 * 2 + 1),
+        # centroid, undistorted point, vector, expected error; size, intensity
+        "stars beyond the published list": MOST_STARS
+        * (MOST_STARS_FACTOR - 1)
+        * (4 * (2 + 2 + 3) + 1 + 2)
+        + MOST_STARS * MOST_STARS_FACTOR * 4,
+    }
 
 
 def _largest_reduction(catalogue: StarCatalogue) -> int:

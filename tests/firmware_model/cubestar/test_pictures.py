@@ -138,14 +138,17 @@ def test_without_supply_there_is_no_way_to_the_picture(board: Board) -> None:
     assert board.pictures.read_now(0, 1) is None
 
 
-def test_the_search_is_that_in_an_array_and_leaves_the_picture(board: Board, sky: Sky) -> None:
+@pytest.mark.parametrize("config", [DetectionConfig(), DetectionConfig(background=True)])
+def test_the_search_is_that_in_an_array_and_leaves_the_picture(
+    board: Board, sky: Sky, config: DetectionConfig
+) -> None:
     """The same stars for the same charge; the accesses are booked, as their time has passed."""
     board.stored(sky.picture)
     own = Meter(CORTEX_M3)
-    expected = detect_stars(sky.picture, DetectionConfig(), own)
+    expected = detect_stars(sky.picture, config, own)
     board.meter.take()
     before, accesses = dict(board.meter.counts), board.accesses
-    found = board.perform(board.pictures.search(DetectionConfig()))
+    found = board.perform(board.pictures.search(config))
     assert np.array_equal(found.centroids, expected.centroids)
     assert np.array_equal(found.intensities, expected.intensities)
     assert (found.dark_value, found.end) == (expected.dark_value, expected.end)
