@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic
 
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, Switches
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device, Engine, Shown
 from cubestack.host.devices.emulated import EmulatedDevice, power_up
 from cubestack.host.options import PLAN, SCENE, Options, option, whole
@@ -46,6 +47,17 @@ class Opener(Generic[BoardT_co, ClientT_co]):
     board: Mapping[str, Any] = field(default_factory=dict)
     shown: Shown = _silent
     opened: Callable[[EmulatedDevice[BoardT_co, ClientT_co]], object] = lambda _emulated: None
+
+    @property
+    def switches(self) -> Switches:
+        """Those that the device's firmware is powered up with."""
+        chosen = self.board.get("profile", DEFAULT_PROFILE), self.board.get("set", "")
+        return self.device.switches.of(*chosen)
+
+    @property
+    def rates(self) -> bool:
+        """Whether the firmware rates its results: our own, but for the published algorithms."""
+        return not self.board.get("firmware") and self.switches.profile != DEFAULT_PROFILE
 
     def __call__(
         self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **options: Any

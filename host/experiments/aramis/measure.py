@@ -194,7 +194,7 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
                     flips = emulated.board.irradiate("flash", options.bit_flips)
                     aramis.activate()
                 aramis.client.pause(float(rng.uniform(0, PHASE_S)))
-                yield _measure(emulated, options, rng, flips)
+                yield _measure(emulated, options, rng, flips, opened.rates)
 
 
 def _view(
@@ -231,7 +231,7 @@ def _configure(aramis: Aramis, options: AramisOptions) -> None:
 
 
 def _measure(
-    emulated: _Emulated, options: AramisOptions, rng: np.random.Generator, flips: int
+    emulated: _Emulated, options: AramisOptions, rng: np.random.Generator, flips: int, rates: bool
 ) -> AramisResult:
     started = time.perf_counter()
     aramis, client, board = emulated.client, emulated.client.client, emulated.board
@@ -252,7 +252,7 @@ def _measure(
     measured = found.quaternion if found.valid else None
     return AramisResult(
         **attitudes.compare(measured, truth),
-        **attitudes.claims(aramis.quality(), measured, truth),
+        **attitudes.claims(aramis.quality() if rates else None, measured, truth),
         outcome=found.outcome.name.lower(),
         reason=found.reason.name.lower(),
         centroids=found.detected,

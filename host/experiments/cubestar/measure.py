@@ -167,14 +167,16 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
                 emulated.wait(START_S)
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
-            searches = options.searches and not _adapts(emulated)
+            searches = options.searches and not _adapts(opened)
             threshold = _threshold(emulated, options, searches)
             for number in range(options.frames):
                 if number and options.is_random:
                     emulated.scene = attitudes.random_view(
                         options, CONDITION, rng, emulated.time_s + EXPOSED_S
                     )
-                yield _measure(emulated, options, picture_truth, rng, threshold, searches)
+                yield _measure(
+                    emulated, options, picture_truth, rng, threshold, searches, opened.rates
+                )
 
     def summarise(self, results: Sequence[CubeStarResult], wall_s: float) -> Iterator[str]:
         if any(result.searched for result in results):
@@ -204,12 +206,10 @@ def _threshold(emulated: CubeStarEmulated, options: CubeStarOptions, searches: b
     return int(found or INTERFACE.telecommand(command).reset_values()[name])
 
 
-def _adapts(emulated: CubeStarEmulated) -> bool:
+def _adapts(opened: CubeStarOpener) -> bool:
     """Whether the firmware takes its threshold from each picture, above what is set."""
-    if emulated.board.firmware:
-        return False
-    switches: Any = emulated.client.profile()
-    return bool(switches.detection == "background")
+    switches: Any = opened.switches
+    return opened.rates and bool(switches.detection == "background")
 
 
 def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[None]:
@@ -248,6 +248,7 @@ def _measure(
     rng: np.random.Generator,
     threshold: int,
     searched: bool,
+    rates: bool,
 ) -> CubeStarResult:
     started = time.perf_counter()
     cubestar, client = emulated.client, emulated.client.client
@@ -278,7 +279,7 @@ def _measure(
     phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
     # The flags say why a task ended as its status tells.
     flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]
-    rated = None if emulated.board.firmware else cubestar.quality()
+    rated = cubestar.quality() if rates else None
     measured = attitude.quaternion if solved else None
     return CubeStarResult(
         **attitudes.compare(measured, known),
