@@ -34,6 +34,9 @@ from cubestack.firmware_model.mcu.costs import Meter
 SIGMAS = 4
 """Noise alone passes it in 17 pixels of a picture, but not in three that touch."""
 
+SPIKE_SIGMAS = 6
+"""Spikes are counted from here on, as noise alone never passes it."""
+
 FEWEST_PIXELS = 3
 """Smaller areas are never stars, whatever the setting."""
 
@@ -102,15 +105,19 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         meter.charge(i32_add=4 * values.size, i32_mul=2 * values.size, loop=values.size)
         saturated = values[:, spots.HALF, spots.HALF] >= spots.SATURATED_DN
         starts = found.middles[sort.candidates] - np.stack([peak_x, peak_y], axis=1)
-        some = np.flatnonzero(~spots.too_sharp(windows, noises))[:MOST_SHAPES]
-        told = windows[some], starts[some], saturated[some], noises[some]
-        star, width_px = spots.shapes(*told, meter)
+        sharp = spots.too_sharp(windows, noises)
+        some = np.flatnonzero(~sharp)[:MOST_SHAPES]
+        windows, noises = windows[some], noises[some]
+        starts, saturated = starts[some], saturated[some]
+        star, width_px = spots.shapes(windows, starts, saturated, noises, meter)
         # Particles and stars of other lenses look alike: where stars are few, the doubtful count.
         sure, doubtful = np.flatnonzero(star), np.flatnonzero(~star)
         doubtful = doubtful[: max(config.max_stars - len(sure), 0)]
         kept = np.concatenate([sure, doubtful])[: MOST_STARS_FACTOR * config.max_stars]
-        measured = spots.centre(*(each[kept] for each in told), width_px, meter)
-        particles = len(sort.candidates) - len(some) + int(np.count_nonzero(~star))
+        measured = spots.centre(
+            windows[kept], starts[kept], saturated[kept], noises[kept], width_px, meter
+        )
+        particles = int(np.count_nonzero(sharp) + np.count_nonzero(~star))
         kept = some[kept]
         chosen = sort.candidates[kept]
         peaks = np.stack([peak_x + left, peak_y + top], axis=1)[kept]
@@ -161,8 +168,8 @@ def _areas(
     runs = areas.runs_of(bright)
     places = runs.places()
     y, x = np.divmod(places, width)
-    levels = sky.interpolated(sky.levels, y, x)
-    sharp = areas.spikes(pixels, places, width, levels, sky.interpolated(sky.noises, y, x))
+    levels, noises = (sky.interpolated(cells, y, x) for cells in (sky.levels, sky.noises))
+    sharp = areas.spikes(pixels, places, width, levels, noises)
     left = areas.without(runs, places[sharp])
     kept = places[~sharp]
 
@@ -174,13 +181,13 @@ def _areas(
     spent += by_row(kept, _AREA) / FEWEST_PIXELS  # so many areas at most
     done = int(np.searchsorted(np.cumsum(spent), limit - meter.total, "right"))
     left = Runs(left.begins[left.begins < done * width], left.ends[left.begins < done * width])
-    signal = (background.UNIT * pixels[places].astype(np.int64) - levels)[~sharp]
-    signal = signal[kept < done * width]
-    tested = int(np.count_nonzero(y < done))
+    signal = background.UNIT * pixels[places].astype(np.int64) - levels
+    counted = int(np.count_nonzero(sharp & (y < done) & (signal > SPIKE_SIGMAS * noises)))
+    tested, signal = int(np.count_nonzero(y < done)), signal[~sharp & (y < done)]
     for count, costs in ((tested, _TEST), (len(signal), _PIXEL), (len(left.begins), _RUN)):
         meter.charge(**{name: count * times for name, times in costs.items()})
     measured = areas.measure(left, areas.join(left, width), signal, width)
-    return measured, tested - len(signal), done >= height
+    return measured, counted, done >= height
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +228,7 @@ def _sorted_out(found: Areas, config: DetectionConfig, meter: Meter) -> _Sorted:
         int(large.sum()),
         int(small.sum()),
         int(drawn_out.sum()),
-        float(np.abs(double_angle.mean())) if some else 0.0,
+        float(np.abs(double_angle.sum())) / max(len(double_angle) + len(brightest), 1),
         float(np.median(np.sqrt(12 * along[drawn_out]))) if some else 0.0,
     )
 

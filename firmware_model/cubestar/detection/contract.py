@@ -109,10 +109,12 @@ class PictureStatistics:
         background_range: its brightest minus its darkest part (32 px wide) in DN.
         noise: median standard deviation of a pixel in DN.
         saturated: share of the picture at the end of the scale, 0 to 1.
-        spikes: bright pixels that are sharper than any spot: hot pixels, particles.
+        spikes: bright pixels and spots that no star leaves: hot pixels, particles.
         large: areas of too many pixels: Moon, limb, horizon.
         elongated: areas drawn out in one direction: streaks, tracks of particles.
-        aligned: how far these share their direction, 0 to 1: streaks of stars do, tracks do not.
+        aligned: 1 where all areas are drawn out in the same direction, 0 where none are or all
+            differ: streaks of stars share their direction, tracks of particles do not, and the
+            edge of something large is beside stars that are round.
         streak_px: median length of these in px; 0 without any.
         spot_px: standard deviation of a star's spot in px, the pixel's own width in it; the usual
             one where fewer than three stars tell.

@@ -110,6 +110,7 @@ def test_stars_in_noise_are_as_far_off_as_expected() -> None:
         assert missing(found, places) == 0
         assert len(found.centroids) <= 19
         assert told(found).noise == pytest.approx(4, rel=0.1)
+        assert told(found).spikes < 5
         pulls.append(errors(found, places) / found.errors_px[:, None])
     sizes = np.abs(np.concatenate(pulls))
     assert 0.6 < np.mean(sizes < 1) < 0.85
@@ -150,7 +151,7 @@ def test_streaks_of_stars_are_told_by_their_common_direction() -> None:
     found = search(taken(image))
     assert len(found.centroids) == 0
     assert told(found).elongated == 18
-    assert told(found).aligned > 0.95
+    assert told(found).aligned > 0.9
     assert told(found).streak_px == pytest.approx(11, abs=3)
 
 
