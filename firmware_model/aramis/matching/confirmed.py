@@ -32,11 +32,14 @@ from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 
-NEAREST_PX = 0.4
+NEAREST_PX = 0.5
 """A star within so many pixels of its place agrees however sure both are."""
 
 REACH_SIGMAS = 4.0
 """Else it agrees within so many of the typical star's errors."""
+
+REACH_LEFT = 2.0
+"""Or within so many root mean square distances: a lens that is not modelled well."""
 
 SCALES = 30
 """Attitudes that count for one whose focal length was fitted: it can be any."""
@@ -54,6 +57,9 @@ FEWEST_STARS = 4
 
 FLOOR_RAD, FLOOR_ROLL_RAD = 3e-6, 2e-5
 """Of the attitude's angles across and about the boresight: pixels, single precision (assumed)."""
+
+LENS_PX = 0.1
+"""Error of a real lens beside the model, which triples must bear (measured with pictures of one)."""
 
 FLOOR_PX = 0.03
 """Error of a star's place beside its centroid's: lens, catalogue (assumed)."""
@@ -152,7 +158,7 @@ class _Search:
         return TripleSearch(
             self.vectors,
             self.measured.centroids,
-            (self.sigma_px * self.field.scale[1]).astype(np.float32),
+            (np.hypot(self.sigma_px, LENS_PX) * self.field.scale[1]).astype(np.float32),
             self.field,
             self.database,
             self.profile.tolerance_rad / self.field.scale[1],
@@ -189,7 +195,7 @@ class _Search:
                 if abs(scale - 1) > LARGEST_SCALE:
                     return None
                 vectors = confirmation.scaled(self.vectors, 1 / scale, self.meter)
-                reach_rad = self._reach(measured)
+                reach_rad = self._reach(measured, apart)
             seen = in_field(self.database.vectors, turn, self.field, self.meter)
             predicted = turned(self.database.vectors[seen], turn)
             measured, rows, apart = confirmation.matched(vectors, predicted, reach_rad, self.meter)
@@ -207,11 +213,13 @@ class _Search:
             quaternion, vectors[measured], measured, stars, expected, alarms, scale, residual_px
         )
 
-    def _reach(self, measured: Indices) -> float:
-        """Within it stars agree, by the errors of those that already do."""
+    def _reach(self, measured: Indices, apart: Floats) -> float:
+        """Within it stars agree, by expected errors and distances (k,) of those that already do."""
+        count, pixel = len(measured), self.field.scale[1]
         typical = float(np.sqrt(np.mean(self.sigma_px[measured] ** 2)))
-        self.meter.charge(f32_mul=len(measured), f32_add=len(measured), f32_sqrt=1, f32_div=1)
-        reach_rad = max(NEAREST_PX, REACH_SIGMAS * typical) * self.field.scale[1]
+        left = float(np.sqrt(np.mean(apart * apart)))
+        self.meter.charge(f32_mul=2 * count, f32_add=2 * count, f32_sqrt=2, f32_div=2)
+        reach_rad = max(NEAREST_PX * pixel, REACH_SIGMAS * typical * pixel, REACH_LEFT * left)
         return min(reach_rad, self.profile.tolerance_rad)
 
     def _weighted(
