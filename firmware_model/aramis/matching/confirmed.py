@@ -59,7 +59,7 @@ FLOOR_RAD, FLOOR_ROLL_RAD = 3e-6, 2e-5
 """Of the attitude's angles across and about the boresight: pixels, single precision (assumed)."""
 
 LENS_PX = 0.1
-"""Error of a real lens beside the model, which triples must bear (measured with pictures of one)."""
+"""Error of a real lens beside the model, which triples must bear (measured with real pictures)."""
 
 FLOOR_PX = 0.03
 """Error of a star's place beside its centroid's: lens, catalogue (assumed)."""
