@@ -6,7 +6,7 @@ Results do not depend on the number of workers.
 
 examples:
   cubestack hazards {first} --hazard moon --frames 20
-  cubestack hazards --frames 40 --out hazards             all hazards of all devices
+  cubestack hazards --frames 40 --out docs                all, and the page that shows them
   cubestack hazards {first} --json > points.jsonl
   cubestack hazards --list                                what there is
 """
@@ -42,7 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
     )
     parser.add_argument(
-        "--out", type=Path, metavar="FOLDER", help="write pictures, curves and points.json there"
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="write hazards.md there, or a part of it, with pictures, curves and points",
     )
     parser.add_argument("--json", action="store_true", help="one JSON object a point")
 

@@ -16,37 +16,92 @@ from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.pictures.hazards import save_curves, save_sample
 
+PAGE = "hazards.md"
+PICTURES = Path("images") / "hazards"
+BEGIN, END = "<!-- hazards -->\n", "<!-- end of hazards -->\n"
+TITLE = f"# Hard skies\n\n{BEGIN}{END}"
+
 
 def check(folder: Path) -> None:
-    """Make the folder; ValueError when figures can not be made or it is a file."""
+    """Make the folder; ValueError when it can not be one, or figures or a page have no place."""
     if find_spec("matplotlib") is None:
         raise ValueError("--out: figures need matplotlib: pip install cubestack[plots]")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
+        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
         raise ValueError(f"--out: {folder} is a file; a folder would be right") from None
+    _page(folder)
 
 
 def write(points: Sequence[Point], folder: Path, seed: int) -> int:
-    """Write the pictures of each hazard, its curves, and all points; returns how many files."""
+    """Write pictures, curves, all points, and the part of the page; returns how many files."""
+    pictures = folder / PICTURES
     lines = [json.dumps(point.as_dict()) for point in points]
-    (folder / "points.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
-    files = 1
-    for name in dict.fromkeys(point.hazard for point in points):
+    (pictures / "points.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
+    names = dict.fromkeys(point.hazard for point in points)
+    for name in names:
         own = [point for point in points if point.hazard == name]
-        rows = {
-            registered(device).title: [point for point in own if point.device == device]
-            for device in dict.fromkeys(point.device for point in own)
-        }
-        kind = known()[name]
-        unit = f", {kind.strength.unit}" if kind.strength.unit else ""
-        save_curves(rows, f"{kind.strength.key}{unit}", kind.meaning, wilson,
-                    folder / f"{name}-curve.png")  # fmt: skip
-        files += 1
-        for device in dict.fromkeys(point.device for point in own):
-            save_sample(sample(device, name, seed), folder / f"{name}-{device}.png")
-            files += 1
-    return files
+        save_curves(
+            {registered(device).title: of for device, of in _by_device(own).items()},
+            _axis(name),
+            known()[name].meaning,
+            wilson,
+            pictures / f"{name}-curve.png",
+        )
+        for device in _by_device(own):
+            save_sample(sample(device, name, seed), pictures / f"{name}-{device}.png")
+    before, after = _page(folder)
+    sections = [_section(name, [p for p in points if p.hazard == name]) for name in sorted(names)]
+    (folder / PAGE).write_text(before + BEGIN + "\n".join(sections) + END + after, "utf-8")
+    return 2 + len(names) + len({(point.hazard, point.device) for point in points})
+
+
+def _page(folder: Path) -> tuple[str, str]:
+    """What stands on the page before and behind the hazards; ValueError without such a place."""
+    path = folder / PAGE
+    page = path.read_text("utf-8") if path.is_file() else TITLE
+    if BEGIN not in page or END not in page:
+        raise ValueError(f"--out: {path} has no lines {BEGIN.strip()} and {END.strip()}")
+    return page.split(BEGIN)[0], page.split(END, 1)[1]
+
+
+def _by_device(points: Sequence[Point]) -> dict[str, list[Point]]:
+    found: dict[str, list[Point]] = {}
+    for point in points:
+        found.setdefault(point.device, []).append(point)
+    return found
+
+
+def _axis(name: str) -> str:
+    scale = known()[name].strength
+    return f"{scale.key}, {scale.unit}" if scale.unit else scale.key
+
+
+def _section(name: str, points: Sequence[Point]) -> str:
+    """Of the page: what a hazard is, a picture of each device, the curve, and the numbers."""
+    kind = known()[name]
+    usual, where = f"{kind.strength.usual:g}", "/".join(kind.__module__.split(".")[1:])
+    lines = [
+        f"## {name}",
+        "",
+        f"{kind.meaning[0].upper()}{kind.meaning[1:]}: `--hazard {name}`, which is "
+        f"`{name}={usual}`. Source: `{where}.py`.",
+        "",
+    ]
+    for device in _by_device(points):
+        title = f"{registered(device).title}, {_axis(name)} {usual}"
+        lines += [f"![{title}]({PICTURES.as_posix()}/{name}-{device}.png)", ""]
+    lines += [f"![right, refused and wrong]({PICTURES.as_posix()}/{name}-curve.png)", ""]
+    lines += [f"| | {_axis(name)} | right | refused | wrong |", "|-|-|-|-|-|"]
+    for device, own in _by_device(points).items():
+        for point in own:
+            reasons = ", ".join(f"{count} {reason}" for reason, count in point.reasons.items())
+            refused = f"{point.refused} ({reasons})" if reasons else f"{point.refused}"
+            lines.append(
+                f"| {registered(device).title} | {point.strength:g} | {point.right} of "
+                f"{point.frames} | {refused} | {point.wrong} |"
+            )
+    return "\n".join(lines) + "\n"
 
 
 def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:

@@ -22,13 +22,25 @@ def test_a_folder_gets_pictures_curves_and_points(
     arguments = ["--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", str(tmp_path)]
     assert main(["hazards", "cubestar", *arguments, "--json"]) == 0
     printed = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    lines = (tmp_path / "points.jsonl").read_text("utf-8").splitlines()
+    pictures = tmp_path / "images" / "hazards"
+    lines = (pictures / "points.jsonl").read_text("utf-8").splitlines()
     assert [json.loads(line) for line in lines] == printed
     assert {point["strength"] for point in printed} >= {0, 60}
-    with Image.open(tmp_path / "gradient-cubestar.png") as sample:
+    with Image.open(pictures / "gradient-cubestar.png") as sample:
         assert sample.size == (640, 320)
-    with Image.open(tmp_path / "gradient-curve.png") as curve:
+    with Image.open(pictures / "gradient-curve.png") as curve:
         assert curve.width > 300
+    page = (tmp_path / "hazards.md").read_text("utf-8")
+    assert "## gradient" in page
+    assert "| CubeStar | 60 | " in page
+
+
+def test_a_page_without_a_place_for_hazards_is_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "hazards.md").write_text("mine\n", "utf-8")
+    assert main(["hazards", "cubestar", "--out", str(tmp_path)]) == 2
+    assert "hazards.md has no lines <!-- hazards -->" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
