@@ -32,12 +32,12 @@ from cubestack.firmware_model.cubestar.detection.contract import (
 from cubestack.firmware_model.mcu.costs import Meter
 
 SIGMAS = 4
-"""Noise alone passes it in 17 pixels of a picture, but not in three that touch."""
+"""Noise alone passes it in 17 pixels of a picture, but hardly in two that touch."""
 
 SPIKE_SIGMAS = 6
-"""Spikes are counted from here on, as noise alone never passes it."""
+"""Spikes and pairs of pixels count from here on, as noise alone never passes it."""
 
-FEWEST_PIXELS = 3
+FEWEST_PIXELS = 2
 """Smaller areas are never stars, whatever the setting."""
 
 STRETCHED = 5
@@ -91,7 +91,7 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         bright = _bright(pixels.reshape(height, width), sky, config, meter)
         limit = start + LIMIT_MS * meter.table.clock_hz // 1000
         found, spikes, complete = _areas(pixels, bright, sky, limit, meter)
-        sort = _sorted_out(found, config, meter)
+        sort = _sorted_out(found, int(np.median(sky.noises)), config, meter)
     with meter.phase("centroid"):
         # At the border a window repeats the last pixel.
         grid = np.arange(-spots.HALF, spots.HALF + 1)
@@ -202,14 +202,15 @@ class _Sorted:
     streak_px: float
 
 
-def _sorted_out(found: Areas, config: DetectionConfig, meter: Meter) -> _Sorted:
-    """Tell the areas that may be stars from the others."""
+def _sorted_out(found: Areas, noise: int, config: DetectionConfig, meter: Meter) -> _Sorted:
+    """Tell the areas that may be stars from the others, in so much ``noise`` (1/16 DN)."""
     xx, yy, xy = found.moments.T
     spread = np.hypot(xx - yy, 2 * xy)
     pixel = 1 / 12
     along, across = (xx + yy + spread) / 2 + pixel, (xx + yy - spread) / 2 + pixel
     whole = ~found.large
-    small = whole & (found.sizes < FEWEST_PIXELS)
+    in_doubt = (found.sizes == FEWEST_PIXELS) & (found.tops < SPIKE_SIGMAS * noise)
+    small = whole & ((found.sizes < FEWEST_PIXELS) | in_doubt)
     drawn_out = whole & ~small & (along > STRETCHED * across)
     wide = along + across > 2 * WIDEST_PX**2
     large = found.large | (~drawn_out & wide & (found.sizes > config.max_pixels))
