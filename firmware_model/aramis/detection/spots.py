@@ -34,11 +34,11 @@ MOST_LIT = 4
 SHOT = 0.12
 """Variance of a pixel in counts squared that each count of light brings: that of 8 electrons."""
 
-FLOOR_PX, FLOOR_SHARE = 0.01, 0.008
+FLOOR_PX, FLOOR_SHARE = 0.01, 0.009
 """Error of a centroid that light does not explain: pixels, and faint neighbours of wide spots as a
 share of the root of the area (measured)."""
 
-CUT, CUT_AREA, CUT_LEVEL = 2.2, 75.0, 4.0
+CUT, CUT_AREA, CUT_LEVEL = 1.8, 60.0, 4.0
 """Where a spot is cut off depends on its noise too, which adds variance, the more so the smaller
 and fainter it is: measured over spots of 1.5 to 6 px, levels of 2 to 200 counts and gradients."""
 

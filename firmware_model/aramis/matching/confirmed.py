@@ -61,7 +61,7 @@ FLOOR_RAD, FLOOR_ROLL_RAD = 3e-6, 2e-5
 LENS_PX = 0.1
 """Error of a real lens beside the model, which triples must bear (measured with real pictures)."""
 
-FLOOR_PX = 0.03
+FLOOR_PX = 0.02
 """Error of a star's place beside its centroid's: lens, catalogue (assumed)."""
 
 
