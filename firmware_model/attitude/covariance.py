@@ -39,6 +39,7 @@ def covariance(
     *,
     weights: NDArray[np.float32] | None = None,
     floor: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    excess: float = 1.0,
 ) -> NDArray[np.float32]:
     """Covariance (3, 3) of the small rotation that separates the true camera axes from the
     estimated ones, in rad^2, about the camera's axes.
@@ -50,6 +51,8 @@ def covariance(
         meter: charged with every operation.
         weights: (n,) weights by which the attitude was estimated; None for 1 / sigma^2.
         floor: standard deviations, in rad about the axes, of errors that no residual shows.
+        excess: by how much the variance counts that residuals show beyond the declared one: more
+            than 1 where its cause moves neighbouring stars alike, as a lens does.
 
     Raises:
         AttitudeError: for fewer than two stars, or stars that all lie in one direction.
@@ -61,11 +64,11 @@ def covariance(
     used = np.float32(1) / variances if weights is None else weights.astype(np.float32)
     total = np.float32(used.sum())
     used = used / total
-    bread = _inverse(_information(directions, used, meter), meter)
+    bread = inverse(information(directions, used, meter), meter)
     if weights is None:
         shape = bread / total
     else:
-        shape = bread @ _information(directions, used * used * variances, meter) @ bread
+        shape = bread @ information(directions, used * used * variances, meter) @ bread
         meter.charge(f32_mul=54 + 2 * count, f32_add=36, loop=18)
     squares = np.float32((residuals.astype(np.float32) ** 2 / variances).sum())
     # The mean of the posterior, degrees - 2: see above.
@@ -73,10 +76,11 @@ def covariance(
     meter.charge(
         f32_mul=3 * count + 12, f32_add=2 * count + 4, f32_div=3 * count + 1, loop=3 * count
     )
+    scale = max(scale, np.float32(excess) * (scale - 1) + 1)
     return np.asarray(scale * shape + np.diag(np.square(floor)), np.float32)
 
 
-def _information(
+def information(
     directions: NDArray[np.float32], weights: NDArray[np.float32], meter: Meter
 ) -> NDArray[np.float32]:
     """Sum (3, 3) of w (I - b b^T) over the stars."""
@@ -86,7 +90,7 @@ def _information(
     return np.asarray(weights.sum() * _IDENTITY - (b * weights[:, None]).T @ b, np.float32)
 
 
-def _inverse(matrix: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
+def inverse(matrix: NDArray[np.float32], meter: Meter) -> NDArray[np.float32]:
     """Inverse of a symmetric positive matrix (3, 3) by its cofactors."""
     first, second, third = matrix
     cofactors = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)])

@@ -23,10 +23,12 @@ class Rating:
     Attributes:
         covariance: (3, 3) of the rotation's error about the camera's axes, rad^2.
         residual: root mean square of the stars' residuals in each axis, rad.
+        scale: measured focal length over the one that is set.
     """
 
     covariance: NDArray[np.float32]
     residual: float
+    scale: float
 
 
 def told(results: Results, reason: Reason) -> dict[str, Value]:
@@ -56,7 +58,7 @@ def rated(
         "Expected": identification.expected,
         "LogFalseAlarm": math.log10(max(false_alarm, _SMALLEST)) if known else 0.0,
         "Residual": rating.residual,
-        "Scale": identification.scale,
+        "Scale": rating.scale,
         "Valid": reason is Reason.SOLVED,
     }
     if reason is Reason.SOLVED:

@@ -12,16 +12,20 @@ from cubestack.firmware_model.interface.cubestar.codes import Reason
 SATURATED_SHARE = 1e-3
 """Of the picture at the end of its scale, about 500 pixels: the brightest stars fill a few each."""
 
-STRAY_RANGE_DN = 10.0
+STRAY_RANGE_DN = 5.0
 STRAY_BACKGROUND_DN = 40.0
-"""Brightness of the sky, and its differences, that no offset and no Milky Way make."""
+"""Brightness of the sky, and its differences: more than noise of 4 DN feigns."""
 
 MANY_SPIKES = 60
-"""Pixels sharper than a spot; a new sensor shows a few."""
+SPIKES_BY_NOISE = 40
+"""Pixels sharper than a spot: a new sensor shows 20, and noise so many for each DN."""
 
 STREAKS = 3
 ALIGNED = 0.6
-"""Streaks that share their direction are stars, those that do not are particles' tracks."""
+"""Share of all areas that are drawn out in the same way: stars of a turning camera are."""
+
+TRACKS = 10
+"""Areas drawn out in directions of their own; pieces of a limb are, too, beside a large area."""
 
 _OUTCOMES = {
     MatchOutcome.TOO_FEW_CENTROIDS: Reason.TOO_FEW_STARS,
@@ -45,9 +49,9 @@ def _disturbance(picture: PictureStatistics) -> Reason | None:
         return Reason.SATURATED
     if picture.background_range > STRAY_RANGE_DN or picture.background > STRAY_BACKGROUND_DN:
         return Reason.STRAY_LIGHT
-    streaked = picture.elongated >= STREAKS
-    if streaked and picture.aligned >= ALIGNED:
+    if picture.elongated >= STREAKS and picture.aligned >= ALIGNED:
         return Reason.SMEAR
-    if picture.spikes > MANY_SPIKES or streaked:
+    tracks = picture.elongated >= TRACKS and not picture.large
+    if tracks or picture.spikes > MANY_SPIKES + SPIKES_BY_NOISE * picture.noise:
         return Reason.RADIATION
     return None

@@ -17,7 +17,18 @@ from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitche
 from ..harness import Harness
 from ..sky import Sky, attitude_of, draw, take
 
-CLEAR = PictureStatistics(5.0, 2.0, 0.5, 5e-5, 20, 0, 0, 0.0, 0.0)
+CLEAR = PictureStatistics(
+    background=5.0,
+    background_range=2.0,
+    noise=0.5,
+    saturated=5e-5,
+    spikes=20,
+    large=0,
+    elongated=0,
+    aligned=0.0,
+    streak_px=0.0,
+    spot_px=1.2,
+)
 
 
 @pytest.fixture
@@ -40,7 +51,8 @@ def quality(unit: Harness, picture: np.ndarray) -> dict[str, float]:
         ({"background": 120.0}, Reason.STRAY_LIGHT),
         ({"background_range": 30.0, "spikes": 500}, Reason.STRAY_LIGHT),
         ({"spikes": 500}, Reason.RADIATION),
-        ({"elongated": 6, "aligned": 0.2}, Reason.RADIATION),
+        ({"spikes": 100, "noise": 4.0}, Reason.UNCONFIRMED),
+        ({"elongated": 12, "aligned": 0.2}, Reason.RADIATION),
         ({"elongated": 6, "aligned": 0.9}, Reason.SMEAR),
         ({"elongated": 2, "aligned": 0.9}, Reason.UNCONFIRMED),
     ],

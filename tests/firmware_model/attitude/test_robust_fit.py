@@ -1,0 +1,102 @@
+"""Attitudes from stars of which some are displaced, through lenses of another focal length."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.attitude.confirmation import scaled
+from cubestack.firmware_model.attitude.quest import dcm, quest
+from cubestack.firmware_model.attitude.robust_fit import Fit, robust_fit
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+
+Floats = NDArray[np.float32]
+SIGMA = 2e-5
+DRAWS = 300
+METER = Meter(CORTEX_M3)
+
+
+def unit(vectors: NDArray[np.floating]) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None], np.float32)
+
+
+def seen(
+    rng: np.random.Generator, count: int = 12, side: float = 0.0
+) -> tuple[Floats, Floats, Rotation]:
+    """Measured and catalogue vectors (count, 3), and the attitude; ``side`` moves the stars off."""
+    points = np.column_stack([rng.uniform(-0.4, 0.4, (count, 2)), np.ones(count)])
+    points[:, 0] += side
+    body, truth = unit(points), Rotation.random(rng=rng)
+    noisy = unit(body + SIGMA * rng.standard_normal(body.shape))
+    return noisy, np.asarray(truth.inv().apply(body), np.float32), truth
+
+
+def fitted(measured: Floats, reference: Floats, scale: float = 1.0) -> Fit:
+    sigmas = np.full(len(measured), SIGMA, np.float32)
+    return robust_fit(measured, reference, sigmas, METER, scale=scale, excess=1.0)
+
+
+def error(quaternion: Floats, truth: Rotation) -> NDArray[np.float64]:
+    return np.asarray((Rotation.from_matrix(dcm(quaternion, METER)) * truth.inv()).as_rotvec())
+
+
+def shares(draw: Callable[[np.random.Generator], tuple[Floats, Floats, Rotation]]) -> list[float]:
+    """Of errors inside 1 and 3 claimed sigmas."""
+    rng, ratios = np.random.default_rng(1), []
+    for _ in range(DRAWS):
+        measured, reference, truth = draw(rng)
+        fit = fitted(measured, reference)
+        ratios.append(error(fit.quaternion, truth) / np.sqrt(np.diag(fit.covariance)))
+    return [float(np.mean(np.abs(ratios) < sigmas)) for sigmas in (1, 3)]
+
+
+@pytest.mark.parametrize("displaced", [0, 1, 3])
+def test_displaced_stars_do_not_turn_the_attitude(displaced: int) -> None:
+    rng, robust, plain = np.random.default_rng(displaced), [], []
+    for _ in range(60):
+        measured, reference, truth = seen(rng)
+        measured[:displaced] = unit(
+            measured[:displaced] + rng.normal(0, 40 * SIGMA, (displaced, 3))
+        )
+        robust.append(error(fitted(measured, reference).quaternion, truth))
+        even = np.ones(len(measured), np.float32)
+        plain.append(error(quest(measured, reference, even, METER), truth))
+    ratio = np.sqrt(np.mean(np.square(robust)) / np.mean(np.square(plain)))
+    assert ratio < (1.15 if displaced == 0 else 0.4)
+
+
+def test_sigmas_hold_with_displaced_stars() -> None:
+    def draw(rng: np.random.Generator) -> tuple[Floats, Floats, Rotation]:
+        measured, reference, truth = seen(rng)
+        measured[:1] = unit(measured[:1] + rng.normal(0, 40 * SIGMA, (1, 3)))
+        return measured, reference, truth
+
+    one, three = shares(draw)
+    assert 0.62 < one < 0.8
+    assert three > 0.985
+
+
+@pytest.mark.parametrize("factor", [0.99, 0.999, 1.0, 1.003, 1.02])
+@pytest.mark.parametrize("side", [0.0, 0.3])
+def test_another_focal_length_is_found_where_there_is_one(factor: float, side: float) -> None:
+    def draw(rng: np.random.Generator) -> tuple[Floats, Floats, Rotation]:
+        measured, reference, truth = seen(rng, side=side)
+        return scaled(measured, factor, METER), reference, truth
+
+    measured, reference, _ = draw(np.random.default_rng(2))
+    scale = fitted(measured, reference).scale
+    assert scale == pytest.approx(factor, abs=2e-4)
+    assert factor != 1 or scale == 1
+    one, three = shares(draw)
+    assert 0.62 < one < 0.8
+    assert three > 0.985
+
+
+def test_a_first_guess_of_the_focal_length_is_refined() -> None:
+    measured, reference, truth = seen(np.random.default_rng(3))
+    fit = fitted(scaled(measured, 1.03, METER), reference, scale=1.027)
+    assert fit.scale == pytest.approx(1.03, abs=2e-4)
+    assert np.linalg.norm(error(fit.quaternion, truth)) < 5e-5
