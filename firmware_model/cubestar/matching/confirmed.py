@@ -2,8 +2,8 @@
 
 An extension. Triangles of centroids (``triangles``) propose attitudes; each predicts which stars
 of the catalogue are in the picture, and where; ``attitude.confirmation`` tells how often chance
-confirms one so well. The first that is below `LARGEST_FALSE_ALARM` a picture is taken, unless
-another one of the same centroids is too.
+confirms one so well. The first with less than `SURE` in a picture is taken. Where none has, the
+best below `LARGEST_FALSE_ALARM` is, unless another attitude or the mirrored sky is below it too.
 
 Sides are compared within two fifths of the margin first. If that confirms nothing, the picture is
 looked at in a mirror, which can only tell why; then other focal lengths are tried, then the whole
@@ -45,6 +45,9 @@ _RESERVE_S = 0.018
 
 #: Stars that a solution needs.
 FEWEST_STARS = 3
+
+#: False alarms at which an attitude is taken at once; above, the search goes on for rivals.
+SURE = 1e-9
 
 #: Attitudes further apart than this are rivals.
 _SAME_DEG = 0.5
@@ -149,8 +152,10 @@ class _Search:
 
     def run(self, passes: tuple[Pass, ...]) -> Candidate | MatchOutcome:
         """The attitude that is believed, or why there is none."""
-        meter = self._picture.meter
+        meter, weak = self._picture.meter, list[Candidate]()
         for each in passes:
+            if weak and not each.mirrored:
+                break
             picture = self._picture.mirrored() if each.mirrored else self._picture
             with meter.phase("distances"):
                 rays = scaled(picture.directions[: each.most], each.factor, meter)
@@ -163,14 +168,18 @@ class _Search:
                 self.entries += step.entries
                 candidates = self._candidates(step, picture, each.factor, tolerance, seen)
                 believed = [one for one in candidates if one.false_alarm <= self._largest]
-                if believed:
-                    best = min(believed, key=lambda one: one.false_alarm)
-                    rivals = any(_apart_deg(best, other) > _SAME_DEG for other in believed)
-                    if each.mirrored:
-                        return MatchOutcome.MIRRORED
-                    return MatchOutcome.AMBIGUOUS if rivals else best
-            if self._late or left > 0:
+                if believed and each.mirrored:
+                    return MatchOutcome.MIRRORED
+                weak += believed
+                best = min(weak, key=lambda one: one.false_alarm, default=None)
+                if best is not None and best.false_alarm <= SURE:
+                    return best
+            if not weak and (self._late or left > 0):
                 return MatchOutcome.NO_TIME
+        if weak:
+            best = min(weak, key=lambda one: one.false_alarm)
+            rivals = any(_apart_deg(best, other) > _SAME_DEG for other in weak)
+            return MatchOutcome.AMBIGUOUS if rivals else best
         return MatchOutcome.UNCONFIRMED if self.tried else MatchOutcome.TOO_FEW_MATCHED
 
     def _candidates(
