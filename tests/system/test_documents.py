@@ -171,7 +171,7 @@ def test_commands_of_the_readme_exist() -> None:
     [
         ("fidelity", "cubestar", 1, 0),
         ("fidelity-cubesense", "cubesense", 4, 0),
-        ("fidelity-aramis", "aramis", 5, 2),
+        ("fidelity-aramis", "aramis", 4, 2),
     ],
 )
 def test_commands_and_files_of_the_fidelity_pages_exist(

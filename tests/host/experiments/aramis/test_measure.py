@@ -80,7 +80,7 @@ def test_modes_noise_rates_and_published_settings() -> None:
 
 
 def test_bits_turned_over_in_flash_are_counted() -> None:
-    for frame in measure(bit_flips=3e-6, frames=2, profile="extended"):
+    for frame in measure(bit_flips=3e-6, frames=2):
         assert 0 < frame.corrected <= frame.flips
         assert (frame.right, frame.lost) == (True, 0)
         assert frame.status in ("", "CatalogueCorrected")
