@@ -69,7 +69,7 @@ START_S = 0.02
 EXPOSED_S = 0.3
 """About so long after the command the picture is exposed, which only what moves fast notices."""
 
-LIMITS_MS = {"detect": 230.0, "match": 250.0, "attitude": 30.0}
+LIMITS_MS = {"detect": 220.0, "match": 250.0, "attitude": 30.0}
 """The 1 Hz loop leaves 500 ms for all of them (section 5.3.6; with idle time and capture)."""
 
 _DN = whole(1, 255)
