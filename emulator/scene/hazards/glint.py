@@ -77,6 +77,6 @@ class Glint(SkyHazard):
             along = math.cos(turn) * one + math.sin(turn) * other
             sizes = [looking.half_field_deg * generator.uniform(*of) for of in (LENGTHS, WIDTHS)]
             length, width = (math.radians(size) for size in sizes)
-            axes = [v @ looking.axes for v in (camera, along, np.cross(camera, along))]
-            patches.append((*axes, length, width))
+            one, two, three = (v @ looking.axes for v in (camera, along, np.cross(camera, along)))
+            patches.append((one, two, three, length, width))
         return patches
