@@ -136,11 +136,13 @@ def compare(
 def axis_errors_deg(
     measured: NDArray[np.floating[Any]], truth: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Errors (3,) about the camera's axes, of quaternions (4,); for small ones, in degrees."""
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion
+    """Rotation vector (3,) from reported to true camera axes, of quaternions (4,); 0 to 180 deg."""
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_matrix
 
-    d = matrix_from_quaternion(measured) @ matrix_from_quaternion(truth).T
-    return np.degrees([d[1, 2] - d[2, 1], d[2, 0] - d[0, 2], d[0, 1] - d[1, 0]]) / 2
+    turn = matrix_from_quaternion(truth) @ matrix_from_quaternion(measured).T
+    *axis, cosine = quaternion_from_matrix(turn)
+    sine = float(np.linalg.norm(axis))
+    return np.degrees(axis) * (2 * np.arctan2(sine, cosine) / sine if sine else 2.0)
 
 
 def claims(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.scene.attitude import (
     matrix_from_quaternion,
@@ -62,6 +63,23 @@ def test_stars_that_the_truth_puts_elsewhere_are_counted() -> None:
 def test_errors_about_the_axes_are_those_of_a_small_turn() -> None:
     turned = propagate(TRUTH, (0.01, -0.02, 0.03), 1.0)
     assert np.abs(axis_errors_deg(turned, TRUTH)) == pytest.approx([0.01, 0.02, 0.03], rel=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1e-5, 1.0, 89.9, 90.1, 168.0, 179.999])
+def test_errors_about_the_axes_are_a_rotation_vector_however_wrong(degrees: float) -> None:
+    axes = np.random.default_rng(5).normal(size=(20, 3))
+    for axis in axes / np.linalg.norm(axes, axis=1)[:, None]:
+        turned = propagate(TRUTH, tuple(degrees * axis), 1.0)
+        true, measured = matrix_from_quaternion(TRUTH), matrix_from_quaternion(turned)
+        expected = Rotation.from_matrix(true @ measured.T).as_rotvec(degrees=True)
+        assert axis_errors_deg(turned, TRUTH) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+        assert np.linalg.norm(expected) == pytest.approx(degrees, rel=1e-6, abs=1e-9)
+
+
+def test_half_a_turn_is_no_small_error() -> None:
+    assert np.linalg.norm(
+        axis_errors_deg(np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0]))
+    ) == pytest.approx(180)
 
 
 def test_claims_stand_beside_errors_only_where_both_are_known() -> None:
