@@ -54,7 +54,7 @@ def _attitudes(results: Sequence[AttitudeResult]) -> Figures:
     right = [result for result in results if result.right]
     cross = [result.error_cross_deg or 0.0 for result in right] or [np.nan]
     roll = [abs(result.error_roll_deg or 0.0) for result in right] or [np.nan]
-    full = [result.phase_ms for result in results if result.centroids == 20]
+    full = [result.phase_ms for result in results if result.centroids >= 20]
     both = [phases["detect"] + phases["match"] for phases in full] or [np.nan]
     return {
         "right": 100 * len(right) / len(results),

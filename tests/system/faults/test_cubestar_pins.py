@@ -64,7 +64,7 @@ def test_with_an_acknowledge_that_is_always_there_noise_is_the_first_picture(
     seen = watch_ack(star)
     status, flags = star.capture()
     assert seen[0] == (1, 0)
-    assert status == "IDENTIFICATION_FAILED"  # noise: what the memory held at power-up
+    assert status == "DETECTION_FAILED"  # noise: what the memory held at power-up has no stars
     assert "ImageCaptureError" not in flags
     assert star.stored_for_ms < 1
     assert (star.transferred != good).mean() > 0.9
