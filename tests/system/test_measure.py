@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.interface.codec.switches import PROFILES
 from tests.system.conftest import Frames, Measure
 
 KEYS = {
     "solved", "right", "centroids", "matched", "wrong", "mode", "error_cross_deg",
     "error_roll_deg", "truth", "quaternion", "phase_ms", "wall_ms", "status", "threshold",
-    "searched", "profile",
+    "searched", "profile", "reason", "false_alarm", "sigma_deg", "error_deg",
 }  # fmt: skip
 PHASES = {"idle", "discard", "capture", "transfer", "detect", "match", "attitude"}
 
@@ -63,16 +62,23 @@ def test_profiles_find_the_same_sky_in_their_own_way(measure: Measure) -> None:
     assert sum(a != b for a, b in zip(errors, plain, strict=True)) >= 4  # centroids weigh others
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-def test_the_first_call_of_a_user_finds_the_threshold(measure: Measure, profile: str) -> None:
-    """All stars in view: with the threshold of 6 most pictures fail, or are wrong (--seed 1)."""
+@pytest.mark.parametrize(
+    ("profile", "searched", "threshold"), [("published", True, 16), ("extended", False, 6)]
+)
+def test_the_first_call_of_a_user_is_right(
+    measure: Measure, profile: str, searched: bool, threshold: int
+) -> None:
+    """All stars in view: as published with 6 DN most pictures fail, or are wrong (--seed 1).
+
+    So a threshold is searched; profile extended takes its own from each picture.
+    """
     first, *others = measure("--frames", 5, "--profile", profile)
     assert first["right"]
     assert sum(frame["right"] for frame in others) >= 3
-    assert {(f["searched"], f["threshold"]) for f in (first, *others)} == {(True, 16)}
+    assert {(f["searched"], f["threshold"]) for f in (first, *others)} == {(searched, threshold)}
     (plain,) = measure("--threshold", 16, "--profile", profile)
     assert (plain["searched"], plain["threshold"]) == (False, 16)
-    assert plain["truth"] == pytest.approx(first["truth"])  # the search has skies of its own
+    assert plain["truth"] == pytest.approx(first["truth"])  # a search has skies of its own
     assert plain["right"]
 
 

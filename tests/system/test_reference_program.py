@@ -129,7 +129,7 @@ def test_only_its_own_profile_is_taken(node: NodeClient) -> None:
     with pytest.raises(CommandRefusedError):
         node.command("SetProfile", Profile="EXTENDED")
     with pytest.raises(CommandRefusedError):
-        node.command("SetSwitch", Switch="VOTING", Value="ROUNDS")
+        node.command("SetSwitch", Switch="VOTING", Value="CONFIRMED")
     assert node.telemetry("Profile") == shown
 
 
