@@ -141,13 +141,13 @@ class Quality:
 
     Attributes:
         covariance: (3, 3) of small turns about the camera's axes, in rad squared.
-        residual_px: root mean square distance of its stars from their places, each axis.
+        residual_rad: root mean square of its stars' residuals in each axis.
         false_alarm: wrong attitudes to be expected that would be confirmed as well.
         scale: focal length that the stars show, beside the one that is set.
     """
 
     covariance: Floats
-    residual_px: float
+    residual_rad: float
     false_alarm: float
     scale: float
 

@@ -17,6 +17,11 @@ from cubestack.firmware_model.attitude.geometry import angles_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
+from cubestack.firmware_model.interface.codec.attitude_quality import (
+    UNRATED,
+    covariance_told,
+    log_false_alarm,
+)
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.mcu.costs import Meter
@@ -27,9 +32,6 @@ NODE_TYPE = 6
 _U16, _U32 = 0xFFFF, 0xFFFF_FFFF
 
 Values = dict[str, Any]
-
-LEAST_FALSE_ALARM = 1e-30
-"""What is less probable is told as this."""
 
 
 def body_quaternion(rotation: Floats, attitude: Floats) -> Floats:
@@ -203,7 +205,8 @@ class Telemetry:
 
     def _quality(self) -> Values:
         latest, found = self._state.measurement, self._state.measurement.solution
-        values = INTERFACE.telemetry("Quality").reset_values() | {"Reason": latest.reason}
+        values = INTERFACE.telemetry("Quality").reset_values() | UNRATED
+        values["Reason"] = latest.reason
         if found is not None and found.measured.light is not None:
             light = found.measured.light
             values |= {
@@ -216,18 +219,15 @@ class Telemetry:
             }
         if found is None or found.quality is None:
             return values
-        quality, (x, y, z) = found.quality, found.quality.sigma_rad
-        (_, xy, xz), (_, _, yz), _ = quality.covariance
+        quality = found.quality
         self._meter.charge(f32_sqrt=3, f32_mul=3, f32_div=3, f32_atan2=1)
         return values | {
             "Valid": int(latest.valid),
-            "FalseAlarm": np.log10(np.float32(max(quality.false_alarm, LEAST_FALSE_ALARM))),
+            **covariance_told(quality.covariance),
+            "LogFalseAlarm": log_false_alarm(quality.false_alarm),
             "Matched": int((found.stars >= 0).sum()),
             "Expected": found.expected,
-            "Residual": quality.residual_px,
-            **{"SigmaX": x, "SigmaY": y, "SigmaZ": z},
-            **{"CorrelationXY": xy / (x * y), "CorrelationXZ": xz / (x * z)},
-            "CorrelationYZ": yz / (y * z),
+            "Residual": quality.residual_rad,
             "Scale": quality.scale,
         }
 

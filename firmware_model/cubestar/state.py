@@ -11,7 +11,6 @@ switch `flash_store` that is paid: each write takes its time, and a worn page ke
 (assumed; the data sheet promises no more than the number). ``FlashStore.writes`` counts them.
 """
 
-import math
 import struct
 from dataclasses import dataclass, fields
 from io import BytesIO
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
-from cubestack.firmware_model.interface.codec import switch_messages
+from cubestack.firmware_model.interface.codec import attitude_quality, switch_messages
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, ResetCause, TaskStatus
@@ -66,12 +65,8 @@ _FLAGS = INTERFACE.telemetry("ErrorFlags")
 _SWITCHES = INTERFACE.telemetry(switch_messages.SHOWN)
 _QUALITY = INTERFACE.telemetry("Quality")
 
-UNRATED: dict[str, Value] = {
-    **_QUALITY.reset_values(),
-    **dict.fromkeys(("SigmaX", "SigmaY", "SigmaZ"), math.pi),
-    "Scale": 1.0,
-}
-"""Values of telemetry Quality that say nothing; 1 sigma of pi rad tells a filter so."""
+UNRATED: dict[str, Value] = _QUALITY.reset_values() | attitude_quality.UNRATED
+"""Values of telemetry Quality that say nothing."""
 
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.interface.codec.attitude_quality import covariance_read
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.errors import BadAnswerError
 
@@ -23,6 +24,7 @@ class AttitudeQuality:
             camera axes, about the camera's x, y and z.
         false_alarm: expected number of attitudes that chance would confirm as well.
         matched, expected: stars that the attitude rests on, and that it puts in the picture.
+        residual_rad: root mean square of the stars' residuals in each axis.
         scale: measured focal length over the one that is set.
         background_dn, noise_dn: the sky's brightness, and the standard deviation of a pixel.
         spikes: bright pixels that are no stars: hot ones, particles.
@@ -34,6 +36,7 @@ class AttitudeQuality:
     false_alarm: float
     matched: int
     expected: int
+    residual_rad: float
     scale: float
     background_dn: float
     noise_dn: float
@@ -45,27 +48,22 @@ class AttitudeQuality:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
-def common(values: Mapping[str, Value], false_alarm: str) -> dict[str, Any]:
+def common(values: Mapping[str, Value]) -> dict[str, Any]:
     """Attributes of ``AttitudeQuality`` but the reason, of a telemetry frame's fields.
 
-    ``false_alarm`` names the field with its decimal logarithm. Raises BadAnswerError for sigmas
-    below 0 and correlations beyond 1.
+    Raises BadAnswerError for sigmas below 0 and correlations beyond 1.
     """
-    sigmas = np.array([float(values[f"Sigma{axis}"]) for axis in "XYZ"])
-    correlations = np.eye(3)
-    for one, other in ((0, 1), (0, 2), (1, 2)):
-        value = float(values[f"Correlation{'XYZ'[one]}{'XYZ'[other]}"])
-        correlations[one, other] = correlations[other, one] = value
-    if not (np.all(sigmas >= 0) and np.all(np.abs(correlations) <= 1)):
-        raise BadAnswerError(
-            f"telemetry Quality: sigmas must be 0 or more and correlations within 1, not {values}"
-        )
+    try:
+        covariance = covariance_read(values)
+    except ValueError as error:
+        raise BadAnswerError(f"telemetry Quality: {error}") from None
     return {
         "valid": bool(values["Valid"]),
-        "covariance": correlations * np.outer(sigmas, sigmas),
-        "false_alarm": 10.0 ** float(values[false_alarm]),
+        "covariance": covariance,
+        "false_alarm": 10.0 ** float(values["LogFalseAlarm"]),
         "matched": int(values["Matched"]),
         "expected": int(values["Expected"]),
+        "residual_rad": float(values["Residual"]),
         "scale": float(values["Scale"]),
         "background_dn": float(values["Background"]),
         "noise_dn": float(values["Noise"]),

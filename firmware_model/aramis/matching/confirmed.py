@@ -76,7 +76,7 @@ class Fit:
         expected: catalogue stars that it puts into the field.
         false_alarm: wrong attitudes to be expected that would be confirmed as well.
         scale: focal length beside the field's.
-        residual_px: root mean square distance of the stars from their places, each axis.
+        residual_rad: root mean square of the stars' residuals in each axis.
     """
 
     quaternion: Floats
@@ -86,7 +86,7 @@ class Fit:
     expected: int
     false_alarm: float
     scale: float
-    residual_px: float
+    residual_rad: float
 
 
 def identify_surely(
@@ -207,10 +207,10 @@ class _Search:
             alarms = confirmation.false_alarm(
                 tried, max(expected - 3, 0), len(measured) - 3, chance, self.meter
             )
-        residual_px = float(np.sqrt(np.mean(apart * apart) / 2)) / self.field.scale[1]
+        residual_rad = float(np.sqrt(np.mean(apart * apart) / 2))
         stars = seen[rows]
         return Fit(
-            quaternion, vectors[measured], measured, stars, expected, alarms, scale, residual_px
+            quaternion, vectors[measured], measured, stars, expected, alarms, scale, residual_rad
         )
 
     def _reach(self, measured: Indices, apart: Floats) -> float:
@@ -272,7 +272,7 @@ class _Search:
             )
         except AttitudeError:
             return unsolved(Reason.UNCONFIRMED, self.measured, **counts)
-        quality = Quality(found, fit.residual_px, fit.false_alarm, fit.scale)
+        quality = Quality(found, fit.residual_rad, fit.false_alarm, fit.scale)
         if quality.sigma_rad[2] > self.profile.largest_sigma_rad:
             return unsolved(Reason.UNCONFIRMED, self.measured, **counts)
         stars = np.full(len(self.measured), NONE, dtype=np.int32)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.cubestar.state import UNRATED
+from cubestack.firmware_model.interface.codec.attitude_quality import (
+    covariance_told,
+    log_false_alarm,
+)
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar.codes import Reason
-
-_SMALLEST = 1e-30
-"""False-alarm probability that is told for smaller ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +57,11 @@ def rated(
     values = told(results, reason) | {
         "Matched": len(identification.matched),
         "Expected": identification.expected,
-        "LogFalseAlarm": math.log10(max(false_alarm, _SMALLEST)) if known else 0.0,
+        "LogFalseAlarm": log_false_alarm(false_alarm) if known else 0.0,
         "Residual": rating.residual,
         "Scale": rating.scale,
         "Valid": reason is Reason.SOLVED,
     }
     if reason is Reason.SOLVED:
-        sigmas = np.sqrt(np.diag(rating.covariance))
-        correlations = rating.covariance / np.outer(sigmas, sigmas)
-        values |= {f"Sigma{axis}": float(sigma) for axis, sigma in zip("XYZ", sigmas, strict=True)}
-        values |= {
-            "CorrelationXY": float(correlations[0, 1]),
-            "CorrelationXZ": float(correlations[0, 2]),
-            "CorrelationYZ": float(correlations[1, 2]),
-        }
+        values |= covariance_told(rating.covariance)
     return values

@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.aramis.telecommands import (
     SWITCHES_SHOWN,
     TELECOMMANDS,
 )
+from cubestack.firmware_model.interface.codec.attitude_quality import ATTITUDE_QUALITY
 from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
@@ -34,9 +35,6 @@ PHASES = {
     "Verification": "confirmation by further stars",
     "Total": "from the request to the result",
 }
-
-
-_AXES = {"X": "x, to the right", "Y": "y, down", "Z": "z, the boresight"}
 
 
 def _quaternion(meaning: str) -> tuple[Field, ...]:
@@ -189,22 +187,7 @@ _QUALITY = Message(
 ).of(
     u8("Valid", "1: the latest picture gave an attitude that further stars confirm"),
     enum8("Reason", "why", choices=codes.Reason),
-    f32(
-        "FalseAlarm",
-        "log10 of the number of wrong attitudes that are expected to be confirmed as well",
-    ),
-    u8("Matched", "stars that agree with it"),
-    u8("Expected", "catalogue stars that it puts into the field"),
-    f32("Residual", "root mean square distance of these stars from their places, each axis", "px"),
-    *(
-        f32(f"Sigma{axis}", f"standard deviation of the turn about {which}", "rad")
-        for axis, which in _AXES.items()
-    ),
-    *(
-        f32(f"Correlation{axes}", f"of the turns about {axes[0]} and {axes[1]}, -1 to 1")
-        for axes in ("XY", "XZ", "YZ")
-    ),
-    f32("Scale", "focal length that the stars show, beside that of SetField"),
+    *ATTITUDE_QUALITY,
     f32(
         "Background",
         "level of the sky, median over the field; 0 with detection=whole-picture",

@@ -7,6 +7,7 @@ has no message for the image sensor's frame rate, which the thesis' ground softw
 
 from dataclasses import replace
 
+from cubestack.firmware_model.interface.codec.attitude_quality import ATTITUDE_QUALITY
 from cubestack.firmware_model.interface.codec.field import Field, bool1, enum8, f32, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
@@ -122,21 +123,10 @@ _TELEMETRY = (
         u8("MaxVotes", "most verification votes of a star"),
     ),
     _SWITCHES_SHOWN,
-    # 1 sigma of pi rad says that nothing is known: no attitude, or one that is not rated.
     Message(209, "Quality", "how good the latest picture's attitude is, and why there is none").of(
         u32("FrameCounter", "number of the picture since power-up"),
         enum8("Reason", "why there is no attitude, or that there is one", choices=Reason),
-        u8("Matched", "stars that the attitude rests on"),
-        u8("Expected", "catalogue stars that the attitude puts in the picture"),
-        f32("LogFalseAlarm", "decimal logarithm of the probability that chance confirms as much"),
-        f32("Residual", "root mean square of the stars' residuals in each axis", "rad"),
-        f32("SigmaX", "standard deviation about the camera's x axis; pi: unknown", "rad"),
-        f32("SigmaY", "the same about its y axis", "rad"),
-        f32("SigmaZ", "the same about its boresight", "rad"),
-        f32("CorrelationXY", "correlation of the errors about x and y"),
-        f32("CorrelationXZ", "the same about x and z"),
-        f32("CorrelationYZ", "the same about y and z"),
-        f32("Scale", "measured focal length over the one that is set"),
+        *ATTITUDE_QUALITY,
         f32("Background", "mean brightness of the sky", "DN"),
         f32("BackgroundRange", "the brightest minus the darkest part of it", "DN"),
         f32("Noise", "standard deviation of a pixel", "DN"),

@@ -74,16 +74,12 @@ class Star:
 class Quality(AttitudeQuality):
     """What the latest attitude is worth, and what its picture was like.
 
-    Without an attitude that further stars confirm, all figures of the attitude are 0.
-
     Attributes:
-        residual_px: root mean square distance of the stars from their places, each axis.
         spread_dn: how far the level of the sky changes over the field.
         blind: part of the field that is too bright for stars, 0 to 1.
         rejected: regions that are no stars by their shape.
     """
 
-    residual_px: float
     spread_dn: float
     blind: float
     rejected: int
@@ -245,9 +241,8 @@ class Aramis(DeviceClient):
         """What the latest attitude is worth, and what its picture was like."""
         values = self.client.telemetry("Quality")
         return Quality(
-            **common(values, "FalseAlarm"),
+            **common(values),
             reason=aramis.Reason(int(values["Reason"])),
-            residual_px=float(values["Residual"]),
             spread_dn=float(values["Spread"]),
             blind=float(values["Blind"]),
             rejected=int(values["Rejected"]),

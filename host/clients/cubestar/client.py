@@ -70,14 +70,12 @@ class Quality(AttitudeQuality):
 
     Attributes:
         frame: number of the picture since power-up.
-        residual_rad: root mean square of the stars' residuals in each axis.
         background_range_dn: largest difference of the sky's brightness.
         saturated: share of the picture at the end of the scale, 0 to 1.
         elongated: areas drawn out to streaks.
     """
 
     frame: int
-    residual_rad: float
     background_range_dn: float
     saturated: float
     elongated: int
@@ -216,10 +214,9 @@ class CubeStar(DeviceClient):
         """How good the latest picture's attitude is; raises BadAnswerError for what none can be."""
         values = self.client.telemetry("Quality")
         return Quality(
-            **common(values, "LogFalseAlarm"),
+            **common(values),
             reason=Reason(int(values["Reason"])),
             frame=int(values["FrameCounter"]),
-            residual_rad=float(values["Residual"]),
             background_range_dn=float(values["BackgroundRange"]),
             saturated=float(values["Saturated"]),
             elongated=int(values["Elongated"]),

@@ -85,8 +85,10 @@ def test_half_a_turn_is_no_small_error() -> None:
 def test_claims_stand_beside_errors_only_where_both_are_known() -> None:
     values = dict.fromkeys(("CorrelationXY", "CorrelationXZ", "CorrelationYZ"), 0.0)
     values |= {f"Sigma{axis}": np.radians(n) for n, axis in enumerate("XYZ", 1)}
-    values |= dict.fromkeys(("Matched", "Expected", "Background", "Noise", "Spikes"), 1.0)
-    found = common({**values, "Valid": True, "Scale": 1.0, "Log": -9.0}, "Log")
+    values |= dict.fromkeys(
+        ("Matched", "Expected", "Residual", "Background", "Noise", "Spikes"), 1.0
+    )
+    found = common({**values, "Valid": True, "Scale": 1.0, "LogFalseAlarm": -9.0})
     rated = AttitudeQuality(reason=Reason.SOLVED, **found)
     assert rated.false_alarm == pytest.approx(1e-9)
     both = claims(rated, TRUTH, TRUTH)

@@ -67,7 +67,7 @@ def test_quality(node: FakeAramis, aramis: Aramis) -> None:
     node.values["Quality"] = {
         "Valid": 1,
         "Reason": codes.Reason.CONFIRMED,
-        "FalseAlarm": -12.5,
+        "LogFalseAlarm": -12.5,
         "Matched": 9,
         "Expected": 11,
         "Residual": 0.125,
@@ -83,7 +83,7 @@ def test_quality(node: FakeAramis, aramis: Aramis) -> None:
     correlation = found.covariance / np.outer(found.sigmas_rad, found.sigmas_rad)
     np.testing.assert_allclose(correlation[0], [1, 0.25, -0.5], rtol=1e-6)
     assert found.false_alarm == pytest.approx(10**-12.5, rel=1e-6)
-    assert (found.residual_px, found.blind) == (0.125, 0.25)
+    assert (found.residual_rad, found.blind) == (0.125, 0.25)
     assert (found.matched, found.expected, found.spikes, found.rejected) == (9, 11, 70_000, 3)
 
 

@@ -1,0 +1,67 @@
+"""How good an attitude is: the fields that telemetry Quality of every star tracker has.
+
+A standard deviation of `UNKNOWN_RAD` tells a filter that nothing is known: there is no attitude, or
+one that is not rated.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.interface.codec.field import Field, Value, f32, u8
+
+UNKNOWN_RAD = math.pi
+
+ATTITUDE_QUALITY: tuple[Field, ...] = (
+    u8("Matched", "stars that the attitude rests on"),
+    u8("Expected", "catalogue stars that the attitude puts in the picture"),
+    f32("LogFalseAlarm", "decimal logarithm of the probability that chance confirms as much"),
+    f32("Residual", "root mean square of the stars' residuals in each axis", "rad"),
+    f32("SigmaX", "standard deviation about the camera's x axis; pi: unknown", "rad"),
+    f32("SigmaY", "the same about its y axis", "rad"),
+    f32("SigmaZ", "the same about its boresight", "rad"),
+    f32("CorrelationXY", "correlation of the errors about x and y"),
+    f32("CorrelationXZ", "the same about x and z"),
+    f32("CorrelationYZ", "the same about y and z"),
+    f32("Scale", "measured focal length over the one that is set"),
+)
+
+UNRATED: dict[str, Value] = {
+    **{field.name: 0 for field in ATTITUDE_QUALITY},
+    **dict.fromkeys(("SigmaX", "SigmaY", "SigmaZ"), UNKNOWN_RAD),
+    "Scale": 1.0,
+}
+"""Values of these fields that say nothing."""
+
+SMALLEST_FALSE_ALARM = 1e-30
+"""Probability that is told for smaller ones."""
+
+_PAIRS = {"CorrelationXY": (0, 1), "CorrelationXZ": (0, 2), "CorrelationYZ": (1, 2)}
+
+
+def log_false_alarm(probability: float) -> float:
+    """Value of field LogFalseAlarm."""
+    return math.log10(max(probability, SMALLEST_FALSE_ALARM))
+
+
+def covariance_told(covariance: NDArray[np.floating]) -> dict[str, Value]:
+    """Fields Sigma and Correlation of a covariance (3, 3), rad^2."""
+    sigmas = np.sqrt(np.diag(covariance))
+    correlations = covariance / np.outer(sigmas, sigmas)
+    values: dict[str, Value] = {
+        f"Sigma{axis}": float(sigma) for axis, sigma in zip("XYZ", sigmas, strict=True)
+    }
+    return values | {name: float(correlations[pair]) for name, pair in _PAIRS.items()}
+
+
+def covariance_read(values: Mapping[str, Value]) -> NDArray[np.float64]:
+    """Covariance (3, 3), rad^2, of these fields; ValueError for what none can have."""
+    sigmas = np.array([float(values[f"Sigma{axis}"]) for axis in "XYZ"])
+    correlations = np.eye(3)
+    for name, (one, other) in _PAIRS.items():
+        correlations[one, other] = correlations[other, one] = float(values[name])
+    if not (np.all(sigmas >= 0) and np.all(np.abs(correlations) <= 1)):
+        raise ValueError(f"sigmas must be 0 or more and correlations within 1, not {dict(values)}")
+    return np.asarray(correlations * np.outer(sigmas, sigmas))
