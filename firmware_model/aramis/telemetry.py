@@ -223,7 +223,7 @@ class Telemetry:
         self._meter.charge(f32_sqrt=3, f32_mul=3, f32_div=3, f32_atan2=1)
         return values | {
             "Valid": int(latest.valid),
-            **covariance_told(quality.covariance),
+            **covariance_told(quality.covariance.tolist()),
             "LogFalseAlarm": log_false_alarm(quality.false_alarm),
             "Matched": int((found.stars >= 0).sum()),
             "Expected": found.expected,

@@ -54,7 +54,7 @@ def common(values: Mapping[str, Value]) -> dict[str, Any]:
     Raises BadAnswerError for sigmas below 0 and correlations beyond 1.
     """
     try:
-        covariance = covariance_read(values)
+        covariance = np.array(covariance_read(values))
     except ValueError as error:
         raise BadAnswerError(f"telemetry Quality: {error}") from None
     return {

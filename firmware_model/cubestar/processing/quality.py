@@ -63,5 +63,5 @@ def rated(
         "Valid": reason is Reason.SOLVED,
     }
     if reason is Reason.SOLVED:
-        values |= covariance_told(rating.covariance)
+        values |= covariance_told(rating.covariance.tolist())
     return values

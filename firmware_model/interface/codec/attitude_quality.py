@@ -5,10 +5,7 @@ one that is not rated.
 """
 
 import math
-from collections.abc import Mapping
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping, Sequence
 
 from cubestack.firmware_model.interface.codec.field import Field, Value, f32, u8
 
@@ -46,22 +43,31 @@ def log_false_alarm(probability: float) -> float:
     return math.log10(max(probability, SMALLEST_FALSE_ALARM))
 
 
-def covariance_told(covariance: NDArray[np.floating]) -> dict[str, Value]:
-    """Fields Sigma and Correlation of a covariance (3, 3), rad^2."""
-    sigmas = np.sqrt(np.diag(covariance))
-    correlations = covariance / np.outer(sigmas, sigmas)
-    values: dict[str, Value] = {
-        f"Sigma{axis}": float(sigma) for axis, sigma in zip("XYZ", sigmas, strict=True)
+def covariance_told(covariance: Sequence[Sequence[float]]) -> dict[str, Value]:
+    """Fields Sigma and Correlation of a covariance, three rows of three, rad^2."""
+    sigmas = [math.sqrt(covariance[axis][axis]) for axis in range(3)]
+    values: dict[str, Value] = dict(zip(("SigmaX", "SigmaY", "SigmaZ"), sigmas, strict=True))
+    return values | {
+        name: covariance[one][other] / (sigmas[one] * sigmas[other])
+        for name, (one, other) in _PAIRS.items()
     }
-    return values | {name: float(correlations[pair]) for name, pair in _PAIRS.items()}
 
 
-def covariance_read(values: Mapping[str, Value]) -> NDArray[np.float64]:
-    """Covariance (3, 3), rad^2, of these fields; ValueError for what none can have."""
-    sigmas = np.array([float(values[f"Sigma{axis}"]) for axis in "XYZ"])
-    correlations = np.eye(3)
-    for name, (one, other) in _PAIRS.items():
-        correlations[one, other] = correlations[other, one] = float(values[name])
-    if not (np.all(sigmas >= 0) and np.all(np.abs(correlations) <= 1)):
+def covariance_read(values: Mapping[str, Value]) -> tuple[tuple[float, float, float], ...]:
+    """Covariance, three rows of three, rad^2, of these fields; ValueError for what none can have."""
+    sigmas = [float(values[f"Sigma{axis}"]) for axis in "XYZ"]
+    correlations = {axes: float(values[name]) for name, axes in _PAIRS.items()}
+    if not (
+        all(sigma >= 0 for sigma in sigmas)
+        and all(abs(each) <= 1 for each in correlations.values())
+    ):
         raise ValueError(f"sigmas must be 0 or more and correlations within 1, not {dict(values)}")
-    return np.asarray(correlations * np.outer(sigmas, sigmas))
+
+    def row(one: int) -> tuple[float, float, float]:
+        x, y, z = (
+            sigmas[one] * sigmas[other] * correlations.get((min(one, other), max(one, other)), 1.0)
+            for other in range(3)
+        )
+        return x, y, z
+
+    return tuple(row(axis) for axis in range(3))

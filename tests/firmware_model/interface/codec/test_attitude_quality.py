@@ -15,8 +15,8 @@ def test_a_covariance_comes_back_from_the_wire(seed: int) -> None:
     root = rng.normal(size=(3, 3)) * 10.0 ** rng.uniform(-6, -2, size=(3, 1))
     covariance = root @ root.T
     frame = Message(1, "Quality", "of a test").of(*attitude_quality.ATTITUDE_QUALITY)
-    values = attitude_quality.UNRATED | attitude_quality.covariance_told(covariance)
-    read = attitude_quality.covariance_read(frame.unpack(frame.pack(**values)))
+    values = attitude_quality.UNRATED | attitude_quality.covariance_told(covariance.tolist())
+    read = np.array(attitude_quality.covariance_read(frame.unpack(frame.pack(**values))))
     scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     assert np.all(np.abs(read - covariance) <= 1e-6 * scale)
 
