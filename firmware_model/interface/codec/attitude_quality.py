@@ -54,13 +54,11 @@ def covariance_told(covariance: Sequence[Sequence[float]]) -> dict[str, Value]:
 
 
 def covariance_read(values: Mapping[str, Value]) -> tuple[tuple[float, float, float], ...]:
-    """Covariance, three rows of three, rad^2, of these fields; ValueError for what none can have."""
+    """Covariance, three rows of three, rad^2, of them; ValueError for what none can have."""
     sigmas = [float(values[f"Sigma{axis}"]) for axis in "XYZ"]
     correlations = {axes: float(values[name]) for name, axes in _PAIRS.items()}
-    if not (
-        all(sigma >= 0 for sigma in sigmas)
-        and all(abs(each) <= 1 for each in correlations.values())
-    ):
+    known = all(sigma >= 0 for sigma in sigmas)
+    if not (known and all(abs(each) <= 1 for each in correlations.values())):
         raise ValueError(f"sigmas must be 0 or more and correlations within 1, not {dict(values)}")
 
     def row(one: int) -> tuple[float, float, float]:
