@@ -5,8 +5,9 @@ here, through its two corners and its middle, in tangents of field angles; for C
 stays within 2 px of the true one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +30,24 @@ class Field:
         sides: (3, 2, 2, 1) coefficients of 1, t, t^2 of the sides' tangents: left and upper, then
             right and lower one; x is told by y, y by x.
         smallest_cosine: cosine of the angle between the boresight and the farthest corner.
-        solid_angle_sr: of the whole picture.
+        solid_angle_sr: of all of the picture in which stars can be seen.
+        blind: cells (down, across) of the picture in which none can; None: there are no such.
     """
 
     sides: Floats
     smallest_cosine: np.float32
     solid_angle_sr: float
+    blind: NDArray[np.bool_] | None = None
+
+    def without(self, blind: NDArray[np.bool_]) -> Self:
+        """The field of which some cells (down, across), of equal size, say nothing."""
+        if not blind.any():
+            return self
+        share = 1 - float(blind.mean())
+        return replace(self, blind=blind, solid_angle_sr=share * self.solid_angle_sr)
 
     def contains(self, directions: Floats, meter: Meter, factor: float = 1.0) -> NDArray[np.bool_]:
-        """Whether unit vectors (n, 3) in camera axes, z above 0, lie in the picture.
+        """Whether unit vectors (n, 3) in camera axes, z above 0, lie where stars can be seen.
 
         ``factor`` is that by which measured tangents are multiplied to make directions of them.
         """
@@ -49,6 +59,12 @@ class Field:
         constant, linear, square = self.sides
         lower, upper = constant + yx * (linear + yx * square)
         inside: NDArray[np.bool_] = ((xy >= lower) & (xy <= upper)).all(axis=0)
+        if self.blind is not None:
+            size = np.array(self.blind.shape[::-1])[:, None]
+            across, down = np.clip((xy - lower) / (upper - lower) * size, 0, size - 1).astype(int)
+            inside &= ~self.blind[down, across]
+            meter.charge(f32_div=2 * count, f32_add=4 * count, f32_mul=2 * count)
+            meter.charge(f32_convert=2 * count, ram_read=count)
         return inside
 
 

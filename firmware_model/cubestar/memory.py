@@ -116,6 +116,8 @@ def _background_search() -> dict[str, int]:
     window = (2 * HALF + 1) ** 2
     return {
         "level and noise of the background": cells * (2 + 2),
+        "cells that are steep, and blind ones": 2 * cells // 8,
+        "level in DN where a row is steep": COLUMNS,
         "histogram of a cell": 256 * 2,
         # the next one is read into the oldest
         "three rows of the picture": 3 * COLUMNS,

@@ -2,7 +2,8 @@
 
 1. Samples of the region give level and noise of the sky in cells (`background`).
 2. Row by row, each pixel is compared with the level, plus the star threshold or `SIGMAS` of the
-   noise, whichever is more. What is sharper than a spot is dropped; the rest forms areas (`areas`).
+   noise, whichever is more; near the Earth's limb or the Moon with what surrounds it (`steep`).
+   What is sharper than a spot is dropped; the rest forms areas (`areas`).
    A part of the picture that is bright all over is its own background, and nothing is found there.
 3. Areas that are too large, too small, too faint or drawn out are counted and dropped. Of the rest
    the brightest are kept. Where those of the minimum size are too few, smaller ones fill the list,
@@ -13,14 +14,14 @@
 The time is limited: rows that are not reached by then are not searched, and the search ends so.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubestar.detection import areas, background, spots
+from cubestack.firmware_model.cubestar.detection import areas, background, spots, steep
 from cubestack.firmware_model.cubestar.detection.areas import Areas, Ints, Runs
-from cubestack.firmware_model.cubestar.detection.background import Background
+from cubestack.firmware_model.cubestar.detection.background import CELL, Background
 from cubestack.firmware_model.cubestar.detection.contract import (
     Detection,
     DetectionConfig,
@@ -88,10 +89,27 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         sky = background.estimate(read.reshape(len(down), len(across)), meter)
         # The program looks at each row when it has read it; the reads cost the same.
         pixels = yield Look(offsets(np.arange(height)[:, None], np.arange(width)).reshape(-1))
-        bright = _bright(pixels.reshape(height, width), sky, config, meter)
+        picture = pixels.reshape(height, width)
         limit = start + LIMIT_MS * meter.table.clock_hz // 1000
-        found, spikes, complete = _areas(pixels, bright, sky, limit, meter)
-        sort = _sorted_out(found, int(np.median(sky.noises)), config, meter)
+        bright = _bright(picture, sky, config, meter)
+        least = background.UNIT * config.star_threshold // 2
+        slopes, searched = steep.steep(sky, height, width), True
+        bumps = steep.along_rows(picture, slopes, sky, least, meter)
+        if len(bumps):
+            searched = len(bumps) <= steep.MOST_PLACES
+            bumps = bumps[: steep.MOST_PLACES]
+            read = yield Look(offsets(*steep.beside(bumps, height, width)).reshape(-1))
+            bumps = steep.all_ways(picture, bumps, read, sky, least, meter)
+        bright[slopes] = False
+        bright[bumps.rows, bumps.columns] = True
+        bright[[0, -1]] = False  # their neighbours would be outside
+        bright[:, [0, -1]] = False
+        local = steep.Sky(sky, slopes, bumps)
+        found, spikes, complete = _areas(pixels, bright, local, limit, meter)
+        on_slope = slopes.reshape(-1)[found.peaks]
+        sort = _sorted_out(found, on_slope, int(np.median(sky.noises)), config, meter)
+        dazzling = np.count_nonzero(picture[slopes] >= spots.SATURATED_DN) > config.max_pixels
+        sort = replace(sort, large=sort.large + int(dazzling))  # Earth or Moon
     with meter.phase("centroid"):
         # At the border a window repeats the last pixel.
         grid = np.arange(-spots.HALF, spots.HALF + 1)
@@ -100,8 +118,8 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         x = np.clip(peak_x[:, None] + grid, 0, width - 1)[:, None, :]
         places = offsets(y, x)
         values = (yield Look(places.reshape(-1))).reshape(places.shape).astype(np.int64)
-        windows = background.UNIT * values - sky.interpolated(sky.levels, y, x)
-        noises = sky.interpolated(sky.noises, peak_y, peak_x)
+        windows = background.UNIT * values - local.under(values, peak_y, peak_x)
+        noises = local.noises_at(peak_y, peak_x)
         meter.charge(i32_add=4 * values.size, i32_mul=2 * values.size, loop=values.size)
         saturated = values[:, spots.HALF, spots.HALF] >= spots.SATURATED_DN
         starts = found.middles[sort.candidates] - np.stack([peak_x, peak_y], axis=1)
@@ -130,10 +148,24 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
         invalid=min(sort.large + sort.elongated, _BYTE),
         noise=min(sort.small, _BYTE),
         dark_value=round(float(np.mean(sky.levels)) / background.UNIT),
-        end=SearchEnd.COMPLETE if complete else SearchEnd.TIME,
+        end=SearchEnd.COMPLETE if complete and searched else SearchEnd.TIME,
         errors_px=measured.errors[order],
         statistics=_statistics(sky, spikes + particles, sort, width_px),
+        blind=_blind(sky, rows, columns, config),
     )
+
+
+def _blind(sky: Background, rows: int, columns: int, config: DetectionConfig) -> NDArray[np.bool_]:
+    """Cells of the picture that are too bright for stars, or outside of the region."""
+    y = np.arange(CELL // 2, rows, CELL) - config.y_start
+    x = np.arange(CELL // 2, columns, CELL) - config.x_start
+    bright = np.pad(sky.levels >= steep.BLIND_DN * background.UNIT, 1, constant_values=True)
+    down, across = (
+        np.clip(places // CELL, -1, size)
+        for places, size in zip((y, x), sky.levels.shape, strict=True)
+    )
+    blind: NDArray[np.bool_] = bright[down[:, None] + 1, across + 1]
+    return blind
 
 
 def _bright(
@@ -147,8 +179,6 @@ def _bright(
     levels = (sky.interpolated(sky.levels, y, x) + above) // background.UNIT
     thresholds = np.repeat(np.clip(levels, 0, _BYTE).astype(np.uint8), BLOCK, axis=1)
     bright: NDArray[np.bool_] = picture > thresholds[:, :width]
-    bright[[0, -1]] = False
-    bright[:, [0, -1]] = False
     # A comparison and a branch for each pixel; the threshold steps on with each block, and its
     # step is worked out for each row of a cell.
     steps = height * sky.levels.shape[1]
@@ -158,7 +188,7 @@ def _bright(
 
 
 def _areas(
-    pixels: NDArray[np.uint8], bright: NDArray[np.bool_], sky: Background, limit: int, meter: Meter
+    pixels: NDArray[np.uint8], bright: NDArray[np.bool_], sky: steep.Sky, limit: int, meter: Meter
 ) -> tuple[Areas, int, bool]:
     """Areas without spikes, the number of these, and whether the time sufficed for all rows.
 
@@ -168,7 +198,7 @@ def _areas(
     runs = areas.runs_of(bright)
     places = runs.places()
     y, x = np.divmod(places, width)
-    levels, noises = (sky.interpolated(cells, y, x) for cells in (sky.levels, sky.noises))
+    levels, noises = sky.levels_at(y, x), sky.noises_at(y, x)
     sharp = areas.spikes(pixels, places, width, levels, noises)
     left = areas.without(runs, places[sharp])
     kept = places[~sharp]
@@ -202,7 +232,9 @@ class _Sorted:
     streak_px: float
 
 
-def _sorted_out(found: Areas, noise: int, config: DetectionConfig, meter: Meter) -> _Sorted:
+def _sorted_out(
+    found: Areas, on_slope: NDArray[np.bool_], noise: int, config: DetectionConfig, meter: Meter
+) -> _Sorted:
     """Tell the areas that may be stars from the others, in so much ``noise`` (1/16 DN)."""
     xx, yy, xy = found.moments.T
     spread = np.hypot(xx - yy, 2 * xy)
@@ -212,7 +244,7 @@ def _sorted_out(found: Areas, noise: int, config: DetectionConfig, meter: Meter)
     in_doubt = (found.sizes == FEWEST_PIXELS) & (found.tops < SPIKE_SIGMAS * noise)
     small = whole & ((found.sizes < FEWEST_PIXELS) | in_doubt)
     drawn_out = whole & ~small & (along > STRETCHED * across)
-    wide = along + across > 2 * WIDEST_PX**2
+    wide = on_slope | (along + across > 2 * WIDEST_PX**2)
     large = found.large | (~drawn_out & wide & (found.sizes > config.max_pixels))
     faint = found.tops <= background.UNIT * config.detection_threshold
     brightest = np.argsort(-found.light, kind="stable")

@@ -152,6 +152,7 @@ class Detection:
         errors_px: (n,) expected standard deviation of each centroid along one axis in px; empty
             where the search does not know.
         statistics: of the picture; None where the search does not know.
+        blind: cells (down, across) of the whole picture in which no star can be seen, likewise.
     """
 
     centroids: NDArray[np.float32]
@@ -163,6 +164,7 @@ class Detection:
     end: SearchEnd
     errors_px: NDArray[np.float32] = field(default_factory=_unknown)
     statistics: PictureStatistics | None = None
+    blind: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ Indices = NDArray[np.intp]
 LARGEST_FALSE_ALARM = 1e-4
 
 #: Parts of the margin within which stars and sides may agree.
-LEVELS = (0.25, 0.5, 1.0)
+LEVELS = (0.0625, 0.25, 0.5, 1.0)
 
 #: Stars from which on the focal length is fitted as well.
 STARS_FOR_SCALE = 5

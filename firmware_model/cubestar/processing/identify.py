@@ -45,6 +45,8 @@ class Searches:
         mode, vectors, attitude = results.mode, results.vectors, self._state.attitude
         margin = float(state.settings.get("setIDMargin", "Margin"))
         field = configuration.field(state.settings)
+        if results.detection is not None and results.detection.blind is not None:
+            field = field.without(results.detection.blind)
         catalogue = self._catalogue.limited(float(switches.pair_limit))
         if mode is MatchMode.TRACKING and attitude is not None:
             return track(

@@ -44,3 +44,27 @@ def test_its_solid_angle_is_the_part_of_the_sphere() -> None:
     part = np.count_nonzero(field.contains(ahead, Meter(CORTEX_M3))) / len(rays)
     assert field.solid_angle_sr == pytest.approx(4 * np.pi * part, rel=0.02)
     assert ahead[field.contains(ahead, Meter(CORTEX_M3)), 2].min() < field.smallest_cosine + 0.01
+
+
+def test_nothing_is_seen_in_blind_cells_and_the_field_is_that_much_smaller() -> None:
+    field = calibrated(LENS)
+    cell = 64
+    blind = np.zeros((ROWS // cell, COLUMNS // cell), np.bool_)
+    blind[2:5, 3:9] = blind[7, 15] = True
+    seen = field.without(blind)
+    share = 1 - np.count_nonzero(blind) / blind.size
+    assert seen.solid_angle_sr == pytest.approx(share * field.solid_angle_sr)
+    assert field.without(np.zeros_like(blind)) is field
+
+    rng = np.random.default_rng(3)
+    rays = np.column_stack([rng.uniform([-0.7, -0.5], [0.7, 0.5], (8000, 2)), np.ones(8000)])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    rays = rays[field.contains(rays.astype(np.float32), Meter(CORTEX_M3))]
+    across, down = np.nan_to_num(LENS.project(rays), nan=-999.0).T
+    inside = (across >= 0) & (across < COLUMNS) & (down >= 0) & (down < ROWS)
+    rays, across, down = rays[inside], across[inside], down[inside]
+    expected = ~blind[(down / cell).astype(int), (across / cell).astype(int)]
+    # The cells follow the field's sides, and the distortion between them by half a cell.
+    wrong = expected != seen.contains(rays.astype(np.float32), Meter(CORTEX_M3))
+    assert np.count_nonzero(wrong) <= 0.05 * len(rays)
+    assert np.count_nonzero(~expected) > 0.1 * len(rays)

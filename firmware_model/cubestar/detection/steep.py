@@ -1,0 +1,175 @@
+"""Where the sky's brightness changes within a cell: at the Earth's limb, beside the Moon.
+
+There a level interpolated between cells is wrong by more than stars are bright. A pixel is compared
+with the middles of the lines between pixels on opposite sides instead, along the row, the column
+and both diagonals: on a slope all agree, along an edge one does, and only a spot is above them all.
+The row is in memory already; the other directions are read for what stands out along it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubestar.detection.background import CELL, UNIT, Background, Ints
+from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF, SATURATED_DN
+from cubestack.firmware_model.mcu.costs import Meter
+
+STEEP_DN, STEEP_SIGMAS = 12, 4
+"""Range of a cell and its eight neighbours from which on it is steep, in DN and in times the noise
+of a pixel; chosen."""
+
+SIGMAS = 4
+"""Of the noise by which a pixel stands out."""
+
+BLIND_DN = 160
+"""Level of a cell of which more than half is at the end of the scale; chosen."""
+
+REACH = HALF + 1
+"""Distance of the pixels compared with: beyond a spot."""
+
+MOST_PLACES = 10_000
+"""That are looked at in all directions: they take 20 ms. The Earth's limb across the picture has up
+to 8000; those below are not searched."""
+
+_OTHER_WAYS = REACH * np.array([[-1, 0], [1, 0], [-1, -1], [1, 1], [-1, 1], [1, -1]])
+
+Marks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places (n,) of a region by row and column, level (whole DN) and noise there in 1/16 DN."""
+
+    rows: Ints
+    columns: Ints
+    levels: Ints
+    noises: Ints
+
+    def __len__(self) -> int:
+        """Number of places."""
+        return len(self.rows)
+
+    def __getitem__(self, which: Marks | slice) -> "Places":
+        """Those that are marked (n,), or a slice."""
+        return Places(self.rows[which], self.columns[which], self.levels[which], self.noises[which])
+
+
+def steep(sky: Background, height: int, width: int) -> Marks:
+    """Which pixels (height, width) are in a cell that differs much from one of its neighbours."""
+    padded = np.pad(sky.levels, 1, mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
+    most = max(STEEP_DN * UNIT, STEEP_SIGMAS * int(np.median(sky.noises)))
+    cells = (np.ptp(around, axis=(2, 3)) > most) & (sky.levels < SATURATED_DN * UNIT)
+    marks: Marks = np.repeat(np.repeat(cells, CELL, axis=0), CELL, axis=1)[:height, :width]
+    return marks
+
+
+def along_rows(
+    picture: NDArray[np.uint8], marks: Marks, sky: Background, least: int, meter: Meter
+) -> Places:
+    """Marked pixels that stand out along their row, by ``least`` (1/16 DN) at least."""
+    rows, columns = np.nonzero(marks)
+    last = picture.shape[1] - 1
+    one = picture[rows, np.maximum(columns - REACH, 0)].astype(np.int64)
+    other = picture[rows, np.minimum(columns + REACH, last)].astype(np.int64)
+    # What is no brighter than both needs no sum; in place of the comparison with the cells' level.
+    count = len(rows)
+    meter.charge(ram_read=2 * count, i32_add=count)
+    levels = (one + other + 1) // 2 * UNIT
+    return _standing_out(picture, Places(rows, columns, levels, levels), sky, least)
+
+
+def beside(places: Places, height: int, width: int) -> tuple[Ints, Ints]:
+    """Rows and columns (6, n) of the pixels in the other directions, or at the border."""
+    rows = np.clip(places.rows + _OTHER_WAYS[:, :1], 0, height - 1)
+    columns = np.clip(places.columns + _OTHER_WAYS[:, 1:], 0, width - 1)
+    return rows, columns
+
+
+def all_ways(
+    picture: NDArray[np.uint8],
+    places: Places,
+    beside: NDArray[np.uint8],
+    sky: Background,
+    least: int,
+    meter: Meter,
+) -> Places:
+    """Which of the places stand out above the pixels ``beside`` (6 n,) too."""
+    pairs = beside.reshape(3, 2, -1).sum(axis=1, dtype=np.int64)
+    levels = np.maximum(places.levels, (pairs.max(axis=0, initial=0) + 1) // 2 * UNIT)
+    count = len(levels)
+    meter.charge(i32_add=15 * count, loop=3 * count)
+    return _standing_out(picture, Places(places.rows, places.columns, levels, levels), sky, least)
+
+
+def _standing_out(
+    picture: NDArray[np.uint8], places: Places, sky: Background, least: int
+) -> Places:
+    """Places above their level by four times the noise of the sky and of the light there, where
+    that is not so bright that the end of the scale makes an edge."""
+    dark = int(np.median(sky.noises))
+    light = UNIT * places.levels / ELECTRONS_PER_DN
+    noises = np.sqrt(1.5 * (dark * dark + light)).astype(np.int64)
+    signal = UNIT * picture[places.rows, places.columns].astype(np.int64) - places.levels
+    found = Places(places.rows, places.columns, places.levels, noises)
+    seen = (signal > np.maximum(SIGMAS * noises, least)) & (places.levels < BLIND_DN * UNIT)
+    return found[seen]
+
+
+@dataclass(frozen=True, eq=False)
+class Sky:
+    """Level and noise of the sky, on slopes as the places there have it."""
+
+    cells: Background
+    slopes: Marks
+    places: Places
+
+    def levels_at(self, rows: Ints, columns: Ints) -> Ints:
+        """Levels (n,) of bright pixels."""
+        return self._known(
+            self.cells.interpolated(self.cells.levels, rows, columns),
+            self.places.levels,
+            rows,
+            columns,
+        )
+
+    def noises_at(self, rows: Ints, columns: Ints) -> Ints:
+        """Noises (n,) of bright pixels."""
+        return self._known(
+            self.cells.interpolated(self.cells.noises, rows, columns),
+            self.places.noises,
+            rows,
+            columns,
+        )
+
+    def _known(self, usual: Ints, known: Ints, rows: Ints, columns: Ints) -> Ints:
+        width, places = self.slopes.shape[1], self.places
+        if not len(places):
+            return usual
+        own, asked = places.rows * width + places.columns, rows * width + columns
+        found = np.minimum(np.searchsorted(own, asked), len(own) - 1)
+        return np.where(own[found] == asked, known[found], usual)
+
+    def under(self, windows: Ints, rows: Ints, columns: Ints) -> Ints:
+        """Levels of windows (n, 9, 9) about the pixels (n,): on slopes the plane on whose level
+        its outermost pixels are."""
+        grid = np.arange(-HALF, HALF + 1)
+        height, width = self.slopes.shape
+        y = np.clip(rows[:, None] + grid, 0, height - 1)[:, :, None]
+        x = np.clip(columns[:, None] + grid, 0, width - 1)[:, None, :]
+        levels = self.cells.interpolated(self.cells.levels, y, x)
+        on_slope = self.slopes[rows, columns]
+        levels[on_slope] = _planes(UNIT * windows[on_slope])
+        return levels
+
+
+def _planes(windows: Ints) -> Ints:
+    top, bottom = windows[:, 0].mean(axis=1), windows[:, -1].mean(axis=1)
+    left, right = windows[:, :, 0].mean(axis=1), windows[:, :, -1].mean(axis=1)
+    away = np.arange(-HALF, HALF + 1) / (2 * HALF)
+    levels = ((top + bottom + left + right) / 4)[:, None, None]
+    levels = levels + (bottom - top)[:, None, None] * away[:, None]
+    levels = levels + (right - left)[:, None, None] * away
+    rounded: Ints = np.rint(levels).astype(np.int64)
+    return rounded
