@@ -5,8 +5,9 @@ of the catalogue are in the picture, and where; ``attitude.confirmation`` tells 
 confirms one so well. The first with less than `SURE` in a picture is taken. Where none has, the
 best below `LARGEST_FALSE_ALARM` is, unless another attitude or the mirrored sky is below it too.
 
-Sides are compared within two fifths of the margin first. If that confirms nothing, the picture is
-looked at in a mirror, which can only tell why; then other focal lengths are tried, then the whole
+The sides of the brightest centroids are compared within two fifths of the margin first. If that
+confirms nothing, the picture is looked at in a mirror, which can only tell why; then other focal
+lengths are tried, each with few centroids, as there are many; then all centroids, then the whole
 margin. Whatever is tried counts.
 """
 
@@ -66,9 +67,10 @@ class Pass:
 
 _OTHER_LENSES = [1 + sign * 0.0025 * step for step in range(1, 13) for sign in (1, -1)]
 PASSES = (
-    Pass(),
+    Pass(most=24),
     Pass(most=10, mirrored=True),
-    *(Pass(factor, most=10) for factor in _OTHER_LENSES),
+    *(Pass(factor, most=8) for factor in _OTHER_LENSES),
+    Pass(),
     Pass(part=1.0),
 )
 

@@ -2,7 +2,7 @@
 
 An extension; ``attitude.confirmation`` says how the false-alarm probability comes about. The
 attitude is refined with the stars that it predicts, within three margins first, then within one. A
-place that fits within a half or a quarter of the margin says more, so these are tried as well, and
+place that fits within a small part of the margin says more, so such parts are tried as well, and
 count as tries.
 """
 
