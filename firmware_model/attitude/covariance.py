@@ -40,6 +40,7 @@ def covariance(
     weights: NDArray[np.float32] | None = None,
     floor: tuple[float, float, float] = (0.0, 0.0, 0.0),
     excess: float = 1.0,
+    beyond: float = 1.0,
 ) -> NDArray[np.float32]:
     """Covariance (3, 3) of the small rotation that separates the true camera axes from the
     estimated ones, in rad^2, about the camera's axes.
@@ -53,6 +54,7 @@ def covariance(
         floor: standard deviations, in rad about the axes, of errors that no residual shows.
         excess: by how much the variance counts that residuals show beyond the declared one: more
             than 1 where its cause moves neighbouring stars alike, as a lens does.
+        beyond: multiple of the declared variance from which on it does.
 
     Raises:
         AttitudeError: for fewer than two stars, or stars that all lie in one direction.
@@ -76,7 +78,7 @@ def covariance(
     meter.charge(
         f32_mul=3 * count + 12, f32_add=2 * count + 4, f32_div=3 * count + 1, loop=3 * count
     )
-    scale = max(scale, np.float32(excess) * (scale - 1) + 1)
+    scale = max(scale, np.float32(excess) * (scale - np.float32(beyond)) + np.float32(beyond))
     return np.asarray(scale * shape + np.diag(np.square(floor)), np.float32)
 
 

@@ -34,9 +34,9 @@ MOST_LIT = 4
 SHOT = 0.12
 """Variance of a pixel in counts squared that each count of light brings: that of 8 electrons."""
 
-FLOOR_PX, FLOOR_SHARE = 0.01, 0.009
-"""Error of a centroid that light does not explain: pixels, and faint neighbours of wide spots as a
-share of the root of the area (measured)."""
+FLOOR_SHARE = 0.006
+"""Error of a centroid that light does not explain, pixels and faint neighbours, as a share of the
+root of its area (measured)."""
 
 CUT, CUT_AREA, CUT_LEVEL = 1.8, 60.0, 4.0
 """Where a spot is cut off depends on its noise too, which adds variance, the more so the smaller
@@ -130,7 +130,7 @@ def find_spots(
     size = areas[names]
     faint = (noise * size / total) ** 2
     lever *= (CUT + CUT_AREA / size) * (1 + CUT_LEVEL * faint)
-    floor = (FLOOR_PX + FLOOR_SHARE * np.sqrt(size)) ** 2 * (1 + full / 25)
+    floor = FLOOR_SHARE**2 * size * (1 + full / 25)
     sigma = np.sqrt(lever / total**2 + floor).astype(_F)
     apart = np.sqrt((xx - yy) ** 2 + 4 * xy**2)
     narrow = np.maximum((xx + yy - apart) / 2, _F(1 / 12))

@@ -55,14 +55,18 @@ ROUNDS = 4
 
 FEWEST_STARS = 4
 
-FLOOR_RAD, FLOOR_ROLL_RAD = 3e-6, 2e-5
+FLOOR_RAD, FLOOR_ROLL_RAD = 1e-6, 1e-5
 """Of the attitude's angles across and about the boresight: pixels, single precision (assumed)."""
 
 LENS_PX = 0.1
 """Error of a real lens beside the model, which triples must bear (measured with real pictures)."""
 
-FLOOR_PX = 0.02
-"""Error of a star's place beside its centroid's: lens, catalogue (assumed)."""
+FLOOR_PX = 0.01
+"""Error of a star's place beside its centroid's: catalogue (assumed)."""
+
+EXCESS, BEYOND = 4.0, 2.0
+"""How much residuals count beyond so many declared variances, which chance seldom gives: chosen so
+that the claimed sigmas hold with lens residuals, which move neighbouring stars alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,6 +273,8 @@ class _Search:
                 (errors * self.field.scale[1]).astype(np.float32),
                 self.meter,
                 floor=(FLOOR_RAD, FLOOR_RAD, FLOOR_ROLL_RAD),
+                excess=EXCESS,
+                beyond=BEYOND,
             )
         except AttitudeError:
             return unsolved(Reason.UNCONFIRMED, self.measured, **counts)

@@ -96,3 +96,23 @@ def test_refuses_what_determines_no_attitude() -> None:
         covariance(three[:1], nothing[:1], sigmas[:1], Meter(CORTEX_M3))
     with pytest.raises(AttitudeError, match="one direction"):
         covariance(three, nothing, sigmas, Meter(CORTEX_M3))
+
+
+def test_residuals_beyond_what_chance_gives_count_more() -> None:
+    rng = np.random.default_rng(9)
+    body = _stars(12, rng)
+    sigmas = np.full(12, 1e-4, np.float32)
+
+    def ratio(residual: float) -> float:
+        residuals = np.full(12, residual * 1e-4, np.float32)
+        plain, more = (
+            covariance(body, residuals, sigmas, Meter(CORTEX_M3), excess=excess, beyond=2.0)
+            for excess in (1.0, 4.0)
+        )
+        shares = more / plain
+        np.testing.assert_allclose(shares, shares[0, 0], rtol=1e-5)
+        return float(shares[0, 0])
+
+    assert ratio(1.4) == 1
+    assert 1 < ratio(2.2) < ratio(3) < ratio(10) < 4
+    assert ratio(100) == pytest.approx(4, rel=0.01)
