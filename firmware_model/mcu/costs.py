@@ -66,18 +66,18 @@ class Meter:
         Raises:
             CostError: for an operation that the table does not have, or a negative count.
         """
-        cycles = 0
-        for name, count in operations.items():
-            cost = self.table.operations.get(name)
-            if cost is None:
-                known = ", ".join(sorted(self.table.operations))
-                raise CostError(
-                    f"operation {name!r} is not in the table of {self.table.name} (it has {known})"
-                )
-            if count < 0:
-                raise CostError(f"operation {name!r} cannot happen {count} times")
-            self.counts[name] += count
-            cycles += cost.cycles * count
+        cycles, counts, table = 0, self.counts, self.table.operations
+        try:
+            for name, count in operations.items():
+                if count < 0:
+                    raise CostError(f"operation {name!r} cannot happen {count} times")
+                cycles += table[name].cycles * count
+                counts[name] += count
+        except KeyError as unknown:
+            known = ", ".join(sorted(table))
+            raise CostError(
+                f"operation {unknown} is not in the table of {self.table.name} (it has {known})"
+            ) from None
         self.total += cycles
         if self._phase is not None:
             self.phases[self._phase] = self.phases.get(self._phase, 0) + cycles

@@ -163,9 +163,9 @@ class _Search:
                 rays = scaled(picture.directions[: each.most], each.factor, meter)
             tolerance = each.part * picture.margin_rad
             seen: list[dict[int, int]] = []
-            left = len(rays) - 2
+            newest = 0
             for step in steps(rays, picture.catalogue, tolerance, self._listed, meter, self._limit):
-                left -= 1
+                newest = step.newest
                 self.chance += step.by_chance
                 self.entries += step.entries
                 candidates = self._candidates(step, picture, each.factor, tolerance, seen)
@@ -176,7 +176,7 @@ class _Search:
                 best = min(weak, key=lambda one: one.false_alarm, default=None)
                 if best is not None and best.false_alarm <= SURE:
                     return best
-            if not weak and (self._late or left > 0):
+            if not weak and (self._late or newest < len(rays) - 1):
                 return MatchOutcome.NO_TIME
         if weak:
             best = min(weak, key=lambda one: one.false_alarm)

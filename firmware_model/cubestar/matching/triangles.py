@@ -28,7 +28,7 @@ MOST_PAIRS = 3072
 
 #: Centroids whose triangles the model finds together, for its own speed; later ones follow only if
 #: these give no attitude. The charge is made centroid by centroid.
-_BATCHES = (5, 10, 18, 64)
+_BATCHES = (5, 12, 24, 64)
 
 #: Triangles that chance gives over those of even stars in a round field: measured in random
 #: pictures. In a field twice as wide as high rings cross at smaller angles, and real stars cluster.
@@ -39,17 +39,19 @@ _SMALLEST_SQUARED_SINE = np.float32(1e-8)
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What one more centroid brings.
+    """What more centroids bring, of which the last alone has triangles.
 
     Attributes:
+        newest: rank of the last one.
         centroids, stars: (t, 3) triangles, by rank of centroid and index of star; the new centroid
             is the last, those whose new star has most triangles first.
         misfit: (t,) largest difference of the sides, in rad.
         mirrored: (t,) whether they turn the other way.
-        entries: entries of the pair list that the new centroid has with those before it.
+        entries: entries of the pair list that the new centroids have with those before them.
         by_chance: triangles that chance gives in this step to be expected.
     """
 
+    newest: int
     centroids: Indices
     stars: Indices
     misfit: Floats
@@ -66,7 +68,7 @@ def steps(
     meter: Meter,
     limit: int,
 ) -> Iterator[Step]:
-    """Triangles of unit vectors (n, 3) in their order, centroid by centroid.
+    """Triangles of unit vectors (n, 3) in their order.
 
     Args:
         rays: brightest first.
@@ -80,16 +82,15 @@ def steps(
     for batch in _BATCHES:
         count = min(batch, len(rays))
         if count > done:
-            found = _Batch(rays[:count], catalogue, tolerance_rad, listed)
-            for newest in range(done, count):
-                operations = found.operations(newest)
-                spent = sum(cycles(each, meter) for each in operations.values())
-                if found.entries[newest] > MOST_PAIRS or meter.total + spent > limit:
-                    return
-                for phase, each in operations.items():
-                    with meter.phase(phase):
-                        meter.charge(**each)
-                yield found.step(newest)
+            found = _Batch(rays[:count], done, catalogue, tolerance_rad, listed)
+            for first, last in found.groups():
+                if found.charged(first, last, meter, limit):
+                    yield found.step(first, last)
+                    continue
+                for newest in range(first, last + 1):
+                    if not found.charged(newest, newest, meter, limit):
+                        return
+                    yield found.step(newest, newest)
             done = count
 
 
@@ -105,36 +106,35 @@ def _pairs_of(count: int) -> tuple[Indices, Indices]:
 
 
 class _Batch:
-    """All triangles among some centroids, and what work each centroid makes.
-
-    Attributes:
-        entries: (n,) entries of the pair list that each centroid has with all before it, twice,
-            for either may be either star.
-    """
+    """All triangles among some centroids (n, 3) whose newest is not one of the first ``done``, and
+    what work each centroid makes."""
 
     def __init__(
         self,
         rays: Floats,
+        done: int,
         catalogue: StarCatalogue,
         tolerance_rad: float,
         listed: NDArray[np.bool_] | None,
     ) -> None:
         tolerance, count, stars = np.float32(tolerance_rad), len(rays), len(catalogue)
-        newer, older = _pairs_of(count)
-        cosine = (rays @ rays.T)[newer, older]
-        pair, first, second, misfit = self._look_up(cosine, newer, catalogue, tolerance, listed)
+        self._done, self._count = done, count
+        newer, older = (each[done * (done - 1) // 2 :] for each in _pairs_of(count))
+        cosines = rays @ rays.T
+        pair, ends, misfit = self._look_up(
+            cosines[newer, older], newer, catalogue, tolerance, listed
+        )
         # An entry joins the rim, an older centroid with one star, to the hub, the newer one with
-        # the other star.
-        hub = np.concatenate((newer[pair] * stars + first, newer[pair] * stars + second))
-        rim_star = np.concatenate((second, first))
+        # the other star; either may be either.
+        hub = (newer[pair] * stars + ends).ravel()
         order = hub.astype(np.uint16 if count * stars < 1 << 16 else np.int32).argsort(
             kind="stable"
         )
-        hub, rim_star = hub[order], rim_star[order]
-        rim = np.concatenate((older[pair], older[pair]))[order]
-        misfit = np.concatenate((misfit, misfit))[order]
+        hub, rim_star = hub[order], ends[::-1].ravel()[order]
+        entry = order % max(len(pair), 1)
+        rim, misfit = older[pair[entry]], misfit[entry]
         newest = hub // stars
-        self.entries = np.bincount(newest, minlength=count)
+        self._entries = np.bincount(newest, minlength=count)
         # Every two entries of one hub: each with all of the hub's entries before it.
         before = np.arange(len(hub)) - hub.searchsorted(hub)
         one = np.arange(len(hub)).repeat(before)
@@ -142,26 +142,26 @@ class _Batch:
         self._wedges = np.bincount(newest[one], minlength=count)
         a, b, ia, ib = rim_star[one], rim_star[other], rim[one], rim[other]
         va, vb = catalogue.vectors[a], catalogue.vectors[b]
-        low, high = np.minimum(ia, ib), np.maximum(ia, ib)
-        side = cosine[high * (high - 1) // 2 + low]
+        side = cosines[ia, ib]
         sine = np.sqrt(np.maximum(1 - side * side, _SMALLEST_SQUARED_SINE))
         third = np.abs((va * vb).sum(axis=1) - side) / sine
         fits = ((third <= tolerance) & (ia != ib) & (a != b)).nonzero()[0]
         one, other = one[fits], other[fits]
-        self._newest = newest[one]
-        self._centroids = np.stack((ia[fits], ib[fits], self._newest), axis=1)
-        self._stars = np.stack((a[fits], b[fits], hub[one] % stars), axis=1)
+        hub = hub[one]
+        self._centroids = np.stack((ia[fits], ib[fits], newest[one]), axis=1)
+        self._stars = np.stack((a[fits], b[fits], hub % stars), axis=1)
         self._misfit = np.maximum(np.maximum(misfit[one], misfit[other]), third[fits])
         volumes = np.linalg.det(
             np.stack((rays[self._centroids], catalogue.vectors[self._stars]))
         )  # of the three vectors of each
         self._mirrored = volumes[0] * volumes[1] < 0
-        self._popularity = np.bincount(hub[one], minlength=1)[hub[one]]
-        self._found = np.bincount(self._newest, minlength=count)
+        self._popularity = hub.searchsorted(hub, side="right") - hub.searchsorted(hub)
+        self._found = np.bincount(newest[one], minlength=count)
+        self._ends = self._found.cumsum()
         # Chance: each entry fixes an attitude in two ways; a third star then agrees where two
         # rings of width 2 e cross, 4 e^2 over the sine of the angle of crossing (2/pi in the mean).
         density = _UNEVEN * stars / (4 * np.pi)
-        self._chance = len(hub) / len(newer) * density * 2 * np.pi * tolerance_rad**2
+        self._chance = len(order) / len(newer) * density * 2 * np.pi * tolerance_rad**2
         self._stars_listed = stars
 
     def _look_up(
@@ -171,8 +171,8 @@ class _Batch:
         catalogue: StarCatalogue,
         tolerance: np.float32,
         listed: NDArray[np.bool_] | None,
-    ) -> tuple[Indices, Indices, Indices, Floats]:
-        """Pair, both stars and misfit in rad of the entries that are as wide as the pairs."""
+    ) -> tuple[Indices, Indices, Floats]:
+        """Pair (e,), both stars (2, e) and misfit (e,) in rad of entries as wide as the pairs."""
         pairs = catalogue.pairs
         angle = arc_cosine(np.minimum(cosine, np.float32(1)))
         start = pairs.angle.searchsorted(angle - tolerance)
@@ -181,34 +181,55 @@ class _Batch:
         self._steps = len(pairs).bit_length()
         pair = np.arange(len(start)).repeat(lengths)
         entry = start[pair] + _counting(lengths)
-        first, second = pairs.first[entry].astype(np.intp), pairs.second[entry].astype(np.intp)
+        stars = np.stack((pairs.first[entry], pairs.second[entry])).astype(np.intp)
         misfit = np.abs(pairs.angle[entry] - angle[pair])
         if listed is None:
-            return pair, first, second, misfit
-        kept = listed[first] & listed[second]
-        return pair[kept], first[kept], second[kept], misfit[kept]
+            return pair, stars, misfit
+        kept = listed[stars].all(axis=0)
+        return pair[kept], stars[:, kept], misfit[kept]
 
-    def operations(self, newest: int) -> dict[str, dict[str, int]]:
-        """What each phase of a step of the part's program executes."""
-        walked, entries = int(self._walked[newest]), int(self.entries[newest])
-        wedges, found = int(self._wedges[newest]), int(self._found[newest])
-        searched = self._steps * newest
+    def groups(self) -> list[tuple[int, int]]:
+        """First and last of the centroids up to each that has triangles, and of what follows."""
+        lasts = [*self._found.nonzero()[0].tolist(), self._count - 1]
+        firsts = [self._done, *(last + 1 for last in lasts)]
+        return [(one, two) for one, two in zip(firsts, lasts, strict=False) if one <= two]
+
+    def charged(self, first: int, last: int, meter: Meter, limit: int) -> bool:
+        """Charge the steps of the centroids from a first to a last one, if the time suffices."""
+        operations = self._operations(first, last)
+        spent = sum(cycles(each, meter) for each in operations.values())
+        if self._entries[first : last + 1].max() > MOST_PAIRS or meter.total + spent > limit:
+            return False
+        for phase, each in operations.items():
+            with meter.phase(phase):
+                meter.charge(**each)
+        return True
+
+    def _operations(self, first: int, last: int) -> dict[str, dict[str, int]]:
+        """What each phase of some steps of the part's program executes."""
+        walked, entries, wedges, found = (
+            int(each[first : last + 1].sum())
+            for each in (self._walked, self._entries, self._wedges, self._found)
+        )
+        steps = last - first + 1
+        older = steps * (first + last) // 2
+        searched, cleared = self._steps * older, steps * (self._stars_listed // 2)
         return {
             "distances": {  # of the newest centroid to the older ones: angles and their sines
-                "f32_mul": 5 * newest,
-                "f32_add": 5 * newest,
-                "f32_acos": newest,
-                "f32_sqrt": newest,
-                "ram_read": 6 * newest,
+                "f32_mul": 5 * older,
+                "f32_add": 5 * older,
+                "f32_acos": older,
+                "f32_sqrt": older,
+                "ram_read": 6 * older,
             },
             # Entries of the pair list, each kept with the newest centroid's star. Floats that are
             # not negative are in order as integers, and compared as such.
             "votes": {
                 "flash_read": searched + 3 * walked,
-                "i32_add": 4 * (searched + entries) + walked + newest,
+                "i32_add": 4 * (searched + entries) + walked + older,
                 "table_byte": 2 * entries,
-                "ram_write": 2 * entries + self._stars_listed // 2,
-                "loop": searched + walked + entries + self._stars_listed // 2,
+                "ram_write": 2 * entries + cleared,
+                "loop": searched + walked + entries + cleared,
             },
             "identities": {  # third sides, and which way the triangles turn
                 "f32_mul": 4 * wedges + 19 * found,
@@ -221,17 +242,20 @@ class _Batch:
             },
         }
 
-    def step(self, newest: int) -> Step:
-        """Triangles of a step."""
-        chosen = (self._newest == newest).nonzero()[0]
-        chosen = chosen[(-self._popularity[chosen]).argsort(kind="stable")]
+    def step(self, first: int, last: int) -> Step:
+        """Triangles of the last of some centroids, with what all of them make."""
+        end, count = int(self._ends[last]), int(self._found[last])
+        begin = end - count
+        chosen = begin + (-self._popularity[begin:end]).argsort(kind="stable")
+        triples = (last * (last * last - 1) - first * (first - 1) * (first - 2)) / 6
         return Step(
+            last,
             self._centroids[chosen],
             self._stars[chosen],
             self._misfit[chosen],
             self._mirrored[chosen],
-            int(self.entries[newest]),
-            newest * (newest - 1) / 2 * float(self._chance),
+            int(self._entries[first : last + 1].sum()),
+            triples * float(self._chance),
         )
 
 
