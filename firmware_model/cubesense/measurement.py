@@ -142,6 +142,7 @@ class Measurement:
             masks=tuple(settings.masks),
             sub_pixel=switches.edges == "sub-pixel",
             listing=switches.edges == "listing",
+            sharp=switches.limb == "robust",
         )
         stored = yield from read_ticks()
         edges = yield from self._find_edges(result, config)
@@ -152,7 +153,7 @@ class Measurement:
         judged = NadirConfig(
             self._tables[codes.Camera.NADIR][1],
             projection_of(codes.Camera.NADIR, switches),
-            checked=switches.limb == "checked",
+            checked=switches.limb == "robust",
         )
         found = find_nadir(edges, judged, self._meter)
         if judged.checked:
@@ -162,6 +163,9 @@ class Measurement:
         result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
         result.radius = round(found.radius_deg * codes.PIXELS_PER_DEGREE * 100)
         result.points = found.edges
+        result.sigma = found.sigma_alpha, found.sigma_beta
+        result.rms, result.found = round(100 * found.rms_px), len(edges)
+        result.reason = found.reason
         result.edges = edges.points
         result.detect = found.detect
         return True
@@ -208,7 +212,9 @@ class Measurement:
         result.first = (x_low + 256 * x_high, y_low + 256 * y_high)
         result.pixels_read = len(data) - sun_centroid.COORDINATE_BYTES
         result.alpha, result.beta, result.x, result.y = found.alpha, found.beta, found.x, found.y
-        result.points = found.pixels
+        result.points = result.found = found.pixels
+        result.sigma = found.sigma_alpha, found.sigma_beta
+        result.reason = found.reason
         result.detect = found.detect
         return True
 

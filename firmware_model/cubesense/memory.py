@@ -44,7 +44,7 @@ _WINDOW = "Sun window"
 
 def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]:
     """Every buffer of the program, while it runs with ``switches``."""
-    checked, cone = switches.limb == "checked", switches.distortion == "stereographic"
+    checked, cone = switches.limb == "robust", switches.distortion == "stereographic"
     places = {
         "normal equations, their inverse, right side": (9 + (9 if checked or cone else 6) + 3)
         * FLOAT
@@ -71,6 +71,8 @@ def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]
         "state of links and main loop": TASK_BYTES,
         "software stack": STACK_BYTES,
     }
+    if checked:
+        ram["sides of the edges, and which are lit or count"] = MAX_EDGES
     shared = {
         "scanned pixels": (FULL_SIZE.scan_step, _WINDOW),
         **({"edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW)} if checked else {}),
@@ -92,7 +94,7 @@ def _state_bytes() -> int:
     """As many as telemetry shows of it, boresights, and what the cameras were told; switches."""
     shown = ["CommunicationStatus", "TcmdProcessed", "Configuration", "Power"]
     for number in (camera + 1 for camera in Camera):
-        shown += [f"Result{number}", f"Details{number}", f"PhaseTimes{number}"]
+        shown += [f"Result{number}", f"Details{number}", f"PhaseTimes{number}", f"Quality{number}"]
     settings = INTERFACE.telemetry("Configuration").length
     boresights = sum(INTERFACE.telecommand(f"Boresight{camera + 1}").length for camera in Camera)
     switches = sum(not one.hardware for one in CubeSenseSwitches.declared().values())

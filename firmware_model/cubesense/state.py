@@ -89,6 +89,10 @@ class Result:
         x, y: centre from the boresight, undistorted, 1/100 px.
         radius: of the fitted circle, undistorted, 1/100 px; 0 for the Sun.
         points: edges of the fit, or Sun pixels of the mean.
+        sigma: standard deviations of alpha and beta, 1/100 deg; 0: not known.
+        rms: of the edges' distances from the circle, 1/100 px.
+        found: edges that the search found, or Sun pixels.
+        reason: why the detection ended as it did.
         edges: pixels (n, 2) of the edges that the search found, in 1/32 px; none for the Sun.
         sram: memory that held the picture.
         first: first Sun pixel (x, y); (0, 0) for the nadir camera.
@@ -104,6 +108,10 @@ class Result:
     y: int = 0
     radius: int = 0
     points: int = 0
+    sigma: tuple[int, int] = (0, 0)
+    rms: int = 0
+    found: int = 0
+    reason: codes.Reason = codes.Reason.NONE
     edges: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 2), np.int16))
     sram: codes.Sram = codes.Sram.SRAM1
     first: tuple[int, int] = (0, 0)

@@ -62,6 +62,7 @@ class Telemetry:
             number = camera + 1
             self._sources[f"Masks{number}"] = partial(self._masks, camera)
             self._sources[f"Details{number}"] = partial(self._details, camera)
+            self._sources[f"Quality{number}"] = partial(self._quality, camera)
             self._sources[f"PhaseTimes{number}"] = partial(self._times, camera)
         shown = {identifier: camera for camera, identifier in telemetry.RESULTS.items()}
         shown |= {identifier: camera for identifier, (camera, _) in telemetry.SCHEDULES.items()}
@@ -152,6 +153,16 @@ class Telemetry:
             "FirstX": result.first[0],
             "FirstY": result.first[1],
             "PixelsRead": result.pixels_read,
+        }
+
+    def _quality(self, camera: codes.Camera) -> Values:
+        result = self.state.results[camera]
+        return {
+            "SigmaAlpha": result.sigma[0] / _HUNDREDTHS,
+            "SigmaBeta": result.sigma[1] / _HUNDREDTHS,
+            "Rms": result.rms / _HUNDREDTHS,
+            "Found": result.found,
+            "Reason": result.reason,
         }
 
     def _times(self, camera: codes.Camera) -> Values:

@@ -103,6 +103,18 @@ def scene_light(
     return light
 
 
+def looking_with(scene: EarthSunScene, camera: Target, time_ps: int) -> Looking:
+    """What hazards may know of ``camera``, whatever is particular to its lens."""
+    return Looking(
+        scene.axes(camera, time_ps),
+        2 * FIELD_DEG,
+        2 * FIELD_DEG,
+        FIELD_DEG,
+        float(lens_of(camera).field.pixel_rad.max()),
+        time_ps / PS_PER_S,
+    )
+
+
 def _usual_lines(camera: Target) -> int:
     return USUAL_EXPOSURE[camera] * EXPOSURE_LINES
 
@@ -170,14 +182,7 @@ def _add_hazards(
     if not hazards:
         return
     field, straight = lens.field, FILTER[camera]
-    looking = Looking(
-        scene.axes(camera, time_ps),
-        2 * FIELD_DEG,
-        2 * FIELD_DEG,
-        FIELD_DEG,
-        float(field.pixel_rad.max()),
-        time_ps / PS_PER_S,
-    )
+    looking = looking_with(scene, camera, time_ps)
     radius = math.radians(angular_radius_deg(scene.altitude_km))
     earth = _Disc(nadir=tuple(np.asarray(scene.nadir).tolist()), radius_rad=radius)
     level = EARTH_LEVEL / _usual_lines(Target.NADIR) / EARTH_RADIANCE

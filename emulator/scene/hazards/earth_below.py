@@ -27,7 +27,13 @@ EDGE = 0.15
 
 
 class EarthHazard(SkyHazard):
-    """One that says how Earth and Sun stand; by itself it leaves them."""
+    """One that says how Earth and Sun stand; by itself it leaves them.
+
+    Attributes:
+        cameras: that it makes it harder for.
+    """
+
+    cameras: ClassVar[tuple[str, ...]] = ("nadir",)
 
     def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
         """Directions (3,) of the Earth's centre and of the Sun; the Earth has this radius."""
@@ -104,6 +110,7 @@ class EarthInSunCamera(EarthHazard):
     above_deg: float = key(5.0, "of the Sun above the limb; below 0 it has set", -90, 120)
     towards_deg: float = key(0.0, "direction of the Earth around the Sun", -360, 360)
 
+    cameras: ClassVar[tuple[str, ...]] = ("sun",)
     name: ClassVar[str] = "earth-in-sun-camera"
     meaning: ClassVar[str] = "the Earth beside the Sun, or in front of it"
     strength: ClassVar[Strength] = Strength(

@@ -12,6 +12,12 @@ centre of the bright pixel, up to a pixel inside, which also lets parts of the l
 An extension, with ``sub_pixel``: the previous sample is a bound, and the edge lies between the two
 pixels that the search ends with, where a straight line through their values meets the threshold.
 
+Another, with ``sharp``: an edge counts as the Earth's limb only where it is dark a few pixels
+outside; the terminator and clouds fade more slowly. Lines are searched with a third of the
+threshold's distance from dark, as a limb in low sunlight is no brighter, and the edge lies half-way
+up to what is a few pixels inside, as a dim limb meets a fixed threshold further in than a bright
+one.
+
 Appendix C.3 has two slips that the text has not, here with ``listing``: edges of the last 32 rows
 come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions is
 right for gateware as flown (appendix D.3), which presents each pixel one clock early
@@ -37,6 +43,15 @@ LISTED_RIM_CENTRE = (367.0, 237.0)
 LISTED_REST = 32
 """Pixels at a column's end; the listing halves where they start."""
 
+OUTSIDE_PX, INSIDE_PX = 6, 3
+"""How far outside of an edge it must be dark, as the limb may graze a line; and where it is lit."""
+
+MOST_INWARDS = 3
+"""Pixels that an edge found by a low threshold may be moved inwards."""
+
+DARK = 34
+"""Level of a picture without light (section 5.7)."""
+
 MAX_EDGES = 2 * EDGES_PER_FRAME
 """Edges that the part keeps: assumed. The widest Earth has 28, the rest is for false ones."""
 
@@ -55,6 +70,7 @@ class EdgeConfig:
         masks: areas whose edges are dropped.
         sub_pixel: interpolate between the pixels of an edge.
         listing: with the slips of appendix C.3.
+        sharp: drop edges that are not dark outside; place the others by the light inside.
     """
 
     threshold: int = 70
@@ -63,13 +79,28 @@ class EdgeConfig:
     masks: Sequence[Mask] = ()
     sub_pixel: bool = True
     listing: bool = False
+    sharp: bool = False
+
+    @property
+    def level(self) -> int:
+        """Where lines are bright."""
+        return DARK + (self.threshold - DARK) // 3 if self._lowered else self.threshold
+
+    @property
+    def darkest(self) -> int:
+        """A pixel outside of a sharp edge is at most so bright: half-way from dark to bright."""
+        return (self.level + DARK) // 2
+
+    @property
+    def _lowered(self) -> bool:
+        return self.sharp and self.threshold > DARK
 
 
 class EdgeList:
     """Edges in the order in which they were found.
 
     Attributes:
-        false: edges dropped at the rim or in a mask.
+        false: edges dropped at the rim, in a mask, or because they are not sharp.
         full: whether there were more than the part keeps.
     """
 
@@ -78,6 +109,8 @@ class EdgeList:
         self._config = config
         self._meter = meter
         self._points: list[tuple[int, int]] = []
+        self._sides: list[tuple[int, int]] = []
+        self._lit: list[bool] = []
         self.false = 0
         self.full = False
 
@@ -90,6 +123,16 @@ class EdgeList:
         """Coordinates (n, 2), x and y in 1/32 px."""
         return np.array(self._points, np.int16).reshape(-1, 2)
 
+    @property
+    def sides(self) -> NDArray[np.int8]:
+        """Where the bright side of each is (n, 2): one of x and y is 1 or -1, the other 0."""
+        return np.array(self._sides, np.int8).reshape(-1, 2)
+
+    @property
+    def lit(self) -> NDArray[np.bool_]:
+        """Which edges (n,) are as bright inside as the threshold asks for."""
+        return np.array(self._lit, bool)
+
     def offsets(self) -> NDArray[np.float32]:
         """Coordinates (n, 2) from the boresight in px; charges the conversion."""
         count = len(self)
@@ -100,21 +143,34 @@ class EdgeList:
             self._meter.charge(i16_add=2 * count)
         return self._from(self._config.boresight, self.points)
 
-    def add(self, line: int, vertical: bool, crossing: "Crossing") -> None:
-        """Judge and keep an edge on scanned row, or column, ``line``."""
-        along = EDGE_UNIT * crossing.bright
+    def add(
+        self, line: int, vertical: bool, crossing: "Crossing", around: tuple[int, int] | None = None
+    ) -> None:
+        """Judge and keep an edge on scanned row, or column, ``line``.
+
+        ``around`` has the values outside of it and inside, where an edge must be sharp.
+        """
+        along, level = EDGE_UNIT * crossing.bright, self._config.level
+        if around is not None:
+            level = _half_way(around[1])
+            self._meter.charge(i8=4)
         if self._config.sub_pixel:
-            share = (crossing.bright_value - self._config.threshold) * EDGE_UNIT
+            share = (crossing.bright_value - level) * EDGE_UNIT
             share //= crossing.bright_value - crossing.dark_value
+            share = min(max(share, -EDGE_UNIT), 2 * EDGE_UNIT)
             along += share if crossing.dark > crossing.bright else -share
             self._meter.charge(i16_div=1, i16_add=4)
         point = (EDGE_UNIT * line, along) if vertical else (along, EDGE_UNIT * line)
-        if self._outside(point) or self._masked(line, vertical, crossing):
+        soft = around is not None and around[0] > self._config.darkest
+        if self._outside(point) or self._masked(line, vertical, crossing) or soft:
             self.false += 1
         elif len(self) == MAX_EDGES:
             self.full = True
         else:
             self._points.append(point)
+            side = 1 if crossing.bright > crossing.dark else -1
+            self._sides.append((0, side) if vertical else (side, 0))
+            self._lit.append(around is None or around[1] >= self._config.threshold)
 
     @staticmethod
     def _from(centre: tuple[float, float], points: NDArray[np.int16]) -> NDArray[np.float32]:
@@ -155,6 +211,31 @@ def crossing(one: tuple[int, int], other: tuple[int, int], threshold: int) -> Cr
         return None
     bright, dark = (one, other) if one[1] >= threshold else (other, one)
     return Crossing(bright[0], dark[0], bright[1], dark[1])
+
+
+def _half_way(inside: int) -> int:
+    return (inside + DARK) >> 1
+
+
+def settled(edge: Crossing, meter: Meter) -> Generator[int, int, tuple[Crossing, tuple[int, int]]]:
+    """Move an edge inwards to where it is half as bright as inside; asks as `bisect` does.
+
+    Returns it, and the values some way outside and inside.
+    """
+    outwards = 1 if edge.dark > edge.bright else -1
+    outside = yield edge.dark + OUTSIDE_PX * outwards
+    inside = yield edge.bright - INSIDE_PX * outwards
+    meter.charge(i8=12, array_byte=2)
+    for _ in range(MOST_INWARDS):
+        meter.charge(i8=4)
+        if edge.bright_value >= _half_way(inside):
+            break
+        further = yield edge.bright - outwards
+        meter.charge(i8=6, array_byte=1, loop=1)
+        if further <= edge.bright_value:
+            break
+        edge = Crossing(edge.bright - outwards, edge.bright, further, edge.bright_value)
+    return edge, (outside, inside)
 
 
 def bisect(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, int, Crossing]:
@@ -244,7 +325,7 @@ class NadirLines:
         sample = int(self._buffer[piece.size - 1])
         self._previous = sample
         self._meter.charge(array_byte=2, i8=3, loop16=1)
-        start, threshold = piece.start, self._config.threshold
+        start, threshold = piece.start, self._config.level
         wide = crossing((start - 1, before), (start + piece.size - 1, sample), threshold)
         if wide is None:
             return
@@ -256,7 +337,16 @@ class NadirLines:
                 start = (start - self._scan_start) // 2 + self._scan_start
             bright = start + self._listed_search(piece.size, sample >= threshold)
             found = Crossing(bright, bright, sample, sample)
-        self.edges.add(line, piece.vertical, found)
+        around = None
+        if self._config.sharp:
+
+            def read(position: int) -> int:
+                if position < piece.start:
+                    return before
+                return int(self._buffer[min(position - piece.start, piece.size - 1)])
+
+            found, around = answered(settled(found, self._meter), read)
+        self.edges.add(line, piece.vertical, found, around)
 
     def _listed_search(self, size: int, rises: bool) -> int:
         """Appendix C.4: the bright pixel's place in the buffer, between its first and its last."""
@@ -265,7 +355,7 @@ class NadirLines:
         self._meter.charge(call=1, i8=6 * steps, array_byte=steps, loop=steps)
         for _ in range(steps):
             middle = (light + dark) >> 1
-            if self._buffer[middle] >= self._config.threshold:
+            if self._buffer[middle] >= self._config.level:
                 light = middle
             else:
                 dark = middle

@@ -10,38 +10,46 @@ The result codes are public, what leads to them is not; assumed:
 As printed there are no checks: every edge counts, the radius is not calculated, and only a division
 by 0 or a centre that the interface does not have is a bad fit. With them:
 
-- too few edges: fewer than `NadirConfig.min_edges`, here 6, twice the unknowns.
+- too few edges: fewer than `NadirConfig.min_edges`, in all or on the circle.
 - bad fit: no circle, an angular radius that no altitude of interest has, a centre more than 100 deg
-  away along an axis, which the interface does not have, or edges off the circle.
-  Up to a quarter of the edges may be dropped first, the worst one at a time: hot pixels, the Moon.
+  away along an axis, which the interface does not have, or half as many edges again off the circle
+  as on it beyond the three that make it (`limb`).
 
 An extension is the fit in the stereographic projection (see `Projection`). A circle there has the
 centre (x, y) and gives the origin the power p; the cone that it is the image of has its axis along
 (2 f x, 2 f y, f^2 - p).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubesense.vision import arithmetic
-from cubestack.firmware_model.cubesense.vision.circle import Circle, LeastSquaresCircle
+from cubestack.firmware_model.cubesense.vision.circle import FEWEST, Circle, LeastSquaresCircle
 from cubestack.firmware_model.cubesense.vision.distortion import FOCAL_PX, Projection, RadiusTable
 from cubestack.firmware_model.cubesense.vision.edges import EdgeList
+from cubestack.firmware_model.cubesense.vision.limb import Limb, Tolerances, far_off, find_limb
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 
-DROPPED_SHARE = 4
-"""One edge in so many may be dropped."""
+LIT = {
+    Projection.STEREOGRAPHIC: Tolerances(on_px=1.0, good_rms_px=0.35, usual_px=0.2),
+    Projection.EQUIDISTANT: Tolerances(on_px=12.0, good_rms_px=8.0, usual_px=3.0),
+}
+"""Of edges that are lit well. In the published projection the limb itself leaves the circle by so
+much towards the rim."""
 
-MAX_RMS_PX = {Projection.EQUIDISTANT: 8.0, Projection.STEREOGRAPHIC: 0.5}
-"""Largest root mean square distance of the edges from the circle, in px of the projection.
+DUSK = 3
+"""Edges along the dusk may be off by so many times as much, and still be the limb's."""
 
-In the published projection the limb itself leaves the circle by this much towards the rim. In the
-stereographic one, edges of a sunlit limb stay below 0.35 px, and a looser limit lets fits to the
-terminator pass.
-"""
+DIM = {kind: replace(allowed, usual_px=3.5 * allowed.usual_px) for kind, allowed in LIT.items()}
+"""Of edges along the dusk."""
+
+FLOOR_DEG = 0.01
+"""Part of the standard deviation that no number of edges takes away."""
+
+MOST_SIGMA = 0xFFFF
 
 LARGEST_PX = np.float32(codes.LARGEST_ANGLE_DEG * codes.PIXELS_PER_DEGREE)
 
@@ -66,6 +74,16 @@ class NadirConfig:
     radius_deg: tuple[float, float] = (30.0, 80.0)
     checked: bool = True
 
+    def because(self, reason: codes.Reason) -> codes.Reason:
+        """The published program gives no reasons."""
+        return reason if self.checked else codes.Reason.NONE
+
+    @property
+    def bounds(self) -> tuple[float, float, float]:
+        """As `find_limb` takes them; constants of the program."""
+        low, high = np.tan(np.radians(self.radius_deg))
+        return float(low), float(high), float(FOCAL_PX)
+
 
 @dataclass(frozen=True)
 class Direction:
@@ -75,6 +93,8 @@ class Direction:
         detect: its result code.
         x, y: centre from the boresight, 1/100 px, undistorted; 0 without success.
         alpha, beta: the same, 1/100 deg.
+        sigma_alpha, sigma_beta: standard deviations of these, 1/100 deg; 0: not known.
+        reason: why, where that is looked at.
     """
 
     detect: codes.DetectResult
@@ -82,6 +102,9 @@ class Direction:
     y: int = 0
     alpha: int = 0
     beta: int = 0
+    sigma_alpha: int = 0
+    sigma_beta: int = 0
+    reason: codes.Reason = codes.Reason.NONE
 
 
 @dataclass(frozen=True)
@@ -92,11 +115,13 @@ class NadirResult(Direction):
         edges: that the fit used; without a fit, that were found.
         dropped: edges left out of it.
         radius_deg: angular radius of the circle; 0 when there is none, or it was not calculated.
+        rms_px: of the distances of these edges from the circle, in px of the projection.
     """
 
     edges: int = 0
     dropped: int = 0
     radius_deg: float = 0.0
+    rms_px: float = 0.0
 
 
 def angle_of(hundredths: NDArray[np.int16], meter: Meter) -> NDArray[np.int16]:
@@ -109,55 +134,88 @@ def angle_of(hundredths: NDArray[np.int16], meter: Meter) -> NDArray[np.int16]:
 def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResult:
     """Undistort the edges, fit the circle, judge it. Phases: `undistort` and `fit`."""
     meter.charge(i8=3)
+    bad, why = codes.DetectResult.BAD_FIT, codes.Reason
     if edges.full:
-        return NadirResult(codes.DetectResult.TOO_MANY_EDGES, edges=len(edges))
+        many = codes.DetectResult.TOO_MANY_EDGES
+        return NadirResult(many, edges=len(edges), reason=config.because(why.MANY_EDGES))
     if config.checked and len(edges) < config.min_edges:
-        return NadirResult(codes.DetectResult.TOO_FEW_EDGES, edges=len(edges))
+        few = codes.DetectResult.TOO_FEW_EDGES
+        return NadirResult(few, edges=len(edges), reason=why.FEW_EDGES)
     with meter.phase("undistort"):
         corrected = config.table.correct(edges.offsets(), meter)
         points = corrected.astype(np.float32) / arithmetic.HUNDREDTHS
         meter.charge(f32_convert=2 * len(points), f32_div=2 * len(points))
     with meter.phase("fit"):
+        limb = None
         if config.checked:
-            circle, used = _fit(points, config, meter)
+            limb = _limb(points, edges, config, meter)
+            circle, used = (None, 0) if limb is None else (limb.circle, limb.on_circle)
         else:
             circle, used = _as_printed(points, config, meter), len(points)
-        dropped = len(edges) - used
+        fit = NadirResult(bad, edges=used, dropped=len(edges) - used)
         if circle is None:
-            return NadirResult(codes.DetectResult.BAD_FIT, edges=used, dropped=dropped)
+            return replace(fit, reason=config.because(why.NO_CIRCLE))
         centre, radius_deg = _on_the_sky(circle, config.projection, meter)
+        fit = replace(fit, radius_deg=radius_deg)
         low, high = config.radius_deg if config.checked else (0.0, 180.0)
         if config.checked:
-            meter.charge(f32_compare=4)
-        in_range = bool(np.all(np.abs(centre) <= LARGEST_PX))
-        if not (in_range and low <= radius_deg <= high):
-            bad = codes.DetectResult.BAD_FIT
-            return NadirResult(bad, edges=used, dropped=dropped, radius_deg=radius_deg)
+            meter.charge(f32_compare=4, i8=4)
+        if not (np.all(np.abs(centre) <= LARGEST_PX) and low <= radius_deg <= high):
+            return replace(fit, reason=config.because(why.WRONG_RADIUS))
+        if limb is not None:
+            if used < config.min_edges:
+                return replace(fit, reason=why.FEW_EDGES)
+            off_px = DUSK * LIT[config.projection].on_px
+            against = far_off(circle, points, edges.sides, off_px, meter)
+            if 3 * (used - FEWEST) <= 2 * against:
+                return replace(fit, reason=why.OTHER_LIGHT)
+            sigma = _sigma(limb, centre, config.projection, meter)
+            fit = replace(
+                fit,
+                sigma_alpha=sigma[0],
+                sigma_beta=sigma[1],
+                rms_px=limb.rms_px,
+                reason=why.MEASURED,
+            )
         meter.charge(f32_mul=2, f32_convert=2)
         position = arithmetic.to_int16(centre * arithmetic.HUNDREDTHS)
         x, y, alpha, beta = (int(value) for value in (*position, *angle_of(position, meter)))
-    return NadirResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, used, dropped, radius_deg)
+    success = codes.DetectResult.SUCCESS
+    return replace(fit, detect=success, x=x, y=y, alpha=alpha, beta=beta)
 
 
-def _fit(points: Values, config: NadirConfig, meter: Meter) -> tuple[Circle | None, int]:
-    """Circle through all but a few of the points, and how many it used; None for a bad one."""
-    limit = np.float32(MAX_RMS_PX[config.projection] ** 2)
-    equations = LeastSquaresCircle(points, meter)
-    fewest = max(config.min_edges, len(points) - len(points) // DROPPED_SHARE)
-    while True:
-        circle = equations.solve()
-        if circle is None:
-            return None, len(points)
-        square = circle.residuals(points, meter) ** 2
-        count = len(points)
-        meter.charge(f32_mul=count + 1, f32_add=count, f32_compare=count + 1, f32_div=1)
-        if arithmetic.sequential_sum(square) / np.float32(count) <= limit:
-            return circle, count
-        if count == fewest:
-            return None, count
-        worst = int(np.argmax(square))
-        equations.remove(points[worst])
-        points = np.delete(points, worst, axis=0)
+def _limb(points: Values, edges: EdgeList, config: NadirConfig, meter: Meter) -> Limb | None:
+    """Of the edges that are well lit, if they are enough and make one; else of all."""
+    lit = edges.lit
+    meter.charge(i8=3 * len(lit))
+    if np.count_nonzero(lit) >= config.min_edges:
+        limb = find_limb(
+            points[lit], edges.sides[lit], LIT[config.projection], config.bounds, meter
+        )
+        if limb is not None and limb.on_circle >= config.min_edges:
+            return limb
+    return find_limb(points, edges.sides, DIM[config.projection], config.bounds, meter)
+
+
+def _sigma(limb: Limb, centre: Values, projection: Projection, meter: Meter) -> tuple[int, int]:
+    """Standard deviations of alpha and beta, 1/100 deg, rounded up.
+
+    How they hang on the circle is tried, with a step of a pixel of its centre and its radius.
+    """
+    circle, one = limb.circle, np.float32(1)
+    moved = (
+        Circle(circle.x + one, circle.y, circle.radius),
+        Circle(circle.x, circle.y + one, circle.radius),
+        Circle(circle.x, circle.y, circle.radius + one),
+    )
+    slopes = np.stack(
+        [_on_the_sky(other, projection, meter)[0] - centre for other in moved], axis=1
+    ) / np.float32(codes.PIXELS_PER_DEGREE)
+    variance = np.einsum("ai,ij,aj->a", slopes, limb.covariance, slopes)
+    meter.charge(f32_mul=2 * 12, f32_add=2 * 9 + 6, f32_div=6, f32_sqrt=2, f32_convert=2)
+    sigma = np.sqrt(np.maximum(variance, 0) + FLOOR_DEG**2) * 100
+    alpha, beta = (int(min(np.ceil(value), MOST_SIGMA)) for value in sigma)
+    return alpha, beta
 
 
 def _as_printed(points: Values, config: NadirConfig, meter: Meter) -> Circle | None:

@@ -13,11 +13,13 @@ from enum import Enum
 import numpy as np
 
 from cubestack.firmware_model.cubesense.vision.edges import (
+    Answer,
     Crossing,
     EdgeConfig,
     EdgeList,
     bisect,
     crossing,
+    settled,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
@@ -56,12 +58,17 @@ def around_samples(
                 (True, int(above[index]), y, x),
             ):
                 first = max(end - read_out.scan_step, -1)
-                wide = crossing((first, before), (end, sample), config.threshold)
+                wide = crossing((first, before), (end, sample), config.level)
                 if wide is None:
                     continue
+                last = (read_out.rows if vertical else read_out.columns) - 1
                 search = bisect if between is Between.BINARY else _walk
-                steps = search(wide, config.threshold, meter)
-                edges.add(line, vertical, (yield from _on_line(steps, line, vertical)))
+                steps = search(wide, config.level, meter)
+                found = yield from _on_line(steps, line, vertical, last)
+                around = None
+                if config.sharp:
+                    found, around = yield from _on_line(settled(found, meter), line, vertical, last)
+                edges.add(line, vertical, found, around)
             left = sample
             above[index] = sample
     return edges
@@ -82,14 +89,15 @@ def _walk(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, in
 
 
 def _on_line(
-    steps: Generator[int, int, Crossing], line: int, vertical: bool
-) -> Generator[Pixel, int, Crossing]:
-    """Ask for pixels where ``steps`` asks for positions on a line."""
+    steps: Generator[int, int, Answer], line: int, vertical: bool, last: int
+) -> Generator[Pixel, int, Answer]:
+    """Ask for pixels where ``steps`` asks for positions on a line, 0 to ``last``."""
     try:
         position = next(steps)
         while True:
+            position = min(max(position, 0), last)
             value = yield (line, position) if vertical else (position, line)
             position = steps.send(value)
     except StopIteration as end:
-        found: Crossing = end.value
+        found: Answer = end.value
         return found

@@ -11,14 +11,16 @@ An extension: a Sun that overflows the window is cut, mostly at the bottom, and 
 row that reaches the window's left or right border is then left out of the mean of x, a column that
 reaches the upper or lower one out of the mean of y. When nothing would remain, all count.
 
-Another: the Sun is not found when the FPGA saw no run of bright pixels, when fewer pixels reach the
-threshold than `SunConfig.min_pixels`, or when their centre lies outside of the field of view, where
-the lens shows nothing and an int of 1/100 px may overflow; the criteria are assumed. Four pixels
-are one more than the FPGA's run, so that one row of stuck pixels is no Sun.
+Another: the light must be a Sun. It is none when the FPGA saw no run of bright pixels, when too few
+or too many pixels reach the threshold, when they are not round, their middle is not saturated or
+their edge is sharper than that of the Sun's image, or when their centre lies outside of the field
+of view, where the lens shows nothing and an int of 1/100 px may overflow. The FPGA finds the first
+bright light of the picture only, so a false one before the Sun hides it: then there is none. The
+limits are assumed, around images of 6 to 8 px in radius (section 5.1.3.2).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +35,20 @@ from cubestack.firmware_model.mcu.costs import Meter
 COORDINATE_BYTES = 4
 """x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
 
+FULL_SCALE = 255
+
+ROUND = 4
+"""Width and height of a whole Sun differ by so many pixels at most."""
+
+SOFT = 5
+"""Square of the number of pixels of a Sun's edge, by the number of bright pixels, at least."""
+
+EDGE_LEVEL = 100
+"""Pixels of a Sun's edge are brighter, and below its threshold: 30 % of its level (5.7)."""
+
+SIGMA_DEG = 0.03
+"""Standard deviation of alpha and beta, fitted: noise, and edges in whole pixels."""
+
 _LARGEST_ANGLE = codes.LARGEST_ANGLE_DEG * 100
 """In 1/100 deg; only another lens images anything beyond."""
 
@@ -46,7 +62,7 @@ class SunConfig:
         threshold: a pixel at or above it belongs to the Sun.
         boresight: (x, y) in px.
         masks: areas whose pixels do not count.
-        min_pixels: fewer are no Sun.
+        min_pixels, max_pixels: fewer, or more, are no Sun.
         printed: without the extensions.
     """
 
@@ -54,7 +70,8 @@ class SunConfig:
     threshold: int = 225
     boresight: tuple[float, float] = (369.0, 250.0)
     masks: Sequence[Mask] = ()
-    min_pixels: int = fpga.SUN_RUN + 1
+    min_pixels: int = 10
+    max_pixels: int = 190
     printed: bool = False
 
 
@@ -87,19 +104,22 @@ def find_sun(
     first = (int(data[0]) + 256 * int(data[1]), int(data[2]) + 256 * int(data[3]))
     origin = read_out.window_origin(*first)
     window = data[COORDINATE_BYTES:].reshape(read_out.window, read_out.window)
+    why = codes.Reason
+    none = SunResult(codes.DetectResult.SUN_NOT_FOUND)
     with meter.phase("centroid"):
         meter.charge(i16_add=8)
         if first == fpga.SUN_NOT_FOUND and not config.printed:
-            return SunResult(codes.DetectResult.SUN_NOT_FOUND)
+            return replace(none, reason=why.NO_LIGHT)
         meter.charge(i8=window.size, loop16=read_out.window)
         rows, columns = np.nonzero(window >= config.threshold)
         kept = ~masked(columns + origin[0], rows + origin[1], config.masks, meter)
         rows, columns = rows[kept], columns[kept]
         pixels = len(rows)
-        if not config.printed:
-            meter.charge(i8=1)
-        if pixels < (1 if config.printed else config.min_pixels):
-            return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
+        none = replace(none, pixels=pixels)
+        if not config.printed and (reason := _no_sun(window, rows, columns, config, meter)):
+            return replace(none, reason=reason)
+        if not pixels:
+            return none
         # What the listing does for each Sun pixel, every factor converted anew.
         meter.charge(f32_convert=4 * pixels, f32_mul=2 * pixels, f32_add=2 * pixels, i16_add=pixels)
         values = window[rows, columns]
@@ -112,15 +132,50 @@ def find_sun(
             offset = mean + np.array(origin, np.float32) - np.array(config.boresight, np.float32)
         meter.charge(f32_add=4, f32_div=2, f32_convert=4)
         if not config.printed and _out_of_field(offset, meter):
-            return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
+            return replace(none, reason=why.OUT_OF_FIELD)
     with meter.phase("undistort"):
         centre = config.table.correct(offset[None], meter)[0]
         angle = angle_of(centre, meter)
         meter.charge(i16_add=4)
         if np.abs(angle).max() > _LARGEST_ANGLE:
-            return SunResult(codes.DetectResult.SUN_NOT_FOUND, pixels=pixels)
+            return none if config.printed else replace(none, reason=why.OUT_OF_FIELD)
     x, y, alpha, beta = (int(value) for value in (*centre, *angle))
-    return SunResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, pixels)
+    found = SunResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, pixels=pixels)
+    if config.printed:
+        return found
+    sigma = round(100 * SIGMA_DEG)
+    return replace(found, sigma_alpha=sigma, sigma_beta=sigma, reason=why.MEASURED)
+
+
+def _no_sun(
+    window: NDArray[np.uint8],
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    config: SunConfig,
+    meter: Meter,
+) -> codes.Reason | None:
+    """Why the bright pixels of the window are no Sun; None when they may be one.
+
+    Counted while the window is read: pixels, those at full scale, those of the edge, and limits.
+    """
+    why, pixels = codes.Reason, len(rows)
+    meter.charge(i8=3 * window.size + 8 * pixels + 20, i16_add=12)
+    if pixels < config.min_pixels:
+        return why.NO_LIGHT
+    if pixels > config.max_pixels:
+        return why.TOO_LARGE
+    if 2 * np.count_nonzero(window[rows, columns] == FULL_SCALE) < pixels:
+        return why.NOT_SATURATED
+    # Rows and columns with two bright pixels: a stuck one beside the Sun makes it no wider.
+    chords = [np.bincount(axis, minlength=window.shape[0]) > 1 for axis in (columns, rows)]
+    width, height = (int(np.count_nonzero(chord)) for chord in chords)
+    cut = [bool(chord[0] or chord[-1]) for chord in chords]
+    if abs(width - height) > ROUND:
+        return why.NOT_ROUND
+    if not any(cut) and not 13 * width * height <= 20 * pixels <= 20 * width * height:
+        return why.NOT_ROUND
+    soft = np.count_nonzero((window >= EDGE_LEVEL) & (window < config.threshold))
+    return why.SHARP if soft * soft < SOFT * pixels else None
 
 
 def _out_of_field(offset: NDArray[np.float32], meter: Meter) -> bool:

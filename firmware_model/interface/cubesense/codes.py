@@ -103,6 +103,32 @@ class DetectResult(IntEnum):
     SUCCESS = 7
 
 
+class Reason(IntEnum):
+    """Why a detection ended as it did, by what the firmware saw; an extension."""
+
+    NONE = 0
+    """No detection yet, or one by the published program, which does not say."""
+    MEASURED = 1
+    FEW_EDGES = 2
+    MANY_EDGES = 3
+    NO_CIRCLE = 4
+    """The edges lie on no common circle with its bright side inside."""
+    OTHER_LIGHT = 5
+    """Most edges lie off the best circle."""
+    WRONG_RADIUS = 6
+    """The circle is none that an altitude of interest has, or its centre is too far away."""
+    NO_LIGHT = 7
+    """No run of bright pixels, or too few of them for a Sun."""
+    TOO_LARGE = 8
+    """More bright pixels than a Sun has: the Earth, or structure."""
+    NOT_ROUND = 9
+    NOT_SATURATED = 10
+    """The Sun's middle is; a reflection's is not."""
+    SHARP = 11
+    """The light ends more sharply than the Sun's image does."""
+    OUT_OF_FIELD = 12
+
+
 class Measurement(IntEnum):
     """Camera and memory in one number, for the register protocol; an extension."""
 

@@ -1,4 +1,5 @@
-"""CubeSense's telemetry beside the published, IDs from 220 on: what a measurement rests on, times.
+"""CubeSense's telemetry beside the published, IDs from 220 on: what a measurement rests on, how
+sure it is, times.
 
 Also the telecommands that change the switches, and the telemetry that shows them.
 """
@@ -71,6 +72,20 @@ def _edges(part: int) -> Message:
     ).of(u8("Count", "edges found in all, false ones left out"), *coordinates)
 
 
+def _quality(camera: codes.Camera) -> Message:
+    return _extension(
+        228 + camera,
+        f"Quality{camera + 1}",
+        f"how sure the latest measurement of camera {camera + 1} is, and why there is none",
+    ).of(
+        u16("SigmaAlpha", "standard deviation of Alpha; 0: not known", "deg", 100),
+        u16("SigmaBeta", "standard deviation of Beta; 0: not known", "deg", 100),
+        u16("Rms", "distances of the edges from the circle; 0 for the Sun", "px", 100),
+        u8("Found", "edges that the search found, or Sun pixels"),
+        u8("Reason", "why the detection ended so", choices=codes.Reason),
+    )
+
+
 EXTENSIONS = (
     *(_details(camera) for camera in codes.Camera),
     *(_times(camera) for camera in codes.Camera),
@@ -79,4 +94,5 @@ EXTENSIONS = (
     ),
     *(_edges(part) for part in range(2)),
     _SHOWN,
+    *(_quality(camera) for camera in codes.Camera),
 )

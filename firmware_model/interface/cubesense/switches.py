@@ -29,20 +29,21 @@ class CubeSenseSwitches(Switches):
         "rim of the field around (367, 237)",
     )
     limb: str = switch(
-        "what becomes of edges that are on no common circle",
+        "which edges make the circle of the Earth",
         "unchecked",
-        "checked",
+        "robust",
         source="section 6.5.3.1, appendix C.5",
-        reason="false edges and the terminator pull the circle away; checks drop a few edges, and "
-        "refuse too few of them, a bad fit, or a radius that no altitude has",
+        reason="the terminator, clouds, Moon, reflections and glint have edges too and pull the "
+        "circle away; robust keeps edges that are dark outside, looks for the circle that most "
+        "of them lie on, with the bright side in, says how sure it is, and refuses what is none",
     )
     sun: str = switch(
-        "which pixels of the Sun's window count",
+        "which pixels of the Sun's window count, and whether they are a Sun",
         "all-pixels",
-        "whole-chords",
+        "confirmed",
         source="sections 4.4.2 and 6.6.3, appendix C.6",
-        reason="a Sun that overflows the window is cut, and its mean moves; stuck pixels and light "
-        "outside of the field are no Sun",
+        reason="a Sun that overflows the window is cut, and its mean moves; what has not the Sun's "
+        "size, shape, saturated middle and soft edge, or lies outside of the field, is none",
     )
     lens: str = switch(
         "what each camera's lens is beside the polynomial that the firmware undoes",

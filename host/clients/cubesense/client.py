@@ -78,6 +78,23 @@ class Measurement:
 
 
 @dataclass(frozen=True)
+class DirectionQuality:
+    """How sure a camera's latest measurement is, and why there is none.
+
+    Attributes:
+        sigma_deg: standard deviations of alpha and beta; 0: not known.
+        rms_px: of the edges' distances from the circle of the Earth, undistorted.
+        found: edges that the search found, or Sun pixels.
+        reason: why the detection ended so.
+    """
+
+    sigma_deg: tuple[float, float]
+    rms_px: float
+    found: int
+    reason: codes.Reason
+
+
+@dataclass(frozen=True)
 class CameraSettings:
     """Exposure in units of two line times (127 us), gain, and gains of the two colours."""
 
@@ -288,6 +305,23 @@ class CubeSense(DeviceClient):
     def details(self, camera: Camera) -> dict[str, Value]:
         """What a camera's latest measurement rests on: the fields of telemetry Details."""
         return self.client.telemetry(f"Details{camera + 1}")
+
+    def quality(self, camera: Camera) -> DirectionQuality:
+        """How sure a camera's latest measurement is: always 0 of the published program.
+
+        Raises BadAnswerError for a reason that there is not.
+        """
+        values = self.client.telemetry(f"Quality{camera + 1}")
+        try:
+            reason = codes.Reason(int(values["Reason"]))
+        except ValueError as error:
+            raise BadAnswerError(f"telemetry Quality{camera + 1}: {error}") from None
+        return DirectionQuality(
+            (float(values["SigmaAlpha"]), float(values["SigmaBeta"])),
+            float(values["Rms"]),
+            int(values["Found"]),
+            reason,
+        )
 
     def edges(self) -> NDArray[np.float64]:
         """Pixels (n, 2), column and row, of the edges that the latest nadir search found.

@@ -44,7 +44,7 @@ FIELD = (PIXELS_PER_DEGREE, 95.0)
 UNDISTORTED = (0.0, 1.0, 0.0, 0.0, 0.0)
 """Factors with which a sensor leaves the picture as it is."""
 
-FINEST = "distortion=equidistant,edges=sub-pixel,sun=whole-chords"
+FINEST = "distortion=equidistant,edges=sub-pixel,sun=confirmed"
 """Switches of the firmware at the bench: it tells places in 1/100 px."""
 
 REACH_DEG = {Camera.SUN: 88.0, Camera.NADIR: 30.0}

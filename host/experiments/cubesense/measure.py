@@ -10,6 +10,7 @@ examples:
   cubestack measure cubesense --sensor nadir --frames 500 --json > nadir.jsonl
   cubestack measure cubesense --scene earth.toml --json
   cubestack measure cubesense --memory other     through the link of the FPGAs
+  cubestack measure cubesense --sensor nadir --hazard clouds --hazard terminator=110
 """
 
 import time
@@ -23,6 +24,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSear
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.devices.experiment import Experiment, Result
+from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
 
@@ -47,7 +49,7 @@ FRAME_S = 525 * 858 / 13.5e6
 GOAL_DEG, SUN_WIDE_DEG, SUN_WIDE_GOAL_DEG = 0.2, 45.0, 2.0
 """Accuracy that the thesis aimed at (sections 7.1 and 7.2), and for a Sun beyond an angle."""
 
-POSE = ("tilt", "sun_angle", "altitude", "bloom", "no_noise")
+POSE = ("tilt", "sun_angle", "altitude", "bloom", "no_noise", "hazard")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +81,11 @@ class CubeSenseOptions(MeasureOptions):
         None, "random pose: radius of the Sun's image (7)", POSITIVE, metavar="PX"
     )
     no_noise: bool = option(False, "random pose: ideal cameras")
+    hazard: tuple[hazards.Asked, ...] = hazards.hazard_option()
 
     def check(self) -> None:
         """Options of the random pose need one; a search reads the camera's own memory."""
+        hazards.check(self.hazard, earth=True)
         if self.scene is not None and self.given(*POSE):
             names = ", ".join(map(flag, POSE))
             raise ValueError(f"{names} belong to the random poses; a scene file has keys for them")
@@ -109,6 +113,9 @@ class SensorResult(Result):
         tolerance_deg: error up to which a direction is right: the thesis' goals, sections 7.1 and
             7.2, by sensor and, for the Sun, by its angle to the boresight.
         right: whether the direction is, or nothing was found where nothing can be seen.
+        sigma_deg: standard deviations of alpha and beta that the device claims; None where it
+            claims none.
+        reason: why the detection ended so, by name; "none" of the published program.
         edges: edges that the nadir sensor's fit used; None for the sun sensor.
         sun_pixels: pixels of the sun sensor's mean; None for the nadir sensor.
         pixels_read: pixels that the processor read from the FPGA.
@@ -126,6 +133,8 @@ class SensorResult(Result):
     error_deg: float | None
     tolerance_deg: float
     right: bool
+    sigma_deg: tuple[float, float] | None
+    reason: str
     edges: int | None
     sun_pixels: int | None
     pixels_read: int
@@ -136,7 +145,7 @@ class SensorResult(Result):
 
 
 def _told(results: Sequence[SensorResult]) -> str:
-    """How many detected their target; over those the errors, and the mean time."""
+    """How many detected their target; over those the errors, and the times."""
     errors = [result.error_deg for result in results if result.error_deg is not None]
     times = [result.phase_ms["total"] for result in results if result.detected]
     right = sum(result.right for result in results)
@@ -145,15 +154,60 @@ def _told(results: Sequence[SensorResult]) -> str:
         return text
     return (
         f"{text}; error: mean {np.mean(errors):.3f}, "
-        f"95th percentile {np.percentile(errors, 95):.3f} deg; time {np.mean(times):.1f} ms"
+        f"95th percentile {np.percentile(errors, 95):.3f} deg; time {np.mean(times):.1f} ms, "
+        f"at most {max(times):.1f}"
     )
+
+
+def _claimed(results: Sequence[SensorResult]) -> str | None:
+    """How errors compare with the standard deviations claimed, and the longest step of each kind;
+    None where none is claimed.
+    """
+    ratios = np.array([ratio for result in results for ratio in _ratios(result)])
+    if not len(ratios):
+        return None
+    steps = {name: max(result.phase_ms[name] for result in results) for name in results[0].phase_ms}
+    longest = max((name for name in steps if name != "total"), key=steps.__getitem__)
+    inside = [100 * float(np.mean(ratios < sigmas)) for sigmas in (1, 3)]
+    return (
+        f"{inside[0]:.0f} % inside of 1 sigma, {inside[1]:.1f} % of 3; "
+        f"longest step: {longest}, {steps[longest]:.1f} ms"
+    )
+
+
+def _ratios(result: SensorResult) -> list[float]:
+    """Errors of alpha and beta by what was claimed."""
+    if result.sigma_deg is None or result.error_deg is None:
+        return []
+    pairs = zip(
+        (result.alpha_deg, result.beta_deg),
+        (result.truth_alpha_deg, result.truth_beta_deg),
+        result.sigma_deg,
+        strict=True,
+    )
+    return [
+        abs(found - truth) / sigma
+        for found, truth, sigma in pairs
+        if found is not None and truth is not None
+    ]
 
 
 class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult]):
     options = CubeSenseOptions
     description = __doc__
     title = "directions over the serial line, beside the truth; degrees"
-    columns = ("sensor", "alpha", "truth", "beta", "truth", "error", "points", "ms", "result")
+    columns = (
+        "sensor",
+        "alpha",
+        "truth",
+        "beta",
+        "truth",
+        "error",
+        "sigma",
+        "points",
+        "ms",
+        "result",
+    )
     decides = ("mcu_addressing",)
 
     def count(self, options: CubeSenseOptions) -> int:
@@ -187,9 +241,10 @@ class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult])
             _degrees(result.beta_deg),
             _degrees(result.truth_beta_deg),
             _degrees(result.error_deg, 3),
+            "-" if result.sigma_deg is None else f"{np.hypot(*result.sigma_deg):.3f}",
             str(result.sun_pixels if result.edges is None else result.edges),
             f"{result.phase_ms['total']:.1f}",
-            result.detect if result.capture.startswith("stored") else result.capture,
+            _ending(result),
         )
 
     def summarise(self, results: Sequence[SensorResult], wall_s: float) -> Iterator[str]:
@@ -197,7 +252,17 @@ class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult])
             own = [result for result in results if result.sensor == sensor]
             if own:
                 yield f"{sensor}: {_told(own)}"
+                if claimed := _claimed(own):
+                    yield f"{sensor}: {claimed}"
         yield f"{wall_s:.1f} s wall time"
+
+
+def _ending(result: SensorResult) -> str:
+    """What became of it, and why nothing was found."""
+    if not result.capture.startswith("stored"):
+        return result.capture
+    told = not result.detected and result.reason != "none"
+    return f"{result.detect}: {result.reason}" if told else result.detect
 
 
 def _degrees(value: float | None, digits: int = 2) -> str:
@@ -209,6 +274,7 @@ def random_view(
 ) -> "EarthSunView":
     """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
     from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+    from cubestack.emulator.scene.earth_sun import Target
 
     reach = _or(options.sun_angle, 90.0) if sensor is Camera.SUN else _or(options.tilt, 30.0)
     radius, towards = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random()
@@ -218,7 +284,8 @@ def random_view(
         noise=not options.no_noise,
         seed=int(rng.integers(1 << 31)),
     )
-    return view_of(sensor, angles, condition, _or(options.altitude, 750.0))
+    view = view_of(sensor, angles, condition, _or(options.altitude, 750.0))
+    return hazards.around_earth(view, Target(sensor), options.hazard, rng)
 
 
 def view_of(
@@ -258,6 +325,8 @@ def measure_once(
     nothing = measured.capture.stored and visible is None and not measured.detected
     details = cubesense.details(sensor)
     points = int(details["Points"])
+    quality = cubesense.quality(sensor)
+    claims = measured.detected and all(quality.sigma_deg)
     return SensorResult(
         sensor=sensor.name.lower(),
         detected=measured.detected,
@@ -268,6 +337,8 @@ def measure_once(
         error_deg=error_deg,
         tolerance_deg=tolerance_deg,
         right=nothing if error_deg is None else error_deg <= tolerance_deg,
+        sigma_deg=quality.sigma_deg if claims else None,
+        reason=quality.reason.name.lower(),
         edges=points if sensor is Camera.NADIR else None,
         sun_pixels=points if sensor is Camera.SUN else None,
         pixels_read=int(details["PixelsRead"]),

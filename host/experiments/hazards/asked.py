@@ -9,7 +9,11 @@ import numpy as np
 from cubestack.host.options import Kind, option
 
 if TYPE_CHECKING:
+    from cubestack.emulator.camera.common.hazards.contract import SensorHazard
     from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.camera.ov7620.view import EarthSunView
+    from cubestack.emulator.scene.earth_sun import Target
+    from cubestack.emulator.scene.hazards import Looking, SkyHazard
     from cubestack.emulator.scene.hazards.hazard import Hazard
 
 
@@ -49,17 +53,17 @@ def hazard_option() -> Any:
     )
 
 
-def known() -> "Mapping[str, type[Hazard]]":
-    """All hazards of light, sensor and lens by name."""
+def known(*, earth: bool = False) -> "Mapping[str, type[Hazard]]":
+    """All hazards of light, sensor and lens by name; ``earth``: those of an Earth below too."""
     from cubestack.emulator.camera.common.hazards import HAZARDS
-    from cubestack.emulator.scene.hazards import SKY_HAZARDS
+    from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
 
-    return {**SKY_HAZARDS, **HAZARDS}
+    return {**SKY_HAZARDS, **(EARTH_HAZARDS if earth else {}), **HAZARDS}
 
 
-def check(asked: Sequence[Asked]) -> None:
+def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
     """Raise ValueError for hazards that there are not, or not of such a strength."""
-    kinds = known() if asked else {}
+    kinds = known(earth=earth) if asked else {}
     for one in asked:
         if one.name not in kinds:
             raise ValueError(f"hazard: there is no {one.name!r}; known: {', '.join(sorted(kinds))}")
@@ -72,28 +76,60 @@ def check(asked: Sequence[Asked]) -> None:
             )
 
 
-def with_hazards(
-    view: "SkyView", asked: Sequence[Asked], rng: np.random.Generator, time_s: float = 0.0
-) -> "SkyView":
-    """The view of a sky with these hazards; ``time_s`` is about when it will be exposed."""
-    from cubestack.emulator.camera.common.exposure import looking_along
+def _placed(
+    asked: Sequence[Asked], looking: "Looking", rng: np.random.Generator, *, earth: bool = False
+) -> "tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]":
+    """Hazards of light, and those of sensor and lens, drawn for one frame."""
     from cubestack.emulator.camera.common.hazards.contract import SensorHazard
     from cubestack.emulator.scene.hazards.contract import SkyHazard
-    from cubestack.emulator.scene.sky import SkyScene
 
-    scene, condition = view.scene, view.condition
-    if not asked or not isinstance(scene, SkyScene):
-        return view
-    looking = looking_along(scene.quaternion, condition.optics, time_s)
-    kinds = known()
+    kinds = known(earth=earth)
     placed = [
         kinds[one.name].placed(
             kinds[one.name].strength.usual if one.strength is None else one.strength, looking, rng
         )
         for one in asked
     ]
-    light = tuple(hazard for hazard in placed if isinstance(hazard, SkyHazard))
-    sensor = tuple(hazard for hazard in placed if isinstance(hazard, SensorHazard))
+    return tuple(hazard for hazard in placed if isinstance(hazard, SkyHazard)), tuple(
+        hazard for hazard in placed if isinstance(hazard, SensorHazard)
+    )
+
+
+def with_hazards(
+    view: "SkyView", asked: Sequence[Asked], rng: np.random.Generator, time_s: float = 0.0
+) -> "SkyView":
+    """The view of a sky with these hazards; ``time_s`` is about when it will be exposed."""
+    from cubestack.emulator.camera.common.exposure import looking_along
+    from cubestack.emulator.scene.sky import SkyScene
+
+    scene, condition = view.scene, view.condition
+    if not asked or not isinstance(scene, SkyScene):
+        return view
+    looking = looking_along(scene.quaternion, condition.optics, time_s)
+    light, sensor = _placed(asked, looking, rng)
+    return replace(
+        view,
+        scene=replace(scene, hazards=(*scene.hazards, *light)),
+        condition=replace(condition, hazards=(*condition.hazards, *sensor)),
+    )
+
+
+def around_earth(
+    view: "EarthSunView", camera: "Target", asked: Sequence[Asked], rng: np.random.Generator
+) -> "EarthSunView":
+    """The view of Earth and Sun with these hazards, as far as they concern ``camera``."""
+    from cubestack.emulator.camera.ov7620.light import looking_with
+    from cubestack.emulator.scene.hazards import EarthHazard
+
+    if not asked:
+        return view
+    scene, condition = view.scene, view.condition
+    light, sensor = _placed(asked, looking_with(scene, camera, 0), rng, earth=True)
+    light = tuple(
+        hazard
+        for hazard in light
+        if not isinstance(hazard, EarthHazard) or camera.name.lower() in hazard.cameras
+    )
     return replace(
         view,
         scene=replace(scene, hazards=(*scene.hazards, *light)),

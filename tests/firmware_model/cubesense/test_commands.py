@@ -142,12 +142,14 @@ def capture_only(unit: Harness) -> None:
 @telecommand("DetectionThreshold1", "DetectionThreshold2")
 def detection_threshold(unit: Harness) -> None:
     lit(unit)
-    unit.scenes[codes.Camera.SUN] = np.minimum(unit.scenes[codes.Camera.SUN], 240)  # type: ignore[type-var]
-    unit.command("DetectionThreshold1", Threshold=241)
-    assert measured(unit, codes.Camera.SUN)[0] is codes.DetectResult.SUN_NOT_FOUND
+    points = []
+    for threshold in (250, 210):
+        unit.command("DetectionThreshold1", Threshold=threshold)
+        assert measured(unit, codes.Camera.SUN)[0] is codes.DetectResult.SUCCESS
+        points.append(unit.telemetry("Details1")["Points"])
+    assert points[0] < points[1]
+    unit.scenes[codes.Camera.NADIR] = earth(0, 0, level=100)
     assert measured(unit, codes.Camera.NADIR)[0] is codes.DetectResult.SUCCESS
-    unit.command("DetectionThreshold1", Threshold=240)
-    assert measured(unit, codes.Camera.SUN)[0] is codes.DetectResult.SUCCESS
     unit.command("DetectionThreshold2", Threshold=250)
     assert measured(unit, codes.Camera.NADIR)[0] is codes.DetectResult.TOO_FEW_EDGES
 

@@ -18,6 +18,7 @@ from cubestack.firmware_model.cubesense.measurement import (
 )
 from cubestack.firmware_model.cubesense.state import distortion_of
 from cubestack.firmware_model.cubesense.vision.distortion import Projection, fine_table
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sun_centroid import SunConfig, find_sun
 from cubestack.firmware_model.interface.cubesense import INTERFACE
@@ -101,7 +102,7 @@ def test_the_earth_in_either_memory(unit: Harness, sram: Sram, truth: tuple[floa
     assert error_deg((measured["Alpha"], measured["Beta"]), truth) < 0.2
     factors = distortion_of(INTERFACE.telecommand("Distortion2").reset_values())
     meter = Meter(PIC18F45K20)
-    edges = edges_in(picture, meter)
+    edges = edges_in(picture, meter, EdgeConfig(sharp=True))
     table = fine_table(meter, Projection.STEREOGRAPHIC, factors)
     expected = find_nadir(edges, NadirConfig(table), meter)
     assert (measured["X"], measured["Y"]) == (expected.x / 100, expected.y / 100)
@@ -239,7 +240,10 @@ def test_times_are_the_timers(unit: Harness, camera: Camera, wait_us: int) -> No
 
 @pytest.mark.parametrize("profile", ["extended"])
 def test_the_published_times(unit: Harness) -> None:
-    """Section 7.4 measures 70.4 ms and 245.0 ms, 48 ms of it imaging; ours are upper bounds."""
+    """Section 7.4 measures 70.4 ms and 245.0 ms, 48 ms of it imaging; ours are upper bounds.
+
+    The robust fit takes a second fit of all edges, its uncertainty, and a look around each edge.
+    """
     unit.scenes[Camera.SUN] = sun(place(0, 0, SUN_BORESIGHT), 7)
     unit.scenes[Camera.NADIR] = earth(5, -5)
     totals = {}
@@ -248,7 +252,7 @@ def test_the_published_times(unit: Harness) -> None:
         assert measured["Wait"] + measured["Store"] == pytest.approx(48_000, abs=200)
         totals[camera] = measured["Total"] / 1000
     assert totals[Camera.SUN] == pytest.approx(85.7, abs=1.5)
-    assert totals[Camera.NADIR] == pytest.approx(264, abs=3)
+    assert totals[Camera.NADIR] == pytest.approx(443, abs=5)
 
 
 def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness) -> None:
@@ -264,8 +268,8 @@ def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness
 @pytest.mark.parametrize("profile", ["extended"])
 def test_thresholds(unit: Harness) -> None:
     unit.scenes[Camera.SUN] = sun_at(3, 4)
-    unit.scenes[Camera.NADIR] = earth(5, 6)
-    unit.command("DetectionThreshold2", Threshold=200)  # above the Earth
+    unit.scenes[Camera.NADIR] = earth(5, 6, level=80)
+    unit.command("DetectionThreshold2", Threshold=200)  # a third of it, from dark on, counts
     assert measure(unit, Camera.NADIR)["Detect"] == DetectResult.TOO_FEW_EDGES
     before = measure(unit, Camera.SUN)["Points"]
     unit.command("DetectionThreshold1", Threshold=120)

@@ -50,6 +50,10 @@ def no_two_alike(node: Links) -> None:
             edges=np.arange(2 * 25, dtype=np.int16).reshape(25, 2) * 32 + base,
             sram=codes.Sram(1 - camera),
             first=(base + 4, base + 5),
+            sigma=(base + 6, base + 7),
+            rms=base + 8,
+            found=(base + 9) % 250,
+            reason=codes.Reason(camera + 1),
             pixels_read=OVER + base,
             wait_us=OVER + base + 1,
             store_us=OVER + base + 2,
@@ -98,6 +102,17 @@ def details(camera: codes.Camera) -> Values:
         "FirstX": base + 4,
         "FirstY": base + 5,
         "PixelsRead": OVER + base,
+    }
+
+
+def quality(camera: codes.Camera) -> Values:
+    base = (camera + 1) * 100
+    return {
+        "SigmaAlpha": (base + 6) / 100,
+        "SigmaBeta": (base + 7) / 100,
+        "Rms": (base + 8) / 100,
+        "Found": (base + 9) % 250,
+        "Reason": camera + 1,
     }
 
 
@@ -168,6 +183,7 @@ EXPECTED: dict[str, Callable[[], Values]] = {
     "NadirEdges2": lambda: edges(1),
     **{f"Masks{camera + 1}": lambda c=camera: masks(c) for camera in codes.Camera},
     **{f"Details{camera + 1}": lambda c=camera: details(c) for camera in codes.Camera},
+    **{f"Quality{camera + 1}": lambda c=camera: quality(c) for camera in codes.Camera},
     **{f"PhaseTimes{camera + 1}": lambda c=camera: times(c) for camera in codes.Camera},
     **{
         INTERFACE.telemetry(identifier).name: lambda c=camera: result(c)

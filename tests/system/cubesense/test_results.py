@@ -7,10 +7,16 @@ from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.angles import angles_from_vector
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
-from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
+from cubestack.firmware_model.interface.cubesense.codes import (
+    Camera,
+    CaptureResult,
+    DetectResult,
+    Reason,
+)
 from tests.system.conftest import Open
 
 NOON = EarthSunScene()
+TERMINATOR = EarthSunScene(sun=(1, 0, -0.3))
 DARK = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
 
 
@@ -28,17 +34,17 @@ def test_on_the_way_to_a_result(ready: Open) -> None:
         assert cubesense.result(Camera.NADIR).detect is DetectResult.NONE_SCHEDULED
 
 
-def many_lights() -> EarthSunScene:
+def lights(count: int | None = None) -> EarthSunScene:
     """Discs around every other sample of rows and columns, four edges each."""
     lens = LENSES[Target.NADIR]
     samples = [(x, y) for x in (191, 319, 447) for y in (79, 207, 335)]
     samples += [(x, y) for x in (255, 383, 511) for y in (143, 271, 399)]
     samples = [(x, y) for x, y in samples if np.hypot(x - lens.cx, y - lens.cy) < 200]
-    lights = (
+    discs = (
         Reflection(Target.NADIR, *angles_from_vector(vector), radius_px=18.0, level=200.0)
-        for vector in lens.unproject(samples)
+        for vector in lens.unproject(samples[:count])
     )
-    return EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(lights))
+    return EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(discs))
 
 
 def hot(scene: EarthSunScene, pixels: int, pairs: int) -> EarthSunView:
@@ -48,8 +54,9 @@ def hot(scene: EarthSunScene, pixels: int, pairs: int) -> EarthSunView:
 RESULTS = {
     "no Earth in view": (EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0)), "TOO_FEW_EDGES"),
     "night side": (EarthSunScene(sun=(0, 0, 1), glow_km=0), "TOO_FEW_EDGES"),
-    "many lights": (many_lights(), "TOO_MANY_EDGES"),
-    "terminator": (EarthSunScene(sun=(1, 0, -0.3)), "BAD_FIT"),
+    "many lights": (lights(), "TOO_MANY_EDGES"),
+    "terminator": (TERMINATOR, "SUCCESS"),
+    "a few lights": (lights(5), "BAD_FIT"),
     "Sun behind": (DARK, "SUN_NOT_FOUND"),
     "Sun beside": (EarthSunScene(nadir=(1, 0, 0), sun=(0.3, 0, 1)), "SUN_NOT_FOUND"),
     "many hot pixels": (hot(DARK, 50, 20), "SUN_NOT_FOUND"),
@@ -61,14 +68,26 @@ RESULTS = {
 @pytest.mark.parametrize("name", RESULTS)
 def test_result_of_a_scene(ready: Open, name: str) -> None:
     scene, expected = RESULTS[name]
-    camera = Camera.SUN if expected in ("SUN_NOT_FOUND", "SUCCESS") else Camera.NADIR
+    of_sun = expected == "SUN_NOT_FOUND" or name == "few beside the Sun"
+    camera = Camera.SUN if of_sun else Camera.NADIR
     with ready(scene) as opened:
         assert opened.client.capture_and_detect(camera).detect.name == expected
 
 
 def test_a_terminator_makes_a_wrong_direction_as_printed(ready: Open) -> None:
-    with ready(RESULTS["terminator"][0], profile="published") as opened:
+    with ready(TERMINATOR, profile="published") as opened:
         found = opened.client.capture_and_detect(Camera.NADIR)
         truth = opened.board.truth(Camera.NADIR)
         assert found.detected
         assert abs(found.alpha_deg - truth.alpha_deg) > 5
+
+
+@pytest.mark.parametrize("profile", ["extended"])
+def test_a_terminator_leaves_the_limb_that_is_lit(ready: Open) -> None:
+    with ready(TERMINATOR) as opened:
+        found = opened.client.capture_and_detect(Camera.NADIR)
+        quality = opened.client.quality(Camera.NADIR)
+        error = found.alpha_deg - opened.board.truth(Camera.NADIR).alpha_deg
+        assert abs(error) < min(0.3, 3 * quality.sigma_deg[0])
+        assert quality.reason is Reason.MEASURED
+        assert quality.found > opened.client.details(Camera.NADIR)["Points"]

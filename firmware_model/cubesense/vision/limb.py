@@ -1,0 +1,230 @@
+"""The Earth's limb among edges that need not all be its own: a circle, and how sure it is.
+
+An extension; CubeSense thesis, section 4.4.1.3, fits a circle through all edges. Here:
+
+1. A circle through all edges, if all lie on it (least squares, as published).
+2. Else circles through three edges each (RANSAC: Fischler and Bolles 1981, Comm. of the ACM 24,
+   381), drawn by a fixed rule. Only those that an altitude of interest can have are tried; the one
+   with most edges on it wins. An edge counts if its bright side is towards the centre, which tells
+   the limb from the far side of the Moon, of glints and of the shadow.
+3. From there, least squares of the distances (Gauss and Newton), as the sum of squares of step 1
+   pulls circles through short arcs inwards; edges that are not on the circle are left out.
+
+The uncertainty is that of the fit: the inverse of its normal equations, which knows how long the
+arc is, times the edges' variance. That is what an edge has in a usual picture, counted as `PRIOR`
+edges, and what these have: a posterior mean. Edges left out make it less sure in proportion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.cubesense.vision.circle import FEWEST, Circle, LeastSquaresCircle
+from cubestack.firmware_model.mcu.costs import Meter
+
+END_PX = np.float32(0.02)
+"""Least squares have ended when they move the circle by no more."""
+
+HELD, DRAWN = 400, 48
+"""Edges are held against circles so often at most, and so many triples are drawn: what a second has
+time for."""
+
+FEW = 4
+"""Few edges hide that one of them is false: their variance is larger by ``FEW`` by their excess."""
+
+STEPS = 3
+"""Of Gauss and Newton at most."""
+
+PRIOR = 6
+"""So many edges the usual standard deviation counts."""
+
+Values = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What a limb's edges may do, in px of the projection.
+
+    Attributes:
+        on_px: an edge this near to the circle is on it.
+        good_rms_px: all edges together are a limb when no further off.
+        usual_px: standard deviation of an edge's distance in usual pictures.
+    """
+
+    on_px: float
+    good_rms_px: float
+    usual_px: float
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """A circle through the limb.
+
+    Attributes:
+        circle: in px of the points.
+        on: which points lie on it (n,).
+        rms_px: of their distances.
+        covariance: (3, 3) of centre and radius, px^2.
+    """
+
+    circle: Circle
+    on: NDArray[np.bool_]
+    rms_px: float
+    covariance: Values
+
+    @property
+    def on_circle(self) -> int:
+        """Number of points on it."""
+        return int(np.count_nonzero(self.on))
+
+
+def find_limb(
+    points: Values,
+    sides: NDArray[np.int8],
+    allowed: Tolerances,
+    tangents: tuple[float, float, float],
+    meter: Meter,
+) -> Limb | None:
+    """The circle that most of the points lie on.
+
+    Args:
+        points: (n, 2) px, in a projection that images circles as circles.
+        sides: (n, 2) towards the bright side of each: one of x and y is 1 or -1, the other 0.
+        allowed: how far off edges may be.
+        tangents: least and largest tangent of the Earth's angular radius, and the focal length: px.
+        meter: charged.
+    """
+    if len(points) < FEWEST:
+        return None
+    circle = LeastSquaresCircle(points, meter).solve()
+    if circle is None or not _all_on(circle, points, sides, allowed.good_rms_px, meter):
+        circle = _most_on(points, sides, allowed.on_px, tangents, meter)
+    return None if circle is None else _refined(circle, points, sides, allowed, meter)
+
+
+def far_off(
+    circle: Circle, points: Values, sides: NDArray[np.int8], most_px: float, meter: Meter
+) -> int:
+    """How many points are further off than ``most_px``, or have their bright side outside."""
+    distance, right = _distances(circle, points, sides, meter)
+    meter.charge(f32_compare=len(points))
+    return int(np.count_nonzero(~right | (np.abs(distance) > np.float32(most_px))))
+
+
+def _distances(
+    circle: Circle, points: Values, sides: NDArray[np.int8], meter: Meter
+) -> tuple[Values, NDArray[np.bool_]]:
+    """How far outside of the circle points lie (n,), and whether their sides are right (n,)."""
+    count = len(points)
+    # Sides are signs of differences that are there already.
+    meter.charge(f32_add=4 * count, f32_mul=3 * count, i8=4 * count, loop=count)
+    towards = np.array([circle.x, circle.y], np.float32) - points
+    return circle.residuals(points, Meter(meter.table)), (towards * sides).sum(axis=1) > 0
+
+
+def _all_on(
+    circle: Circle, points: Values, sides: NDArray[np.int8], good_rms_px: float, meter: Meter
+) -> bool:
+    distance, right = _distances(circle, points, sides, meter)
+    meter.charge(f32_mul=len(points), f32_add=len(points), f32_div=1, f32_compare=1)
+    return bool(right.all() and np.mean(distance * distance) <= good_rms_px**2)
+
+
+def _triples(count: int) -> list[tuple[int, int, int]]:
+    """Three of ``count`` numbers, again and again: a linear congruential generator of 16 bits."""
+    drawn: list[tuple[int, int, int]] = []
+    state = 1
+    while len(drawn) < DRAWN:
+        numbers = []
+        for _ in range(3):
+            state = (state * 25173 + 13849) & 0xFFFF
+            numbers.append((state >> 8) * count >> 8)
+        if len(set(numbers)) == 3:
+            drawn.append((numbers[0], numbers[1], numbers[2]))
+    return drawn
+
+
+def _through(three: Values, meter: Meter) -> Circle | None:
+    """The circle through three points (3, 2)."""
+    meter.charge(f32_add=12, f32_mul=14, f32_div=2, f32_sqrt=1, f32_compare=1, call=1)
+    (ax, ay), (bx, by), (cx, cy) = three
+    bx, by, cx, cy = bx - ax, by - ay, cx - ax, cy - ay
+    double = 2 * (bx * cy - by * cx)
+    if abs(double) < 1:
+        return None
+    b, c = bx * bx + by * by, cx * cx + cy * cy
+    x, y = (cy * b - by * c) / double, (bx * c - cx * b) / double
+    return Circle(ax + x, ay + y, np.sqrt(x * x + y * y))
+
+
+def _most_on(
+    points: Values,
+    sides: NDArray[np.int8],
+    on_px: float,
+    tangents: tuple[float, float, float],
+    meter: Meter,
+) -> Circle | None:
+    """The best of the circles through three points."""
+    low, high, focal = (np.float32(value) for value in tangents)
+    best, most, held = None, 0, 0
+    meter.charge(i16_add=9 * DRAWN, loop=3 * DRAWN)
+    for triple in _triples(len(points)):
+        circle = _through(points[list(triple)], meter)
+        if circle is None:
+            continue
+        meter.charge(f32_mul=6, f32_add=3, f32_compare=3)
+        over = 2 * focal * circle.radius
+        under = focal * focal + circle.power
+        if not low * under <= over <= high * under:
+            continue
+        distance, right = _distances(circle, points, sides, meter)
+        meter.charge(f32_compare=len(points))
+        if not right[list(triple)].all():
+            continue
+        held += len(points)
+        count = int(np.count_nonzero(right & (np.abs(distance) < np.float32(on_px))))
+        if count > most:
+            best, most = circle, count
+        if held >= HELD or 5 * most >= 4 * len(points):
+            break
+    return best
+
+
+def _refined(
+    circle: Circle, points: Values, sides: NDArray[np.int8], allowed: Tolerances, meter: Meter
+) -> Limb | None:
+    """Least squares of the distances of those on the circle."""
+    for _ in range(STEPS):
+        distance, right = _distances(circle, points, sides, meter)
+        on = right & (np.abs(distance) < np.float32(allowed.on_px))
+        count = int(np.count_nonzero(on))
+        if count < FEWEST:
+            return None
+        away = points[on] - np.array([circle.x, circle.y], np.float32)
+        length = np.sqrt((away * away).sum(axis=1))
+        rows = np.column_stack([away / length[:, None], np.ones(count, np.float32)])
+        meter.charge(
+            f32_mul=(2 + 9) * count + 30,
+            f32_add=(1 + 9) * count + 20,
+            f32_div=2 * count + 3,
+            f32_sqrt=count,
+            f32_compare=len(points) + 3,
+            loop=count,
+        )
+        normal = (rows.T @ rows).astype(np.float64)
+        if not np.linalg.det(normal) > 1e-6 * count**3:
+            return None
+        inverse = np.linalg.inv(normal)
+        off = length - circle.radius
+        step = (inverse @ (rows.T @ off)).astype(np.float32)
+        circle = Circle(circle.x + step[0], circle.y + step[1], circle.radius + step[2])
+        if np.abs(step).max() < END_PX:
+            break
+    left = off - rows @ step
+    square = float(left @ left)
+    variance = (PRIOR * allowed.usual_px**2 + square) / (PRIOR + count - 3)
+    variance *= (len(points) / count) ** 2 * (1 + FEW / max(count - 3, 1))
+    meter.charge(f32_mul=2 * count + 12, f32_add=3 * count + 1, f32_div=3)
+    covariance = (variance * inverse).astype(np.float32)
+    return Limb(circle, on, float(np.sqrt(square / count)), covariance)
