@@ -94,7 +94,7 @@ def _show(points: list[curves.Point]) -> None:
     for point in points:
         right, wrong = (
             "{} ({:.0f}-{:.0f} %)".format(
-                count, *(100 * limit for limit in curves.wilson(count, point.frames))
+                count, *(100 * limit for limit in curves.wilson(count, point.pictures))
             )
             for count in (point.right, point.wrong)
         )

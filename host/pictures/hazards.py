@@ -41,7 +41,7 @@ def save_curves(
     """Write shares of right, refused and wrong frames against strength, a panel for each device.
 
     Args:
-        rows: points by the device's name; each with strength, frames, right, refused, wrong.
+        rows: points by the device's name; each with strength, pictures, right, refused, wrong.
         axis: what strength is, with its unit.
         title: of the whole.
         limits: of a rate; the bands of right and wrong.
@@ -63,16 +63,16 @@ def save_curves(
             ("refused", REFUSED, "s"),
             ("wrong", WRONG, "x"),
         ):
-            shares = [100 * getattr(point, kind) / point.frames for point in points]
+            shares = [100 * getattr(point, kind) / point.pictures for point in points]
             panel.plot(places, shares, marker=marker, color=colour, label=kind, linewidth=1.5)
             if kind != "refused":
-                bands = [limits(getattr(point, kind), point.frames) for point in points]
+                bands = [limits(getattr(point, kind), point.pictures) for point in points]
                 low, high = np.array(bands).T * 100
                 panel.fill_between(places, low, high, color=colour, alpha=0.15, linewidth=0)
         panel.set_xticks(places, [f"{point.strength:g}" for point in points])
         panel.set(title=name, xlabel=axis, ylim=(-4, 104))
         panel.grid(alpha=0.3)
-    panels[0].set_ylabel(f"% of {points[0].frames} pictures")
+    panels[0].set_ylabel(f"% of {points[0].pictures} pictures")
     panels[0].legend(loc="center left", fontsize="small")
     figure.suptitle(title, fontsize="medium")
     figure.savefig(path, dpi=110)

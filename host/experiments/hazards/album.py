@@ -99,17 +99,22 @@ def _section(name: str, points: Sequence[Point]) -> str:
             refused = f"{point.refused} ({reasons})" if reasons else f"{point.refused}"
             lines.append(
                 f"| {registered(device).title} | {point.strength:g} | {point.right} of "
-                f"{point.frames} | {refused} | {point.wrong} |"
+                f"{point.pictures} | {refused} | {point.wrong} |"
             )
     return "\n".join(lines) + "\n"
 
 
 def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
-    """The picture (rows, columns) of a device's first frame with a hazard of its usual strength."""
+    """The picture (rows, columns) of a device's first frame with a hazard of its usual strength;
+    those of several cameras side by side.
+    """
     found, kept = registered(device), list[AnyEmulated]()
     experiment = experiment_of(found)
     options = experiment.options(hazard=(Asked(hazard),), seed=seed)
     results = experiment.run(Opener(found, opened=kept.append), options)
     next(results)  # while more could come, the device is there
     client = kept[0].client
-    return client.picture(next(iter(client.picture_sources), None))
+    sources: tuple[str | None, ...] = client.picture_sources or (None,)
+    for _ in sources[1:]:
+        next(results)
+    return np.hstack([client.picture(source) for source in sources])

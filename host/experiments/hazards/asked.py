@@ -53,17 +53,23 @@ def hazard_option() -> Any:
     )
 
 
-def known(*, earth: bool = False) -> "Mapping[str, type[Hazard]]":
-    """All hazards of light, sensor and lens by name; ``earth``: those of an Earth below too."""
+def known() -> "Mapping[str, type[Hazard]]":
+    """All hazards of light, of sensor and lens, and of an Earth below, by name."""
     from cubestack.emulator.camera.common.hazards import HAZARDS
     from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
 
-    return {**SKY_HAZARDS, **(EARTH_HAZARDS if earth else {}), **HAZARDS}
+    return {**SKY_HAZARDS, **EARTH_HAZARDS, **HAZARDS}
 
 
 def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
-    """Raise ValueError for hazards that there are not, or not of such a strength."""
-    kinds = known(earth=earth) if asked else {}
+    """Raise ValueError for hazards that there are not, or not of such a strength; those of an
+    ``earth`` below are for scenes that have one.
+    """
+    if not asked:
+        return
+    from cubestack.emulator.scene.hazards import EARTH_HAZARDS
+
+    kinds = {name: kind for name, kind in known().items() if earth or name not in EARTH_HAZARDS}
     for one in asked:
         if one.name not in kinds:
             raise ValueError(f"hazard: there is no {one.name!r}; known: {', '.join(sorted(kinds))}")
@@ -77,13 +83,13 @@ def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
 
 
 def _placed(
-    asked: Sequence[Asked], looking: "Looking", rng: np.random.Generator, *, earth: bool = False
+    asked: Sequence[Asked], looking: "Looking", rng: np.random.Generator
 ) -> "tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]":
     """Hazards of light, and those of sensor and lens, drawn for one frame."""
     from cubestack.emulator.camera.common.hazards.contract import SensorHazard
     from cubestack.emulator.scene.hazards.contract import SkyHazard
 
-    kinds = known(earth=earth)
+    kinds = known()
     placed = [
         kinds[one.name].placed(
             kinds[one.name].strength.usual if one.strength is None else one.strength, looking, rng
@@ -124,7 +130,7 @@ def around_earth(
     if not asked:
         return view
     scene, condition = view.scene, view.condition
-    light, sensor = _placed(asked, looking_with(scene, camera, 0), rng, earth=True)
+    light, sensor = _placed(asked, looking_with(scene, camera, 0), rng)
     light = tuple(
         hazard
         for hazard in light

@@ -38,7 +38,7 @@ class Point(Job):
     """What a job gave.
 
     Attributes:
-        right, refused, wrong: how many frames ended so.
+        right, refused, wrong: how many pictures ended so.
         reasons: of the refused ones, as the device gives them, with their number.
     """
 
@@ -46,6 +46,11 @@ class Point(Job):
     refused: int
     wrong: int
     reasons: Mapping[str, int]
+
+    @property
+    def pictures(self) -> int:
+        """How many there were; a frame of several cameras has one of each."""
+        return self.right + self.refused + self.wrong
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -111,10 +116,9 @@ def perform(job: Job) -> Point:
     reasons: Counter[str] = Counter()
     for each in measure(job.device, hazard=(Asked(job.hazard, job.strength),), **options):
         result: Any = each
-        solved = getattr(result, "solved", result.right is not False)
-        ended["right" if result.right else "wrong" if solved else "refused"] += 1
-        if not solved:
-            reasons[str(getattr(result, "reason", None) or result.ending)] += 1
+        ended["right" if result.right else "wrong" if result.solved else "refused"] += 1
+        if not (result.right or result.solved):
+            reasons[str(result.reason or result.ending)] += 1
     return Point(
         **asdict(job),
         right=ended["right"],

@@ -252,7 +252,7 @@ def test_the_published_times(unit: Harness) -> None:
         assert measured["Wait"] + measured["Store"] == pytest.approx(48_000, abs=200)
         totals[camera] = measured["Total"] / 1000
     assert totals[Camera.SUN] == pytest.approx(85.7, abs=1.5)
-    assert totals[Camera.NADIR] == pytest.approx(443, abs=5)
+    assert totals[Camera.NADIR] == pytest.approx(347, abs=5)
 
 
 def test_the_wait_for_a_new_exposure_is_no_part_of_the_measurement(unit: Harness) -> None:

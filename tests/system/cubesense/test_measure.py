@@ -56,7 +56,7 @@ def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
     assert [f["tolerance_deg"] for f in sun] == np.where(angle > 45, 2.0, 0.2).tolist()
 
 
-@pytest.mark.parametrize("bloom", [3, 5, 7])
+@pytest.mark.parametrize("bloom", [5, 6, 7])
 def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float) -> None:
     angles = ("--bloom", bloom, "--sun-angle", 45)
     frames = measure(*SUN, *angles, "--frames", 12, "--seed", 5, *EXTENDED)
@@ -70,7 +70,7 @@ def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
     divided by the root of 12 is 9.6 ms; published are 11 ms.
     """
     total = np.array([frame["phase_ms"]["total"] for frame in nadir])
-    assert total.mean() == pytest.approx(445, abs=20)
+    assert total.mean() == pytest.approx(359, abs=15)
     waits = np.array([frame["phase_ms"]["wait"] for frame in (*nadir, *sun)])
     assert waits.std() == pytest.approx(33.37 / np.sqrt(12), rel=0.15)
     assert all(frame["phase_ms"]["store"] == pytest.approx(30.5, abs=0.1) for frame in nadir)

@@ -6,9 +6,13 @@ import pytest
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.hazards import EARTH_HAZARDS
 from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, random_view
 from cubestack.host.experiments.cubestar.measure import CubeStarOptions
-from cubestack.host.experiments.hazards.asked import Asked, known, with_hazards
+from cubestack.host.experiments.hazards.asked import Asked, around_earth, known, with_hazards
 
 VIEW = SkyView(SkyScene.pointing(84, -1), CONDITION)
 
@@ -32,12 +36,24 @@ def test_what_is_no_hazard_is_refused(given: str, message: str) -> None:
         CubeStarOptions(hazard=(given,))
 
 
-@pytest.mark.parametrize("name", sorted(known()))
+@pytest.mark.parametrize("name", sorted(set(known()) - set(EARTH_HAZARDS)))
 def test_every_hazard_goes_where_it_belongs_at_every_strength(name: str) -> None:
     for strength in known()[name].strength.values:
         view = with_hazards(VIEW, (Asked(name, strength),), np.random.default_rng(1))
         assert len(view.scene.hazards) + len(view.condition.hazards) == 1
         assert VIEW.scene.hazards == VIEW.condition.hazards == ()
+
+
+@pytest.mark.parametrize("camera", Target)
+@pytest.mark.parametrize("name", sorted(known()))
+def test_around_the_earth_every_hazard_goes_where_it_belongs(name: str, camera: Target) -> None:
+    kind = known()[name]
+    view = random_view(CubeSenseOptions(), Camera(camera), np.random.default_rng(1))
+    concerned = camera.name.lower() in getattr(kind, "cameras", ("nadir", "sun"))
+    for strength in kind.strength.values:
+        made = around_earth(view, camera, (Asked(name, strength),), np.random.default_rng(1))
+        added = len(made.scene.hazards) + len(made.condition.hazards)
+        assert added == int(concerned)
 
 
 def test_the_moon_is_in_the_field_of_every_frame() -> None:

@@ -29,6 +29,17 @@ def test_star_trackers_take_all_hazards_of_the_sky() -> None:
     assert {"moon", "protons", "gradient"} <= set(hazards_of(device("cubestar")))
 
 
+def test_only_a_device_with_an_earth_below_takes_what_is_of_the_earth() -> None:
+    of_earth = {"clouds", "terminator", "earth-in-sun-camera"}
+    assert of_earth <= set(hazards_of(device("cubesense")))
+    assert not of_earth & {*hazards_of(device("cubestar")), *hazards_of(device("aramis"))}
+
+
+def test_each_camera_has_a_picture_of_each_frame() -> None:
+    (point,) = run([Job("cubesense", "extended", "terminator", 0.0, 2, 4)], 1)
+    assert (point.pictures, point.right) == (4, 4)
+
+
 def test_a_hazard_that_a_device_has_not_is_named() -> None:
     with pytest.raises(ValueError, match="hazard: cubestar has no 'rain'; known: aberration"):
         list(jobs_of("cubestar", ["rain"], 1, 0, "extended"))
