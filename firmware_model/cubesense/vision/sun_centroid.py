@@ -12,11 +12,12 @@ row that reaches the window's left or right border is then left out of the mean 
 reaches the upper or lower one out of the mean of y. When nothing would remain, all count.
 
 Another: the light must be a Sun. It is none when the FPGA saw no run of bright pixels, when too few
-or too many pixels reach the threshold, when they are not round, their middle is not saturated or
-their edge is sharper than that of the Sun's image, or when their centre lies outside of the field
-of view, where the lens shows nothing and an int of 1/100 px may overflow. The FPGA finds the first
-bright light of the picture only, so a false one before the Sun hides it: then there is none. The
-limits are assumed, around images of 6 to 8 px in radius (section 5.1.3.2).
+or too many pixels reach the threshold, when they are not round or not in one piece, their middle is
+not saturated, or when their centre lies outside of the field of view, where the lens shows nothing
+and an int of 1/100 px may overflow. A light with an edge sharper than that of the Sun's image may
+be a Sun or sunlit structure: it is handed out with a standard deviation that says so. The FPGA
+finds the first bright light of the picture only, so a false one before the Sun hides it: then there
+is none. The limits are assumed, around images of 6 to 8 px in radius (section 5.1.3.2).
 """
 
 from collections.abc import Sequence
@@ -40,6 +41,9 @@ FULL_SCALE = 255
 ROUND = 4
 """Width and height of a whole Sun differ by so many pixels at most."""
 
+TIPS = 4
+"""Pixels of a small Sun that are alone in their row or column, and make it no wider."""
+
 SOFT = 5
 """Square of the number of pixels of a Sun's edge, by the number of bright pixels, at least."""
 
@@ -48,6 +52,9 @@ EDGE_LEVEL = 100
 
 SIGMA_DEG = 0.03
 """Standard deviation of alpha and beta, fitted: noise, and edges in whole pixels."""
+
+SHARP_SIGMA_DEG = 48.0
+"""That of a light that is perhaps no Sun: of a place anywhere in the field, half its radius."""
 
 _LARGEST_ANGLE = codes.LARGEST_ANGLE_DEG * 100
 """In 1/100 deg; only another lens images anything beyond."""
@@ -70,7 +77,7 @@ class SunConfig:
     threshold: int = 225
     boresight: tuple[float, float] = (369.0, 250.0)
     masks: Sequence[Mask] = ()
-    min_pixels: int = 10
+    min_pixels: int = 7
     max_pixels: int = 190
     printed: bool = False
 
@@ -143,8 +150,10 @@ def find_sun(
     found = SunResult(codes.DetectResult.SUCCESS, x, y, alpha, beta, pixels=pixels)
     if config.printed:
         return found
-    sigma = round(100 * SIGMA_DEG)
-    return replace(found, sigma_alpha=sigma, sigma_beta=sigma, reason=why.MEASURED)
+    soft = _soft(window, pixels, config, meter)
+    sigma = round(100 * (SIGMA_DEG if soft else SHARP_SIGMA_DEG))
+    reason = why.MEASURED if soft else why.SHARP
+    return replace(found, sigma_alpha=sigma, sigma_beta=sigma, reason=reason)
 
 
 def _no_sun(
@@ -156,10 +165,11 @@ def _no_sun(
 ) -> codes.Reason | None:
     """Why the bright pixels of the window are no Sun; None when they may be one.
 
-    Counted while the window is read: pixels, those at full scale, those of the edge, and limits.
+    Counted while the window is read: pixels, those at full scale, and limits; columns are gone
+    through once more.
     """
     why, pixels = codes.Reason, len(rows)
-    meter.charge(i8=3 * window.size + 8 * pixels + 20, i16_add=12)
+    meter.charge(i8=5 * window.size + 12 * pixels + 20, i16_add=12)
     if pixels < config.min_pixels:
         return why.NO_LIGHT
     if pixels > config.max_pixels:
@@ -172,10 +182,33 @@ def _no_sun(
     cut = [bool(chord[0] or chord[-1]) for chord in chords]
     if abs(width - height) > ROUND:
         return why.NOT_ROUND
-    if not any(cut) and not 13 * width * height <= 20 * pixels <= 20 * width * height:
+    if not any(cut) and not 13 * width * height <= 20 * pixels <= 20 * (width * height + TIPS):
         return why.NOT_ROUND
-    soft = np.count_nonzero((window >= EDGE_LEVEL) & (window < config.threshold))
-    return why.SHARP if soft * soft < SOFT * pixels else None
+    bright = np.zeros(window.shape, bool)
+    bright[rows, columns] = True
+    return why.NOT_ROUND if _torn(bright) or _torn(bright.T) else None
+
+
+def _torn(bright: NDArray[np.bool_]) -> bool:
+    """Whether a row has two pieces, or two rows that follow each other have no column in common.
+
+    A lone pixel is no piece, and none is missed: pixels may be stuck.
+    """
+    wide = np.pad(bright, ((0, 0), (1, 1)))
+    wide[:, 1:-1] |= wide[:, :-2] & wide[:, 2:]
+    chords = wide[:, 1:-1] & (wide[:, :-2] | wide[:, 2:])
+    starts = np.diff(chords.astype(np.int8), axis=1, prepend=0) == 1
+    if (starts.sum(axis=1) > 1).any():
+        return True
+    chords = chords[chords.any(axis=1)]
+    return not bool((chords[:-1] & chords[1:]).any(axis=1).all())
+
+
+def _soft(window: NDArray[np.uint8], pixels: int, config: SunConfig, meter: Meter) -> bool:
+    """Whether the light fades as the Sun's image does, over more than a pixel."""
+    meter.charge(i8=2 * window.size, i16_add=2)
+    edge = np.count_nonzero((window >= EDGE_LEVEL) & (window < config.threshold))
+    return int(edge) ** 2 >= SOFT * pixels
 
 
 def _out_of_field(offset: NDArray[np.float32], meter: Meter) -> bool:

@@ -125,7 +125,7 @@ class Reason(IntEnum):
     NOT_SATURATED = 10
     """The Sun's middle is; a reflection's is not."""
     SHARP = 11
-    """The light ends more sharply than the Sun's image does."""
+    """Found, but the light ends more sharply than the Sun's image does: perhaps it is none."""
     OUT_OF_FIELD = 12
 
 

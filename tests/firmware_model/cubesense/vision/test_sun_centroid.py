@@ -36,11 +36,29 @@ def test_the_goal(ours: SunConfig, bloom_px: float) -> None:
     assert p95(ours, bloom_px, 45, 90) < 0.13  # the goal is 2
 
 
-def test_a_disc_that_ends_sharply_is_no_sun(ours: SunConfig, meter: Meter) -> None:
-    """A reflection, or structure: the Sun's image fades over more than a pixel."""
-    for bloom in (4.0, 5.0, 6.0):
-        result = find_sun(window(sun(np.array([300.3, 200.6]), bloom, flat=True)), ours, meter)
-        assert (result.detect, result.reason) == (DetectResult.SUN_NOT_FOUND, Reason.SHARP)
+@pytest.mark.parametrize("bloom_px", [4.0, 5.0, 6.0])
+def test_a_disc_that_ends_sharply_is_doubtful(
+    ours: SunConfig, meter: Meter, bloom_px: float
+) -> None:
+    """A flat Sun, or structure: the usual image fades over more than a pixel."""
+    truth = (20.0, -13.0)
+    picture = sun(place(*truth, SUN_BORESIGHT), bloom_px, flat=True)
+    result = find_sun(window(picture), ours, meter)
+    assert (result.detect, result.reason) == (DetectResult.SUCCESS, Reason.SHARP)
+    assert error_deg((result.alpha / 100, result.beta / 100), truth) < 0.13
+    assert result.sigma_alpha == result.sigma_beta == 4800
+
+
+@pytest.mark.parametrize("apart", [(8, 7), (-8, 7), (0, 9), (9, 3)], ids=str)
+def test_two_lights_in_a_window_are_no_sun(
+    ours: SunConfig, meter: Meter, apart: tuple[int, int]
+) -> None:
+    """Neither of them is whole, and the mean is between them."""
+    one = np.array([300.0, 200.0])
+    picture = np.maximum(sun(one, 5), sun(one + apart, 5))
+    result = find_sun(window(picture), ours, meter)
+    assert result.reason is Reason.NOT_ROUND
+    assert result.detect is DetectResult.SUN_NOT_FOUND
 
 
 def test_the_sun_has_a_standard_deviation_and_a_reason(ours: SunConfig, meter: Meter) -> None:
