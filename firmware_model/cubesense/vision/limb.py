@@ -12,7 +12,8 @@ An extension; CubeSense thesis, section 4.4.1.3, fits a circle through all edges
 
 The uncertainty is that of the fit: the inverse of its normal equations, which knows how long the
 arc is, times the edges' variance. That is what an edge has in a usual picture, counted as `PRIOR`
-edges, and what these have: a posterior mean. Edges left out make it less sure in proportion.
+edges, and what these have: a posterior mean; what is beyond the usual counts `EXCESS` times. Edges
+left out make it less sure in proportion.
 """
 
 from dataclasses import dataclass
@@ -30,11 +31,14 @@ HELD, DRAWN = 400, 48
 """Edges are held against circles so often at most, and so many triples are drawn: what a second has
 time for."""
 
-FEW = 4
+FEW = 2
 """Few edges hide that one of them is false: their variance is larger by ``FEW`` by their excess."""
 
 STEPS = 3
 """Of Gauss and Newton at most."""
+
+EXCESS = 4.0
+"""How much variance beyond the usual one counts: clouds move neighbouring edges alike."""
 
 PRIOR = 6
 """So many edges the usual standard deviation counts."""
@@ -224,7 +228,9 @@ def _refined(
     left = off - rows @ step
     square = float(left @ left)
     variance = (PRIOR * allowed.usual_px**2 + square) / (PRIOR + count - 3)
+    usual = allowed.usual_px**2
+    variance = max(variance, usual + EXCESS * (variance - usual))
     variance *= (len(points) / count) ** 2 * (1 + FEW / max(count - 3, 1))
-    meter.charge(f32_mul=2 * count + 12, f32_add=3 * count + 1, f32_div=3)
+    meter.charge(f32_mul=2 * count + 13, f32_add=3 * count + 3, f32_div=3)
     covariance = (variance * inverse).astype(np.float32)
     return Limb(circle, on, float(np.sqrt(square / count)), covariance)

@@ -34,7 +34,7 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 
 LIT = {
-    Projection.STEREOGRAPHIC: Tolerances(on_px=1.0, good_rms_px=0.35, usual_px=0.2),
+    Projection.STEREOGRAPHIC: Tolerances(on_px=1.0, good_rms_px=0.35, usual_px=0.1),
     Projection.EQUIDISTANT: Tolerances(on_px=12.0, good_rms_px=8.0, usual_px=3.0),
 }
 """Of edges that are lit well. In the published projection the limb itself leaves the circle by so
@@ -43,7 +43,7 @@ much towards the rim."""
 DUSK = 3
 """Edges along the dusk may be off by so many times as much, and still be the limb's."""
 
-DIM = {kind: replace(allowed, usual_px=3.5 * allowed.usual_px) for kind, allowed in LIT.items()}
+DIM = {kind: replace(allowed, usual_px=2 * allowed.usual_px) for kind, allowed in LIT.items()}
 """Of edges along the dusk."""
 
 FLOOR_DEG = 0.01
