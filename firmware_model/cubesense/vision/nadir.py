@@ -63,14 +63,14 @@ class NadirConfig:
     Attributes:
         table: undistorts the edges.
         projection: that the table leads to.
-        min_edges: fewer are too few.
+        min_edges: fewer are too few: three make a circle, one tells whether it is the limb's.
         radius_deg: angular radii that the Earth may have: 96 to 6378 km of altitude.
         checked: whether these and the distances from the circle are looked at.
     """
 
     table: RadiusTable
     projection: Projection = Projection.STEREOGRAPHIC
-    min_edges: int = 6
+    min_edges: int = 4
     radius_deg: tuple[float, float] = (30.0, 80.0)
     checked: bool = True
 

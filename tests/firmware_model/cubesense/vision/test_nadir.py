@@ -117,6 +117,21 @@ def test_most_edges_may_be_false_but_not_nearly_all(ours: NadirConfig) -> None:
     assert refused.reason in (Reason.FEW_EDGES, Reason.OTHER_LIGHT)
 
 
+@pytest.mark.parametrize("turn_deg", range(0, 360, 45))
+def test_half_a_limb_is_enough(ours: NadirConfig, turn_deg: int) -> None:
+    """The Sun beside the Earth: light falls off to nothing at the middle of the disc."""
+    truth, turn = (10.0, 5.0), np.radians(turn_deg)
+    x, y = place(*truth, NADIR_BORESIGHT)
+    rows, columns = np.mgrid[:ROWS, :COLUMNS]
+    towards = ((columns - x) * np.cos(turn) + (rows - y) * np.sin(turn)) / 180
+    picture = (34 + (earth(*truth) - 34.0) * np.clip(towards, 0, 1)).astype(np.uint8)
+    result = measure(picture, ours, EdgeConfig(sharp=True))
+    assert result.detect is DetectResult.SUCCESS
+    assert result.edges >= 4
+    off = np.abs(np.array([result.alpha, result.beta]) / 100 - truth)
+    assert (off < 0.03 * np.array([result.sigma_alpha, result.sigma_beta])).all()
+
+
 def intruder(rng: np.random.Generator, picture: NDArray[np.uint8]) -> None:
     """Add a bar or a disc, dark or bright, anywhere."""
     rows, columns = np.mgrid[:ROWS, :COLUMNS]
