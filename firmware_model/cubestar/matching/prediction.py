@@ -148,7 +148,9 @@ class Picture:
         chance = by_chance(spare, level * self.margin_rad, self.field.solid_angle_sr)
         further, missing = found - given, expected - found
         with self.meter.phase("selection"):
-            odds = false_alarm(tries * len(LEVELS), further + missing, further, chance, self.meter)
+            # Without further stars all parts of the margin say the same.
+            tries *= len(LEVELS) if further else 1
+            odds = false_alarm(tries, further + missing, further, chance, self.meter)
             if missing > 0:
                 return odds
             # A wrong attitude seldom puts so few stars into the picture that none is missing.
