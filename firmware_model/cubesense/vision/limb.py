@@ -32,7 +32,8 @@ HELD, DRAWN = 400, 48
 time for."""
 
 FEW = 2
-"""Few edges hide that one of them is false: their variance is larger by ``FEW`` by their excess."""
+"""Few edges hide that one is false: their variance is larger by ``FEW`` times their number by
+their excess squared."""
 
 STEPS = 3
 """Of Gauss and Newton at most."""
@@ -230,7 +231,7 @@ def _refined(
     variance = (PRIOR * allowed.usual_px**2 + square) / (PRIOR + count - 3)
     usual = allowed.usual_px**2
     variance = max(variance, usual + EXCESS * (variance - usual))
-    variance *= (len(points) / count) ** 2 * (1 + FEW / max(count - 3, 1))
-    meter.charge(f32_mul=2 * count + 13, f32_add=3 * count + 3, f32_div=3)
+    variance *= (len(points) / count) ** 2 * (1 + FEW * count / max(count - 3, 1) ** 2)
+    meter.charge(f32_mul=2 * count + 15, f32_add=3 * count + 3, f32_div=3)
     covariance = (variance * inverse).astype(np.float32)
     return Limb(circle, on, float(np.sqrt(square / count)), covariance)
