@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-WIDTH_PX = 640
+WIDTH_PX = 480
 FEWEST_COUNTS = 24
 """Range of grey values that is stretched to the whole, at least: noise is not made a picture."""
 
@@ -23,7 +23,7 @@ class Limits(Protocol):
 
 
 def save_sample(picture: NDArray[np.uint8], path: Path) -> None:
-    """Write grey values (rows, columns) as a small PNG that is stretched for the eye.
+    """Write grey values (rows, columns) as a small JPEG that is stretched for the eye.
 
     The darkest hundredth is black and the brightest five thousandth white, with a gamma of 0.6.
     """
@@ -32,7 +32,7 @@ def save_sample(picture: NDArray[np.uint8], path: Path) -> None:
     grey = 255 * (np.clip((picture - low) / spread, 0, 1) ** 0.6)
     image = Image.fromarray(grey.astype(np.uint8))
     height = round(WIDTH_PX * picture.shape[0] / picture.shape[1])
-    image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS).save(path, optimize=True)
+    image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS).save(path, quality=70, optimize=True)
 
 
 def save_curves(
@@ -72,7 +72,7 @@ def save_curves(
         panel.set_xticks(places, [f"{point.strength:g}" for point in points])
         panel.set(title=name, xlabel=axis, ylim=(-4, 104))
         panel.grid(alpha=0.3)
-    panels[0].set_ylabel(f"% of {points[0].pictures} pictures")
+    panels[0].set_ylabel("% of pictures")
     panels[0].legend(loc="center left", fontsize="small")
     figure.suptitle(title, fontsize="medium")
     figure.savefig(path, dpi=110)

@@ -16,6 +16,7 @@ from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.pictures.hazards import save_curves, save_sample
 
+PROFILE = "extended"
 PAGE = "hazards.md"
 PICTURES = Path("images") / "hazards"
 BEGIN, END = "<!-- hazards -->\n", "<!-- end of hazards -->\n"
@@ -49,7 +50,7 @@ def write(points: Sequence[Point], folder: Path, seed: int) -> int:
             pictures / f"{name}-curve.png",
         )
         for device in _by_device(own):
-            save_sample(sample(device, name, seed), pictures / f"{name}-{device}.png")
+            save_sample(sample(device, name, seed), pictures / f"{name}-{device}.jpg")
     before, after = _page(folder)
     sections = [_section(name, [p for p in points if p.hazard == name]) for name in sorted(names)]
     (folder / PAGE).write_text(before + BEGIN + "\n".join(sections) + END + after, "utf-8")
@@ -90,7 +91,7 @@ def _section(name: str, points: Sequence[Point]) -> str:
     ]
     for device in _by_device(points):
         title = f"{registered(device).title}, {_axis(name)} {usual}"
-        lines += [f"![{title}]({PICTURES.as_posix()}/{name}-{device}.png)", ""]
+        lines += [f"![{title}]({PICTURES.as_posix()}/{name}-{device}.jpg)", ""]
     lines += [f"![right, refused and wrong]({PICTURES.as_posix()}/{name}-curve.png)", ""]
     lines += [f"| | {_axis(name)} | right | refused | wrong |", "|-|-|-|-|-|"]
     for device, own in _by_device(points).items():
@@ -109,12 +110,15 @@ def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
     those of several cameras side by side.
     """
     found, kept = registered(device), list[AnyEmulated]()
-    experiment = experiment_of(found)
-    options = experiment.options(hazard=(Asked(hazard),), seed=seed)
-    results = experiment.run(Opener(found, opened=kept.append), options)
-    next(results)  # while more could come, the device is there
-    client = kept[0].client
-    sources: tuple[str | None, ...] = client.picture_sources or (None,)
-    for _ in sources[1:]:
-        next(results)
-    return np.hstack([client.picture(source) for source in sources])
+    options = experiment_of(found).options(hazard=(Asked(hazard),), seed=seed)
+    opener = Opener(found, board={"profile": PROFILE}, opened=kept.append)
+    pictures: list[NDArray[np.uint8]] = []
+    results = experiment_of(found).run(opener, options)
+    # Each result is of the next camera; what was rendered is what a download would bring, at once.
+    for _ in results:
+        board = kept[0].board
+        cameras = list(getattr(board, "cameras", {0: getattr(board, "camera", None)}).values())
+        pictures.append(cameras[len(pictures)].rendered)
+        if len(pictures) == len(cameras):
+            break
+    return np.hstack(pictures)
