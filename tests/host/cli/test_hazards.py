@@ -26,8 +26,8 @@ def test_a_folder_gets_pictures_curves_and_points(
     lines = (pictures / "points.jsonl").read_text("utf-8").splitlines()
     assert [json.loads(line) for line in lines] == printed
     assert {point["strength"] for point in printed} >= {0, 60}
-    with Image.open(pictures / "gradient-cubestar.png") as sample:
-        assert sample.size == (640, 320)
+    with Image.open(pictures / "gradient-cubestar.jpg") as sample:
+        assert sample.size == (480, 240)
     with Image.open(pictures / "gradient-curve.png") as curve:
         assert curve.width > 300
     page = (tmp_path / "hazards.md").read_text("utf-8")
