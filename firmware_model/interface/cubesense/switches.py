@@ -43,7 +43,8 @@ class CubeSenseSwitches(Switches):
         "confirmed",
         source="sections 4.4.2 and 6.6.3, appendix C.6",
         reason="a Sun that overflows the window is cut, and its mean moves; what has not the Sun's "
-        "size, shape, saturated middle and soft edge, or lies outside of the field, is none",
+        "size, shape and saturated middle, is in pieces or outside of the field is none; what ends "
+        "too sharply is told with a sigma of 48 deg",
     )
     lens: str = switch(
         "what each camera's lens is beside the polynomial that the firmware undoes",

@@ -80,7 +80,8 @@ class CubeStarSwitches(Switches):
         source="section 5.3.3: every third pixel of every third row against a fixed threshold; the "
         "search ends at 20 stars, counted from the top",
         reason="stray light, noise and hot pixels pass a fixed threshold, the brightest stars may "
-        "stand further down, and faint spots fall between the samples",
+        "stand further down, and faint spots fall between the samples; beside the Earth's limb a "
+        "pixel is compared with what surrounds it",
     )
 
 
