@@ -46,7 +46,7 @@ def matched(
         return nothing, nothing, np.zeros(0, np.float32)
     apart = predicted[:, None, :] - measured[None, :, :]
     square = apart * apart
-    chord2 = square.sum(axis=2)
+    chord2 = square[..., 0] + square[..., 1] + square[..., 2]
     reach = np.float32(radius_rad)
     near = int(np.count_nonzero(square[..., 0] <= reach * reach))
     meter.charge(
@@ -75,8 +75,10 @@ def false_alarm(hypotheses: float, expected: int, found: int, chance: float, met
         chance: that a measured star lies in reach of a predicted one by chance; see ``by_chance``.
         meter: charged with the product, factor by factor.
     """
-    meter.charge(f32_mul=3 * found + 2, f32_div=found, f32_convert=2 * found, f32_add=2, loop=found)
-    meter.charge(f32_mul=2 * max(expected - found, 1).bit_length())  # (1 - c)^(N - f) by squares
+    squares = 2 * max(expected - found, 1).bit_length()  # (1 - c)^(N - f)
+    meter.charge(
+        f32_mul=3 * found + 2 + squares, f32_div=found, f32_convert=2 * found, f32_add=2, loop=found
+    )
     found = min(found, expected)
     ways = (expected + 1) * comb(expected, found)
     return float(hypotheses * ways * chance**found * (1 - chance) ** (expected - found))

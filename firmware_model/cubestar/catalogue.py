@@ -11,6 +11,7 @@ for the ground's reports.
 
 import hashlib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -65,6 +66,11 @@ class StarCatalogue:
     v_mag: NDArray[np.float64]
     mag_limit: float
     pair_limit_deg: float
+
+    @cached_property
+    def cosines(self) -> NDArray[np.float32]:
+        """Cosines (n, n) of the angles between stars; for the model's speed, the part has none."""
+        return np.asarray(sum(np.outer(axis, axis) for axis in self.vectors.T), np.float32)
 
     @classmethod
     def build(

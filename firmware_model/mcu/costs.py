@@ -5,8 +5,8 @@ happened; the table of its part (a module beside this one) turns the counts into
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -51,14 +51,20 @@ class CostTable:
 
 @dataclass(eq=False)
 class Meter:
-    """Counts a program's operations by name, and cycles: in all, and over all visits of a phase."""
+    """Counts a program's operations by name, and cycles: in all, and over all visits of a phase.
+
+    Attributes:
+        table: of the processor.
+        total, counts, phases: cycles in all, operations by name, cycles by phase.
+        phase_now: of the innermost block; set by ``phase``.
+    """
 
     table: CostTable
     total: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     phases: dict[str, int] = field(default_factory=dict)
     _taken: int = 0
-    _phase: str | None = None
+    phase_now: str | None = None
 
     def charge(self, **operations: int) -> None:
         """Charge each named operation so many times.
@@ -79,8 +85,8 @@ class Meter:
                 f"operation {unknown} is not in the table of {self.table.name} (it has {known})"
             ) from None
         self.total += cycles
-        if self._phase is not None:
-            self.phases[self._phase] = self.phases.get(self._phase, 0) + cycles
+        if self.phase_now is not None:
+            self.phases[self.phase_now] += cycles
 
     def book(self, **operations: int) -> None:
         """Count operations as `charge` does whose time has passed already: not to be taken."""
@@ -94,12 +100,23 @@ class Meter:
         self._taken = self.total
         return cycles
 
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
+    def phase(self, name: str) -> AbstractContextManager[None]:
         """Book what is charged inside the block under `name`; an inner phase takes its own part."""
-        outer, self._phase = self._phase, name
-        self.phases.setdefault(name, 0)
-        try:
-            yield
-        finally:
-            self._phase = outer
+        return _Phase(self, name)
+
+
+class _Phase(AbstractContextManager[None]):
+    """A class, as a generator would take a tenth of the time of what it surrounds."""
+
+    __slots__ = ("_meter", "_name", "_outer")
+
+    def __init__(self, meter: Meter, name: str) -> None:
+        self._meter, self._name = meter, name
+
+    def __enter__(self) -> None:
+        meter = self._meter
+        self._outer, meter.phase_now = meter.phase_now, self._name
+        meter.phases.setdefault(self._name, 0)
+
+    def __exit__(self, *_: object) -> None:
+        self._meter.phase_now = self._outer

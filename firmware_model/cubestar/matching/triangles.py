@@ -141,10 +141,9 @@ class _Batch:
         other = one - 1 - _counting(before)
         self._wedges = np.bincount(newest[one], minlength=count)
         a, b, ia, ib = rim_star[one], rim_star[other], rim[one], rim[other]
-        va, vb = catalogue.vectors[a], catalogue.vectors[b]
         side = cosines[ia, ib]
         sine = np.sqrt(np.maximum(1 - side * side, _SMALLEST_SQUARED_SINE))
-        third = np.abs((va * vb).sum(axis=1) - side) / sine
+        third = np.abs(catalogue.cosines[a, b] - side) / sine
         fits = ((third <= tolerance) & (ia != ib) & (a != b)).nonzero()[0]
         one, other = one[fits], other[fits]
         hub = hub[one]
