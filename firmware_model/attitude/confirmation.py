@@ -28,6 +28,8 @@ from cubestack.firmware_model.mcu.costs import Meter
 Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
+#: Added to the normal equations: a turn that nothing determines is none.
+_ALMOST_NOTHING = np.eye(4, dtype=np.float32) * np.float32(1e-6)
 _SIDES = ((0, 1), (0, 2), (1, 2))
 
 
@@ -44,11 +46,11 @@ def matched(
     if compared == 0:
         nothing = np.zeros(0, np.intp)
         return nothing, nothing, np.zeros(0, np.float32)
-    apart = predicted[:, None, :] - measured[None, :, :]
-    square = apart * apart
-    chord2 = square[..., 0] + square[..., 1] + square[..., 2]
-    reach = np.float32(radius_rad)
-    near = int(np.count_nonzero(square[..., 0] <= reach * reach))
+    apart = predicted.T[:, :, None] - measured.T[:, None, :]
+    apart *= apart
+    first, second, third = apart
+    reach = float(radius_rad) ** 2
+    near = int(np.count_nonzero(first <= reach))
     meter.charge(
         f32_mul=count + 3 * near,
         f32_convert=count,
@@ -58,10 +60,13 @@ def matched(
         i32_add=2 * compared,
         loop=compared,
     )
-    rows, nearest = np.arange(len(predicted)), chord2.argmin(axis=1)
+    chord2 = first + second + third
+    rows, nearest = (chord2 <= reach).nonzero()
     smallest = chord2[rows, nearest]
-    kept = (chord2.argmin(axis=0)[nearest] == rows) & (smallest <= reach * reach)
-    return nearest[kept], rows[kept], np.sqrt(smallest[kept])
+    if len(set(rows.tolist())) < len(rows) or len(set(nearest.tolist())) < len(rows):
+        kept = (chord2.argmin(axis=1)[rows] == nearest) & (chord2.argmin(axis=0)[nearest] == rows)
+        rows, nearest, smallest = rows[kept], nearest[kept], smallest[kept]
+    return nearest, rows, np.sqrt(smallest)
 
 
 def false_alarm(hypotheses: float, expected: int, found: int, chance: float, meter: Meter) -> float:
@@ -97,10 +102,9 @@ def scaled(directions: Floats, factor: float, meter: Meter) -> Floats:
         return directions
     count = len(directions)
     meter.charge(f32_mul=8 * count, f32_add=2 * count, f32_sqrt=count, f32_div=count, loop=count)
-    longer = directions.copy()
-    longer[:, :2] *= np.float32(factor)
-    x, y, z = longer.T
-    longer /= np.sqrt(x * x + y * y + z * z)[:, None]
+    longer = directions * np.array((factor, factor, 1), np.float32)
+    x, y, z = (longer * longer).T
+    longer /= np.sqrt(x + y + z)[:, None]
     return longer
 
 
@@ -114,7 +118,8 @@ def correction(
     """
     x, y, z = predicted.T
     size, count = 4 if with_scale else 3, len(predicted)
-    design = np.zeros((size, 3, count), np.float32)  # what turns about x, y, z and scale change
+    # What turns about x, y, z and scale change, and what is to be explained.
+    design = np.zeros((size + 1, 3, count), np.float32)
     design[0, 1], design[0, 2] = -z, y
     design[1, 0], design[1, 2] = z, -x
     design[2, 0], design[2, 1] = -y, x
@@ -122,8 +127,9 @@ def correction(
         rays = measured.T
         design[3] = rays * (rays[0] * rays[0] + rays[1] * rays[1])
         design[3, :2] -= rays[:2]
-    rows = design.reshape(size, -1)
-    normal, right = rows @ rows.T, rows @ (measured - predicted).T.ravel()
+    design[size] = (measured - predicted).T
+    rows = design.reshape(size + 1, -1)
+    product = rows @ rows.T
     meter.charge(
         f32_mul=(3 * size * (size + 3) // 2 + 5) * count + size**3 // 3 + 20,
         f32_add=(3 * size * (size + 3) // 2 + 6) * count + size**3 // 3 + 20,
@@ -131,8 +137,8 @@ def correction(
         ram_read=6 * count,
         loop=count + 2 * size * size,
     )
-    normal.flat[:: size + 1] += np.float32(1e-6)  # a direction that nothing determines: none
-    solution = np.linalg.solve(normal, right).tolist()
+    normal = product[:size, :size] + _ALMOST_NOTHING[:size, :size]
+    solution = np.linalg.solve(normal, product[:size, size]).tolist()
     a, b, c = (part / 2 for part in solution[:3])
     share = 2 / (1 + a * a + b * b + c * c)
     rotation = np.array(
@@ -158,6 +164,13 @@ def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
     i, j = min(cosines, key=lambda side: cosines[side])
     there, here = _axes(vectors[i], vectors[j]), _axes(known[i], known[j])
     return (there.T @ here).astype(np.float32)
+
+
+def volume(vectors: Floats) -> float:
+    """Six times the volume that three vectors (3, 3) span; its sign tells which way they turn.
+    Charged to whom it is called by."""
+    (a, b, c), (d, e, f), (g, h, i) = vectors.tolist()
+    return float(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
 
 
 def _axes(one: list[float], other: list[float]) -> NDArray[np.float64]:

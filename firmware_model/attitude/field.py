@@ -52,17 +52,23 @@ class Field:
         ``factor`` is that by which measured tangents are multiplied to make directions of them.
         """
         count = len(directions)
-        meter.charge(f32_div=2 * count, f32_mul=8 * count, f32_add=8 * count, f32_compare=4 * count)
-        meter.charge(loop=count)
+        meter.charge(
+            f32_div=2 * count,
+            f32_mul=8 * count,
+            f32_add=8 * count,
+            f32_compare=4 * count,
+            loop=count,
+        )
         xy = directions.T[:2] / (directions[:, 2] * np.float32(factor))
         yx = xy[::-1]
         constant, linear, square = self.sides
         lower, upper = constant + yx * (linear + yx * square)
-        inside: NDArray[np.bool_] = ((xy >= lower) & (xy <= upper)).all(axis=0)
+        across, down = (xy >= lower) & (xy <= upper)
+        inside: NDArray[np.bool_] = across & down
         if self.blind is not None:
             size = np.array(self.blind.shape[::-1])[:, None]
-            across, down = np.clip((xy - lower) / (upper - lower) * size, 0, size - 1).astype(int)
-            inside &= ~self.blind[down, across]
+            column, row = np.clip((xy - lower) / (upper - lower) * size, 0, size - 1).astype(int)
+            inside &= ~self.blind[row, column]
             meter.charge(f32_div=2 * count, f32_add=4 * count, f32_mul=2 * count)
             meter.charge(f32_convert=2 * count, ram_read=count)
         return inside

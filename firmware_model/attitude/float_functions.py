@@ -37,9 +37,13 @@ _PARTS = (_F(1.5703125), _F(4.837512969970703e-4), _F(7.549790126404332e-8))
 def arc_cosine(x: Floats) -> Floats:
     """Arc cosine of -1 to 1, in rad."""
     size = np.abs(x)
-    small = size <= _HALF
-    square = np.where(small, x * x, (_ONE - size) * _HALF)
+    square = (_ONE - size) * _HALF
     root = np.sqrt(square)
+    if np.size(x) and x.min() > _HALF:  # the usual case: angles below 60 deg, nothing to choose
+        half: Floats = root + root * (square * _polynomial(_ARC_SINE, square))
+        return half + half
+    small = size <= _HALF
+    square = np.where(small, x * x, square)
     base = np.where(small, x, root)
     sine = base + base * (square * _polynomial(_ARC_SINE, square))
     middle = _HALF_PI - (sine - _HALF_PI_REST)

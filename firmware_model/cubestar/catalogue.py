@@ -42,6 +42,11 @@ class PairList:
     second: NDArray[np.uint16]
     angle: NDArray[np.float32]
 
+    @cached_property
+    def ends(self) -> NDArray[np.intp]:
+        """Second and first stars (2, m), ready to be looked up; for the model's speed."""
+        return np.stack((self.second, self.first)).astype(np.intp)
+
     def __len__(self) -> int:
         """Number of pairs."""
         return len(self.angle)
@@ -71,6 +76,11 @@ class StarCatalogue:
     def cosines(self) -> NDArray[np.float32]:
         """Cosines (n, n) of the angles between stars; for the model's speed, the part has none."""
         return np.asarray(sum(np.outer(axis, axis) for axis in self.vectors.T), np.float32)
+
+    @cached_property
+    def _axes(self) -> NDArray[np.float32]:
+        """The vectors by axis (3, n), as the part has them."""
+        return np.ascontiguousarray(self.vectors.T)
 
     @classmethod
     def build(
@@ -172,16 +182,17 @@ class StarCatalogue:
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter
     ) -> NDArray[np.uint16]:
         """Indices of the stars within `radius_deg` of a unit vector (3,), rising."""
-        return self.within(boresight, np.float32(np.cos(np.radians(radius_deg))), meter)
+        least = np.float32(np.cos(np.radians(radius_deg)))
+        return self.within(boresight, least, meter).astype(np.uint16)
 
     def within(
         self, boresight: NDArray[np.float32], least: np.float32, meter: Meter
-    ) -> NDArray[np.uint16]:
+    ) -> NDArray[np.intp]:
         """Indices, rising, of the stars whose cosine with a unit vector is ``least`` or more."""
         direction = boresight.astype(np.float32)
-        x, y, z = self.vectors.T
+        x, y, z = self._axes
         cosine = x * direction[0] + y * direction[1] + z * direction[2]
-        inside = cosine >= least
+        inside: NDArray[np.intp] = (cosine >= least).nonzero()[0]
         count = len(self)
         meter.charge(
             flash_read=3 * count,
@@ -191,7 +202,7 @@ class StarCatalogue:
             ram_write=count,
             loop=count,
         )
-        return np.flatnonzero(inside).astype(np.uint16)
+        return inside
 
     def reduced(
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, get_args
 
 Provenance = Literal["measured", "published", "fitted", "assumed"]
@@ -44,6 +45,11 @@ class CostTable:
     clock_hz: int
     operations: Mapping[str, Cost]
 
+    @cached_property
+    def cycles(self) -> dict[str, int]:
+        """What each operation takes."""
+        return {name: cost.cycles for name, cost in self.operations.items()}
+
     def seconds(self, cycles: int) -> float:
         """Duration of so many cycles, in seconds."""
         return cycles / self.clock_hz
@@ -72,12 +78,12 @@ class Meter:
         Raises:
             CostError: for an operation that the table does not have, or a negative count.
         """
-        cycles, counts, table = 0, self.counts, self.table.operations
+        cycles, counts, table = 0, self.counts, self.table.cycles
         try:
             for name, count in operations.items():
                 if count < 0:
                     raise CostError(f"operation {name!r} cannot happen {count} times")
-                cycles += table[name].cycles * count
+                cycles += table[name] * count
                 counts[name] += count
         except KeyError as unknown:
             known = ", ".join(sorted(table))

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.confirmation import from_three, scaled
+from cubestack.firmware_model.attitude.confirmation import from_three, scaled, volume
 from cubestack.firmware_model.attitude.field import Field
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.identification import (
@@ -194,10 +194,12 @@ class _Search:
     ) -> Iterator[Candidate]:
         """Attitudes of the triangles of a step, but not of those that one of `seen` has within it:
         star of each centroid that attitudes tried so far name."""
-        for row in np.flatnonzero(~step.mirrored):
-            centroids, stars = step.centroids[row], step.stars[row]
+        for row, (centroids, stars) in enumerate(zip(step.centroids, step.stars, strict=True)):
             if self._late:
                 return
+            here, there = picture.directions[centroids], picture.catalogue.vectors[stars]
+            if (volume(here) < 0) != (volume(there) < 0):  # it turns the other way
+                continue
             named = dict(zip(centroids.tolist(), stars.tolist(), strict=True))
             if any(named.items() <= one.items() for one in seen):
                 continue
@@ -207,8 +209,7 @@ class _Search:
             tries = len(LEVELS) * self.chance * part**3
             self.tried += 1
             with picture.meter.phase("verification"):
-                rays = scaled(picture.directions[centroids], factor, picture.meter)
-                rotation = from_three(rays, picture.catalogue.vectors[stars], picture.meter)
+                rotation = from_three(scaled(here, factor, picture.meter), there, picture.meter)
                 candidate = picture.confirm(
                     rotation, FEWEST_STARS, tries, factor=factor, largest=self._largest
                 )

@@ -6,6 +6,7 @@ place that fits within a small part of the margin says more, so such parts are t
 count as tries.
 """
 
+from bisect import bisect
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import exp, factorial, inf, pi
@@ -124,23 +125,23 @@ class Picture:
                 rays = scaled(self.directions, factor, meter)
             rows, predicted, apart = matched(rays, places, margin, meter)
         least, most = inf, given - 1
+        distances = sorted(apart.tolist())
         for level in LEVELS if refined else ():
-            found = int(np.count_nonzero(apart <= level * margin))
+            found = bisect(distances, level * margin)
             if found > most:  # the same within a larger reach says less
                 least = min(least, self._chance(len(near), found, given, level, tries))
                 most = found
-        stars = near[predicted].astype(np.intp)
-        return Candidate(rows, stars, apart, rotation, factor, len(near), least)
+        return Candidate(rows, near.take(predicted), apart, rotation, factor, len(near), least)
 
     def _predict(self, rotation: Floats, factor: float) -> tuple[Indices, Floats, Floats]:
         """Stars (m,) in the picture, and their unit vectors (m, 3) in inertial and camera axes."""
         meter, vectors = self.meter, self.catalogue.vectors
         near = self.catalogue.within(rotation[2], self.field.smallest_cosine, meter)
-        ahead = vectors[near]
+        ahead = vectors.take(near, axis=0)
         places = turned(ahead, rotation)
         meter.charge(f32_mul=9 * len(near), f32_add=6 * len(near), loop=len(near))
-        inside = self.field.contains(places, meter, factor)
-        return near[inside].astype(np.intp), ahead[inside], places[inside]
+        inside = self.field.contains(places, meter, factor).nonzero()[0]
+        return near.take(inside), ahead.take(inside, axis=0), places.take(inside, axis=0)
 
     def _chance(self, expected: int, found: int, given: int, level: float, tries: float) -> float:
         """False alarms where so many places agree within a part of the margin."""

@@ -12,6 +12,8 @@ any with a fainter one, and a false star spoils only those that it is in. (Pyram
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +30,7 @@ MOST_PAIRS = 3072
 
 #: Centroids whose triangles the model finds together, for its own speed; later ones follow only if
 #: these give no attitude. The charge is made centroid by centroid.
-_BATCHES = (5, 12, 24, 64)
+_BATCHES = (8, 24, 64)
 
 #: Triangles that chance gives over those of even stars in a round field: measured in random
 #: pictures. In a field twice as wide as high rings cross at smaller angles, and real stars cluster.
@@ -46,7 +48,6 @@ class Step:
         centroids, stars: (t, 3) triangles, by rank of centroid and index of star; the new centroid
             is the last, those whose new star has most triangles first.
         misfit: (t,) largest difference of the sides, in rad.
-        mirrored: (t,) whether they turn the other way.
         entries: entries of the pair list that the new centroids have with those before them.
         by_chance: triangles that chance gives in this step to be expected.
     """
@@ -55,7 +56,6 @@ class Step:
     centroids: Indices
     stars: Indices
     misfit: Floats
-    mirrored: NDArray[np.bool_]
     entries: int
     by_chance: float
 
@@ -78,11 +78,11 @@ def steps(
         meter: charged step by step; phases `distances`, `votes`, `identities`.
         limit: total of the meter at which this ends.
     """
-    done = 2
+    sides, done = _Sides(rays), 2
     for batch in _BATCHES:
         count = min(batch, len(rays))
         if count > done:
-            found = _Batch(rays[:count], done, catalogue, tolerance_rad, listed)
+            found = _Batch(sides, done, count, catalogue, tolerance_rad, listed)
             for first, last in found.groups():
                 if found.charged(first, last, meter, limit):
                     yield found.step(first, last)
@@ -96,7 +96,7 @@ def steps(
 
 def cycles(operations: dict[str, int], meter: Meter) -> int:
     """What operations would take, in processor cycles."""
-    return sum(meter.table.operations[name].cycles * n for name, n in operations.items())
+    return sum([meter.table.cycles[name] * n for name, n in operations.items()])
 
 
 @lru_cache(maxsize=128)
@@ -105,99 +105,130 @@ def _pairs_of(count: int) -> tuple[Indices, Indices]:
     return np.tril_indices(count, -1)
 
 
+class _Sides:
+    """What is between the centroids of unit vectors (n, 3).
+
+    Attributes:
+        cosines, sines: (n, n) of the angles between them.
+        angles: (p,) in rad, of the pairs as ``_pairs_of`` has them.
+    """
+
+    def __init__(self, rays: Floats) -> None:
+        self.cosines = rays @ rays.T
+        square = self.cosines * self.cosines
+        self.sines = np.sqrt(np.maximum(1 - square, _SMALLEST_SQUARED_SINE))
+        self.angles = arc_cosine(np.minimum(self.cosines[_pairs_of(len(rays))], np.float32(1)))
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What the centroids of a batch in front of each make together; the last is in front of none.
+
+    Attributes:
+        walked: entries of the pair list that are as wide as a pair.
+        entries: entries with either star as that of the newer centroid.
+        wedges: every two entries that give the newer centroid one star.
+        found: triangles.
+    """
+
+    walked: list[int]
+    entries: list[int]
+    wedges: list[int]
+    found: list[int]
+
+
 class _Batch:
-    """All triangles among some centroids (n, 3) whose newest is not one of the first ``done``, and
-    what work each centroid makes."""
+    """All triangles among the first ``count`` centroids whose newest is not one of the first
+    ``done``, and what work each centroid makes."""
 
     def __init__(
         self,
-        rays: Floats,
+        sides: _Sides,
         done: int,
+        count: int,
         catalogue: StarCatalogue,
         tolerance_rad: float,
         listed: NDArray[np.bool_] | None,
     ) -> None:
-        tolerance, count, stars = np.float32(tolerance_rad), len(rays), len(catalogue)
         self._done, self._count = done, count
-        newer, older = (each[done * (done - 1) // 2 :] for each in _pairs_of(count))
-        cosines = rays @ rays.T
-        pair, ends, misfit = self._look_up(
-            cosines[newer, older], newer, catalogue, tolerance, listed
-        )
+        self._catalogue, self._tolerance = catalogue, np.float32(tolerance_rad)
+        begin, end = done * (done - 1) // 2, count * (count - 1) // 2
+        newer, older = (each[begin:] for each in _pairs_of(count))
+        self._angle = sides.angles[begin:end]
+        ranks = np.arange(done, count + 1)
+        walked = self._look_up(ranks * (ranks - 1) // 2 - begin, listed)
+        stars = len(catalogue)
         # An entry joins the rim, an older centroid with one star, to the hub, the newer one with
         # the other star; either may be either.
-        hub = (newer[pair] * stars + ends).ravel()
-        order = hub.astype(np.uint16 if count * stars < 1 << 16 else np.int32).argsort(
-            kind="stable"
-        )
-        hub, rim_star = hub[order], ends[::-1].ravel()[order]
-        entry = order % max(len(pair), 1)
-        rim, misfit = older[pair[entry]], misfit[entry]
-        newest = hub // stars
-        self._entries = np.bincount(newest, minlength=count)
-        # Every two entries of one hub: each with all of the hub's entries before it.
-        before = np.arange(len(hub)) - hub.searchsorted(hub)
-        one = np.arange(len(hub)).repeat(before)
-        other = one - 1 - _counting(before)
-        self._wedges = np.bincount(newest[one], minlength=count)
-        a, b, ia, ib = rim_star[one], rim_star[other], rim[one], rim[other]
-        side = cosines[ia, ib]
-        sine = np.sqrt(np.maximum(1 - side * side, _SMALLEST_SQUARED_SINE))
-        third = np.abs(catalogue.cosines[a, b] - side) / sine
-        fits = ((third <= tolerance) & (ia != ib) & (a != b)).nonzero()[0]
-        one, other = one[fits], other[fits]
-        hub = hub[one]
-        self._centroids = np.stack((ia[fits], ib[fits], newest[one]), axis=1)
-        self._stars = np.stack((a[fits], b[fits], hub % stars), axis=1)
-        self._misfit = np.maximum(np.maximum(misfit[one], misfit[other]), third[fits])
-        volumes = np.linalg.det(
-            np.stack((rays[self._centroids], catalogue.vectors[self._stars]))
-        )  # of the three vectors of each
-        self._mirrored = volumes[0] * volumes[1] < 0
-        self._popularity = hub.searchsorted(hub, side="right") - hub.searchsorted(hub)
-        self._found = np.bincount(newest[one], minlength=count)
-        self._ends = self._found.cumsum()
+        hub = ((newer * stars).take(self._pair) + self._ends[::-1]).ravel()
+        small = np.uint16 if count * stars < 1 << 16 else np.int32
+        self._order = hub.astype(small).argsort(kind="stable")
+        self._hub = hub.take(self._order)
+        rims = older.take(self._pair)
+        self._rims, self._rim_stars = np.concatenate((rims, rims)), self._ends.ravel()
+        self._pair_up(sides)
+        entries = self._hub.searchsorted(ranks * stars)
+        wedges = self._first.searchsorted(entries)
+        found = self._fits.searchsorted(wedges)
+        self._before = _Work(*(each.tolist() for each in (walked, entries, wedges, found)))
         # Chance: each entry fixes an attitude in two ways; a third star then agrees where two
         # rings of width 2 e cross, 4 e^2 over the sine of the angle of crossing (2/pi in the mean).
-        density = _UNEVEN * stars / (4 * np.pi)
-        self._chance = len(order) / len(newer) * density * 2 * np.pi * tolerance_rad**2
-        self._stars_listed = stars
+        density = _UNEVEN * stars / (4 * pi)
+        self._chance = len(hub) / (end - begin) * density * 2 * pi * tolerance_rad**2
 
-    def _look_up(
-        self,
-        cosine: Floats,
-        newer: Indices,
-        catalogue: StarCatalogue,
-        tolerance: np.float32,
-        listed: NDArray[np.bool_] | None,
-    ) -> tuple[Indices, Indices, Floats]:
-        """Pair (e,), both stars (2, e) and misfit (e,) in rad of entries as wide as the pairs."""
-        pairs = catalogue.pairs
-        angle = arc_cosine(np.minimum(cosine, np.float32(1)))
-        start = pairs.angle.searchsorted(angle - tolerance)
-        lengths = np.maximum(pairs.angle.searchsorted(angle + tolerance, side="right") - start, 0)
-        self._walked = np.bincount(newer, lengths)
-        self._steps = len(pairs).bit_length()
+    def _look_up(self, pairs: Indices, listed: NDArray[np.bool_] | None) -> Indices:
+        """Find the entries as wide as the pairs; how many the pairs in front of some walk over."""
+        angles, reach = self._catalogue.pairs.angle, self._tolerance
+        start, end = angles.searchsorted(np.array((self._angle - reach, self._angle + reach)))
+        lengths = end - start
         pair = np.arange(len(start)).repeat(lengths)
-        entry = start[pair] + _counting(lengths)
-        stars = np.stack((pairs.first[entry], pairs.second[entry])).astype(np.intp)
-        misfit = np.abs(pairs.angle[entry] - angle[pair])
-        if listed is None:
-            return pair, stars, misfit
-        kept = listed[stars].all(axis=0)
-        return pair[kept], stars[:, kept], misfit[kept]
+        entry = np.arange(len(pair)) + (end - lengths.cumsum()).repeat(lengths)
+        ends = self._catalogue.pairs.ends.take(entry, axis=1)
+        walked = pair.searchsorted(pairs)
+        if listed is not None:
+            kept = listed[ends].all(axis=0)
+            pair, entry, ends = pair[kept], entry[kept], ends[:, kept]
+        self._pair, self._entry, self._ends = pair, entry, ends
+        return walked
+
+    def _pair_up(self, sides: _Sides) -> None:
+        """Find every two entries of one hub, each with all of the hub's entries before it, and
+        which of them fit."""
+        place = np.arange(len(self._hub))
+        before = place.copy()
+        before[1:] *= self._hub[1:] != self._hub[:-1]
+        before = place - np.maximum.accumulate(before)
+        wedges = before.cumsum()
+        first = place.repeat(before)
+        second = (place + wedges - before - 1).repeat(before) - np.arange(len(first))
+        one, two = self._order.take(first), self._order.take(second)
+        rim, other = self._rims.take(one), self._rims.take(two)
+        star, another = self._rim_stars.take(one), self._rim_stars.take(two)
+        side = rim * len(sides.cosines) + other
+        third = self._catalogue.cosines.take(star * len(self._catalogue) + another)
+        third = np.abs(third - sides.cosines.take(side)) / sides.sines.take(side)
+        fits = (third <= self._tolerance).nonzero()[0]
+        apart = (rim.take(fits) != other.take(fits)) & (star.take(fits) != another.take(fits))
+        self._first, self._fits = first, fits[apart]
+        self._one, self._two, self._third = one, two, third
 
     def groups(self) -> list[tuple[int, int]]:
         """First and last of the centroids up to each that has triangles, and of what follows."""
-        lasts = [*self._found.nonzero()[0].tolist(), self._count - 1]
-        firsts = [self._done, *(last + 1 for last in lasts)]
-        return [(one, two) for one, two in zip(firsts, lasts, strict=False) if one <= two]
+        found, done = self._before.found, self._done
+        lasts = [
+            rank for rank in range(done, self._count) if found[rank - done] < found[rank + 1 - done]
+        ]
+        firsts = [done, *(last + 1 for last in lasts)]
+        lasts.append(self._count - 1)
+        return [(one, two) for one, two in zip(firsts, lasts, strict=True) if one <= two]
 
     def charged(self, first: int, last: int, meter: Meter, limit: int) -> bool:
         """Charge the steps of the centroids from a first to a last one, if the time suffices."""
+        entries = self._before.entries[first - self._done : last + 2 - self._done]
+        if max(after - before for before, after in pairwise(entries)) > MOST_PAIRS:
+            return False
         operations = self._operations(first, last)
-        spent = sum(cycles(each, meter) for each in operations.values())
-        if self._entries[first : last + 1].max() > MOST_PAIRS or meter.total + spent > limit:
+        if meter.total + sum(cycles(each, meter) for each in operations.values()) > limit:
             return False
         for phase, each in operations.items():
             with meter.phase(phase):
@@ -206,13 +237,16 @@ class _Batch:
 
     def _operations(self, first: int, last: int) -> dict[str, dict[str, int]]:
         """What each phase of some steps of the part's program executes."""
+        work, begin, end = self._before, first - self._done, last + 1 - self._done
         walked, entries, wedges, found = (
-            int(each[first : last + 1].sum())
-            for each in (self._walked, self._entries, self._wedges, self._found)
+            each[end] - each[begin] for each in (work.walked, work.entries, work.wedges, work.found)
         )
         steps = last - first + 1
         older = steps * (first + last) // 2
-        searched, cleared = self._steps * older, steps * (self._stars_listed // 2)
+        searched, cleared = (
+            len(self._catalogue.pairs).bit_length() * older,
+            steps * (len(self._catalogue) // 2),
+        )
         return {
             "distances": {  # of the newest centroid to the older ones: angles and their sines
                 "f32_mul": 5 * older,
@@ -243,22 +277,21 @@ class _Batch:
 
     def step(self, first: int, last: int) -> Step:
         """Triangles of the last of some centroids, with what all of them make."""
-        end, count = int(self._ends[last]), int(self._found[last])
-        begin = end - count
-        chosen = begin + (-self._popularity[begin:end]).argsort(kind="stable")
+        work, done = self._before, self._done
+        entries = work.entries[last + 1 - done] - work.entries[first - done]
         triples = (last * (last * last - 1) - first * (first - 1) * (first - 2)) / 6
-        return Step(
-            last,
-            self._centroids[chosen],
-            self._stars[chosen],
-            self._misfit[chosen],
-            self._mirrored[chosen],
-            int(self._entries[first : last + 1].sum()),
-            triples * float(self._chance),
-        )
-
-
-def _counting(lengths: Indices) -> Indices:
-    """0, 1, ... up to each of ``lengths`` (n,), one after the other."""
-    ends = lengths.cumsum()
-    return np.arange(ends[-1] if len(ends) else 0) - (ends - lengths).repeat(lengths)
+        fits = self._fits[work.found[last - done] : work.found[last + 1 - done]]
+        hub = self._hub.take(self._first.take(fits))
+        if len(fits) > 1:
+            popularity = hub.searchsorted(hub, side="right") - hub.searchsorted(hub)
+            chosen = (-popularity).argsort(kind="stable")
+            fits, hub = fits.take(chosen), hub.take(chosen)
+        both = np.array((self._one.take(fits), self._two.take(fits)))
+        centroids, stars = np.full((2, len(fits), 3), last)
+        centroids[:, :2] = self._rims.take(both).T
+        stars[:, :2], stars[:, 2] = self._rim_stars.take(both).T, hub % len(self._catalogue)
+        both %= max(len(self._pair), 1)
+        wide = self._catalogue.pairs.angle.take(self._entry.take(both))
+        one, two = np.abs(wide - self._angle.take(self._pair.take(both)))
+        misfit = np.maximum(np.maximum(one, two), self._third.take(fits))
+        return Step(last, centroids, stars, misfit, entries, triples * self._chance)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.confirmation import scaled
+from cubestack.firmware_model.attitude.confirmation import scaled, volume
 from cubestack.firmware_model.attitude.field import Field
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.confirmed import Pass, identify
@@ -215,8 +215,8 @@ def test_triangles_are_those_that_trying_all_finds(catalogue: StarCatalogue) -> 
         found = set()
         for step in steps(rays, catalogue, tolerance, None, meter(), 1 << 62):
             chance += step.by_chance
-            seen += np.count_nonzero(~step.mirrored)
             for centroids, stars in zip(step.centroids, step.stars, strict=True):
+                seen += volume(rays[centroids]) * volume(vectors[stars]) > 0
                 found.add(tuple(sorted(zip(centroids.tolist(), stars.tolist(), strict=True))))
         assert len(found ^ wanted) <= 1  # a side at the tolerance may round either way
     assert 0.4 < seen / chance < 1.2  # these stars do not cluster
