@@ -198,7 +198,7 @@ def _limb(points: Values, edges: EdgeList, config: NadirConfig, meter: Meter) ->
 
 
 def _sigma(limb: Limb, centre: Values, projection: Projection, meter: Meter) -> tuple[int, int]:
-    """Standard deviations of alpha and beta, 1/100 deg, rounded up.
+    """Standard deviations of alpha and beta, 1/100 deg, rounded.
 
     How they hang on the circle is tried, with a step of a pixel of its centre and its radius.
     """
@@ -214,7 +214,7 @@ def _sigma(limb: Limb, centre: Values, projection: Projection, meter: Meter) -> 
     variance = np.einsum("ai,ij,aj->a", slopes, limb.covariance, slopes)
     meter.charge(f32_mul=2 * 12, f32_add=2 * 9 + 6, f32_div=6, f32_sqrt=2, f32_convert=2)
     sigma = np.sqrt(np.maximum(variance, 0) + FLOOR_DEG**2) * 100
-    alpha, beta = (int(min(np.ceil(value), MOST_SIGMA)) for value in sigma)
+    alpha, beta = (int(min(np.floor(value + 0.5), MOST_SIGMA)) for value in sigma)
     return alpha, beta
 
 
