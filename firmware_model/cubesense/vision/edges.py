@@ -13,10 +13,11 @@ An extension, with ``sub_pixel``: the previous sample is a bound, and the edge l
 pixels that the search ends with, where a straight line through their values meets the threshold.
 
 Another, with ``sharp``: an edge counts as the Earth's limb only where it is dark a few pixels
-outside; the terminator and clouds fade more slowly. Lines are searched with a third of the
-threshold's distance from dark, as a limb in low sunlight is no brighter, and the edge lies half-way
-up to what is a few pixels inside, as a dim limb meets a fixed threshold further in than a bright
-one.
+outside; the terminator and clouds fade more slowly. Both ends of a short bright run are no edges:
+the limb seldom just touches a line, and the Sun is often in the field. Lines are searched with a
+third of the threshold's distance from dark, as a limb in low sunlight is no brighter, and the edge
+lies half-way up to what is a few pixels inside, as a dim limb meets a fixed threshold further in
+than a bright one.
 
 Appendix C.3 has two slips that the text has not, here with ``listing``: edges of the last 32 rows
 come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions is
@@ -48,6 +49,9 @@ OUTSIDE_PX, INSIDE_PX = 6, 3
 
 MOST_INWARDS = 3
 """Pixels that an edge found by a low threshold may be moved inwards."""
+
+SHORT_PX = 40
+"""A bright run of a line up to this long is a small light: the Sun with its bloom has some 25."""
 
 DARK = 34
 """Level of a picture without light (section 5.7)."""
@@ -100,7 +104,7 @@ class EdgeList:
     """Edges in the order in which they were found.
 
     Attributes:
-        false: edges dropped at the rim, in a mask, or because they are not sharp.
+        false: edges dropped at the rim, in a mask, of small lights, or because they are not sharp.
         full: whether there were more than the part keeps.
     """
 
@@ -111,6 +115,7 @@ class EdgeList:
         self._points: list[tuple[int, int]] = []
         self._sides: list[tuple[int, int]] = []
         self._lit: list[bool] = []
+        self._begun: tuple[bool, int, int, int] | None = None
         self.false = 0
         self.full = False
 
@@ -162,7 +167,8 @@ class EdgeList:
             self._meter.charge(i16_div=1, i16_add=4)
         point = (EDGE_UNIT * line, along) if vertical else (along, EDGE_UNIT * line)
         soft = around is not None and around[0] > self._config.darkest
-        if self._outside(point) or self._masked(line, vertical, crossing) or soft:
+        short = around is not None and self._ends_short(line, vertical, crossing, soft)
+        if self._outside(point) or self._masked(line, vertical, crossing) or soft or short:
             self.false += 1
         elif len(self) == MAX_EDGES:
             self.full = True
@@ -171,6 +177,24 @@ class EdgeList:
             side = 1 if crossing.bright > crossing.dark else -1
             self._sides.append((0, side) if vertical else (side, 0))
             self._lit.append(around is None or around[1] >= self._config.threshold)
+
+    def _ends_short(self, line: int, vertical: bool, crossing: "Crossing", soft: bool) -> bool:
+        """Whether the edge ends a short bright run, whose begin is then dropped as well; a soft
+        end is a terminator's, and the other one may be a crescent's limb."""
+        self._meter.charge(i8=6, i16_add=1)
+        kept = len(self)
+        begun, self._begun = self._begun, None
+        if soft:
+            return False
+        if crossing.bright > crossing.dark:
+            self._begun = (vertical, line, crossing.bright, kept)
+            return False
+        if begun is None or begun[:2] != (vertical, line) or crossing.bright - begun[2] >= SHORT_PX:
+            return False
+        self.false += kept - begun[3]
+        for each in (self._points, self._sides, self._lit):
+            del each[begun[3] :]
+        return True
 
     @staticmethod
     def _from(centre: tuple[float, float], points: NDArray[np.int16]) -> NDArray[np.float32]:

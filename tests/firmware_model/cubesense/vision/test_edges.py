@@ -45,6 +45,29 @@ def literal(picture: NDArray[np.uint8], config: EdgeConfig) -> list[list[int]]:
     return found
 
 
+SHARP = EdgeConfig(sharp=True)
+
+
+def rows_of(first: int, values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """A dark picture with the same values in all rows from a column on."""
+    picture = np.full((ROWS, COLUMNS), 34, np.uint8)
+    picture[:, first : first + len(values)] = values
+    return picture
+
+
+@pytest.mark.parametrize(("last", "ends"), [(330, 0), (353, 0), (354, 2), (450, 2)])
+def test_small_lights_make_no_edges(meter: Meter, last: int, ends: int) -> None:
+    edges = edges_in(rows_of(314, np.full(last - 313, 200.0)), meter, SHARP)
+    assert np.count_nonzero((edges.points[:, 1] == 32 * 207) & (edges.sides[:, 0] != 0)) == ends
+
+
+def test_a_thin_crescent_has_its_limb(meter: Meter) -> None:
+    edges = edges_in(rows_of(314, np.linspace(66, 40, 38)), meter, SHARP)
+    in_rows = edges.sides[:, 0]
+    assert np.count_nonzero(in_rows == 1) > 3
+    assert not np.any(in_rows == -1)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_agrees_with_the_literal_search_in_roughness(meter: Meter, seed: int) -> None:
     rng = np.random.default_rng(seed)
