@@ -16,7 +16,6 @@ examples:
 
 import argparse
 import json
-import os
 import time
 from pathlib import Path
 
@@ -24,6 +23,7 @@ from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments import fidelity
+from cubestack.host.experiments.workers import cores
 from cubestack.host.terminal import console, say
 
 
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
             name, (row for _, row in rows), profiles, quick=args.quick, frames=args.frames
         )
     ]
-    workers = min(args.workers or os.cpu_count() or 1, len(jobs))
+    workers = min(args.workers or cores(), len(jobs))
     told = _Rest(jobs, quiet=args.json)
     found = fidelity.run_jobs(jobs, workers, told)
     for name, rows in chosen.items():

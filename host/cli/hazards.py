@@ -13,7 +13,6 @@ examples:
 
 import argparse
 import json
-import os
 from pathlib import Path
 
 from rich.table import Table
@@ -22,6 +21,8 @@ from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.cli.arguments import whole
 from cubestack.host.experiments.hazards import curves
 from cubestack.host.experiments.hazards.asked import known
+from cubestack.host.experiments.rates import wilson
+from cubestack.host.experiments.workers import cores
 from cubestack.host.terminal import console, progress, say
 
 
@@ -65,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         from cubestack.host.experiments.hazards import album
 
         album.check(args.out)
-    workers = min(args.workers or os.cpu_count() or 1, len(jobs))
+    workers = min(args.workers or cores(), len(jobs))
     points = []
     for point in progress(curves.run(jobs, workers), len(jobs), "measuring", quiet=args.json):
         points.append(point)
@@ -94,7 +95,7 @@ def _show(points: list[curves.Point]) -> None:
     for point in points:
         right, wrong = (
             "{} ({:.0f}-{:.0f} %)".format(
-                count, *(100 * limit for limit in curves.wilson(count, point.pictures))
+                count, *(100 * limit for limit in wilson(count, point.pictures))
             )
             for count in (point.right, point.wrong)
         )

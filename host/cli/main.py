@@ -21,6 +21,7 @@ COMMANDS = {
     "emulate": "serve an emulated device on serial ports until Ctrl-C",
     "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude or directions out: each result beside the truth",
+    "campaign": "measure thousands of skies, resumable, on all cores or a cluster",
     "hazards": "make skies hard: how often a sensor is right, refuses, or is wrong",
     "fidelity": "measure published figures: theirs, ours in both profiles, and how ours come about",
     "calibrate": "fit a camera's lens to pictures of known stars or lights",

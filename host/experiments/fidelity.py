@@ -7,10 +7,8 @@ several at a time.
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from multiprocessing import get_context
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
@@ -19,6 +17,7 @@ from cubestack.host.devices.fidelity import Fidelity, Figures, Row, Trial
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.workers import performed
 from cubestack.host.options import flag
 
 COLUMNS = ("figure", "source", "published", "`published`", "`extended`", "word", "command")
@@ -131,20 +130,9 @@ def run_jobs(
     """Figures of all jobs, the longest first; ``on_done`` is told of each as it ends."""
     found: dict[Job, Figures] = {}
     order = sorted(jobs, key=lambda job: -job.seconds)
-    if workers == 1:
-        for job in order:
-            found[job] = perform(job)
-            on_done(job)
-        return found
-    # A process of its own each: forking one that shows progress in a thread can hang.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        running: dict[Future[Figures], Job] = {pool.submit(perform, job): job for job in order}
-        try:
-            for future in as_completed(running):
-                found[running[future]] = future.result()
-                on_done(running[future])
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    for job, figures in performed(perform, order, workers):
+        found[job] = figures
+        on_done(job)
     return found
 
 

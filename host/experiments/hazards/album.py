@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.hazards.asked import Asked, known
-from cubestack.host.experiments.hazards.curves import Point, wilson
+from cubestack.host.experiments.hazards.curves import Point
 from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.rates import wilson
 from cubestack.host.pictures.hazards import save_curves, save_sample
 
 PROFILE = "extended"

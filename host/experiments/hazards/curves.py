@@ -4,12 +4,9 @@ The results come end to end: scene, camera, electronics, firmware, serial line, 
 right as `cubestack measure` judges it; wrong is one that the sensor calls valid and that is not.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from math import sqrt
-from multiprocessing import get_context
 from typing import Any
 
 from cubestack.host.devices.device import AnyDevice
@@ -17,8 +14,8 @@ from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.hazards.asked import Asked, known
 from cubestack.host.experiments.measure import experiment_of, measure
-
-CONFIDENCE_Z = 1.96  # of 95 %
+from cubestack.host.experiments.rates import outcome, why_refused
+from cubestack.host.experiments.workers import performed
 
 
 @dataclass(frozen=True)
@@ -55,20 +52,6 @@ class Point(Job):
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
-
-
-def wilson(count: int, of: int, z: float = CONFIDENCE_Z) -> tuple[float, float]:
-    """Limits of a rate, 0 to 1, of which ``count`` of ``of`` were seen: Wilson 1927, JASA 22, 209.
-
-    All that there can be where nothing was seen.
-    """
-    if of == 0:
-        return 0.0, 1.0
-    rate, z2 = count / of, z * z
-    middle = rate + z2 / (2 * of)
-    half = z * sqrt(rate * (1 - rate) / of + z2 / (4 * of * of))
-    low, high = (middle - half) / (1 + z2 / of), (middle + half) / (1 + z2 / of)
-    return (0.0 if count == 0 else low), (1.0 if count == of else high)
 
 
 def devices_with_hazards() -> list[str]:
@@ -114,11 +97,10 @@ def perform(job: Job) -> Point:
     options: dict[str, Any] = {"frames": job.frames, "seed": job.seed, "profile": job.profile}
     ended: Counter[str] = Counter()
     reasons: Counter[str] = Counter()
-    for each in measure(job.device, hazard=(Asked(job.hazard, job.strength),), **options):
-        result: Any = each
-        ended["right" if result.right else "wrong" if result.solved else "refused"] += 1
-        if not (result.right or result.solved):
-            reasons[str(result.reason or result.ending)] += 1
+    for result in measure(job.device, hazard=(Asked(job.hazard, job.strength),), **options):
+        ended[outcome(result)] += 1
+        if outcome(result) == "refused":
+            reasons[why_refused(result)] += 1
     return Point(
         **asdict(job),
         right=ended["right"],
@@ -130,12 +112,9 @@ def perform(job: Job) -> Point:
 
 def run(jobs: Sequence[Job], workers: int) -> Iterator[Point]:
     """Points of the jobs, in their order, each as soon as it and all before it are there."""
-    if workers == 1:
-        yield from map(perform, jobs)
-        return
-    # A process of its own each: forking one that shows progress in a thread can hang.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        try:
-            yield from pool.map(perform, jobs)
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    found: dict[Job, Point] = {}
+    rest = deque(jobs)
+    for job, point in performed(perform, jobs, workers):
+        found[job] = point
+        while rest and rest[0] in found:
+            yield found.pop(rest.popleft())

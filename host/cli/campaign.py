@@ -1,0 +1,98 @@
+"""Measure thousands of skies: every combination of the values that a plan gives, on
+all cores or on a cluster; with 95 % limits of what is right, refused and wrong.
+
+A plan is a TOML file (docs/campaigns.md). Results are added to FOLDER/rows.jsonl block
+by block, so that little is lost whatever happens; --resume goes on.
+
+examples:
+  cubestack campaign false-stars.toml
+  cubestack campaign false-stars.toml --resume --workers 2
+  cubestack campaign false-stars.toml --scheduler tcp://10.0.0.1:8786
+  cubestack campaign replay false-stars.campaign 17       measure row 17 again
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.table import Table
+
+from cubestack.host.cli.arguments import whole
+from cubestack.host.experiments.campaigns import run as campaigns
+from cubestack.host.experiments.campaigns.folder import Folder
+from cubestack.host.experiments.campaigns.plan import Plan
+from cubestack.host.experiments.rates import wilson
+from cubestack.host.experiments.workers import cores
+from cubestack.host.terminal import console, progress, say
+
+REPLAY = "replay"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.usage = (
+        "cubestack campaign FILE [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
+        "       cubestack campaign replay FOLDER ROW"
+    )
+    parser.add_argument("words", nargs="+", metavar="FILE", help="plan of the campaign")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER", help="default: the plan's name, with .campaign"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with what is in the folder")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    )
+    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
+    parser.add_argument("--json", action="store_true", help="one JSON object a point")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run or replay; 1 when frames failed, or when it was stopped."""
+    if args.words[0] == REPLAY:
+        return _replay(args.words[1:])
+    if len(args.words) > 1:
+        raise ValueError(f"one plan at a time, not {' '.join(args.words)}")
+    path = Path(args.words[0])
+    plan = Plan.read(path)
+    folder = Folder.begun(args.out or campaigns.default_folder(path), plan, resume=args.resume)
+    total, done = campaigns.count(plan), 0
+    rows = campaigns.run(folder, args.workers or cores(), args.scheduler)
+    try:
+        for _ in progress(rows, total, "measuring", quiet=args.json):
+            done += 1
+    except (KeyboardInterrupt, OSError):
+        say(f"{done} of {total} results are in {folder.path}; --resume goes on")
+        raise
+    failed = _show(folder, as_json=args.json)
+    return 1 if failed else 0
+
+
+def _replay(words: list[str]) -> int:
+    if len(words) != 2 or not words[1].isdecimal():
+        raise ValueError("replay wants a campaign's folder and the number of a row")
+    print(json.dumps(campaigns.replayed(Folder(Path(words[0])), int(words[1]))))
+    return 0
+
+
+def _show(folder: Folder, *, as_json: bool) -> int:
+    """Rates at every point; returns how many frames failed."""
+    found = campaigns.summary(folder)
+    names = list(folder.plan.grid)
+    table = Table(*names, *campaigns.ENDINGS, title="results; 95 % limits in brackets")
+    for point, ended in found.items():
+        of = ended.total()
+        if as_json:
+            print(json.dumps({"point": dict(point), "of": of, **ended}))
+            continue
+        cells = []
+        for ending in campaigns.ENDINGS:
+            low, high = (100 * limit for limit in wilson(ended[ending], of))
+            cells.append(f"{ended[ending]} ({low:.1f}-{high:.1f} %)")
+        table.add_row(*(str(value) for _, value in point), *cells)
+    if not as_json:
+        console.print(table)
+    failed = sum(ended["failed"] for ended in found.values())
+    if failed:
+        say(f'{failed} failed: "outcome": "failed" in {folder.path}; replay shows how')
+    return failed

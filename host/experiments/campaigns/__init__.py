@@ -1,0 +1,1 @@
+"""Campaigns: the same measurement over thousands of skies, on all cores or a cluster, resumable."""

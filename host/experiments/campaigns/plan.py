@@ -1,0 +1,204 @@
+"""What a campaign measures: a TOML file, and the blocks of frames that it asks for.
+
+The file has ``device``, ``frames`` and ``seed``, and three tables of options of `cubestack measure
+DEVICE`: ``[options]`` for all frames, ``[grid]`` with lists of which every combination is a point,
+and ``[random]`` with what is drawn anew for each block (docs/campaigns.md has an example).
+
+All points see the same skies and the same drawn values, so that points differ by what they are and
+not by luck.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.experiments.measure import board_options, experiment_of, measure
+from cubestack.host.options import whole
+
+FRAMES = 25
+"""Frames of a block: a device is powered up once for so many."""
+
+DECIDED = ("frames", "seed")
+"""Options of `measure` that the plan decides."""
+
+Values = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Frames that one worker measures one after the other; what it gives hangs on nothing else.
+
+    Attributes:
+        number: counts from 0 through the campaign.
+        device: name.
+        options: of `measure`, with what is swept.
+        swept: those of them that differ between blocks.
+        frames: how many.
+        seed: of the first one.
+    """
+
+    number: int
+    device: str
+    options: Values
+    swept: Values
+    frames: int
+    seed: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """A campaign; attributes are keys of its file.
+
+    Attributes:
+        device: what is measured.
+        frames: at each point of the grid.
+        seed: of everything random.
+        block: frames for which the device is powered up once.
+        options: of `measure`, for all frames.
+        grid: values of options; every combination is measured.
+        random: options drawn anew for each block: uniform from ``low`` to ``high``, or one ``of``.
+    """
+
+    device: str
+    frames: int
+    seed: int = 0
+    block: int = FRAMES
+    options: Values = field(default_factory=dict)
+    grid: Mapping[str, list[Any]] = field(default_factory=dict)
+    random: Mapping[str, Values] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse what can not be measured; ValueError names the key."""
+        for name, least in (("frames", 1), ("seed", 0), ("block", 1)):
+            try:
+                object.__setattr__(self, name, whole(least)(getattr(self, name)))
+            except ValueError as error:
+                raise ValueError(f"{name}: {error}") from None
+        for name in ("options", "grid", "random"):
+            if not isinstance(getattr(self, name), dict):
+                raise ValueError(f"{name} must be a table of options")
+        for name, values in self.grid.items():
+            if not isinstance(values, list) or not values:
+                raise ValueError(f"grid.{name} must be a list of values, not {values!r}")
+        for name, draw in self.random.items():
+            _check_draw(name, draw)
+        given = [*self.options, *self.grid, *self.random]
+        for name in given:
+            if name in DECIDED:
+                raise ValueError(f"{name} stands at the top of a plan, not among options")
+            if given.count(name) > 1:
+                raise ValueError(f"{name} is given in two of options, grid and random")
+        for block in self.blocks():
+            try:
+                measure(block.device, frames=1, seed=0, **block.options)
+            except ValueError as error:
+                raise ValueError(_where(block, str(error))) from None
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """The plan of a TOML file; paths in it start at its folder.
+
+        Raises:
+            ValueError: names the file, and what is wrong with it.
+            OSError: it can not be read.
+        """
+        try:
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
+            known = list(cls.__dataclass_fields__)
+            for key in table:
+                if key not in known:
+                    raise ValueError(f"no key {key!r} here; known: {', '.join(known)}")
+            for key in ("device", "frames"):
+                if key not in table:
+                    raise ValueError(f"{key} is missing")
+            return cls(**_with_paths(table, path.parent))
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; ``Plan(**...)`` makes the same one of it."""
+        return dict(vars(self))
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """Every combination of the grid's values."""
+        return [
+            dict(zip(self.grid, values, strict=True)) for values in product(*self.grid.values())
+        ]
+
+    def blocks(self) -> Iterator[Block]:
+        """All blocks, in their order."""
+        at_a_point = -(-self.frames // self.block)
+        for where, point in enumerate(self.points):
+            for index in range(at_a_point):
+                frames = min(self.block, self.frames - index * self.block)
+                seed, drawn = self._drawn(index)
+                swept = point | drawn
+                options = dict(self.options) | swept
+                number = where * at_a_point + index
+                yield Block(number, self.device, options, swept, frames, seed)
+
+    def _drawn(self, index: int) -> tuple[int, dict[str, Any]]:
+        """Seed and random options of a point's block."""
+        generator = np.random.default_rng([self.seed, index])
+        seed = int(generator.integers(1 << 31))
+        drawn: dict[str, Any] = {}
+        for name, draw in self.random.items():
+            if "of" in draw:
+                drawn[name] = draw["of"][int(generator.integers(len(draw["of"])))]
+            else:
+                drawn[name] = float(generator.uniform(draw["low"], draw["high"]))
+        return seed, drawn
+
+
+def _check_draw(name: str, draw: Any) -> None:
+    right = isinstance(draw, dict) and (
+        (set(draw) == {"of"} and isinstance(draw["of"], list) and bool(draw["of"]))
+        or (
+            set(draw) == {"low", "high"}
+            and all(isinstance(value, int | float) for value in draw.values())
+            and draw["low"] <= draw["high"]
+        )
+    )
+    if not right:
+        raise ValueError(
+            f"random.{name} must be {{ low = A, high = B }} or {{ of = [A, B] }}, not {draw!r}"
+        )
+
+
+def _where(block: Block, error: str) -> str:
+    swept = ", ".join(f"{name} = {value!r}" for name, value in block.swept.items())
+    return f"{error} (with {swept})" if swept else error
+
+
+def _with_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The table with the paths of files in options, which start at the plan's folder, as told."""
+    device = registered(table["device"])
+    experiment = experiment_of(device)
+    files = {
+        name
+        for name, declared in experiment.options.declared().items()
+        if declared.metadata["option"].metavar == "FILE"
+    }
+    files |= {
+        name for name, one in board_options(device, experiment).items() if one.metavar == "FILE"
+    }
+
+    def told(name: str, value: Any) -> Any:
+        return str(folder / value) if name in files and isinstance(value, str) else value
+
+    changed = dict(table)
+    if isinstance(table.get("options"), dict):
+        changed["options"] = {name: told(name, value) for name, value in table["options"].items()}
+    if isinstance(table.get("grid"), dict):
+        changed["grid"] = {
+            name: [told(name, value) for value in values] if isinstance(values, list) else values
+            for name, values in table["grid"].items()
+        }
+    return changed

@@ -1,0 +1,77 @@
+"""Runs a campaign into its folder, and shows what came of it."""
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from cubestack.host.experiments.campaigns.block import Row, perform, rows_of
+from cubestack.host.experiments.campaigns.folder import Folder, FolderError
+from cubestack.host.experiments.campaigns.plan import Block, Plan
+from cubestack.host.experiments.measure import measure
+from cubestack.host.experiments.workers import performed
+
+ENDINGS = ("right", "refused", "wrong", "failed")
+
+
+def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[Row]:
+    """Measure what is missing; yields each row that is in the folder, first those from before.
+
+    Raises:
+        FolderError: another process works on it.
+        WorkersError: workers that can not be had or went away; what is done is kept.
+        RuntimeError: nothing but failures in the first block that ended.
+    """
+    blocks = {block.number: block for block in folder.plan.blocks()}
+    with folder.alone():
+        whole = folder.repair({number: rows_of(block) for number, block in blocks.items()})
+        yield from folder.rows()
+        missing = [block for number, block in blocks.items() if number not in whole]
+        for _, rows in performed(perform, missing, workers, scheduler):
+            if not whole and all(row.outcome == "failed" for row in rows):
+                raise RuntimeError(f"nothing can be measured: {rows[0].reason}")
+            folder.add(rows)
+            whole.add(rows[0].block)
+            yield from rows
+        folder.sort()
+
+
+def count(plan: Plan) -> int:
+    """How many rows a campaign has."""
+    return sum(map(rows_of, plan.blocks()))
+
+
+def replayed(folder: Folder, number: int) -> dict[str, Any]:
+    """What the frame of a row of the file, counted from 0, gives now.
+
+    Raises FolderError for a row that there is not; and whatever the frame failed with.
+    """
+    rows = list(folder.rows())
+    if not 0 <= number < len(rows):
+        raise FolderError(f"{folder.path} has rows 0 to {len(rows) - 1}, not {number}")
+    row = rows[number]
+    block: Block = next(each for each in folder.plan.blocks() if each.number == row.block)
+    a_frame = rows_of(block) // block.frames
+    frames = row.after // a_frame + 1
+    results = measure(block.device, frames=frames, seed=row.seed, **block.options)
+    return next(islice(results, row.after, None)).as_dict()
+
+
+def summary(folder: Folder) -> dict[tuple[tuple[str, Any], ...], Counter[str]]:
+    """How many rows ended how, by point of the grid."""
+    names = list(folder.plan.grid)
+    found: dict[tuple[tuple[str, Any], ...], Counter[str]] = {}
+    for row in folder.rows():
+        point = tuple((name, _hashable(row.swept[name])) for name in names)
+        found.setdefault(point, Counter())[row.outcome] += 1
+    return found
+
+
+def _hashable(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def default_folder(path: Path) -> Path:
+    """Where the results of a plan's file go."""
+    return Path(f"{path.stem}.campaign")

@@ -1,0 +1,32 @@
+"""How often: what became of pictures, and within which limits that is their rate."""
+
+from math import sqrt
+from typing import Any, Literal
+
+CONFIDENCE_Z = 1.96  # of 95 %
+
+Outcome = Literal["right", "refused", "wrong"]
+
+
+def outcome(result: Any) -> Outcome:
+    """What became of the picture of a result, which has ``right`` and ``solved``."""
+    return "right" if result.right else "wrong" if result.solved else "refused"
+
+
+def why_refused(result: Any) -> str:
+    """The reason of a refused one, as the device gives it."""
+    return str(result.reason or result.ending)
+
+
+def wilson(count: int, of: int, z: float = CONFIDENCE_Z) -> tuple[float, float]:
+    """Limits of a rate, 0 to 1, of which ``count`` of ``of`` were seen: Wilson 1927, JASA 22, 209.
+
+    All that there can be where nothing was seen.
+    """
+    if of == 0:
+        return 0.0, 1.0
+    rate, z2 = count / of, z * z
+    middle = rate + z2 / (2 * of)
+    half = z * sqrt(rate * (1 - rate) / of + z2 / (4 * of * of))
+    low, high = (middle - half) / (1 + z2 / of), (middle + half) / (1 + z2 / of)
+    return (0.0 if count == 0 else low), (1.0 if count == of else high)
