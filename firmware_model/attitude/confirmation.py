@@ -61,8 +61,9 @@ def matched(
         loop=compared,
     )
     chord2 = first + second + third
-    rows, nearest = (chord2 <= reach).nonzero()
-    smallest = chord2[rows, nearest]
+    inside = (chord2.ravel() <= reach).nonzero()[0]
+    rows, nearest = np.divmod(inside, len(measured))
+    smallest = chord2.take(inside)
     if len(set(rows.tolist())) < len(rows) or len(set(nearest.tolist())) < len(rows):
         kept = (chord2.argmin(axis=1)[rows] == nearest) & (chord2.argmin(axis=0)[nearest] == rows)
         rows, nearest, smallest = rows[kept], nearest[kept], smallest[kept]

@@ -94,6 +94,29 @@ class Meter:
         if self.phase_now is not None:
             self.phases[self.phase_now] += cycles
 
+    def charge_all(self, phases: Mapping[str, Mapping[str, int]], limit: int) -> bool:
+        """Charge operations by phase, unless the total would be above a limit; whether it did.
+
+        What `phase` and `charge` do one by one, in half of the model's time.
+
+        Raises:
+            KeyError: for an operation that the table does not have.
+        """
+        table = self.table.cycles
+        taken = {
+            phase: sum([table[name] * count for name, count in operations.items()])
+            for phase, operations in phases.items()
+        }
+        total = self.total + sum(taken.values())
+        if total > limit:
+            return False
+        self.total = total
+        for phase, cycles in taken.items():
+            self.phases[phase] = self.phases.get(phase, 0) + cycles
+            for name, count in phases[phase].items():
+                self.counts[name] += count
+        return True
+
     def book(self, **operations: int) -> None:
         """Count operations as `charge` does whose time has passed already: not to be taken."""
         before = self.total

@@ -197,7 +197,8 @@ class _Search:
         for row, (centroids, stars) in enumerate(zip(step.centroids, step.stars, strict=True)):
             if self._late:
                 return
-            here, there = picture.directions[centroids], picture.catalogue.vectors[stars]
+            here = picture.directions.take(centroids, axis=0)
+            there = picture.catalogue.vectors.take(stars, axis=0)
             if (volume(here) < 0) != (volume(there) < 0):  # it turns the other way
                 continue
             named = dict(zip(centroids.tolist(), stars.tolist(), strict=True))

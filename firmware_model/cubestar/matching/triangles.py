@@ -94,11 +94,6 @@ def steps(
             done = count
 
 
-def cycles(operations: dict[str, int], meter: Meter) -> int:
-    """What operations would take, in processor cycles."""
-    return sum([meter.table.cycles[name] * n for name, n in operations.items()])
-
-
 @lru_cache(maxsize=128)
 def _pairs_of(count: int) -> tuple[Indices, Indices]:
     """Newer and older one of all pairs of so many centroids, by rising newer one."""
@@ -227,13 +222,7 @@ class _Batch:
         entries = self._before.entries[first - self._done : last + 2 - self._done]
         if max(after - before for before, after in pairwise(entries)) > MOST_PAIRS:
             return False
-        operations = self._operations(first, last)
-        if meter.total + sum(cycles(each, meter) for each in operations.values()) > limit:
-            return False
-        for phase, each in operations.items():
-            with meter.phase(phase):
-                meter.charge(**each)
-        return True
+        return meter.charge_all(self._operations(first, last), limit)
 
     def _operations(self, first: int, last: int) -> dict[str, dict[str, int]]:
         """What each phase of some steps of the part's program executes."""

@@ -67,6 +67,27 @@ def test_phases_split_the_total() -> None:
     assert meter.total == 333
 
 
+def test_all_phases_at_once_are_as_one_by_one() -> None:
+    phases = {"search": {"add": 4, "loop": 1}, "sort": {"loop": 3}, "none": {}}
+    one, other = Meter(SIMPLE), Meter(SIMPLE)
+    for meter in (one, other):
+        meter.charge(add=1)
+        with meter.phase("sort"):
+            meter.charge(add=7)
+    for name, operations in phases.items():
+        with one.phase(name):
+            one.charge(**operations)
+    assert other.charge_all(phases, limit=one.total)
+    assert vars(other) == vars(one)
+
+
+def test_phases_that_do_not_fit_are_not_charged() -> None:
+    meter = Meter(SIMPLE)
+    meter.charge(add=1)
+    assert not meter.charge_all({"search": {"add": 4}, "sort": {"loop": 3}}, limit=3 + 12 + 15 - 1)
+    assert (meter.total, meter.counts, meter.phases) == (3, {"add": 1}, {})
+
+
 def test_phase_ends_when_its_block_fails() -> None:
     meter = Meter(SIMPLE)
     with pytest.raises(RuntimeError, match="stop"), meter.phase("search"):
