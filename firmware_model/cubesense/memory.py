@@ -73,6 +73,7 @@ def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]
     }
     if checked:
         ram["sides of the edges, and which are lit or count"] = MAX_EDGES
+        ram["begin of a bright run: line, place, edges until then"] = 2 + INT
     shared = {
         "scanned pixels": (FULL_SIZE.scan_step, _WINDOW),
         **({"edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW)} if checked else {}),
