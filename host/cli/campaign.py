@@ -8,6 +8,8 @@ examples:
   cubestack campaign false-stars.toml
   cubestack campaign false-stars.toml --resume --workers 2
   cubestack campaign false-stars.toml --scheduler tcp://10.0.0.1:8786
+  cubestack campaign report false-stars.campaign          report.html there
+  cubestack campaign report NEW --compare OLD             exit code 1 when NEW is worse
   cubestack campaign replay false-stars.campaign 17       measure row 17 again
 """
 
@@ -18,20 +20,23 @@ from pathlib import Path
 from rich.table import Table
 
 from cubestack.host.cli.arguments import whole
+from cubestack.host.experiments.campaigns import report, statistics
 from cubestack.host.experiments.campaigns import run as campaigns
 from cubestack.host.experiments.campaigns.folder import Folder
 from cubestack.host.experiments.campaigns.plan import Plan
+from cubestack.host.experiments.campaigns.statistics import Change, compared
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.workers import cores
 from cubestack.host.terminal import console, progress, say
 
-REPLAY = "replay"
+REPLAY, REPORT = "replay", "report"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.usage = (
         "cubestack campaign FILE [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
+        "       cubestack campaign report FOLDER [--compare FOLDER]\n"
         "       cubestack campaign replay FOLDER ROW"
     )
     parser.add_argument("words", nargs="+", metavar="FILE", help="plan of the campaign")
@@ -44,6 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
     )
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
+    parser.add_argument(
+        "--compare", type=Path, metavar="FOLDER", help="of a report: what was before, same skies"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a point")
 
 
@@ -51,6 +59,10 @@ def run(args: argparse.Namespace) -> int:
     """Run or replay; 1 when frames failed, or when it was stopped."""
     if args.words[0] == REPLAY:
         return _replay(args.words[1:])
+    if args.words[0] == REPORT:
+        return _report(args)
+    if args.compare:
+        raise ValueError("--compare is for a report")
     if len(args.words) > 1:
         raise ValueError(f"one plan at a time, not {' '.join(args.words)}")
     path = Path(args.words[0])
@@ -75,20 +87,36 @@ def _replay(words: list[str]) -> int:
     return 0
 
 
+def _report(args: argparse.Namespace) -> int:
+    if len(args.words) != 2:
+        raise ValueError("report wants a campaign's folder")
+    folder, changes = Folder(Path(args.words[1])), list[Change]()
+    if args.compare:
+        changes = compared(Folder(args.compare), folder)
+    page, *pictures = report.write(folder, changes, args.compare)
+    worse = [change for change in changes if change.worse]
+    for change in changes if args.json else worse:
+        told = f"{statistics.told(change.point)}: {change.outcome} {change.before} before"
+        text = f"{told}, {change.after} after: {report.verdict(change)}"
+        print(json.dumps(vars(change)) if args.json else text)
+    say(f"wrote {page} and {len(pictures)} figures")
+    return 1 if worse else 0
+
+
 def _show(folder: Folder, *, as_json: bool) -> int:
     """Rates at every point; returns how many frames failed."""
-    found = campaigns.summary(folder)
+    found = statistics.rates(folder)
     names = list(folder.plan.grid)
-    table = Table(*names, *campaigns.ENDINGS, title="results; 95 % limits in brackets")
+    table = Table(*names, *statistics.ENDINGS, title="results, and 95 % limits of their rates")
     for point, ended in found.items():
         of = ended.total()
         if as_json:
             print(json.dumps({"point": dict(point), "of": of, **ended}))
             continue
         cells = []
-        for ending in campaigns.ENDINGS:
+        for ending in statistics.ENDINGS:
             low, high = (100 * limit for limit in wilson(ended[ending], of))
-            cells.append(f"{ended[ending]} ({low:.1f}-{high:.1f} %)")
+            cells.append(f"{ended[ending]}\n{low:.1f}-{high:.1f} %")
         table.add_row(*(str(value) for _, value in point), *cells)
     if not as_json:
         console.print(table)

@@ -1,6 +1,5 @@
-"""Runs a campaign into its folder, and shows what came of it."""
+"""Runs a campaign into its folder, and single rows of it again."""
 
-from collections import Counter
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -11,8 +10,6 @@ from cubestack.host.experiments.campaigns.folder import Folder, FolderError
 from cubestack.host.experiments.campaigns.plan import Block, Plan
 from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.workers import performed
-
-ENDINGS = ("right", "refused", "wrong", "failed")
 
 
 def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[Row]:
@@ -56,20 +53,6 @@ def replayed(folder: Folder, number: int) -> dict[str, Any]:
     frames = row.after // a_frame + 1
     results = measure(block.device, frames=frames, seed=row.seed, **block.options)
     return next(islice(results, row.after, None)).as_dict()
-
-
-def summary(folder: Folder) -> dict[tuple[tuple[str, Any], ...], Counter[str]]:
-    """How many rows ended how, by point of the grid."""
-    names = list(folder.plan.grid)
-    found: dict[tuple[tuple[str, Any], ...], Counter[str]] = {}
-    for row in folder.rows():
-        point = tuple((name, _hashable(row.swept[name])) for name in names)
-        found.setdefault(point, Counter())[row.outcome] += 1
-    return found
-
-
-def _hashable(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
 
 
 def default_folder(path: Path) -> Path:

@@ -23,6 +23,8 @@ def test_a_campaign_from_begin_to_replay(
     assert "--resume goes on with it" in capsys.readouterr().err
     assert main(["campaign", "false.toml", "--resume", "--workers", "1"]) == 0
     assert "right" in capsys.readouterr().out
+    assert main(["campaign", "report", "false.campaign", "--compare", "false.campaign"]) == 0
+    assert "wrote false.campaign/report.html and 3 figures" in capsys.readouterr().err
     rows = Path("false.campaign/rows.jsonl").read_text("utf-8").splitlines()
     assert main(["campaign", "replay", "false.campaign", "3"]) == 0
     again = json.loads(capsys.readouterr().out)
@@ -34,6 +36,8 @@ def test_a_campaign_from_begin_to_replay(
     [
         (["nothing.toml"], "No such file"),
         (["a.toml", "b.toml"], "one plan at a time"),
+        (["report"], "report wants a campaign's folder"),
+        (["a.toml", "--compare", "b"], "--compare is for a report"),
         (["replay"], "replay wants a campaign's folder and the number of a row"),
         (["replay", "nowhere", "1"], "nowhere is no campaign's folder"),
     ],

@@ -12,7 +12,8 @@ import pytest
 from cubestack.host.experiments.campaigns import block as blocks
 from cubestack.host.experiments.campaigns.folder import PLAN, ROWS, Folder
 from cubestack.host.experiments.campaigns.plan import Plan
-from cubestack.host.experiments.campaigns.run import count, replayed, run, summary
+from cubestack.host.experiments.campaigns.run import count, replayed, run
+from cubestack.host.experiments.campaigns.statistics import rates
 
 from ..cluster import dask_cluster
 
@@ -82,8 +83,8 @@ def test_what_cannot_be_replayed_is_told(alone: Folder) -> None:
         replayed(alone, 8)
 
 
-def test_the_summary_counts_by_point(alone: Folder) -> None:
-    found = summary(alone)
+def test_rates_are_counted_by_point(alone: Folder) -> None:
+    found = rates(alone)
     assert list(found) == [(("false_stars", 0),), (("false_stars", 10),)]
     assert all(ended.total() == 4 for ended in found.values())
     assert found[(("false_stars", 0),)]["right"] == 4
