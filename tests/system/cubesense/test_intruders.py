@@ -35,14 +35,20 @@ def test_hot_pixels_do_not_move_a_direction(ready: Open, camera: Camera) -> None
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_a_light_beside_the_earth_is_dropped_from_its_limb(ready: Open) -> None:
-    """A disc on a sample of a scanned row: two edges more, which the fit leaves out."""
+@pytest.mark.parametrize(("radius_px", "edges"), [(9.0, 0), (25.0, 2)])
+def test_a_light_beside_the_earth_is_dropped_from_its_limb(
+    ready: Open, radius_px: float, edges: int
+) -> None:
+    """A disc on a sample of a scanned row: small ones make no edges, the fit leaves others out."""
     (sample,) = LENSES[Target.NADIR].unproject([(511, 79)])
-    light = Reflection(Target.NADIR, *angles_from_vector(sample), radius_px=9.0, level=200.0)
+    light = Reflection(Target.NADIR, *angles_from_vector(sample), radius_px=radius_px, level=200.0)
+    with ready(FACING) as opened:
+        check_right(opened.client.capture_and_detect(Camera.NADIR))
+        alone = len(opened.client.edges())
     with ready(replace(FACING, reflections=(light,))) as opened:
         check_right(opened.client.capture_and_detect(Camera.NADIR))
-        used = opened.client.details(Camera.NADIR)["Points"]
-        assert used <= len(opened.client.edges()) - 2
+        assert len(opened.client.edges()) == alone + edges
+        assert opened.client.details(Camera.NADIR)["Points"] <= alone
 
 
 @pytest.mark.parametrize(

@@ -35,13 +35,13 @@ def test_on_the_way_to_a_result(ready: Open) -> None:
 
 
 def lights(count: int | None = None) -> EarthSunScene:
-    """Discs around every other sample of rows and columns, four edges each."""
+    """Discs around every other sample of rows and columns, four edges each; not small ones."""
     lens = LENSES[Target.NADIR]
     samples = [(x, y) for x in (191, 319, 447) for y in (79, 207, 335)]
     samples += [(x, y) for x in (255, 383, 511) for y in (143, 271, 399)]
     samples = [(x, y) for x, y in samples if np.hypot(x - lens.cx, y - lens.cy) < 200]
     discs = (
-        Reflection(Target.NADIR, *angles_from_vector(vector), radius_px=18.0, level=200.0)
+        Reflection(Target.NADIR, *angles_from_vector(vector), radius_px=25.0, level=200.0)
         for vector in lens.unproject(samples[:count])
     )
     return EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(discs))
