@@ -167,7 +167,8 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
                 return replace(fit, reason=why.FEW_EDGES)
             off_px = DUSK * LIT[config.projection].on_px
             against = far_off(circle, points, edges.sides, off_px, meter)
-            if used - FEWEST <= against:
+            # Up to three edges against weigh as many as others; of more, a third may be wrong.
+            if 3 * (used - FEWEST) <= 2 * against + min(against, 3):
                 return replace(fit, reason=why.OTHER_LIGHT)
             sigma = _sigma(limb, centre, config.projection, meter)
             fit = replace(

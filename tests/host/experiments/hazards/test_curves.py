@@ -10,8 +10,8 @@ from cubestack.host.experiments.hazards.curves import (
     hazards_of,
     jobs_of,
     run,
-    wilson,
 )
+from cubestack.host.experiments.rates import wilson
 
 
 @pytest.mark.parametrize(("count", "of"), [(0, 20), (1, 20), (13, 40), (20, 20), (3, 1000)])
