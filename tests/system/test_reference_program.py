@@ -17,6 +17,7 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.conformance.contract import CheckRun, Verdict
 from cubestack.host.conformance.reads import check_reads
 from cubestack.host.conformance.writes import check_writes
+from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.targets import Target
@@ -185,7 +186,8 @@ def test_the_same_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
 def test_conformance_of_what_is_read(star: AnyEmulated, node: NodeClient) -> None:
     """All telemetry and framing, and no telecommand: `cubestack conformance` does those as well."""
     notes = device("cubestar").conformance
-    run = CheckRun(Target("emulated", INTERFACE, node), notes=notes)
+    target = Target("emulated", INTERFACE, node, controls=EmulatedControls(star))
+    run = CheckRun(target, notes=notes)
     check_reads(run)
     check_writes(run)
     assert {check.name for check in run.checks if check.verdict is Verdict.FAILED} == set()
