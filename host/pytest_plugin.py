@@ -15,17 +15,17 @@ events go into the JUnit report; what the faults did is shown below a test that 
 
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
+from cubestack.host.devices.device import Engine
 from cubestack.host.devices.registry import device_names, devices
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
-    from cubestack.host.devices.device import Engine
     from cubestack.host.devices.emulated import AnyEmulated
 
 MARKER = "cubestack"
@@ -48,7 +48,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption(
         "--cubestack-engine",
-        choices=("auto", "compiled", "python"),
+        choices=get_args(Engine),
         default="auto",
         help="how the FPGA is run (default: compiled where there is a compiler)",
     )

@@ -150,7 +150,7 @@ class Board(ABC):
     @cached_property
     def faults(self) -> Faults:
         """Injects faults into this board."""
-        return Faults(self._sites(), self.seed)
+        return Faults(self.sites(), self.seed)
 
     def serial(self, name: str = "uart") -> DirectSerial:
         """Host's end of the serial line ``name``, in this process; KeyError for none."""
@@ -184,7 +184,7 @@ class Board(ABC):
         if self.engine is not None:
             self.engine.close()
 
-    def _sites(self) -> Sites:
+    def sites(self) -> Sites:
         """Where faults can hit: here what all boards have."""
         uarts, buses = {line.target: line.uart for line in self.lines}, {"i2c": self.i2c_bus}
         return Sites(self.kernel, self.processor, uarts, buses, self.power, self.engine)

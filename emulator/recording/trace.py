@@ -75,6 +75,7 @@ class VcdTrace:
             self.declare(f"firmware.{name}", bits)
         self._pins: tuple[str, ...] = ()
         if engine is not None:
+            engine.use_strides(False)  # a trace shows clocks that were made, one by one
             self._pins = (*engine.wiring.mcu_pins, *engine.wiring.output_pins)
             for pin in self._pins:
                 self.declare(f"fpga.{pin}", engine.wiring.widths[pin], engine.get_pin(pin))

@@ -67,6 +67,7 @@ class RtlEngine(ABC):
         now_ps: virtual time.
         memories: each memory's bytes by its name, live views, shape (2 ** width of its address,).
         sram: those of the first one.
+        flip_changed: whether the latest ``flip`` changed anything; in reset it does not.
     """
 
     def __init__(self, wiring: Wiring, *, skipping: bool) -> None:
@@ -84,6 +85,8 @@ class RtlEngine(ABC):
         self._camera_of = {pin: camera for camera in self._cameras for pin in camera.pins.pins}
         self._idle = False  # no camera runs, and none will before something is done to the pins
         self._next_strobe = 0, Fraction(0), Fraction(0)  # time, period, fraction
+        self._later: list[tuple[int, str, int]] = []  # time, register and bit of upsets to come
+        self.flip_changed = False
 
     @abstractmethod
     def _set(self, name: str, value: int) -> None:
@@ -125,6 +128,19 @@ class RtlEngine(ABC):
     def registers(self) -> dict[str, int]:
         """Bits of every register by its path in the design; empty in the simulated engine."""
         return {}
+
+    @property
+    def clocks_at_once(self) -> int:
+        """Clocks that were not made one by one, but as strides; see `hdl.blocks.stride`."""
+        return 0
+
+    def use_strides(self, on: bool) -> None:
+        """Whether strides may be made at once, where the engine can, from ``now_ps`` on."""
+        del on  # it makes none
+
+    def state(self) -> bytes:
+        """Levels of all registers, to be compared; of the simulated engine nothing."""
+        return b""
 
     def _flip(self, register: str, bit: int) -> None:
         """Turn a bit of a register over at ``now_ps`` and let everything settle."""
@@ -184,21 +200,30 @@ class RtlEngine(ABC):
         self.run(self.now_ps)
         self._power(list(self.memories).index(name), on)
 
-    def flip(self, register: str, bit: int) -> None:
-        """Turn over a bit of a register at ``now_ps``, as a particle does; ValueError for none.
+    def flip(self, register: str, bit: int, at_ps: int | None = None) -> None:
+        """Turn over a bit of a register at ``at_ps``, by default now; ValueError for none.
 
-        A register that is in reset at once has its reset value again.
+        As a particle does: between two edges of any clock, or on one. A register that is in reset
+        at once has its reset value again.
         """
         if not self.registers:
             raise ValueError("only the compiled engine can turn over the FPGA's registers")
         if bit not in range(self.registers.get(register, 0)):
             known = ", ".join(f"{name} ({bits})" for name, bits in self.registers.items())
             raise ValueError(f"no register bit {register}[{bit}]; registers (bits): {known}")
+        if at_ps is not None and at_ps < self.now_ps:
+            raise ValueError(f"an upset at {at_ps} ps is too late, it is {self.now_ps} ps")
+        self._later.append((self.now_ps if at_ps is None else at_ps, register, bit))
+        self._later.sort()
         self.run(self.now_ps)
+
+    def _turn_over(self, register: str, bit: int) -> None:
         for camera in self._cameras:
             self._catch_up(camera)
         self._idle = False
+        before = self.state(), dict(self.violation_counts)
         self._flip(register, bit)
+        self.flip_changed = (self.state(), dict(self.violation_counts)) != before
 
     def set_pin(self, name: str, value: int) -> None:
         """Drive one of the microcontroller's pins; this and what follows as in ``FpgaPort``."""
@@ -223,6 +248,18 @@ class RtlEngine(ABC):
 
     def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
         """Advance to ``until_ps`` or to ``stop_on``."""
+        while self._later and self._later[0][0] <= until_ps:
+            time_ps, register, bit = self._later[0]
+            if self._run(max(time_ps, self.now_ps), stop_on) < time_ps or (
+                stop_on is not None and self._get(stop_on[0]) == stop_on[1]
+            ):
+                return self.now_ps
+            del self._later[0]
+            self._turn_over(register, bit)
+        return self._run(until_ps, stop_on)
+
+    def _run(self, until_ps: int, stop_on: tuple[str, int] | None) -> int:
+        """Do as ``run`` does, without upsets."""
         if self._idle and stop_on is None and until_ps >= self.now_ps:
             self.now_ps = until_ps
             return until_ps
@@ -263,10 +300,11 @@ class RtlEngine(ABC):
         # Cycle n ends at floor(fraction + n * period): the largest n that keeps it within reach.
         reach = ceil((until_ps - self.now_ps + 1 - fraction) / period) - 1
         cycles = max(0, min(len(out), reach))
-        if not self._running():
-            self._strobe(out[:cycles], period, fraction)
+        upset = self._later and self._later[0][0] <= start + cycles * period
+        if self._running() or upset:
+            self._strobe_step_by_step(out[:cycles], period, fraction)
         else:
-            self._strobe_beside_pixels(out[:cycles], period, fraction)
+            self._strobe(out[:cycles], period, fraction)
         whole, fraction = divmod(fraction + cycles * period, 1)
         self.run(start + whole)
         self._next_strobe = (self.now_ps, period, fraction)
@@ -285,7 +323,8 @@ class RtlEngine(ABC):
         start, period = self.now_ps, transactions.period
         # Transaction n ends at floor(n * period): the largest n that keeps it within reach.
         fitting = max(0, ceil((until_ps - start + 1) / period) - 1)
-        done = self._access(transactions.first(min(fitting, len(transactions))))
+        access = RtlEngine._access if self._later else type(self)._access
+        done = access(self, transactions.first(min(fitting, len(transactions))))
         self.run(start + int(done * period))
         return done
 
@@ -337,13 +376,14 @@ class RtlEngine(ABC):
 
         None of them has skipped a clock: a camera becomes one of these by ``set_pin`` only.
         """
-        storing = self.wiring.storing(self._get)
+        storing, stored = self.wiring.storing(self._get), self.wiring.stored(self._get)
         running = []
         for camera in self._cameras:
             loaded, stores = camera.loaded, camera.pins.name in storing
             if loaded is None or (self._skipping and not stores):
                 continue
-            if stores and loaded.segment.rows and loaded.pixels is None:
+            wanted = stores and camera.pins.name not in stored
+            if wanted and loaded.segment.rows and loaded.pixels is None:
                 self._use_pixels(camera.number, loaded.render())
             running.append(camera)
         return running
@@ -404,10 +444,10 @@ class RtlEngine(ABC):
             self._set(camera.pins.clock, 0)
         self._load(camera.number, loaded, edge)
 
-    def _strobe_beside_pixels(
+    def _strobe_step_by_step(
         self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction
     ) -> None:
-        """Do as ``_strobe`` does, with pixel clocks running."""
+        """Do as ``_strobe`` does, with pixel clocks running, or an upset in the middle."""
         start, clock = self.now_ps, self.wiring.data_clock
         for i in range(len(out)):
             self.run(start + int(fraction + i * period))

@@ -10,7 +10,7 @@ from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
 
-EngineKind = Literal["auto", "compiled", "python"]
+EngineKind = Literal["auto", "compiled", "exact", "python"]
 """How FPGAs are run."""
 
 
@@ -25,20 +25,21 @@ def make_engine(
 
     Args:
         wiring: the design with its surroundings.
-        kind: "compiled", "python" (the Amaranth simulator), or "auto": compiled where there is a
-            C++ compiler, else the simulator with a warning.
+        kind: "compiled", "exact" (compiled, and every clock made one by one), "python" (the
+            Amaranth simulator), or "auto": compiled where there is a C++ compiler, else the
+            simulator with a warning.
         sram_timing: limits that the SRAM model checks.
         skipping: skip pixel clocks that provably change nothing.
 
     Raises:
-        CompilerError: "compiled" without a C++ compiler, or the compiler failed.
+        CompilerError: "compiled" or "exact" without a C++ compiler, or the compiler failed.
     """
     if kind == "python":
         return SimulatedEngine(wiring, sram_timing, skipping=skipping)
     try:
-        return CompiledEngine(wiring, sram_timing, skipping=skipping)
+        return CompiledEngine(wiring, sram_timing, skipping=skipping and kind != "exact")
     except NoCompilerError as error:
-        if kind == "compiled":
+        if kind != "auto":
             raise
         warnings.warn(
             f"{error}; using the Amaranth simulator, about a thousand times slower", stacklevel=2

@@ -7,9 +7,10 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from amaranth.lib.wiring import Component, In
+from amaranth.lib.wiring import In
 
 from cubestack.emulator.sim.fpga_port import STEPS, Transactions
+from cubestack.hdl.blocks.pinned import PinnedComponent
 
 #: An SRAM's pins, seen from the FPGA.
 MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
@@ -127,6 +128,8 @@ class Wiring:
         acknowledges: outputs that ``run`` may stop on.
         storing: names of the cameras whose pixel clocks may change anything, by the levels of the
             other pins. Changes with those pins and the acknowledges only.
+        stored: names of those of them that have stored a whole picture: their registers follow, but
+            no pixel goes anywhere.
         settling_clocks: after as many clocks with the line pin low no further one changes a
             register.
         contention: output that is not 0 while two drivers are on one wire; None for no such.
@@ -135,7 +138,7 @@ class Wiring:
         bus: the microcontroller's external bus; None where it does not lead here.
     """
 
-    component: Component
+    component: PinnedComponent
     cameras: tuple[CameraPins, ...]
     memories: tuple[MemoryPins, ...]
     data_clock: str
@@ -143,6 +146,7 @@ class Wiring:
     acknowledges: tuple[str, ...]
     storing: Callable[[Level], Collection[str]]
     settling_clocks: int
+    stored: Callable[[Level], Collection[str]] = lambda _level: ()
     contention: str | None = None
     burst_levels: tuple[Levels, ...] = ()
     bus: BusPins | None = None

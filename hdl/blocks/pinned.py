@@ -6,6 +6,7 @@ from amaranth.hdl import Module
 from amaranth.lib.wiring import Component, In, Out
 
 from cubestack.firmware_model.interface.pins import Pin
+from cubestack.hdl.blocks.stride import Stride
 
 
 class PinnedComponent(Component):
@@ -25,6 +26,11 @@ class PinnedComponent(Component):
                 for port in pin.ports
             }
         )
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        """Clocks of which an engine may make many at once; none unless declared."""
+        return ()
 
 
 def connect_ports(

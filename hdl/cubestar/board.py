@@ -8,11 +8,13 @@ through two flip-flops.
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Value
 from amaranth.lib.cdc import ResetSynchronizer
 
+from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.firmware_model.interface.pins import Pin, resized
 from cubestack.hdl.blocks.bus_port import BusPort
 from cubestack.hdl.blocks.frame_writer import FrameWriter
 from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.blocks.pinned import PinnedComponent
+from cubestack.hdl.blocks.stride import Stride
 
 
 class CubeStarBoard(PinnedComponent):
@@ -28,6 +30,33 @@ class CubeStarBoard(PinnedComponent):
         width = MatrixCounter.address_width(columns, rows) + self._banks
         addresses = [pin for pin in self._pins if pin.endswith("_A")]
         super().__init__(resized(self._pins, **dict.fromkeys(addresses, width)))
+
+    def _row_stored(
+        self, name: str = "row", memory: str = "SRAM", into: tuple[tuple[str, int], ...] = ()
+    ) -> Stride:
+        """Pixels inside a row, from the first one's write to the last one's.
+
+        ``into`` are levels of registers with which they go to ``memory``.
+        """
+        over = ("line_full", "frame_full", "ack")
+        begun = ("store", "line_open", "between_lines_seen")
+        return Stride(
+            name,
+            clock=pins.PIXCLK,
+            levels=((pins.ENABLE, 1), (pins.RNW, 0), (pins.HSYNC, 1), (pins.VSYNC, 1)),
+            state=(
+                *((f"pix_reset.stage{stage}", 0) for stage in (0, 1)),
+                *((f"writer.{register}", 1) for register in begun),
+                *((f"writer.{register}", 0) for register in over),
+                *into,
+            ),
+            counter="writer.counter.column",
+            last=self.columns - 1,
+            data="writer.data",
+            source=pins.PIXDATA,
+            memory=memory,
+            stores=True,
+        )
 
     def _add_writer(self, m: Module, storing: Value) -> FrameWriter:
         """The camera's writer in its domain "pix", in reset unless ``storing``."""

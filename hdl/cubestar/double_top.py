@@ -14,6 +14,7 @@ How each asynchronous input is brought in:
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Signal
 
 from cubestack.firmware_model.interface.cubestar.pins import DOUBLE
+from cubestack.hdl.blocks.stride import Stride
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
 _SRAM = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
@@ -31,6 +32,14 @@ class CubeStarDouble(CubeStarBoard):
 
     _pins = DOUBLE
     _banks = False
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        """A row that is stored in either memory."""
+        return tuple(
+            self._row_stored(f"row-{number}", f"SRAM{number}", (("into", number - 1),))
+            for number in (1, 2)
+        )
 
     def elaborate(self, platform: object) -> Module:
         """Wire writer and bus to either SRAM."""

@@ -14,6 +14,7 @@ How each asynchronous input is brought in:
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Signal
 
 from cubestack.firmware_model.interface.cubestar.pins import SHARED
+from cubestack.hdl.blocks.stride import Stride
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
 
@@ -27,6 +28,11 @@ class CubeStarShared(CubeStarBoard):
 
     _pins = SHARED
     _banks = True
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        """A row that is stored."""
+        return (self._row_stored(),)
 
     def elaborate(self, platform: object) -> Module:
         """Wire writer, bus and bank register to the SRAM."""

@@ -17,8 +17,10 @@ No clock is ever switched: each counter has its own, and only the SRAM address i
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Mux, ResetSignal, Signal
 
+from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
 from cubestack.hdl.blocks.frame_reader import FrameReader
+from cubestack.hdl.blocks.stride import Stride
 from cubestack.hdl.cubestar.board import CubeStarBoard
 
 
@@ -34,6 +36,23 @@ class CubeStarTop(CubeStarBoard):
 
     _pins = PUBLISHED
     _banks = True
+
+    @property
+    def strides(self) -> tuple[Stride, ...]:
+        """A row that is stored, and one that is read."""
+        read = Stride(
+            "row-read",
+            clock=pins.DCLK,
+            levels=((pins.ENABLE, 1), (pins.RNW, 1)),
+            state=(),
+            counter="reader.counter.column",
+            last=self.columns - 1,
+            data="reader.data",
+            source="SRAM_D_I",
+            memory="SRAM",
+            stores=False,
+        )
+        return self._row_stored(), read
 
     def elaborate(self, platform: object) -> Module:
         """Wire writer, reader and bank register to the pins."""

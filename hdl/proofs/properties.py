@@ -35,6 +35,11 @@ def writer_wires(writer: str, domain: str, below: str | None = None) -> dict[str
     }
 
 
+def first_step() -> Value:
+    """High in the first step."""
+    return Initial()
+
+
 def domain(m: Module, name: str, clock: Value, reset: Value) -> Any:
     """Statements at the rising edge of ``clock``, with an asynchronous reset."""
     m.domains += ClockDomain(name, async_reset=True, local=True)

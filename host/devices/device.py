@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from cubestack.host.devices.experiment import AnyExperiment
     from cubestack.host.devices.fidelity import Fidelity
 
-#: How an FPGA is run: compiled where there is a compiler, always compiled, or Amaranth's simulator.
-Engine = Literal["auto", "compiled", "python"]
+#: How an FPGA is run: compiled where there is a compiler, always compiled, compiled with every
+#: clock made one by one, or Amaranth's simulator.
+Engine = Literal["auto", "compiled", "exact", "python"]
 
 #: Passes items through and shows how many of a total are done: (items, total, label) -> items.
 Shown = Callable[[Iterable[Any], int, str], Iterator[Any]]
@@ -163,6 +164,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         fidelity: its published figures, and what measures ours; None for a device without any.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
+        campaigns: package with a folder ``campaigns`` of plans that come with it; empty for none.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
@@ -189,6 +191,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     fidelity: "Callable[[], Fidelity] | None" = None
     tops: "Callable[[], TopTable]" = dict
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
+    campaigns: str = ""
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
     costs: "Callable[[], CostReport] | None" = None

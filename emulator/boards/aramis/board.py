@@ -169,10 +169,11 @@ class AramisBoard(Board):
         target = self.catalogue_flash if memory == "flash" else self.sdram
         return flip_bits(target, rate, self._rng)
 
-    def _sites(self) -> Sites:
+    def sites(self) -> Sites:
+        """Where faults can hit."""
         # Its camera and processor have no faults of their own.
         memories = {"sdram": self.sdram, "flash": self.catalogue_flash}
-        return replace(super()._sites(), memories=memories)
+        return replace(super().sites(), memories=memories)
 
     def _frame_ended(self, end: FrameEnd) -> None:
         if end is FrameEnd.STORED and self.ppi.stored is not None:

@@ -50,8 +50,11 @@ CLOCKED = (*STORING, Action.SEND_PICTURE)
 
 
 @lru_cache(maxsize=4)
-def _wiring(gateware: str, mcu_addressing: bool) -> Wiring:
-    """Kept, as an engine knows its library by the design's text, a slow thing."""
+def wiring_of(gateware: str, *, mcu_addressing: bool = False) -> Wiring:
+    """The FPGAs with the gateware that a switch names.
+
+    Kept, as an engine knows its library by the design's text, a slow thing.
+    """
     return cubesense_wiring(CubeSensePair(READ_OUTS[gateware], mcu_addressing))
 
 
@@ -98,7 +101,9 @@ class CubeSenseBoard(Board):
                 ``seed``.
         """
         super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
-        self.engine = make_engine(_wiring(switches.gateware, mcu_addressing), engine)
+        self.engine = make_engine(
+            wiring_of(switches.gateware, mcu_addressing=mcu_addressing), engine
+        )
         drawn = switches.lens == "residuals"
         self.cameras = {
             Camera[target.name]: Ov7620(
@@ -164,9 +169,10 @@ class CubeSenseBoard(Board):
             probes[f"{half}_detect"] = codes.DetectResult(result.detect).name
         return probes
 
-    def _sites(self) -> Sites:
+    def sites(self) -> Sites:
+        """Where faults can hit."""
         return replace(
-            super()._sites(),
+            super().sites(),
             controls=(pins.RNW, pins.EDGE, pins.SHIFT, *ENABLE),
             cameras={
                 half: CameraSite(self.cameras[camera], self.cameras[camera].power, f"{half}_camera")

@@ -112,8 +112,9 @@ class CubeStarBoard(CubeStarStack):
         """What a trace shows: the main task's status beside what all boards show."""
         return super().probes() | {"task": TaskStatus(self.program.state.task_status).name}
 
-    def _sites(self) -> Sites:
-        return replace(super()._sites(), resets=self._resets())
+    def sites(self) -> Sites:
+        """Where faults can hit."""
+        return replace(super().sites(), resets=self._resets())
 
     def _resets(self) -> dict[str, Callable[[], None]]:
         """What resets the processor against its program's will, the usual one first."""

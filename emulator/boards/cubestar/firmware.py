@@ -150,8 +150,9 @@ class CubeStarFirmwareBoard(CubeStarStack):
         self.insight.close()
         self.machine.close()
 
-    def _sites(self) -> Sites:
-        sites, machine = super()._sites(), self.machine
+    def sites(self) -> Sites:
+        """Where faults can hit."""
+        sites, machine = super().sites(), self.machine
         return replace(
             sites,
             resets=self._resets(),

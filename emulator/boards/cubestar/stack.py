@@ -94,9 +94,10 @@ class CubeStarStack(Board):
     def scene(self, scene: object) -> None:
         self.camera.scene = scene
 
-    def _sites(self) -> Sites:
+    def sites(self) -> Sites:
+        """Where faults can hit."""
         return replace(
-            super()._sites(),
+            super().sites(),
             controls=self.layout.controls,
             cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
             memories={"external": self.external_ram} if self.layout.external_ram else {},

@@ -19,18 +19,21 @@ _AT_REST: Levels = ((pins.ALE, 0), (pins.RE_N, 1), (pins.WE_N, 1))
 
 
 def _stores(level: Level, board: str = "") -> bool:
-    on, reads, done = (level(board + pin) for pin in (pins.ENABLE, pins.RNW, pins.ACK))
-    return bool(on and not reads and not done)
+    on, reads = (level(board + pin) for pin in (pins.ENABLE, pins.RNW))
+    return bool(on and not reads)
 
 
 def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
     """The FPGA board: one camera, "imager", and one memory, "SRAM".
 
-    Not storing, its pixel clock domain is in reset; with ACK high it waits for one.
+    Not storing, its pixel clock domain is in reset; with ACK high its writer follows the lines.
     """
 
     def storing(level: Level) -> Collection[str]:
         return ("imager",) if _stores(level) else ()
+
+    def stored(level: Level) -> Collection[str]:
+        return ("imager",) if level(pins.ACK) else ()
 
     return Wiring(
         top or CubeStarTop(),
@@ -40,6 +43,7 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
         data=pins.DATA,
         acknowledges=(pins.ACK,),
         storing=storing,
+        stored=stored,
         # Two release the reset, one ends the store, one the line.
         settling_clocks=8,
         burst_levels=(((pins.DCLK, 0), *_STORING),),
@@ -84,6 +88,11 @@ def _on_bus(
         stores = any(_stores(level, board) for board in boards)
         return ("imager",) if stores else ()
 
+    def stored(level: Level) -> Collection[str]:
+        # One camera for all: until none of them stores any more.
+        waits = (level(board + pins.ACK) or not _stores(level, board) for board in boards)
+        return ("imager",) if all(waits) else ()
+
     return Wiring(
         component,
         cameras=(_IMAGER,),
@@ -92,6 +101,7 @@ def _on_bus(
         data=pins.AD_LOW.ports[1].name,
         acknowledges=tuple(board + pins.ACK for board in boards),
         storing=storing,
+        stored=stored,
         settling_clocks=8,  # as above
         contention=contention,
         burst_levels=burst_levels,

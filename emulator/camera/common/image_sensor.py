@@ -1,6 +1,7 @@
 """What all image sensors have: a scene before them, a condition, a supply, and a pixel clock."""
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, ClassVar, Generic
@@ -11,6 +12,9 @@ from cubestack.emulator.camera.common.stream import PixelClock
 from cubestack.emulator.camera.common.view import C, S, View
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
+
+KEPT = 2
+"""Pictures that are kept: one that was joined in the middle, and the whole one after it."""
 
 
 class ImageSensor(ABC, Generic[S, C]):
@@ -45,7 +49,7 @@ class ImageSensor(ABC, Generic[S, C]):
         self._clock: PixelClock | None = PixelClock(hz)
         self._powered = True
         self._in_reset = False
-        self._made: tuple[Any, Grey] | None = None
+        self._made: deque[tuple[Any, Grey]] = deque(maxlen=KEPT)
 
     @property
     def scene(self) -> S:
@@ -114,7 +118,7 @@ class ImageSensor(ABC, Generic[S, C]):
     @property
     def rendered(self) -> Grey | None:
         """The picture (rows, columns) that was rendered last, of the latest frame looked at."""
-        return None if self._made is None else self._made[1]
+        return self._made[-1][1] if self._made else None
 
     @abstractmethod
     def _restarted(self, now_ps: int) -> None:
@@ -123,6 +127,10 @@ class ImageSensor(ABC, Generic[S, C]):
     def _once(self, frame: object, make: Callable[[], Grey]) -> Grey:
         """The picture of ``frame``, made anew only when frame, scene or condition is another."""
         key = (frame, self._scene, self._condition)
-        if self._made is None or self._made[0] != key:
-            self._made = key, make()
-        return self._made[1]
+        made = next((each for each in self._made if each[0] == key), None)
+        if made is None:
+            made = key, make()
+        else:
+            self._made = deque((each for each in self._made if each is not made), KEPT)
+        self._made.append(made)
+        return made[1]

@@ -14,7 +14,14 @@ from cubestack.emulator.rtl.cxxrtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import cxxrtl_headers, cxxrtl_text, design_hash, rtlil_text
 
-SOURCES = ("driver.cpp", "sram_model.h", "pins_header.py", "clock_steps.py", "variants.py")
+SOURCES = (
+    "driver.cpp",
+    "sram_model.h",
+    "pins_header.py",
+    "clock_steps.py",
+    "variants.py",
+    "strides.py",
+)
 
 
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:

@@ -78,6 +78,7 @@ struct Register {
     const char *name;
     int32_t bits;
     void (*flip)(Top &, int32_t);
+    const uint32_t *(*levels)(const Top &);
 };
 
 template <size_t Bits> void flip_bit(cxxrtl::wire<Bits> &wire, int32_t bit) {
@@ -87,9 +88,10 @@ template <size_t Bits> void flip_bit(cxxrtl::wire<Bits> &wire, int32_t bit) {
 }
 
 #define REGISTER(name, port, bits) \
-    {name, bits, [](Top &top, int32_t bit) { flip_bit(top.port, bit); }},
+    {name, bits, [](Top &top, int32_t bit) { flip_bit(top.port, bit); }, \
+     [](const Top &top) -> const uint32_t * { return top.port.curr.data; }},
 
-const Register REGISTER_TABLE[] = {REGISTERS {nullptr, 0, nullptr}};
+const Register REGISTER_TABLE[] = {REGISTERS {nullptr, 0, nullptr, nullptr}};
 const int32_t REGISTER_COUNT = (int32_t)(sizeof REGISTER_TABLE / sizeof *REGISTER_TABLE) - 1;
 
 // The lines of camera number N.
@@ -134,6 +136,9 @@ struct Segment {
     int64_t rows, line_clocks, active_columns, vsync;
 };
 
+// Clocks that are worth to be made at once.
+constexpr int64_t SHORTEST_STRIDE = 4;
+
 // What a camera sends, and how far it is.
 struct Stream {
     Segment segment = {};
@@ -167,6 +172,12 @@ struct Stream {
     }
 
     bool inside() const { return segment.rows && column < segment.active_columns; }
+
+    // A clock is to rise that has many more behind it in its row.
+    bool in_row() const {
+        return edge % 2 == 0 && pixels && inside() &&
+               segment.active_columns - column > SHORTEST_STRIDE + 2;
+    }
 
     uint8_t pixel() const {
         return inside() && pixels ? pixels[row * segment.active_columns + column] : 0;
@@ -209,7 +220,7 @@ enum Outcome : int32_t { TIME_REACHED, ACKNOWLEDGE_CHANGED, SEGMENT_OVER };
 class Driver {
 public:
     Driver(uint8_t *const *memories, const SramTiming &timing, int64_t keep, bool skipping)
-        : log(keep), skipping(skipping) {
+        : log(keep), skipping(skipping), strides(skipping) {
         for (int n = 0; n < MEMORY_COUNT; n++)
             srams.emplace_back(memories[n], timing, log, n);
         for (const Pin &pin : PIN_TABLE)
@@ -280,6 +291,11 @@ public:
     // The microcontroller's transfer loop; cycle edges are at start + floor of `halves`.
     __attribute__((flatten)) void strobe(uint8_t *out, int64_t count, int64_t start, Steps halves) {
         for (int64_t i = 0; i < count; i++) {
+            if (strides)
+                if (const int64_t read = read_strides(out + i, count - i, start, halves, 2 * i)) {
+                    i += read;
+                    halves.go_to(2 * i);
+                }
             const int64_t rise = start + halves.value();
             if (!top.DATA_CLOCK.get<bool>())
                 sample(rise);
@@ -347,8 +363,11 @@ public:
     }
 #endif
 
-private:
     const bool skipping;
+    bool strides;                // whether clocks may be made at once
+    int64_t clocks_at_once = 0;  // how many were
+
+private:
     std::vector<Sram> srams;
     Stream streams[CAMERA_COUNT];
     uint32_t contention = 0;
@@ -520,10 +539,90 @@ private:
         }
     }
 
+    // Makes at once the clocks of camera N that a stride describes, up to `until`. The row's last one,
+    // and one more, are left, so that an ordinary clock follows.
+    template <int N, class Model> void store_strides(Model &top, int64_t until) {
+        store_strides<N>(top, until, std::make_integer_sequence<int, STRIDE_COUNT>());
+    }
+    template <int N, class Model, int... K>
+    void store_strides(Model &top, int64_t until, std::integer_sequence<int, K...>) {
+        (void)top, (void)until;
+        (store_stride<N, K>(top, until), ...);
+    }
+    template <int N, int K, class Model> void store_stride(Model &top, int64_t until) {
+        if constexpr (Stride<K>::camera == N) {
+            constexpr std::integral_constant<int, K> stride;
+            Stream &stream = streams[N];
+            const Segment &segment = stream.segment;
+            Sram &sram = srams[Stride<K>::memory];
+            const int64_t half = segment.half_numerator / segment.half_denominator;
+            if (!stride_ready(stride, top) || !sram.stores_at(stream.time(), half, 2 * half))
+                return;
+            const int64_t counter = stride_counter(stride, top);
+            const int64_t edges = stream.times.last_within(until - segment.start) + 1 - stream.edge;
+            const int64_t clocks =
+                std::min({segment.active_columns - 1 - stream.column, Stride<K>::last - counter,
+                          edges / 2}) - 1;
+            if (clocks < SHORTEST_STRIDE)
+                return;
+            const uint8_t *next =
+                stream.pixels + stream.row * segment.active_columns + stream.column;
+            const int64_t end = stream.edge + 2 * clocks;
+            stream.go_to(end - 2);
+            const int64_t rose = stream.time();
+            stream.next_edge();
+            const int64_t fell = stream.time();
+            sram.store(next, clocks, rose, fell);
+            stride_to(stride, top, counter + clocks, next[clocks - 1]);
+            stream.go_to(end);
+            put_sample<N>(top);
+            clocks_at_once += clocks;
+        }
+    }
+
+    // Reads into `out` at once what a stride describes, but the last one of `count` bytes at least;
+    // how many. The next edge is number `edge` of `halves`.
+    int64_t read_strides(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge) {
+        return read_strides(out, count, start, halves, edge,
+                            std::make_integer_sequence<int, STRIDE_COUNT>());
+    }
+    template <int... K>
+    int64_t read_strides(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge,
+                         std::integer_sequence<int, K...>) {
+        int64_t read = 0;
+        (void)(... || (read = read_stride<K>(out, count, start, halves, edge)));
+        return read;
+    }
+    template <int K>
+    int64_t read_stride(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge) {
+        if constexpr (Stride<K>::camera < 0) {
+            constexpr std::integral_constant<int, K> stride;
+            Sram &sram = srams[Stride<K>::memory];
+            if (count <= SHORTEST_STRIDE || top.DATA_CLOCK.get<bool>() || !stride_ready(stride, top))
+                return 0;
+            const int64_t counter = stride_counter(stride, top);
+            const int64_t clocks = std::min(count, Stride<K>::last - counter) - 1;
+            const int64_t rise = start + halves.value();
+            halves.go_to(edge + 2);
+            const int64_t period = start + halves.value() - rise - 1;
+            if (clocks < SHORTEST_STRIDE || !sram.offers_at(rise, period))
+                return 0;
+            halves.go_to(edge + 2 * (clocks - 1));
+            sram.offer(out, clocks, start + halves.value());
+            stride_to(stride, top, counter + clocks, out[clocks - 1]);
+            Memory<Stride<K>::memory>::offer(top, sram.bus());
+            clocks_at_once += clocks;
+            return clocks;
+        }
+        return 0;
+    }
+
     template <int N, class Model>
     __attribute__((flatten)) Outcome burst_of_one(Model &top, int64_t until, int64_t &reached) {
         const uint32_t before = acknowledges(top);
         while (!streams[N].over()) {
+            if (strides && streams[N].in_row())
+                store_strides<N>(top, until);
             const int64_t time = streams[N].time();
             if (time > until) {
                 reached = until;
@@ -616,6 +715,24 @@ const char *driver_register(int32_t index, int32_t *bits) {
 
 void driver_flip(Driver *driver, int32_t index, int32_t bit, int64_t now) {
     driver->flip(REGISTER_TABLE[index], bit, now);
+}
+
+void driver_use_strides(Driver *driver, int32_t on) { driver->strides = on != 0; }
+
+int64_t driver_clocks_at_once(const Driver *driver) { return driver->clocks_at_once; }
+
+// Levels of all registers into `out`, unless null; how many words of 32 bits.
+int64_t driver_state(const Driver *driver, uint32_t *out) {
+    int64_t words = 0;
+    for (int32_t index = 0; index < REGISTER_COUNT; index++) {
+        const Register &one = REGISTER_TABLE[index];
+        const uint32_t *levels = one.levels(driver->top);
+        const int64_t count = (one.bits + 31) / 32;
+        if (out)
+            std::copy(levels, levels + count, out + words);
+        words += count;
+    }
+    return words;
 }
 
 void driver_power(Driver *driver, int32_t memory, int32_t on, int64_t now) {

@@ -29,10 +29,13 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "driver_new": (_POINTER, (ctypes.POINTER(_POINTER), _LONGS, _LONG, _INT)),
     "driver_delete": (None, (_POINTER,)),
     "driver_pin": (_INT, (ctypes.c_char_p,)),
+    "driver_use_strides": (None, (_POINTER, _INT)),
+    "driver_clocks_at_once": (_LONG, (_POINTER,)),
     "driver_set": (None, (_POINTER, _INT, ctypes.c_uint32, _LONG)),
     "driver_get": (ctypes.c_uint32, (_POINTER, _INT)),
     "driver_register": (ctypes.c_char_p, (_INT, _INT_OUT)),
     "driver_flip": (None, (_POINTER, _INT, _INT, _LONG)),
+    "driver_state": (_LONG, (_POINTER, _POINTER)),
     "driver_power": (None, (_POINTER, _INT, _INT, _LONG)),
     "driver_load": (None, (_POINTER, _INT, _LONGS, _LONG)),
     "driver_use_pixels": (None, (_POINTER, _INT, _POINTER)),
@@ -52,7 +55,8 @@ def _longs(*values: int) -> ctypes.Array[ctypes.c_int64]:
 class CompiledEngine(RtlEngine):
     """Tens of millions of clocks a second.
 
-    With ``skipping``, a clock outside of lines that changed no register is not repeated.
+    With ``skipping``, a clock outside of lines that changed no register is not repeated, and the
+    design's strides are made at once.
     """
 
     def __init__(
@@ -109,9 +113,9 @@ class CompiledEngine(RtlEngine):
         return self._driver
 
     @property
-    def driver(self) -> Driver:
-        """The driver's functions; always the same object."""
-        return self._functions
+    def driver(self) -> Driver | None:
+        """The driver's functions, always the same object; None while an upset is to come."""
+        return None if self._later else self._functions
 
     @cached_property
     def _functions(self) -> Driver:
@@ -134,6 +138,21 @@ class CompiledEngine(RtlEngine):
     def registers(self) -> dict[str, int]:
         """Bits of every register."""
         return dict(self._registers)
+
+    @property
+    def clocks_at_once(self) -> int:
+        """Clocks that were made as strides."""
+        return int(self._library.driver_clocks_at_once(self._handle))
+
+    def use_strides(self, on: bool) -> None:
+        """Whether strides may be made at once."""
+        self._library.driver_use_strides(self._handle, on)
+
+    def state(self) -> bytes:
+        """Levels of all registers, 4 bytes for each 32 bits."""
+        words = (ctypes.c_uint32 * self._library.driver_state(self._handle, None))()
+        self._library.driver_state(self._handle, words)
+        return bytes(words)
 
     def _flip(self, register: str, bit: int) -> None:
         number = list(self._registers).index(register)

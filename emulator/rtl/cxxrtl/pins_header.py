@@ -4,10 +4,9 @@ import re
 from collections.abc import Sequence
 
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps, port
+from cubestack.emulator.rtl.cxxrtl.strides import path_of, stride_functions, stride_table
 from cubestack.emulator.rtl.cxxrtl.variants import held, members
 from cubestack.emulator.rtl.wiring import MEMORY_PINS, BusPins, CameraPins, MemoryPins, Wiring
-
-_ESCAPE = re.compile("__|_([0-9a-f]{2})_")
 
 
 def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> str:
@@ -28,6 +27,7 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
       its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state that can
       change, hold_0(from, to) the rest to the copy; its class is what clock_steps.py makes of it.
+    - what strides.py makes of the design, and of each of the variants.
     """
     acknowledges = " | ".join(
         f"{_level(pin)} << {bit}" for bit, pin in enumerate(wiring.acknowledges)
@@ -48,7 +48,8 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
         "VARIANTS": " ".join(f"VARIANT({n})" for n in range(len(variants))),
     }
     text = "".join(f"#define {name} {text}\n" for name, text in definitions.items())
-    text += _derived_edges(wiring, design, "cxxrtl_design")
+    text += _derived_edges(wiring, design, "cxxrtl_design") + stride_table(wiring)
+    text += stride_functions(wiring, "cxxrtl_design", members(design) if design else {})
     for number, variant in enumerate(variants):
         text += _variant(wiring, design, variant, number)
     return text
@@ -95,12 +96,7 @@ def _registers(design: str) -> list[str]:
     """What CXXRTL buffers are registers; it escapes what C++ does not take in a name."""
     kinds = members(design).items() if design else ()
     wires = [(member, kind) for member, kind in kinds if kind.startswith("wire")]
-    return [f'REGISTER("{_plain(member)}", {member}, {kind[5:-1]})' for member, kind in wires]
-
-
-def _plain(member: str) -> str:
-    name = member.removeprefix("p_")
-    return _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else "_", name)
+    return [f'REGISTER("{path_of(member)}", {member}, {kind[5:-1]})' for member, kind in wires]
 
 
 def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
@@ -149,5 +145,6 @@ def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
         "template <class From, class To> "
         f"void hold_{number}(const From &from, To &to) "
         f"{{ (void)from, (void)to; {holding} }}\n"
+        + stride_functions(wiring, namespace, part, wiring.burst_levels[number])
         + clock_steps(wiring, variant, dict(part), number)
     )

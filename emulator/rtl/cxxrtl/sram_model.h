@@ -2,6 +2,7 @@
 // at the speed that a compiled frame needs. A test drives both with the same pins.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -103,6 +104,39 @@ public:
             selected_since = time;
         if (!pins.same_data(old))
             data_since = time;
+    }
+
+    // Whether clocks from `time` on can store a byte each, one to the next address, without breaking a
+    // rule: low for `low` of `period`.
+    bool stores_at(int64_t time, int64_t low, int64_t period) const {
+        return powered && pins.writes() && pins.driven() && pins.selected() &&
+               low >= timing.write_pulse && time - write_since >= timing.write_pulse &&
+               period >= timing.data_setup && time - data_since >= timing.data_setup;
+    }
+
+    // `count` such clocks, the last one of which rose and fell then: the byte on the lines is
+    // stored, and all of `next` but the last one, which is on the lines afterwards.
+    void store(const uint8_t *next, int64_t count, int64_t rose, int64_t fell) {
+        uint8_t *const to = memory + pins.address();
+        *to = pins.data();
+        std::copy(next, next + count - 1, to + 1);
+        pins = SramPins(pins.address() + (uint32_t)count, false, true, false, true, next[count - 1]);
+        address_since = data_since = rose;
+        write_since = fell;
+    }
+
+    // Whether clocks from `time` on can read a byte each, one from the next address, likewise.
+    bool offers_at(int64_t time, int64_t period) const {
+        return powered && pins.reads() && !pins.driven() && period >= timing.access &&
+               time - address_since >= timing.access && time - selected_since >= timing.access &&
+               time - reads_since >= timing.output_enable;
+    }
+
+    // `count` such clocks, the last one of which rose then.
+    void offer(uint8_t *out, int64_t count, int64_t rose) {
+        std::copy(memory + pins.address(), memory + pins.address() + count, out);
+        pins = SramPins(pins.address() + (uint32_t)count, false, false, true, false, 0);
+        address_since = rose;
     }
 
     // The FPGA takes the bus at `time`.

@@ -77,9 +77,10 @@ class SunSlitBoard(NodeBoard[SunSlitProgram, SlitScene]):
         """What a trace shows: the latest outcome beside what all boards show."""
         return super().probes() | {"outcome": self.program.latest.outcome.name}
 
-    def _sites(self) -> Sites:
+    def sites(self) -> Sites:
+        """Where faults can hit."""
         return replace(
-            super()._sites(),
+            super().sites(),
             controls=(ENABLE, RNW, EXPOSE),
             cameras={"array": CameraSite(self.array, self._switch, "array")},
         )

@@ -5,7 +5,6 @@ from functools import partial
 from types import SimpleNamespace
 
 from amaranth.hdl import Assert, Module, Mux, Signal, Value
-from amaranth.lib.wiring import Component
 from amaranth.utils import ceil_log2
 
 from cubestack.firmware_model.interface.cubestar.pins import PUBLISHED
@@ -15,13 +14,14 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.properties import starts_in, wires_below
 from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.hdl.proofs.strides import stride_proof
 
-Make = Callable[[bool], tuple[Component, SimpleNamespace]]
+Make = Callable[[bool], tuple[CubeStarBoard, SimpleNamespace]]
 
 
 def _made(
     design: type[CubeStarBoard], columns: int, rows: int, small: bool
-) -> tuple[Component, SimpleNamespace]:
+) -> tuple[CubeStarBoard, SimpleNamespace]:
     """The design at a size, or so small that a counterexample takes a few clocks."""
     size = SimpleNamespace(columns=3 if small else columns, rows=3 if small else rows)
     return design(size.columns, size.rows), size
@@ -87,6 +87,7 @@ def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
 WRITER = properties.writer_wires("writer", "pix")
 LAST_ROW = Fault("writer.counter.last_row", 1)
 LAST_COLUMN = Fault("writer.counter.last_column", 0)
+ROW_ENDS = Fault("writer.counter.last_column", 1)
 
 BANK_RESTS = "With ENABLE low every register but the bank is reset, and the bank rests"
 
@@ -117,5 +118,9 @@ PROOFS = {
         _reads_in_order,
         Fault("reader.counter.last_column", 0),
         wires_below("reader.counter", "column", "row"),
+    ),
+    "cubestar-row": stride_proof(full(CubeStarTop), "row", ROW_ENDS),
+    "cubestar-row-read": stride_proof(
+        full(CubeStarTop), "row-read", Fault("reader.counter.last_column", 1)
     ),
 }

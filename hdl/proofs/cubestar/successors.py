@@ -14,6 +14,7 @@ from cubestack.hdl.proofs.cubestar import published
 from cubestack.hdl.proofs.cubestar.published import inside
 from cubestack.hdl.proofs.properties import starts_in, writer_wires, written_is_driven
 from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.hdl.proofs.strides import stride_proof
 
 _SHARED, _DOUBLE, _BOARDS = map(published.full, (CubeStarShared, CubeStarDouble, CubeStarTwoBoards))
 
@@ -126,6 +127,7 @@ PROOFS = {
     "cubestar-shared-idle": Proof(
         published.BANK_RESTS, _SHARED, partial(published.bank_rests, SHARED), Fault("bus.on", 1)
     ),
+    "cubestar-shared-row": stride_proof(_SHARED, "row", published.ROW_ENDS),
     "cubestar-double-ack": Proof(
         properties.ACKNOWLEDGES,
         _DOUBLE,
@@ -162,6 +164,8 @@ PROOFS = {
         _double_idle,
         Fault("bus.on", 1),
     ),
+    "cubestar-double-row-1": stride_proof(_DOUBLE, "row-1", published.ROW_ENDS),
+    "cubestar-double-row-2": stride_proof(_DOUBLE, "row-2", published.ROW_ENDS),
     "cubestar-boards-ack": Proof(
         properties.ACKNOWLEDGES,
         _BOARDS,

@@ -93,6 +93,7 @@ def test_small_frames_joined_anywhere(bank, tmp_path):
         assert len(board.outcome(commands).acks) == 1
 
 
+@pytest.mark.slow
 def test_one_full_frame(tmp_path):
     """1024 x 512 pixels of 1322 clocks a line at 10 MHz, stored and read back to the last byte."""
     top = CubeStarTop()

@@ -109,6 +109,7 @@ def test_random_lives_are_worth_it():
     assert seen["bytes"] > 1000
 
 
+@pytest.mark.slow
 def test_one_full_frame(tmp_path):
     """858 clocks a line at 13.5 MHz: the sun's picture across the link, then scan and window."""
     period, line_clocks = Fraction(10**12, 13_500_000), 858

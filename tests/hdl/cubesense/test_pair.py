@@ -11,15 +11,16 @@ from cubestack.hdl.cubesense.pair import CubeSensePair
 from tests.hdl.regression import SMALLEST, addressable
 
 NAMES = ["modes", "read", "store", "failures"]
+SEEDS = [1, pytest.param(2, marks=pytest.mark.slow)]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", NAMES)
 def test_pair(simulate: Any, read_out: ReadOut, name: str, seed: int) -> None:
     simulate(CubeSensePair, read_out, name, seed=seed)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", SEEDS)
 def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
     """Standby alone makes the state: the parts' flip-flops come up as they like."""
     names = NAMES.copy()
@@ -27,11 +28,12 @@ def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
     simulate(CubeSensePair, SMALLEST, *names, seed=seed, initialised=False)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", SEEDS)
 def test_addressing(simulate: Any, read_out: ReadOut, seed: int) -> None:
     simulate(addressable, read_out, "addressing", mcu_addressing=True, seed=seed)
 
 
+@pytest.mark.slow
 def test_addressing_at_full_size(simulate: Any) -> None:
     simulate(addressable, FULL_SIZE, "addressing", mcu_addressing=True, seed=1)
 

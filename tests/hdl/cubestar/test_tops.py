@@ -13,19 +13,24 @@ from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
 from tests.hdl.regression import STAR, TIERS, modules
 
-SEEDS = [1, 2, 3]
+SIZES = [(8, 4), (5, 3), (16, 8)]
+#: One seed a size, and the others.
+SIZED_SEEDS = [
+    pytest.param(*size, seed, marks=() if number + 1 == seed else pytest.mark.slow)
+    for number, size in enumerate(SIZES)
+    for seed in (1, 2, 3)
+]
 STORING = modules(STAR, "store", "borders")
 NEXT_VERSION = ["cubestar-shared", "cubestar-double", "cubestar-boards"]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize(("columns", "rows"), [(8, 4), (5, 3), (16, 8)])
+@pytest.mark.parametrize(("columns", "rows", "seed"), SIZED_SEEDS)
 @pytest.mark.parametrize("name", ["store", "read", "modes"])
 def test_published(icarus: Any, name: str, columns: int, rows: int, seed: int) -> None:
     icarus.run(CubeStarTop, columns, rows, *modules(STAR, name), seed=seed)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
     """Standby alone makes the state: the part's flip-flops come up as they like."""
     shuffled = [*modules(STAR, "store", "read", "modes")]

@@ -1,0 +1,78 @@
+"""Proofs that a design does in each clock of a stride what it declares, and nothing else."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+from amaranth.hdl import Assert, Cat, Module, Mux, Value
+from amaranth.lib.wiring import In
+
+from cubestack.hdl.blocks.pinned import PinnedComponent
+from cubestack.hdl.blocks.stride import Stride
+from cubestack.hdl.proofs.properties import first_step
+from cubestack.hdl.proofs.prover import Fault, Proof, past
+
+Make = Callable[[bool], tuple[PinnedComponent, SimpleNamespace]]
+
+
+def stride_proof(make: Make, name: str, fault: Fault) -> Proof:
+    """The proof of the stride of that name; ``make`` and ``fault`` as ``Proof`` has them."""
+
+    def made(small: bool) -> tuple[PinnedComponent, SimpleNamespace]:
+        design, _ = make(small)
+        (stride,) = (each for each in design.strides if each.name == name)
+        return design, SimpleNamespace(stride=stride, members=design.signature.members)
+
+    return Proof(
+        "Inside a row each clock takes a byte to or from the next address, and does nothing else",
+        made,
+        _each_clock,
+        fault,
+    )
+
+
+def _each_clock(m: Module, d: SimpleNamespace) -> None:
+    stride: Stride = d.size.stride
+    registers = {register.name: register.value for register in d.registers}
+    counter, data = registers[stride.counter], registers[stride.data]
+    inputs = {name for name, member in d.size.members.items() if member.flow is In}
+    steady = inputs - {stride.clock, stride.source, f"{stride.memory}_D_I"}
+    stays = Cat(getattr(d, name) == past(m, getattr(d, name)) for name in sorted(steady)).all()
+
+    ready = Cat(
+        *(getattr(d, pin) == level for pin, level in stride.levels),
+        *(registers[register] == value for register, value in stride.state),
+        counter < stride.last,
+    ).all()
+    within = past(m, ready) & stays & ~first_step()
+    clock = getattr(d, stride.clock)
+    rises = clock & ~past(m, clock)
+    moved = {stride.counter: past(m, counter) + 1, stride.data: past(m, getattr(d, stride.source))}
+    for name, value in registers.items():
+        before = past(m, value)
+        after = Mux(rises, moved.get(name, before), before)
+        m.d.comb += Assert(~within | (value == after))
+
+    _at_the_memory(m, d, stride, ready, counter, data)
+    address = getattr(d, f"{stride.memory}_A")
+    m.d.comb += Assert(~within | (address[len(counter) :] == past(m, address)[len(counter) :]))
+    shown = {f"{stride.memory}_{pin}" for pin in ("A", "D_O", "WE_N")}
+    if not stride.stores:
+        shown.add("DATA")
+        m.d.comb += Assert(~ready | (data == d.DATA))
+    for name in sorted({*d.size.members} - inputs - shown):
+        m.d.comb += Assert(~within | (getattr(d, name) == past(m, getattr(d, name))))
+
+
+def _at_the_memory(
+    m: Module, d: SimpleNamespace, stride: Stride, ready: Value, counter: Value, data: Value
+) -> None:
+    """Its pins while the stride goes on."""
+    a, d_o, d_oe, ce_n, oe_n, we_n = (
+        getattr(d, f"{stride.memory}_{pin}") for pin in ("A", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
+    )
+    expected = [a[: len(counter)] == counter, ~ce_n]
+    if stride.stores:
+        expected += [d_o == data, d_oe, oe_n, we_n == getattr(d, stride.clock)]
+    else:
+        expected += [~d_oe, ~oe_n, we_n]
+    m.d.comb += Assert(~ready | Cat(*expected).all())

@@ -1,0 +1,143 @@
+"""Many clocks at once, beside the same clocks one by one: nothing may tell them apart."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.boards.cubestar.wiring import (
+    cubestar_double_wiring,
+    cubestar_shared_wiring,
+    cubestar_wiring,
+)
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.sram import SramTiming
+from cubestack.emulator.rtl.wiring import Wiring
+from tests.emulator.rtl.cameras import ListCamera
+from tests.emulator.rtl.comparison import assert_same
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+PERIOD = Fraction(10**12, 12_300_000)
+COLUMNS, ROWS = 1024, 512
+BOARDS = (cubestar_wiring, cubestar_shared_wiring, cubestar_double_wiring)
+
+#: Each is one that a stride would break: for those it must not be made.
+SLOW_PARTS = (
+    SramTiming(write_pulse_ps=50_000),
+    SramTiming(data_setup_ps=90_000),
+    SramTiming(access_ps=800_000),
+)
+
+
+@contextmanager
+def both(wiring: Wiring, timing: SramTiming | None = None) -> Iterator[list[CompiledEngine]]:
+    engines = [CompiledEngine(wiring, timing, skipping=skipping) for skipping in (True, False)]
+    yield engines
+    for engine in engines:
+        engine.close()
+
+
+def camera(rng: np.random.Generator, rows: int, columns: int = COLUMNS) -> ListCamera:
+    """A part of a picture that is joined in the middle, then a whole one or less."""
+    line_clocks = columns + int(rng.integers(3, 40))
+    found = ListCamera(PERIOD, line_clocks, columns)
+    found.add_image(rng.integers(0, 256, (3, columns), np.uint8))
+    found.add_blank(200)
+    found.add_image(rng.integers(0, 256, (rows, columns), np.uint8))
+    found.add_blank(300)
+    return found
+
+
+def step(engines: list[CompiledEngine], act: Callable[[RtlEngine], object], what: object) -> None:
+    assert_same(engines, act, what)
+    assert engines[0].state() == engines[1].state(), what
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("board", BOARDS)
+def test_a_picture_is_stored_alike(board: Callable[[], Wiring], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    # Rows of the picture's length, too long, too short.
+    columns = (COLUMNS, COLUMNS, COLUMNS + 9, COLUMNS - 200)[seed]
+    source = camera(rng, ROWS + 1 if seed else ROWS, columns)
+    with both(board()) as engines:
+        registers = engines[0].registers
+        for engine in engines:
+            engine.attach(source)
+            engine.set_pin("ENABLE", 1)
+        times = np.sort(rng.integers(0, source.end_ps, 60))
+        for number, time_ps in enumerate(times):
+            step(engines, lambda engine, t=int(time_ps): engine.run(t), number)
+            if number % 10 == 9:
+                name = list(registers)[int(rng.integers(len(registers)))]
+                bit = int(rng.integers(registers[name]))
+                step(engines, lambda engine, n=name, b=bit: engine.flip(n, b), (name, bit))
+        assert engines[0].clocks_at_once > 10 * COLUMNS
+        assert engines[1].clocks_at_once == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bytes_are_read_alike(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    with both(cubestar_wiring()) as engines:
+        engines[0].sram[:] = engines[1].sram[:] = rng.integers(0, 256, 2 * COLUMNS * ROWS)
+        for engine in engines:
+            for pin in ("RNW", "BANK", "ENABLE"):
+                engine.set_pin(pin, 1)
+        for number in range(40):
+            count = int(rng.integers(1, 4000))
+            period = Fraction(int(rng.integers(30_000, 900_000)), int(rng.integers(1, 4)))
+
+            def read(engine: RtlEngine, c: int = count, p: Fraction = period) -> bytes:
+                out = np.empty(c, np.uint8)
+                until_ps = engine.now_ps + int(c * p * Fraction(9, 10))
+                return out[: engine.strobe_read(out, p, until_ps)].tobytes()
+
+            step(engines, read, number)
+            if number % 8 == 7:
+                register = ("reader.counter.column", "reader.counter.row")[number // 8 % 2]
+                later_ps = engines[0].now_ps + int(rng.integers(10**9))
+                for engine in engines:
+                    engine.flip(register, number // 8, later_ps)
+        assert engines[0].clocks_at_once > 10_000
+
+
+@pytest.mark.parametrize("timing", SLOW_PARTS)
+def test_a_memory_that_is_too_slow_breaks_its_rules_alike(timing: SramTiming) -> None:
+    rng = np.random.default_rng(1)
+    source = camera(rng, 12)
+    with both(cubestar_wiring(), timing) as engines:
+        for engine in engines:
+            engine.attach(source)
+            engine.set_pin("ENABLE", 1)
+        step(engines, lambda engine: engine.run(source.end_ps), "stored")
+        for engine in engines:
+            engine.set_pin("ENABLE", 0)
+            engine.set_pin("RNW", 1)
+            engine.set_pin("ENABLE", 1)
+
+        def read(engine: RtlEngine) -> bytes:
+            out = np.empty(3000, np.uint8)
+            engine.strobe_read(out, Fraction(770_000), engine.now_ps + 10**12)
+            return out.tobytes()
+
+        step(engines, read, "read")
+        assert engines[0].violation_counts
+
+
+def test_switched_off_they_are_not_made() -> None:
+    source = camera(np.random.default_rng(0), 4)
+    with both(cubestar_wiring()) as (engine, _):
+        engine.use_strides(False)
+        engine.attach(source)
+        engine.set_pin("ENABLE", 1)
+        engine.run(source.end_ps // 2)
+        assert engine.clocks_at_once == 0
+        engine.use_strides(True)
+        engine.run(source.end_ps)
+        assert engine.clocks_at_once > COLUMNS
