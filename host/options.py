@@ -70,6 +70,7 @@ CORNER = Kind("X,Y, as in 0,256", _corner)
 """A pixel's column and row."""
 
 PATH = Kind("a path", Path)
+TEXT = Kind("a text", str)
 
 
 def _file(given: Any) -> Any:

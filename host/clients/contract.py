@@ -36,8 +36,8 @@ Columns = dict[str, bool | int | float | str | None]
 
 T = TypeVar("T")
 
-#: Time between two polls of a node.
-POLL_PERIOD_S = 0.01
+#: Time between two polls of a node: its tasks take tenths of a second.
+POLL_PERIOD_S = 0.04
 
 
 class Closable(ABC):
@@ -120,11 +120,11 @@ class Client(Closable):
         period_s: float = POLL_PERIOD_S,
     ) -> T:
         """``read`` until it gives what is ``done``; NoAnswerError ``late`` after ``timeout_s``."""
-        for _ in range(math.ceil(timeout_s / period_s)):
+        for number in range(math.ceil(timeout_s / period_s)):
             found = read()
             if done(found):
                 return found
-            self.pause(period_s)
+            self.pause(min(period_s, timeout_s - number * period_s))
         raise NoAnswerError(late)
 
     def _check_error(self, message: Message, error: int) -> None:

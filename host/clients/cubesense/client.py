@@ -17,12 +17,9 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
-from cubestack.host.clients.contract import Columns, DeviceClient
+from cubestack.host.clients.contract import POLL_PERIOD_S, Columns, DeviceClient
 from cubestack.host.clients.cubesense.download import download_image, picture_of
 from cubestack.host.errors import BadAnswerError, NoAnswerError
-
-#: Time between two polls of a result.
-POLL_PERIOD_S = 0.04
 
 #: What a capture is given; a lens that was set before it is worked out first, in about 1 s.
 CAPTURE_TIMEOUT_S = 3.0

@@ -9,6 +9,7 @@ from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
+from cubestack.host.clients.contract import POLL_PERIOD_S
 from cubestack.host.clients.node import MAX_READS, NodeClient
 from cubestack.host.errors import BadAnswerError, CommandRefusedError, NoAnswerError
 
@@ -124,7 +125,7 @@ def test_processing_is_polled(client: NodeClient, node: Any, uart: Any) -> None:
     node.busy = 5
     client.command("DetectStars")
     client.wait_processed(1.0)
-    assert uart.silences.count(0.01) == 5
+    assert uart.silences.count(POLL_PERIOD_S) == 5
     client.command("DetectStars")
     with pytest.raises(NoAnswerError, match=r"not processed within 0.03 s"):
         client.wait_processed(0.03)
