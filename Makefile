@@ -14,11 +14,12 @@ SIMULATOR ?= icarus
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run test test-hdl firmware mutants lint bench bench-engines clean
+.PHONY: help venv run test test-all test-hdl firmware mutants lint bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
-	@echo "make test      set up, then run all tests"
+	@echo "make test      set up, then run the tests, but for those that take long"
+	@echo "make test-all  set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
@@ -42,6 +43,9 @@ run: .venv/ready-run
 
 test: .venv/ready-dev
 	@$(BIN)/pytest -n auto
+
+test-all: .venv/ready-dev
+	@$(BIN)/pytest -n auto -m "slow or not slow"
 
 firmware: .venv/ready-run
 	@command -v arm-none-eabi-gcc >/dev/null 2>&1 || { \
