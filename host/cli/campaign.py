@@ -5,6 +5,8 @@ A plan is a TOML file (docs/campaigns.md). Results are added to FOLDER/rows.json
 by block, so that little is lost whatever happens; --resume goes on.
 
 examples:
+  cubestack campaign --list                               plans that come with the devices
+  cubestack campaign seu-cubestar --workers 2
   cubestack campaign false-stars.toml
   cubestack campaign false-stars.toml --resume --workers 2
   cubestack campaign false-stars.toml --scheduler tcp://10.0.0.1:8786
@@ -24,6 +26,7 @@ from cubestack.host.experiments.campaigns import report, statistics
 from cubestack.host.experiments.campaigns import run as campaigns
 from cubestack.host.experiments.campaigns.folder import Folder
 from cubestack.host.experiments.campaigns.plan import Plan
+from cubestack.host.experiments.campaigns.plans import known_plans, plan_file, summary
 from cubestack.host.experiments.campaigns.statistics import Change, compared
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.workers import cores
@@ -35,11 +38,14 @@ REPLAY, REPORT = "replay", "report"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.usage = (
-        "cubestack campaign FILE [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
+        "cubestack campaign PLAN [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
         "       cubestack campaign report FOLDER [--compare FOLDER]\n"
         "       cubestack campaign replay FOLDER ROW"
     )
-    parser.add_argument("words", nargs="+", metavar="FILE", help="plan of the campaign")
+    parser.add_argument(
+        "words", nargs="*", metavar="PLAN", help="file, or name of one that comes with a device"
+    )
+    parser.add_argument("--list", action="store_true", help="list the plans that there are by name")
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER", help="default: the plan's name, with .campaign"
     )
@@ -57,6 +63,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run or replay; 1 when frames failed, or when it was stopped."""
+    if args.list:
+        return _list(as_json=args.json)
+    if not args.words:
+        raise ValueError("name a plan: a file, or one of --list")
     if args.words[0] == REPLAY:
         return _replay(args.words[1:])
     if args.words[0] == REPORT:
@@ -65,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError("--compare is for a report")
     if len(args.words) > 1:
         raise ValueError(f"one plan at a time, not {' '.join(args.words)}")
-    path = Path(args.words[0])
+    path = plan_file(args.words[0])
     plan = Plan.read(path)
     folder = Folder.begun(args.out or campaigns.default_folder(path), plan, resume=args.resume)
     total, done = campaigns.count(plan), 0
@@ -78,6 +88,13 @@ def run(args: argparse.Namespace) -> int:
         raise
     failed = _show(folder, as_json=args.json)
     return 1 if failed else 0
+
+
+def _list(*, as_json: bool) -> int:
+    for name, path in known_plans().items():
+        about = {"plan": name, "what": summary(path)}
+        print(json.dumps(about) if as_json else f"{name:<26} {about['what']}")
+    return 0
 
 
 def _replay(words: list[str]) -> int:

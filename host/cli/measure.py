@@ -27,7 +27,7 @@ from cubestack.host.cli.device_options import (
     insight,
     tell_notices,
 )
-from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.device import AnyDevice, BoardOption
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import board_as_said, board_options, running
@@ -68,21 +68,23 @@ def add_devices(
             "--json", action="store_true", help="one JSON object a result, nothing else"
         )
         add_options(command, experiment.options)
-        add_board(command, device, experiment)
+        add_board(command, (device, experiment))
         command.set_defaults(chosen=(device, experiment))
         parsers.append(command)
     return parsers
 
 
-def add_board(
-    parser: argparse.ArgumentParser, device: AnyDevice, experiment: AnyExperiment
-) -> None:
-    """Declare how the device's FPGA is run, and what of its board the user chooses."""
-    if device.has_fpga and experiment.powers_up:
+def add_board(parser: argparse.ArgumentParser, *measured: tuple[AnyDevice, AnyExperiment]) -> None:
+    """Declare how the devices' FPGAs are run, and what of their boards the user chooses."""
+    if any(device.has_fpga and experiment.powers_up for device, experiment in measured):
         add_engine_arguments(parser)
-    if device.processor is not None and "firmware" in board_options(device, experiment):
-        add_insight_arguments(parser)
-    for option in board_options(device, experiment).values():
+    options: dict[str, BoardOption] = {}
+    for device, experiment in measured:
+        own = board_options(device, experiment)
+        if device.processor is not None and "firmware" in own:
+            add_insight_arguments(parser)
+        options = {**own, **options}
+    for option in options.values():
         add_option(parser, option)
 
 

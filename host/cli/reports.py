@@ -8,6 +8,7 @@ from cubestack.host.cli.measure import add_board, run_experiment
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment
 from cubestack.host.devices.registry import devices
+from cubestack.host.experiments.measure import board_options
 from cubestack.host.options import flag
 
 
@@ -36,14 +37,17 @@ class Reports:
         )
         parser.add_argument("--json", action="store_true", help="one JSON object a result")
         add_options(parser, *(experiment.options for _, experiment in self.found.values()))
-        for device, experiment in self.found.values():
-            add_board(parser, device, experiment)
+        add_board(parser, *self.found.values())
 
     def run(self, args: argparse.Namespace) -> int:
         """Run it for the device; ValueError for an option that is another's."""
         device, experiment = self.found[args.device]
         own = experiment.options.declared()
+        known = board_options(device, experiment)
         for other, theirs in self.found.values():
+            for name, declared in board_options(other, theirs).items():
+                if name not in known and getattr(args, name) is not None:
+                    raise ValueError(f"{declared.flag} is an option of {other.name} alone")
             for name, option in theirs.options.declared().items():
                 if name not in own and getattr(args, name) != option.default:
                     raise ValueError(

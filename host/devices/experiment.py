@@ -1,7 +1,8 @@
 """What an experiment is: a device measured end to end, each result beside the truth."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from cubestack.host.options import Options
@@ -17,6 +18,22 @@ class Result:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class Section:
+    """Part of a report about many results: a table, a figure as PNG, or both.
+
+    Attributes:
+        title: of it.
+        head, rows: cells of the table; none without rows.
+        png: of the figure; empty without.
+    """
+
+    title: str
+    head: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    png: bytes = b""
 
 
 OpenerT = TypeVar("OpenerT")
@@ -65,6 +82,13 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
     @abstractmethod
     def summarise(self, results: Sequence[ResultT], wall_s: float) -> Iterable[str]:
         """What the results, which took ``wall_s``, are together: lines for a reader."""
+
+    def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
+        """What a campaign's report says of its results, as JSON has them, beside their rates.
+
+        Raises ValueError without matplotlib.
+        """
+        yield from ()
 
     def succeeded(self, results: Sequence[ResultT]) -> bool:
         """Whether the run was a success; to find nothing is one, unless an experiment says else."""

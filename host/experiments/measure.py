@@ -11,12 +11,16 @@ from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options
 
+MEASURE = "measure"
+"""Name of the command that all devices have."""
+
 
 def measure(
     name: str,
     *,
     progress: Callable[[int, int], None] | None = None,
     engine: Engine = "auto",
+    command: str = MEASURE,
     **options: Any,
 ) -> Iterator[Result]:
     """Measure a device end to end; yields each result, beside the truth, as soon as it is there.
@@ -25,22 +29,24 @@ def measure(
         name: of the device, one of ``device_names()``.
         progress: called with the number of results so far, and of all.
         engine: how its FPGA is run.
+        command: another one that the device has, such as ``upsets``.
         options: as `cubestack measure NAME --help` has them, with underscores: ``frames=20``,
             ``mag_limit=3.8``, ``no_noise=True``; options of its board among them.
 
     Raises:
         TargetError: nobody registered that name.
-        ValueError: an option, or a value of one, that can not be; the text says what is right.
+        ValueError: a command that the device does not have, an option, or a value of one, that can
+            not be; the text says what is right.
     """
     device = registered(name)
-    experiment = experiment_of(device)
+    experiment = experiment_of(device, command)
     own = {one: value for one, value in options.items() if one in experiment.options.declared()}
     board = {one: value for one, value in options.items() if one not in own}
     known = board_options(device, experiment)
     for one in board:
         if one not in known:
             every = ", ".join([*experiment.options.declared(), *known])
-            raise ValueError(f"measure has no option {one!r} for {device.name}; known: {every}")
+            raise ValueError(f"{command} has no option {one!r} for {device.name}; known: {every}")
     check_options(device, board)
     checked = experiment.options(**own)
     board = board_as_said(device, checked, board)
@@ -48,8 +54,14 @@ def measure(
     return results if progress is None else _counted(results, experiment.count(checked), progress)
 
 
-def experiment_of(device: AnyDevice) -> AnyExperiment:
-    """What ``measure`` does with a device; ValueError when that is nothing."""
+def experiment_of(device: AnyDevice, command: str = MEASURE) -> AnyExperiment:
+    """What ``measure``, or another command, does with a device; ValueError when that is nothing."""
+    if command != MEASURE:
+        found = {report.name: report for report in device.reports}
+        if command not in found:
+            names = ", ".join([MEASURE, *found])
+            raise ValueError(f"{device.name} has no command {command!r}, only {names}")
+        return found[command].load()
     if device.experiment is None:
         raise ValueError(f"there is nothing to measure with {device.name}")
     return device.experiment()

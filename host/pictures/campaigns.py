@@ -14,7 +14,8 @@ SMALLEST = 1e-6
 """Errors below are drawn there, as a logarithm has no 0."""
 
 
-def _figure(width: float, height: float) -> "Figure":
+def figure(width: float, height: float) -> "Figure":
+    """An empty one, in inches; ValueError without matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -22,7 +23,8 @@ def _figure(width: float, height: float) -> "Figure":
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _png(figure: "Figure") -> bytes:
+def png(figure: "Figure") -> bytes:
+    """A figure as a PNG's bytes."""
     written = BytesIO()
     figure.savefig(written, format="png", dpi=110)
     return written.getvalue()
@@ -38,8 +40,8 @@ def rate_curves(
         places: its values, numbers or texts.
         rates: rate, low and high limit (0 to 1) at each, by outcome.
     """
-    figure = _figure(6, 3.4)
-    panel = figure.subplots()
+    drawn = figure(6, 3.4)
+    panel = drawn.subplots()
     numbers = all(isinstance(place, int | float) for place in places)
     at = list(places) if numbers else list(range(len(places)))
     for number, (outcome, values) in enumerate(rates.items()):
@@ -55,7 +57,7 @@ def rate_curves(
     panel.set(xlabel=axis, ylabel="% of results, with 95 % limits", ylim=(-4, 104))
     panel.grid(alpha=0.3)
     panel.legend(fontsize="small")
-    return _png(figure)
+    return png(drawn)
 
 
 def error_curves(name: str, errors: Mapping[str, Sequence[float]]) -> bytes:
@@ -65,8 +67,8 @@ def error_curves(name: str, errors: Mapping[str, Sequence[float]]) -> bytes:
         name: of the error, with its unit behind the last underscore.
         errors: sizes, rising, by what the point is told as.
     """
-    figure = _figure(6, 3.4)
-    panel = figure.subplots()
+    drawn = figure(6, 3.4)
+    panel = drawn.subplots()
     for number, (point, values) in enumerate(errors.items()):
         shares = [100 * (place + 1) / len(values) for place in range(len(values))]
         panel.step(
@@ -81,4 +83,4 @@ def error_curves(name: str, errors: Mapping[str, Sequence[float]]) -> bytes:
     panel.set(xscale="log", xlabel=f"{what.replace('_', ' ')}, {unit}", ylabel="% smaller")
     panel.grid(alpha=0.3)
     panel.legend(fontsize="x-small")
-    return _png(figure)
+    return png(drawn)

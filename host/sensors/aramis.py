@@ -63,6 +63,7 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
+    campaigns=EXPERIMENTS,
     has_fpga=False,
     prepare=lambda shown: call(f"{BOARD}.catalogue:onboard_database", progress=shown)(),
     conformance=ConformanceNotes(

@@ -48,10 +48,16 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
             "turn the nadir sensor before the ball of its bench",
             get(f"{EXPERIMENTS}.ball:EXPERIMENT"),
         ),
+        Report(
+            "upsets",
+            "turn over bits of FPGAs and memories, and see what comes of it",
+            get(f"{EXPERIMENTS}.upsets:EXPERIMENT"),
+        ),
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
+    campaigns=EXPERIMENTS,
     options=(
         BoardOption(
             "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"

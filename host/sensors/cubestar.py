@@ -143,10 +143,16 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             "list what firmware uses of the processor's memories",
             get(f"{EXPERIMENTS}.memory:EXPERIMENT"),
         ),
+        Report(
+            "upsets",
+            "turn over bits of FPGA and memories, and see what comes of it",
+            get(f"{EXPERIMENTS}.upsets:EXPERIMENT"),
+        ),
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
+    campaigns=EXPERIMENTS,
     options=(
         BoardOption(
             "layout",

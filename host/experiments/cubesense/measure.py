@@ -361,6 +361,17 @@ def measure_once(
     )
 
 
+def is_right(
+    emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]", sensor: Camera, measured: Measurement
+) -> bool:
+    """Whether what was detected is as near to the truth as the thesis aimed at."""
+    truth = emulated.board.truth(sensor) if measured.capture.stored else None
+    if truth is None or not truth.visible:
+        return False
+    error_deg = _error_deg(measured, truth)
+    return error_deg is not None and error_deg <= _tolerance_deg(sensor, truth, None)
+
+
 def _tolerance_deg(
     sensor: Camera, truth: "SensorTruth | None", claimed: tuple[float, float] | None
 ) -> float:

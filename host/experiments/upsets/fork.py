@@ -1,0 +1,76 @@
+"""A running device as a checkpoint: a copy of this process goes on from here, and tells what came.
+
+Everything is in the copy: gateware, memories, virtual time, and the firmware in the middle of its
+work. A copy shares all memory that neither writes, so it costs a few milliseconds.
+"""
+
+import logging
+import os
+import pickle
+import select
+import signal
+import time
+from collections.abc import Callable
+from typing import IO, TypeVar
+
+T = TypeVar("T")
+
+LIMIT_S = 60.0
+"""Wall time after which a copy is given up: what it does takes a second."""
+
+
+class CopyError(RuntimeError):
+    """A copy that failed, hangs or died."""
+
+
+def in_copy(act: Callable[[], T], limit_s: float = LIMIT_S) -> T:
+    """What ``act`` gives in a copy of this process; here nothing happens.
+
+    Raises CopyError with what was raised there, when it dies, and after ``limit_s`` of wall time.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        _run(act, writing)
+    os.close(writing)
+    with open(reading, "rb", buffering=0) as pipe:
+        try:
+            answer = _read(pipe, time.monotonic() + limit_s)
+        except TimeoutError:
+            os.kill(child, signal.SIGKILL)
+            raise CopyError(f"no end after {limit_s:g} s") from None
+        finally:
+            os.waitpid(child, 0)
+    if not answer:
+        raise CopyError("the copy of the process died")
+    failed, result = pickle.loads(answer)  # from our own copy
+    if failed:
+        raise CopyError(result)
+    return result  # type: ignore[no-any-return]
+
+
+def _run(act: Callable[[], T], writing: int) -> None:
+    """In the copy; does not return. What is warned of there is part of the answer."""
+    logging.disable()
+    try:
+        try:
+            answer = pickle.dumps((False, act()))
+        except BaseException as error:  # told to who waits
+            answer = pickle.dumps((True, f"{type(error).__name__}: {error}"))
+        with open(writing, "wb") as pipe:
+            pipe.write(answer)
+    finally:
+        os._exit(0)
+
+
+def _read(pipe: IO[bytes], until: float) -> bytes:
+    parts = list[bytes]()
+    while True:
+        ready, _, _ = select.select([pipe], [], [], max(0.0, until - time.monotonic()))
+        if not ready:
+            raise TimeoutError
+        part = pipe.read(1 << 20)
+        if not part:
+            return b"".join(parts)
+        parts.append(part)

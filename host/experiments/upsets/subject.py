@@ -1,0 +1,49 @@
+"""What is asked of a device whose bits are turned over: a loop of its work, judged."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cubestack.emulator.rtl.contract import RtlEngine
+
+Answer = Literal["right", "refused", "wrong"]
+
+IDLE = "idle"
+"""State of FPGAs that are commanded nothing."""
+
+STORING = "storing"
+"""State of FPGAs that store; between two pictures it is the phase `BETWEEN`."""
+
+BETWEEN = "between"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the device answered after a loop, beside the truth; ``reason`` of a refusal."""
+
+    answer: Answer
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """How one device is put to work.
+
+    Attributes:
+        scene: something that it should measure rightly.
+        start: has a powered-up one begin a loop, and returns at once.
+        judge: waits for the answer of its loop, and judges it.
+        state: what the FPGAs are commanded: `IDLE`, `STORING`, or another name.
+        row_bytes: of a line of the picture.
+        period_s: from one loop to the next, in use.
+    """
+
+    scene: Callable[[np.random.Generator], Any]
+    start: Callable[[Any], None]
+    judge: Callable[[Any], Verdict]
+    state: "Callable[[RtlEngine], str]"
+    row_bytes: int
+    period_s: float = 1.0

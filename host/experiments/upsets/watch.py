@@ -1,0 +1,78 @@
+"""What the processor sees of its FPGAs: bytes, and acknowledges with their times."""
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from cubestack.emulator.sim.fpga_port import Driver, FpgaPort, Transactions
+
+
+class PortWatch:
+    """An ``FpgaPort`` that stands where the processor looks for its FPGA, and keeps what passes.
+
+    Attributes:
+        data: all bytes that were read, in their order.
+        seen: times in ps, pins and levels at which acknowledges were looked at and had changed.
+    """
+
+    def __init__(self, engine: "FpgaPort", acknowledges: tuple[str, ...]) -> None:
+        """Stand before ``engine``."""
+        self._engine = engine
+        self._levels = dict.fromkeys(acknowledges, 0)
+        self.data = bytearray()
+        self.seen: list[tuple[int, str, int]] = []
+
+    def clear(self) -> None:
+        """Forget what was."""
+        self.data, self.seen = bytearray(), []
+
+    @property
+    def now_ps(self) -> int:
+        """Virtual time of the FPGA."""
+        return self._engine.now_ps
+
+    @property
+    def running(self) -> int:
+        """Cameras whose clocks are made now."""
+        return self._engine.running
+
+    @property
+    def driver(self) -> "Driver | None":
+        """None: nobody may go past."""
+        return None
+
+    def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
+        """A burst of a driver ended."""
+        return self._engine.attend(reached_ps, end, camera, until_ps)
+
+    def set_pin(self, name: str, value: int) -> None:
+        """Drive a pin."""
+        self._engine.set_pin(name, value)
+
+    def get_pin(self, name: str) -> int:
+        """Level of a pin."""
+        level = self._engine.get_pin(name)
+        if self._levels.get(name, level) != level:
+            self._levels[name] = level
+            self.seen.append((self._engine.now_ps, name, level))
+        return level
+
+    def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
+        """Advance."""
+        return self._engine.run(until_ps, stop_on)
+
+    def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
+        """Run the transfer loop."""
+        done = self._engine.strobe_read(out, period, until_ps)
+        self.data += out[:done].tobytes()
+        return done
+
+    def access(self, transactions: "Transactions", until_ps: int) -> int:
+        """Make transactions on the external bus."""
+        done = self._engine.access(transactions, until_ps)
+        if not transactions.write:
+            self.data += transactions.data[:done].tobytes()
+        return done

@@ -1,0 +1,97 @@
+"""Upsets of real boards: what must be harmless is, what is not shows, and a seed repeats it."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.boards.cubestar import stack
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.hdl.blocks import frame_writer
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.cubesense import upsets as cubesense
+from cubestack.host.experiments.cubestar import upsets as cubestar
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.upsets import experiment
+from cubestack.host.experiments.upsets.sample import UpsetResult
+
+from .voted import VotedCounter
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+def measured(name: str, tested: Any, **options: Any) -> list[UpsetResult]:
+    chosen = tested.options(**options)
+    results = list(tested.run(Opener(device(name)), chosen))
+    assert len(results) == tested.count(chosen)
+    return results
+
+
+@pytest.fixture(scope="module")
+def counters() -> list[UpsetResult]:
+    return measured("cubestar", cubestar.EXPERIMENT, registers="*er.counter.row", memory_bits=1)
+
+
+def test_every_bit_is_hit_in_every_phase(counters: list[UpsetResult]) -> None:
+    hit = [(r.target, r.bit, r.phase) for r in counters if not r.memory]
+    registers = [f"{part}.counter.row" for part in ("writer", "reader")]
+    phases = ("idle", "storing", "between", "reading")
+    assert sorted(hit) == sorted(
+        (name, bit, phase) for name in registers for bit in range(9) for phase in phases
+    )
+    times = [result.time_s for result in counters]
+    assert times == sorted(times)
+
+
+def test_a_counter_matters_only_where_it_counts(counters: list[UpsetResult]) -> None:
+    for result in counters:
+        matters = {"writer.counter.row": "storing", "reader.counter.row": "reading"}
+        if result.memory:
+            continue
+        if result.phase == matters[result.target]:
+            assert result.effect in ("picture", "timing")
+        elif result.phase == "idle" or result.target == "reader.counter.row":
+            assert (result.effect, result.answer) == ("nothing", "right")
+    healed = sum(result.recovered in (0, 1) for result in counters)
+    assert healed > len(counters) / 2
+
+
+def test_a_seed_repeats_it() -> None:
+    options = {"registers": "writer.data", "memory_bits": 0, "seed": 5}
+    first, again = (measured("cubestar", cubestar.EXPERIMENT, **options) for _ in range(2))
+    assert first == again
+    stored = [result.effect for result in first if result.phase == "storing"]
+    assert set(stored) <= {"nothing", "pixel", "timing"}
+    assert "pixel" in stored
+
+
+@pytest.fixture
+def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    kept = stack._wiring, experiment._registers
+    monkeypatch.setattr(frame_writer, "MatrixCounter", VotedCounter)
+    for cached in kept:
+        cached.cache_clear()
+    yield
+    for cached in kept:
+        cached.cache_clear()
+
+
+def test_a_voted_counter_is_immune(voted: None) -> None:
+    tested = replace(cubestar.EXPERIMENT, phases=("storing", "between"))
+    results = measured("cubestar", tested, registers="writer.counter.*", memory_bits=0)
+    assert len({result.target for result in results}) == 6
+    assert {result.effect for result in results} <= {"nothing", "left over"}
+    assert {result.answer for result in results} == {"right"}
+
+
+def test_two_linked_fpgas() -> None:
+    results = measured("cubesense", cubesense.EXPERIMENT, registers="*_writer.ack", memory_bits=0)
+    assert {result.phase for result in results} == set(cubesense.EXPERIMENT.phases)
+    assert {result.effect for result in results if result.phase == "idle"} == {"nothing"}
+    assert {result.effect for result in results} > {"nothing"}
+
+
+def test_a_register_that_is_not_there_is_told() -> None:
+    with pytest.raises(ValueError, match=r"no register is like 'writer.roww'; there are .*writer"):
+        measured("cubestar", cubestar.EXPERIMENT, registers="writer.roww")
