@@ -50,10 +50,22 @@ class Row:
 
 def rows_of(block: Block) -> int:
     """How many rows it makes: of devices with several cameras, one for each in a frame."""
-    experiment = experiment_of(registered(block.device))
+    experiment = experiment_of(registered(block.device), block.command)
     own = experiment.options.declared()
     options = {name: value for name, value in block.options.items() if name in own}
     return int(experiment.count(experiment.options(frames=block.frames, seed=0, **options)))
+
+
+def measured(block: Block, frames: int, seed: int) -> Iterator[Any]:
+    """Results from one power-up on."""
+    options = {"frames": frames, "seed": seed, **block.options}
+    return measure(block.device, command=block.command, **options)
+
+
+def frames_of(block: Block, seed: int) -> int:
+    """How many frames were to be measured from the power-up with that seed on."""
+    seeds = [block.seed, *(_seed(block.seed, frame) for frame in range(1, block.frames))]
+    return block.frames - seeds.index(seed)
 
 
 def perform(block: Block) -> list[Row]:
@@ -62,7 +74,7 @@ def perform(block: Block) -> list[Row]:
     a_frame, frame = rows_of(block) // block.frames, 0
     while frame < block.frames:
         seed = _seed(block.seed, frame) if frame else block.seed
-        results = measure(block.device, frames=block.frames - frame, seed=seed, **block.options)
+        results = measured(block, block.frames - frame, seed)
         rows += _measured(block, results, len(rows), seed, a_frame)
         frame = len(rows) // a_frame
     return rows

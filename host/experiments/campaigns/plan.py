@@ -1,8 +1,9 @@
 """What a campaign measures: a TOML file, and the blocks of frames that it asks for.
 
 The file has ``device``, ``frames`` and ``seed``, and three tables of options of `cubestack measure
-DEVICE`: ``[options]`` for all frames, ``[grid]`` with lists of which every combination is a point,
-and ``[random]`` with what is drawn anew for each block (docs/campaigns.md has an example).
+DEVICE`, or of another ``command``: ``[options]`` for all frames, ``[grid]`` with lists of which
+every combination is a point, and ``[random]`` with what is drawn anew for each block
+(docs/campaigns.md has an example).
 
 All points see the same skies and the same drawn values, so that points differ by what they are and
 not by luck.
@@ -18,7 +19,7 @@ from typing import Any, Self
 import numpy as np
 
 from cubestack.host.devices.registry import device as registered
-from cubestack.host.experiments.measure import board_options, experiment_of, measure
+from cubestack.host.experiments.measure import MEASURE, board_options, experiment_of, measure
 from cubestack.host.options import whole
 
 FRAMES = 25
@@ -37,10 +38,11 @@ class Block:
     Attributes:
         number: counts from 0 through the campaign.
         device: name.
-        options: of `measure`, with what is swept.
+        options: of the command, with what is swept.
         swept: those of them that differ between blocks.
         frames: how many.
         seed: of the first one.
+        command: what measures it.
     """
 
     number: int
@@ -49,6 +51,7 @@ class Block:
     swept: Values
     frames: int
     seed: int
+    command: str = MEASURE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,15 +61,17 @@ class Plan:
     Attributes:
         device: what is measured.
         frames: at each point of the grid.
+        command: `measure`, or another one of the device that takes ``frames`` and ``seed``.
         seed: of everything random.
         block: frames for which the device is powered up once.
-        options: of `measure`, for all frames.
+        options: of the command, for all frames.
         grid: values of options; every combination is measured.
         random: options drawn anew for each block: uniform from ``low`` to ``high``, or one ``of``.
     """
 
     device: str
     frames: int
+    command: str = MEASURE
     seed: int = 0
     block: int = FRAMES
     options: Values = field(default_factory=dict)
@@ -96,7 +101,7 @@ class Plan:
                 raise ValueError(f"{name} is given in two of options, grid and random")
         for block in self.blocks():
             try:
-                measure(block.device, frames=1, seed=0, **block.options)
+                measure(block.device, command=self.command, frames=1, seed=0, **block.options)
             except ValueError as error:
                 raise ValueError(_where(block, str(error))) from None
 
@@ -142,7 +147,8 @@ class Plan:
                 swept = point | drawn
                 options = dict(self.options) | swept
                 number = where * at_a_point + index
-                yield Block(number, self.device, options, swept, frames, seed)
+                what = options, swept, frames, seed, self.command
+                yield Block(number, self.device, *what)
 
     def _drawn(self, index: int) -> tuple[int, dict[str, Any]]:
         """Seed and random options of a point's block."""
@@ -180,7 +186,7 @@ def _where(block: Block, error: str) -> str:
 def _with_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
     """The table with the paths of files in options, which start at the plan's folder, as told."""
     device = registered(table["device"])
-    experiment = experiment_of(device)
+    experiment = experiment_of(device, table.get("command", MEASURE))
     files = {
         name
         for name, declared in experiment.options.declared().items()

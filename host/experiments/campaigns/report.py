@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from cubestack.host.devices.experiment import Section
+from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.campaigns.folder import Folder
 from cubestack.host.experiments.campaigns.statistics import (
     ENDINGS,
@@ -15,6 +17,7 @@ from cubestack.host.experiments.campaigns.statistics import (
     rates,
     told,
 )
+from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.pictures.campaigns import error_curves, rate_curves
 
@@ -50,10 +53,14 @@ def write(
         pictures[f"{name}.png"] = error_curves(
             name, {told(point): values for point, values in points.items()}
         )
+    device, command = registered(folder.plan.device), folder.plan.command
+    done = (row.result for row in folder.rows() if row.result)
+    sections = list(experiment_of(device, command).sections(done))
+    pictures |= {f"{each.title.replace(' ', '-')}.png": each.png for each in sections if each.png}
     for name, png in pictures.items():
         (folder.path / name).write_bytes(png)
     page = folder.path / PAGE
-    page.write_text(_page(folder, found, pictures, changes, against), "utf-8")
+    page.write_text(_page(folder, found, pictures, sections, changes, against), "utf-8")
     return [page, *(folder.path / name for name in pictures)]
 
 
@@ -77,6 +84,7 @@ def _page(
     folder: Folder,
     found: Mapping[Point, Counter[str]],
     pictures: Mapping[str, bytes],
+    sections: Sequence[Section],
     changes: Sequence[Change],
     against: Path | None,
 ) -> str:
@@ -94,6 +102,9 @@ def _page(
     ]
     if against is not None:
         parts += [f"<h2>Compared with {escape(str(against))}</h2>", _changes(changes)]
+    for section in sections:
+        if section.rows:
+            parts += [f"<h2>{escape(section.title)}</h2>", _table(section.head, section.rows)]
     for name, png in pictures.items():
         parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' '))}</h2>")
         data = b64encode(png).decode("ascii")

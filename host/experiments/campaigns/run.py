@@ -5,10 +5,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from cubestack.host.experiments.campaigns.block import Row, perform, rows_of
+from cubestack.host.experiments.campaigns.block import Row, frames_of, measured, perform, rows_of
 from cubestack.host.experiments.campaigns.folder import Folder, FolderError
 from cubestack.host.experiments.campaigns.plan import Block, Plan
-from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.workers import performed
 
 
@@ -49,10 +48,9 @@ def replayed(folder: Folder, number: int) -> dict[str, Any]:
         raise FolderError(f"{folder.path} has rows 0 to {len(rows) - 1}, not {number}")
     row = rows[number]
     block: Block = next(each for each in folder.plan.blocks() if each.number == row.block)
-    a_frame = rows_of(block) // block.frames
-    frames = row.after // a_frame + 1
-    results = measure(block.device, frames=frames, seed=row.seed, **block.options)
-    return next(islice(results, row.after, None)).as_dict()
+    results = measured(block, frames_of(block, row.seed), row.seed)
+    found: dict[str, Any] = next(islice(results, row.after, None)).as_dict()
+    return found
 
 
 def default_folder(path: Path) -> Path:
