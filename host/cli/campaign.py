@@ -6,7 +6,7 @@ by block, so that little is lost whatever happens; --resume goes on.
 
 examples:
   cubestack campaign --list                               plans that come with the devices
-  cubestack campaign seu-cubestar --workers 2
+  cubestack campaign NAME --workers 2                     one of them
   cubestack campaign false-stars.toml
   cubestack campaign false-stars.toml --resume --workers 2
   cubestack campaign false-stars.toml --scheduler tcp://10.0.0.1:8786

@@ -21,6 +21,21 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A published error, beside which ours are drawn.
+
+    Attributes:
+        error: name of ours in the results.
+        value: of it, in the unit of ours.
+        text: what it is, and its source.
+    """
+
+    error: str
+    value: float
+    text: str
+
+
+@dataclass(frozen=True)
 class Section:
     """Part of a report about many results: a table, a figure as PNG, or both.
 
@@ -51,6 +66,7 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
         label: says what is going on, beside the progress bar; empty for none.
         powers_up: whether it needs the device, and not only its tables.
         decides: options of the board that the experiment sets itself.
+        marks: published errors.
     """
 
     options: type[OptionsT]
@@ -60,6 +76,7 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
     label: str = "measuring"
     powers_up: bool = True
     decides: tuple[str, ...] = ()
+    marks: tuple[Mark, ...] = ()
 
     def count(self, options: OptionsT) -> int:
         """How many results there will be."""

@@ -5,7 +5,7 @@ across is the angle between the boresights, the error about them atan2(D01 - D10
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.host.clients.quality import AttitudeQuality
-from cubestack.host.devices.experiment import Experiment, OpenerT, Result
+from cubestack.host.clients.quaternions import pointing_deg
+from cubestack.host.devices.experiment import Experiment, OpenerT, Result, Section
 from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
+from cubestack.host.pictures.campaigns import sky_map
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.view import SkyCondition, SkyView
@@ -300,6 +302,15 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         if judged and len(right) < POOR * judged:
             yield f"what may help: {self.advice(results)}"
 
+    def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
+        """Where on the sky it was right."""
+        known = [each for each in results if each.get("truth") is not None]
+        if known:
+            looking = [pointing_deg(np.array(each["truth"])) for each in known]
+            ended = map(_ended, known)
+            places = [(ra, dec, end) for (ra, dec, _), end in zip(looking, ended, strict=True)]
+            yield Section("right by where it looked", png=sky_map(places))
+
     def longest(self, results: Sequence[AttitudeResultT]) -> str:
         """The worst case of each step of the processing, beside what it may take; one phrase."""
         shown = [
@@ -311,6 +322,10 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
     def advice(self, results: Sequence[AttitudeResultT]) -> str:
         """What to change where few results are right; one phrase."""
         return "--mode assisted --hint-error 3, or --profile extended"
+
+
+def _ended(result: Mapping[str, Any]) -> str:
+    return "right" if result["right"] else "wrong" if result["solved"] else "refused"
 
 
 def percentile_95(values: Iterator[float | None]) -> float | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from io import BytesIO
+from math import log, radians, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -60,27 +61,78 @@ def rate_curves(
     return png(drawn)
 
 
-def error_curves(name: str, errors: Mapping[str, Sequence[float]]) -> bytes:
-    """A PNG of how many of the errors are smaller, by point of the grid.
+def error_curves(
+    name: str, errors: Mapping[str, Sequence[float]], marks: Sequence[tuple[float, str]] = ()
+) -> bytes:
+    """A PNG of how many of the errors are smaller, by point of the grid, with 95 % bands.
 
     Args:
         name: of the error, with its unit behind the last underscore.
         errors: sizes, rising, by what the point is told as.
+        marks: published values, with what they are.
     """
     drawn = figure(6, 3.4)
     panel = drawn.subplots()
     for number, (point, values) in enumerate(errors.items()):
+        sizes = [max(value, SMALLEST) for value in values]
         shares = [100 * (place + 1) / len(values) for place in range(len(values))]
-        panel.step(
-            [max(value, SMALLEST) for value in values],
+        # Of the whole curve: Dvoretzky, Kiefer and Wolfowitz, with Massart's constant.
+        band = 100 * sqrt(log(2 / 0.05) / (2 * len(values)))
+        (line,) = panel.step(
+            sizes,
             shares,
             where="post",
             linestyle=LINES[number % len(LINES)],
             linewidth=1 + number // len(LINES) / 2,
             label=f"{point} ({len(values)})",
         )
+        below = [max(share - band, 0) for share in shares]
+        above = [min(share + band, 100) for share in shares]
+        panel.fill_between(sizes, below, above, step="post", alpha=0.12, color=line.get_color())
+    for number, (value, text) in enumerate(marks):
+        panel.axvline(value, color="black", linewidth=0.8, linestyle=LINES[-1 - number % 2])
+        panel.text(value, 2, f" {text}", rotation=90, fontsize="xx-small", va="bottom", ha="right")
     what, unit = name.rsplit("_", 1)
     panel.set(xscale="log", xlabel=f"{what.replace('_', ' ')}, {unit}", ylabel="% smaller")
     panel.grid(alpha=0.3)
     panel.legend(fontsize="x-small")
+    return png(drawn)
+
+
+def sky_map(places: Sequence[tuple[float, float, str]]) -> bytes:
+    """A PNG of how often a sensor was right by where it looked, in cells of equal area.
+
+    Args:
+        places: right ascension and declination in degrees, and what became of the picture.
+    """
+    columns, rows = 18, 9
+    counts = [[0] * columns for _ in range(rows)]
+    right = [[0] * columns for _ in range(rows)]
+    for ra_deg, dec_deg, outcome in places:
+        column = min(int(ra_deg / 360 * columns), columns - 1)
+        row = min(int((sin(radians(dec_deg)) + 1) / 2 * rows), rows - 1)
+        counts[row][column] += 1
+        right[row][column] += outcome == "right"
+    rates = [
+        [100 * good / of if of else float("nan") for good, of in zip(*both, strict=True)]
+        for both in zip(right, counts, strict=True)
+    ]
+    drawn = figure(8, 3.8)
+    panel = drawn.subplots()
+    panel.patch.set(hatch="////", edgecolor="#aaaaaa")  # where nothing was measured
+    shown = panel.imshow(
+        rates, origin="lower", extent=(0, 360, -1, 1), aspect="auto", cmap="gray", vmin=0, vmax=100
+    )
+    for row, found in enumerate(counts):
+        for column, of in enumerate(found):
+            x, y = (column + 0.5) * 360 / columns, (row + 0.5) * 2 / rows - 1
+            dark = of and right[row][column] < of / 2
+            ink = "white" if dark else "black"
+            told = str(of) if of else ""
+            panel.text(x, y, told, ha="center", va="center", fontsize="xx-small", color=ink)
+    ticks = (-90, -45, -20, 0, 20, 45, 90)
+    panel.set_yticks([sin(radians(tick)) for tick in ticks], [str(tick) for tick in ticks])
+    panel.set_xticks(range(0, 361, 60))
+    panel.set(xlabel="right ascension, deg", ylabel="declination, deg")
+    drawn.colorbar(shown, label="% right; numbers: results")
     return png(drawn)

@@ -49,13 +49,13 @@ def write(
         for name, values in folder.plan.grid.items()
         if len(values) > 1
     }
+    measured = experiment_of(registered(folder.plan.device), folder.plan.command)
     for name, points in errors(folder).items():
-        pictures[f"{name}.png"] = error_curves(
-            name, {told(point): values for point, values in points.items()}
-        )
-    device, command = registered(folder.plan.device), folder.plan.command
+        curves = {told(point): values for point, values in points.items()}
+        marks = [(mark.value, mark.text) for mark in measured.marks if mark.error == name]
+        pictures[f"{name}.png"] = error_curves(name, curves, marks)
     done = (row.result for row in folder.rows() if row.result)
-    sections = list(experiment_of(device, command).sections(done))
+    sections = list(measured.sections(done))
     pictures |= {f"{each.title.replace(' ', '-')}.png": each.png for each in sections if each.png}
     for name, png in pictures.items():
         (folder.path / name).write_bytes(png)

@@ -23,7 +23,7 @@ import numpy as np
 from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.devices.emulated import EmulatedDevice
-from cubestack.host.devices.experiment import Experiment, Result
+from cubestack.host.devices.experiment import Experiment, Mark, Result
 from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
@@ -201,6 +201,11 @@ def _ratios(result: SensorResult) -> list[float]:
 class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult]):
     options = CubeSenseOptions
     description = __doc__
+    marks = (
+        Mark("error_deg", GOAL_DEG, "goal: section 8"),
+        Mark("error_deg", 1.0, "Sun, 40 to 60 deg: section 7.2"),
+        Mark("error_deg", 1.85, "Sun, 60 to 90 deg: section 7.2"),
+    )
     title = "directions over the serial line, beside the truth; degrees"
     columns = (
         "sensor",

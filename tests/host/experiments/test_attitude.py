@@ -12,6 +12,7 @@ from cubestack.emulator.scene.attitude import (
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.interface.cubestar.codes import Reason
 from cubestack.host.clients.quality import AttitudeQuality, common
+from cubestack.host.devices.registry import device
 from cubestack.host.experiments.attitude import (
     axis_errors_deg,
     claims,
@@ -20,6 +21,7 @@ from cubestack.host.experiments.attitude import (
     is_right,
     rough_boresight,
 )
+from cubestack.host.experiments.measure import experiment_of
 
 TRUTH = quaternion_from_pointing(84.0, -1.0, 20.0)
 
@@ -96,3 +98,14 @@ def test_claims_stand_beside_errors_only_where_both_are_known() -> None:
     assert both["error_deg"] == pytest.approx([0, 0, 0], abs=1e-12)
     assert claims(rated, None, TRUTH) == dict.fromkeys(both)
     assert claims(None, TRUTH, None) == dict.fromkeys(both)
+
+
+def test_a_report_shows_where_on_the_sky_it_was_right() -> None:
+    results = [
+        {"truth": [0.0, 0.0, 0.0, 1.0], "right": right, "solved": solved}
+        for right, solved in ((True, True), (False, True), (False, False))
+    ]
+    tested = experiment_of(device("cubestar"))
+    (section,) = tested.sections(results)
+    assert section.png.startswith(b"\x89PNG")
+    assert list(tested.sections([{**results[0], "truth": None}])) == []
