@@ -28,11 +28,13 @@ from cubestack.host.experiments.campaigns.folder import Folder
 from cubestack.host.experiments.campaigns.plan import Plan
 from cubestack.host.experiments.campaigns.plans import known_plans, plan_file, summary
 from cubestack.host.experiments.campaigns.statistics import Change, compared
+from cubestack.host.experiments.campaigns.worst import worst
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.workers import cores
 from cubestack.host.terminal import console, progress, say
 
 REPLAY, REPORT = "replay", "report"
+WORST = 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,6 +59,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
     parser.add_argument(
         "--compare", type=Path, metavar="FOLDER", help="of a report: what was before, same skies"
+    )
+    parser.add_argument(
+        "--worst",
+        type=whole(0),
+        default=WORST,
+        metavar="N",
+        help=f"of a report: worst cases that are measured again and shown (default {WORST})",
     )
     parser.add_argument("--json", action="store_true", help="one JSON object a point")
 
@@ -110,7 +119,8 @@ def _report(args: argparse.Namespace) -> int:
     folder, changes = Folder(Path(args.words[1])), list[Change]()
     if args.compare:
         changes = compared(Folder(args.compare), folder)
-    page, *pictures = report.write(folder, changes, args.compare)
+    cases = list(progress(worst(folder, args.worst), args.worst, "looking", quiet=args.json))
+    page, *pictures = report.write(folder, changes, args.compare, cases)
     worse = [change for change in changes if change.worse]
     for change in changes if args.json else worse:
         told = f"{statistics.told(change.point)}: {change.outcome} {change.before} before"

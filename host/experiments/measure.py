@@ -5,7 +5,7 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
-from cubestack.host.devices.emulated import check_options, scene_options
+from cubestack.host.devices.emulated import AnyEmulated, check_options, scene_options
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.opener import Opener
@@ -21,6 +21,7 @@ def measure(
     progress: Callable[[int, int], None] | None = None,
     engine: Engine = "auto",
     command: str = MEASURE,
+    opened: Callable[[AnyEmulated], object] = lambda _emulated: None,
     **options: Any,
 ) -> Iterator[Result]:
     """Measure a device end to end; yields each result, beside the truth, as soon as it is there.
@@ -29,6 +30,7 @@ def measure(
         name: of the device, one of ``device_names()``.
         progress: called with the number of results so far, and of all.
         engine: how its FPGA is run.
+        opened: told of each device that is powered up.
         command: another one that the device has, such as ``upsets``.
         options: as `cubestack measure NAME --help` has them, with underscores: ``frames=20``,
             ``mag_limit=3.8``, ``no_noise=True``; options of its board among them.
@@ -50,7 +52,7 @@ def measure(
     check_options(device, board)
     checked = experiment.options(**own)
     board = board_as_said(device, checked, board)
-    results = experiment.run(Opener(device, engine, board), checked)
+    results = experiment.run(Opener(device, engine, board, opened=opened), checked)
     return results if progress is None else _counted(results, experiment.count(checked), progress)
 
 

@@ -1,5 +1,6 @@
 """Many jobs at a time: on the cores of this machine, or on the workers of a Dask cluster."""
 
+import logging
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
@@ -14,6 +15,7 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from importlib import import_module
+from itertools import chain
 from multiprocessing import connection, get_context, parent_process
 from threading import Thread
 from typing import Any, TypeVar
@@ -25,6 +27,11 @@ AHEAD = 2
 """Jobs that are given away for each worker: one to run, one to wait."""
 
 CONNECT = "10s"
+
+DEATHS = 1
+"""Times that a worker process may die: once may be chance, twice is the job's or the memory's."""
+
+_log = logging.getLogger(__name__)
 
 
 class WorkersError(OSError):
@@ -48,29 +55,55 @@ def performed(
         scheduler: address of a Dask scheduler in place of processes.
 
     Raises:
-        WorkersError: no scheduler answers there, or workers went away while jobs ran.
+        WorkersError: no scheduler answers there, or workers went away while jobs ran. When a
+            process dies for the first time, what was under way begins anew.
     """
     if workers == 1 and scheduler is None:
         for job in jobs:
             yield job, function(job)
         return
-    rest, running = iter(jobs), dict[Future[Done], Job]()
-    with _processes(workers) if scheduler is None else _cluster(scheduler) as (pool, count):
+    rest, deaths = iter(jobs), 0
+    while True:
+        running = dict[Future[Done], Job]()
         try:
-            while True:
-                for job in rest:
-                    running[pool.submit(function, job)] = job
-                    if len(running) == AHEAD * count:
-                        break
-                if not running:
-                    return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    yield running.pop(future), future.result()
+            with _processes(workers) if scheduler is None else _cluster(scheduler) as (pool, count):
+                yield from _handed_out(function, rest, pool, AHEAD * count, running)
+            return
         except (BrokenProcessPool, CancelledError) as error:
-            raise WorkersError(f"workers went away: {str(error) or 'they were stopped'}") from None
-        finally:
-            for future in running:
-                future.cancel()
+            deaths += 1
+            if scheduler is not None or deaths > DEATHS:
+                told = str(error) or "they were stopped"
+                raise WorkersError(f"workers went away: {told}") from None
+            _log.warning("a worker died; %d jobs that were under way begin anew", len(running))
+            rest = chain(running.values(), rest)
+
+
+def _handed_out(
+    function: Callable[[Job], Done],
+    jobs: Iterator[Job],
+    pool: Executor,
+    most: int,
+    running: dict[Future[Done], Job],
+) -> Iterator[tuple[Job, Done]]:
+    """Jobs as they end, ``most`` of them given away at a time; ``running`` are those under way."""
+    try:
+        while True:
+            for job in jobs:
+                try:
+                    running[pool.submit(function, job)] = job
+                except BrokenProcessPool:
+                    running[Future()] = job  # it was taken from the others, and is lost with them
+                    raise
+                if len(running) == most:
+                    break
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                result = future.result()  # before it is taken out: a lost one begins anew
+                yield running.pop(future), result
+    finally:
+        for future in running:
+            future.cancel()
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ class Limits(Protocol):
         """Of ``count`` of ``of``."""
 
 
-def save_sample(picture: NDArray[np.uint8], path: Path) -> None:
+def save_sample(picture: NDArray[np.uint8], path: Path | BinaryIO) -> None:
     """Write grey values (rows, columns) as a small JPEG that is stretched for the eye.
 
     The darkest hundredth is black and the brightest five thousandth white, with a gamma of 0.6.
@@ -32,7 +32,9 @@ def save_sample(picture: NDArray[np.uint8], path: Path) -> None:
     grey = 255 * (np.clip((picture - low) / spread, 0, 1) ** 0.6)
     image = Image.fromarray(grey.astype(np.uint8))
     height = round(WIDTH_PX * picture.shape[0] / picture.shape[1])
-    image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS).save(path, quality=70, optimize=True)
+    image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS).save(
+        path, "JPEG", quality=70, optimize=True
+    )
 
 
 def save_curves(

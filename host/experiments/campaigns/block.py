@@ -56,10 +56,10 @@ def rows_of(block: Block) -> int:
     return int(experiment.count(experiment.options(frames=block.frames, seed=0, **options)))
 
 
-def measured(block: Block, frames: int, seed: int) -> Iterator[Any]:
-    """Results from one power-up on."""
+def measured(block: Block, frames: int, seed: int, **more: Any) -> Iterator[Any]:
+    """Results from one power-up on; ``more`` as ``measure`` has it."""
     options = {"frames": frames, "seed": seed, **block.options}
-    return measure(block.device, command=block.command, **options)
+    return measure(block.device, command=block.command, **options, **more)
 
 
 def frames_of(block: Block, seed: int) -> int:

@@ -17,6 +17,7 @@ from cubestack.host.experiments.campaigns.statistics import (
     rates,
     told,
 )
+from cubestack.host.experiments.campaigns.worst import Case
 from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.pictures.campaigns import error_curves, rate_curves
@@ -35,9 +36,14 @@ img { max-width: 100% } code { background: #eee } .worse { font-weight: bold }
 
 
 def write(
-    folder: Folder, changes: Sequence[Change] = (), against: Path | None = None
+    folder: Folder,
+    changes: Sequence[Change] = (),
+    against: Path | None = None,
+    cases: Sequence[Case] = (),
 ) -> list[Path]:
     """Write the page and its figures into the folder; the files, the page first.
+
+    ``cases`` are shown with their pictures.
 
     Raises ValueError for a folder without rows, or without matplotlib.
     """
@@ -60,7 +66,7 @@ def write(
     for name, png in pictures.items():
         (folder.path / name).write_bytes(png)
     page = folder.path / PAGE
-    page.write_text(_page(folder, found, pictures, sections, changes, against), "utf-8")
+    page.write_text(_page(folder, found, pictures, sections, changes, against, cases), "utf-8")
     return [page, *(folder.path / name for name in pictures)]
 
 
@@ -87,6 +93,7 @@ def _page(
     sections: Sequence[Section],
     changes: Sequence[Change],
     against: Path | None,
+    cases: Sequence[Case],
 ) -> str:
     plan = folder.plan
     title = f"{plan.device}: {sum(ended.total() for ended in found.values())} results"
@@ -109,6 +116,12 @@ def _page(
         parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' '))}</h2>")
         data = b64encode(png).decode("ascii")
         parts.append(f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">')
+    if cases:
+        parts.append("<h2>worst cases, and what the cameras saw, stretched for the eye</h2>")
+    for case in cases:
+        data = b64encode(case.jpeg).decode("ascii")
+        image = f'<br><img alt="" src="data:image/jpeg;base64,{data}">' if case.jpeg else ""
+        parts.append(f"<p>row {case.number}: {escape(case.text)}{image}</p>")
     failed = [(number, row) for number, row in enumerate(folder.rows()) if row.outcome == "failed"]
     if failed:
         lines = [[str(number), row.reason] for number, row in failed[:FAILURES]]

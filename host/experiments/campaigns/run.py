@@ -1,10 +1,11 @@
 """Runs a campaign into its folder, and single rows of it again."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.experiments.campaigns.block import Row, frames_of, measured, perform, rows_of
 from cubestack.host.experiments.campaigns.folder import Folder, FolderError
 from cubestack.host.experiments.campaigns.plan import Block, Plan
@@ -46,9 +47,15 @@ def replayed(folder: Folder, number: int) -> dict[str, Any]:
     rows = list(folder.rows())
     if not 0 <= number < len(rows):
         raise FolderError(f"{folder.path} has rows 0 to {len(rows) - 1}, not {number}")
-    row = rows[number]
+    return again(folder, rows[number])
+
+
+def again(
+    folder: Folder, row: Row, opened: Callable[[AnyEmulated], object] = lambda _emulated: None
+) -> dict[str, Any]:
+    """The result of a row's frame, measured again; ``opened`` is told of the device."""
     block: Block = next(each for each in folder.plan.blocks() if each.number == row.block)
-    results = measured(block, frames_of(block, row.seed), row.seed)
+    results = measured(block, frames_of(block, row.seed), row.seed, opened=opened)
     found: dict[str, Any] = next(islice(results, row.after, None)).as_dict()
     return found
 

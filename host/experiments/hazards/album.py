@@ -15,6 +15,7 @@ from cubestack.host.experiments.hazards.curves import Point
 from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
+from cubestack.host.experiments.seen import cameras_of
 from cubestack.host.pictures.hazards import save_curves, save_sample
 
 PROFILE = "extended"
@@ -117,8 +118,7 @@ def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
     results = experiment_of(found).run(opener, options)
     # Each result is of the next camera; what was rendered is what a download would bring, at once.
     for _ in results:
-        board = kept[0].board
-        cameras = list(getattr(board, "cameras", {0: getattr(board, "camera", None)}).values())
+        cameras = list(cameras_of(kept[0].board))
         pictures.append(cameras[len(pictures)].rendered)
         if len(pictures) == len(cameras):
             break

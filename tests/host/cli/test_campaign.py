@@ -23,7 +23,12 @@ def test_a_campaign_from_begin_to_replay(
     assert "--resume goes on with it" in capsys.readouterr().err
     assert main(["campaign", "false.toml", "--resume", "--workers", "1"]) == 0
     assert "right" in capsys.readouterr().out
-    assert main(["campaign", "report", "false.campaign", "--compare", "false.campaign"]) == 0
+    assert (
+        main(
+            ["campaign", "report", "false.campaign", "--compare", "false.campaign", "--worst", "1"]
+        )
+        == 0
+    )
     assert "wrote false.campaign/report.html and 4 figures" in capsys.readouterr().err
     rows = Path("false.campaign/rows.jsonl").read_text("utf-8").splitlines()
     assert main(["campaign", "replay", "false.campaign", "3"]) == 0

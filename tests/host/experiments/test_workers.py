@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +22,14 @@ def own_process(_number: int) -> int:
 
 def die(number: int) -> int:
     if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def die_once(job: tuple[Path, int]) -> int:
+    mark, number = job
+    if number == 3 and not mark.exists():
+        mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number
 
@@ -61,7 +70,13 @@ def test_an_error_is_that_of_the_job() -> None:
         list(performed(fail, range(4), 2))
 
 
-def test_a_worker_that_dies_is_told() -> None:
+def test_what_was_under_way_when_a_worker_died_begins_anew(tmp_path: Path) -> None:
+    jobs = [(tmp_path / "died", number) for number in range(9)]
+    assert sorted(done for _, done in performed(die_once, jobs, 2)) == list(range(9))
+    assert (tmp_path / "died").exists()
+
+
+def test_workers_that_die_again_are_told() -> None:
     with pytest.raises(WorkersError, match="workers went away: "):
         list(performed(die, range(9), 2))
 
