@@ -2,15 +2,29 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from threading import Event, Thread
+from time import monotonic
 from typing import TypeVar
 
 from rich import progress as bars
 from rich.console import Console
+from rich.text import Text
 
 console = Console()
 _errors = Console(stderr=True)
 
 T = TypeVar("T")
+
+EVERY_S = 5.0
+"""Between two lines that tell how far it is, where there is no terminal to draw a bar on."""
+
+
+class _Rate(bars.ProgressColumn):
+    """How many a second."""
+
+    def render(self, task: bars.Task) -> Text:
+        speed = task.finished_speed or task.speed
+        return Text("" if speed is None else f"{speed:.3g}/s", style="progress.data.speed")
 
 
 def say(text: str) -> None:
@@ -24,6 +38,7 @@ def progress_bar() -> bars.Progress:
         bars.TextColumn("{task.description}"),
         bars.BarColumn(),
         bars.MofNCompleteColumn(),
+        _Rate(),
         bars.TimeElapsedColumn(),
         bars.TimeRemainingColumn(),
         console=_errors,
@@ -33,9 +48,15 @@ def progress_bar() -> bars.Progress:
 
 
 def progress(items: Iterable[T], total: int, label: str, *, quiet: bool = False) -> Iterator[T]:
-    """Pass ``items`` through with a bar, unless ``quiet``; it may be inside another's loop."""
+    """Pass ``items`` through with a bar, unless ``quiet``; it may be inside another's loop.
+
+    Off a terminal there is a line every `EVERY_S` of wall time instead.
+    """
     if quiet:
         yield from items
+        return
+    if not _errors.is_terminal:
+        yield from _told(items, total, label)
         return
     with _shown_bar() as bar:
         task = bar.add_task(label, total=total)
@@ -59,3 +80,24 @@ def _shown_bar() -> Iterator[bars.Progress]:
             yield bar
         finally:
             _open.clear()
+
+
+def _told(items: Iterable[T], total: int, label: str) -> Iterator[T]:
+    """Pass ``items`` through; a thread says how far it is, as one may take long."""
+    done, over, begun = 0, Event(), monotonic()
+
+    def tell() -> None:
+        while not over.wait(EVERY_S):
+            rate = done / (monotonic() - begun)
+            rest = f", {rate:.3g}/s, {(total - done) / rate:.0f} s left" if rate else ""
+            say(f"{label}: {done} of {total}{rest}")
+
+    teller = Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        for item in items:
+            yield item
+            done += 1
+    finally:
+        over.set()
+        teller.join()

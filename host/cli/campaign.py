@@ -13,6 +13,7 @@ examples:
   cubestack campaign report false-stars.campaign          report.html there
   cubestack campaign report NEW --compare OLD             exit code 1 when NEW is worse
   cubestack campaign replay false-stars.campaign 17       measure row 17 again
+  cubestack campaign parquet false-stars.campaign         rows.parquet there
 """
 
 import argparse
@@ -22,7 +23,7 @@ from pathlib import Path
 from rich.table import Table
 
 from cubestack.host.cli.arguments import whole
-from cubestack.host.experiments.campaigns import report, statistics
+from cubestack.host.experiments.campaigns import parquet, report, statistics
 from cubestack.host.experiments.campaigns import run as campaigns
 from cubestack.host.experiments.campaigns.folder import Folder
 from cubestack.host.experiments.campaigns.plan import Plan
@@ -33,7 +34,7 @@ from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.workers import cores
 from cubestack.host.terminal import console, progress, say
 
-REPLAY, REPORT = "replay", "report"
+REPLAY, REPORT, PARQUET = "replay", "report", "parquet"
 WORST = 6
 
 
@@ -42,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = (
         "cubestack campaign PLAN [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
         "       cubestack campaign report FOLDER [--compare FOLDER]\n"
-        "       cubestack campaign replay FOLDER ROW"
+        "       cubestack campaign replay FOLDER ROW\n"
+        "       cubestack campaign parquet FOLDER"
     )
     parser.add_argument(
         "words", nargs="*", metavar="PLAN", help="file, or name of one that comes with a device"
@@ -80,6 +82,8 @@ def run(args: argparse.Namespace) -> int:
         return _replay(args.words[1:])
     if args.words[0] == REPORT:
         return _report(args)
+    if args.words[0] == PARQUET:
+        return _parquet(args.words[1:])
     if args.compare:
         raise ValueError("--compare is for a report")
     if len(args.words) > 1:
@@ -110,6 +114,13 @@ def _replay(words: list[str]) -> int:
     if len(words) != 2 or not words[1].isdecimal():
         raise ValueError("replay wants a campaign's folder and the number of a row")
     print(json.dumps(campaigns.replayed(Folder(Path(words[0])), int(words[1]))))
+    return 0
+
+
+def _parquet(words: list[str]) -> int:
+    if len(words) != 1:
+        raise ValueError("parquet wants a campaign's folder")
+    say(f"wrote {parquet.write(Folder(Path(words[0])))}")
     return 0
 
 

@@ -169,8 +169,7 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
         elif options.is_random:
             scene = attitudes.random_view(options, CONDITION, rng)
         with opened(scene, seed=options.seed, faults=options.faults) as emulated:
-            if emulated.board.firmware:
-                emulated.wait(START_S)
+            wait_started(emulated)
             if camera is not None:
                 emulated.client.configure(calibrate(camera).settings)
             searches = options.searches and not _adapts(opened)
@@ -199,6 +198,12 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
         if stars >= MOST_STARS:
             return f"pictures full of stars: --threshold above {threshold}, or --threshold search"
         return "--mode assisted --hint-error 5 or --profile extended solve more"
+
+
+def wait_started(emulated: CubeStarEmulated) -> None:
+    """Let a firmware of one's own come up."""
+    if emulated.board.firmware:
+        emulated.wait(START_S)
 
 
 def _threshold(emulated: CubeStarEmulated, options: CubeStarOptions, searches: bool) -> int:

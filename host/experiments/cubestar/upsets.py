@@ -17,6 +17,7 @@ import numpy as np
 
 from cubestack.firmware_model.interface.cubestar.pins import ENABLE, RNW
 from cubestack.host.experiments import attitude as attitudes
+from cubestack.host.experiments.cubestar.measure import wait_started
 from cubestack.host.experiments.upsets.experiment import UpsetExperiment
 from cubestack.host.experiments.upsets.subject import BETWEEN, IDLE, STORING, Subject, Verdict
 
@@ -67,7 +68,7 @@ def _wiring() -> "Wiring":
 
 
 EXPERIMENT = UpsetExperiment(
-    (Subject(_scene, _start, _judge, _state, row_bytes=1024),),
+    (Subject(_scene, _start, _judge, _state, row_bytes=1024, ready=wait_started),),
     _wiring,
     (IDLE, STORING, BETWEEN, READING),
     ("SRAM", "external"),

@@ -58,6 +58,9 @@ class UpsetOptions(Options):
     registers: str = option(
         "*", "only those with such a path, as 'writer.*'", TEXT, metavar="PATTERN"
     )
+    memories: str = option(
+        "", "memories to hit, as 'ram,flash' (default: those with pictures)", TEXT, metavar="NAMES"
+    )
     memory_bits: int = option(
         8, "bits of each memory, drawn anew, beside those of the registers (default 8)", whole(0)
     )
@@ -77,7 +80,7 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
         subjects: how it is put to work; one of them by chance.
         wiring: of its FPGAs, for the names of their registers.
         phases: of a loop, those that there always are.
-        memories: of the board, by name.
+        memories: of the board, by name, that are hit unless others are asked for.
         description: for the help.
     """
 
@@ -102,14 +105,17 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
         rng = np.random.default_rng(options.seed)
         subject = self.subjects[int(rng.integers(len(self.subjects)))]
         with opened(subject.scene(rng), seed=options.seed) as emulated:
+            subject.ready(emulated)
             sites = emulated.board.sites()
             watch = PortWatch(sites.engine, sites.engine.wiring.acknowledges)
-            emulated.board.processor.fpga = watch
+            if not emulated.board.firmware:  # machine code reaches its FPGA past everyone
+                emulated.board.processor.fpga = watch
             clean = _begin(emulated, subject, sites, watch, rng)
             render(clean, sites)
             sizes = dict(sites.engine.registers)
             sizes |= {name: 8 * memory.size for name, memory in sites.all_memories().items()}
             targets = self._targets(options)
+            _check(targets, sizes)
             upsets = [
                 Upset(_moment(clean.intervals, phase, rng), phase, _drawn(target, sizes, rng))
                 for phase in self.phases
@@ -161,7 +167,7 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
             raise ValueError(f"no register is like {options.registers!r}; there are {known}")
         return registers + [
             Target(name, 0, memory=True)
-            for name in self.memories
+            for name in (options.memories.split(",") if options.memories else self.memories)
             for _ in range(options.memory_bits)
         ]
 
@@ -216,6 +222,12 @@ def _registers(wiring: "Callable[[], Wiring]") -> Mapping[str, int]:
         return engine.registers
     finally:
         engine.close()
+
+
+def _check(targets: Sequence[Target], sizes: Mapping[str, int]) -> None:
+    for target in targets:
+        if target.name not in sizes:
+            raise ValueError(f"there is no memory {target.name!r}; there are {', '.join(sizes)}")
 
 
 def _moment(intervals: Sequence[Interval], phase: str, rng: np.random.Generator) -> int:

@@ -39,6 +39,7 @@ class Subject:
         state: what the FPGAs are commanded: `IDLE`, `STORING`, or another name.
         row_bytes: of a line of the picture.
         period_s: from one loop to the next, in use.
+        ready: waits until a device that was just powered up takes commands.
     """
 
     scene: Callable[[np.random.Generator], Any]
@@ -47,3 +48,4 @@ class Subject:
     state: "Callable[[RtlEngine], str]"
     row_bytes: int
     period_s: float = 1.0
+    ready: Callable[[Any], None] = lambda _emulated: None

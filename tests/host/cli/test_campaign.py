@@ -44,6 +44,7 @@ def test_a_campaign_from_begin_to_replay(
         (["report"], "report wants a campaign's folder"),
         (["a.toml", "--compare", "b"], "--compare is for a report"),
         (["replay"], "replay wants a campaign's folder and the number of a row"),
+        (["parquet"], "parquet wants a campaign's folder"),
         (["replay", "nowhere", "1"], "nowhere is no campaign's folder"),
     ],
 )

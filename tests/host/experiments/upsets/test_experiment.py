@@ -1,6 +1,6 @@
 """Upsets of real boards: what must be harmless is, what is not shows, and a seed repeats it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,9 +21,11 @@ from .voted import VotedCounter
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
-def measured(name: str, tested: Any, **options: Any) -> list[UpsetResult]:
+def measured(
+    name: str, tested: Any, board: Mapping[str, Any] | None = None, **options: Any
+) -> list[UpsetResult]:
     chosen = tested.options(**options)
-    results = list(tested.run(Opener(device(name)), chosen))
+    results = list(tested.run(Opener(device(name), board=board or {}), chosen))
     assert len(results) == tested.count(chosen)
     return results
 
@@ -95,3 +97,21 @@ def test_two_linked_fpgas() -> None:
 def test_a_register_that_is_not_there_is_told() -> None:
     with pytest.raises(ValueError, match=r"no register is like 'writer.roww'; there are .*writer"):
         measured("cubestar", cubestar.EXPERIMENT, registers="writer.roww")
+
+
+def test_a_memory_that_is_not_there_is_told() -> None:
+    with pytest.raises(ValueError, match="no memory 'flash'; there are .*SRAM, external"):
+        measured("cubestar", cubestar.EXPERIMENT, memories="flash")
+
+
+@pytest.mark.slow
+def test_own_firmware_s_memories_are_hit_and_each_answer_asked_for() -> None:
+    results = measured(
+        *("cubestar", cubestar.EXPERIMENT, {"firmware": "reference"}),
+        **{"memories": "ram,flash", "memory_bits": 2, "registers": "bank"},
+    )
+    assert {(one.target, one.bits) for one in results} == {
+        *(("bank", 1), ("ram", 8 * (128 << 10)), ("flash", 8 * (1 << 20)))
+    }
+    assert {one.effect for one in results if one.memory} == {"left over"}
+    assert sum(one.right for one in results) > len(results) / 2
