@@ -100,7 +100,7 @@ def test_a_register_that_is_not_there_is_told() -> None:
 
 
 def test_a_memory_that_is_not_there_is_told() -> None:
-    with pytest.raises(ValueError, match="no memory 'flash'; there are .*SRAM, external"):
+    with pytest.raises(ValueError, match=r"no memory 'flash'; there are .*SRAM, external"):
         measured("cubestar", cubestar.EXPERIMENT, memories="flash")
 
 
