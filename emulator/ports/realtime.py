@@ -55,7 +55,8 @@ class RealtimeScheduler:
         env: kernel; its time is in ps.
         endpoints: open ports.
         busy: whether the device has work, or bytes are on a wire.
-        pace: whether virtual time follows wall time or runs ahead (text of the module).
+        pace: whether virtual time follows wall time or runs ahead (text of the module); see
+            ``set_pace``.
         report: receives a line when pace "real" can not be kept.
         clock_ns: wall time in ns from any origin; never runs back.
         wait: waits for descriptors, at most so many s, as ``wait_ready`` does.
@@ -73,6 +74,7 @@ class RealtimeScheduler:
     def __post_init__(self) -> None:
         """Prepare to serve."""
         self._stopped = False
+        self._speed = 1.0
         self._offset_ps = 0  # virtual less wall time
         self._reported_ns = self.clock_ns()
 
@@ -80,13 +82,28 @@ class RealtimeScheduler:
         """Make ``run`` return soon; for other threads, and for signal handlers."""
         self._stopped = True
 
+    @property
+    def speed(self) -> float:
+        """Virtual seconds in a second of wall time, where virtual time follows that."""
+        return self._speed
+
+    def set_pace(self, pace: Literal["real", "fast"], speed: float = 1.0) -> None:
+        """Go on at another pace; of "real", ``speed`` times as fast as wall time."""
+        self.pace, self._speed = pace, speed
+        self.align()
+
+    def align(self) -> None:
+        """Go on from here: what virtual time is ahead of wall time, or behind, does not count."""
+        self._offset_ps = 0
+        self._offset_ps = self.env.now - self._wall_ps()
+
     def run(self) -> None:
         """Serve until ``stop``."""
-        self._align()
+        self.align()
         while not self._stopped:
             ahead = self.pace == "fast" and self._run_ahead()
             if ahead:
-                self._align()
+                self.align()
             elif not self.env.paused:
                 self._follow()
             for endpoint in self.endpoints:
@@ -97,11 +114,10 @@ class RealtimeScheduler:
 
     def _wall_ps(self) -> int:
         """Wall time on the scale of virtual time."""
-        return (self.clock_ns() - self.env.held_ns) * PS_PER_NS + self._offset_ps
-
-    def _align(self) -> None:
-        self._offset_ps = 0
-        self._offset_ps = self.env.now - self._wall_ps()
+        wall_ps = (self.clock_ns() - self.env.held_ns) * PS_PER_NS
+        if self._speed != 1.0:
+            wall_ps = round(wall_ps * self._speed)
+        return wall_ps + self._offset_ps
 
     def _slice_end_ns(self) -> int:
         return self.clock_ns() + int(SLICE_S * NS_PER_S)
@@ -161,4 +177,5 @@ class RealtimeScheduler:
         times = [ps for ps in (self._release_ps(1), self.env.horizon()) if ps is not None]
         if not times:
             return IDLE_S
-        return min(IDLE_S, max(0.0, (min(times) - self._wall_ps()) / PS_PER_S))
+        left_s = (min(times) - self._wall_ps()) / PS_PER_S / self._speed
+        return min(IDLE_S, max(0.0, left_s))

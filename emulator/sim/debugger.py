@@ -5,13 +5,12 @@ at the same time, and the kernel makes no step before the debugger lets it. So e
 and nothing has happened that would not have happened without: a trace is the same. The machine may
 be ahead of the kernel then, by no more than to the next thing that happens.
 
-While the kernel is paused, a scheduler of ports makes no steps; anybody else's call of
+While the kernel is held, a scheduler of ports makes no steps; anybody else's call of
 ``Kernel.step`` waits in ``serve``.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from time import monotonic_ns
 from typing import Protocol
 
 import numpy as np
@@ -42,6 +41,9 @@ ALL_FAULTS = 0x7F0
 """Bits VC_* of DEMCR but that for a reset: C1.6.5."""
 
 BKPT_BYTES = 2
+
+HOLDER = "debugger"
+"""Who holds the kernel."""
 
 OWN_COMMANDS = """reset [halt]      reset the processor, and stand at its first instruction
 catch on|off      stop at faults, before their handlers"""
@@ -103,7 +105,6 @@ class Debugger:
         """Take a place before the kernel."""
         self.halted: Reason | None = None
         self._attached = False
-        self._since_ns = 0
         self._range: tuple[int, int] | None = None
         self._to_wake = False  # a step has fallen asleep: stand when it goes on
         self._at_bkpt: int | None = None
@@ -181,8 +182,7 @@ class Debugger:
 
     def _stand(self, reason: Reason) -> None:
         self.halted = reason
-        if not self.kernel.paused:
-            self.kernel.paused, self._since_ns = True, monotonic_ns()
+        self.kernel.hold(HOLDER)
         self._range = None
         self._to_wake = False
 
@@ -226,9 +226,7 @@ class Debugger:
             self.machine.set_register("pc", self._at_bkpt + BKPT_BYTES)
         self._at_bkpt = None
         self.halted = None
-        if self.kernel.paused:
-            self.kernel.paused = False
-            self.kernel.held_ns += monotonic_ns() - self._since_ns
+        self.kernel.release(HOLDER)
 
     def step(self, low: int, high: int) -> None:
         """See ``Target``."""

@@ -1,5 +1,7 @@
 """Virtual time: an integer number of picoseconds, its kernel, and clocks that convert exactly."""
 
+from time import monotonic_ns
+
 import simpy
 
 PS_PER_S = 10**12
@@ -11,12 +13,38 @@ class Kernel(simpy.Environment):
     """SimPy's environment with an integer clock in ps.
 
     Attributes:
-        paused: whether a debugger has halted a processor: nothing may happen then.
         held_ns: wall time of all pauses that are over.
     """
 
-    paused: bool = False
     held_ns: int = 0
+
+    def __init__(self, initial_time: int = 0) -> None:
+        """Begin at ``initial_time``."""
+        super().__init__(initial_time)
+        self._holders = set[str]()
+        self._since_ns = 0
+
+    @property
+    def paused(self) -> bool:
+        """Whether anybody holds it, as a debugger that has halted a processor."""
+        return bool(self._holders)
+
+    @property
+    def holders(self) -> frozenset[str]:
+        """Who holds it."""
+        return frozenset(self._holders)
+
+    def hold(self, holder: str) -> None:
+        """Let nothing happen until ``holder`` releases it."""
+        if not self._holders:
+            self._since_ns = monotonic_ns()
+        self._holders.add(holder)
+
+    def release(self, holder: str) -> None:
+        """``holder`` holds it no more; it may be held by others."""
+        if self._holders == {holder}:
+            self.held_ns += monotonic_ns() - self._since_ns
+        self._holders.discard(holder)
 
     @property
     def now(self) -> int:

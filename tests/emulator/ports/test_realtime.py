@@ -308,7 +308,7 @@ def test_virtual_time_stands_while_the_kernel_is_paused(bench, pace):
 
     def process():
         yield kernel.timeout(105 * PS_PER_MS)
-        kernel.paused = True
+        kernel.hold("debugger")
         since.append(wall.ns)
 
     kernel.process(process())
@@ -316,8 +316,8 @@ def test_virtual_time_stands_while_the_kernel_is_paused(bench, pace):
 
     def exchange(now_ps):
         if since and kernel.paused and wall.ns - since[0] > 2000 * NS_PER_MS:
-            kernel.paused = False
-            kernel.held_ns += wall.ns - since[0]
+            kernel.release("debugger")
+            kernel.held_ns = wall.ns - since[0]
         stop(now_ps)
 
     bench.port.exchange = exchange

@@ -1,0 +1,158 @@
+"""Acts of other threads on a running emulation: when they happen, and what time does then."""
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.ports.control import MOST_EVENTS, ControlPort
+from cubestack.emulator.ports.realtime import RealtimeScheduler
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
+
+SOON_S = 20.0
+
+
+@dataclass
+class Running:
+    """An emulation that ticks every ms of virtual time, in a thread."""
+
+    pace: Any = "real"
+    kernel: Kernel = field(default_factory=Kernel)
+    ticks: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.port = ControlPort(self.kernel)
+        self.scheduler = RealtimeScheduler(self.kernel, [self.port], lambda: False, pace=self.pace)
+        self.port.scheduler = self.scheduler
+        self.kernel.process(self._tick())
+        self.thread = threading.Thread(target=self.scheduler.run)
+
+    def _tick(self) -> Iterator[Any]:
+        while True:
+            self.ticks.append(self.kernel.now)
+            yield self.kernel.timeout(PS_PER_MS)
+
+    def ask(self, act: Callable[[], Any]) -> Any:
+        return self.port.call(act).result(SOON_S)
+
+    def end(self) -> None:
+        self.scheduler.stop()
+        self.thread.join(SOON_S)
+        self.port.close()
+
+
+@pytest.fixture(params=["real", "fast"])
+def running(request: pytest.FixtureRequest) -> Iterator[Running]:
+    running = Running(request.param)
+    running.thread.start()
+    yield running
+    running.end()
+
+
+def test_an_act_is_done_in_the_emulation_s_thread(running: Running) -> None:
+    assert running.ask(threading.get_ident) == running.thread.ident
+
+
+def test_what_goes_wrong_is_told_to_who_asked(running: Running) -> None:
+    with pytest.raises(ZeroDivisionError):
+        running.ask(lambda: 1 // 0)
+    assert running.ask(lambda: 7) == 7
+
+
+def test_time_stands_while_it_is_held(running: Running) -> None:
+    port = running.port
+    held_ps = running.ask(lambda: (port.pause(), running.kernel.now)[1])
+    looks = [running.ask(lambda: (port.held, running.kernel.now)) for _ in range(20)]
+    assert set(looks) == {(True, held_ps)}
+    running.ask(port.resume)
+    assert not running.ask(lambda: port.held)
+
+
+def test_one_event_after_the_other(running: Running) -> None:
+    running.ask(running.port.pause)
+    before = len(running.ticks)
+    assert running.ask(running.port.step) == 1
+    assert len(running.ticks) == before + 1
+    assert running.ask(lambda: running.port.step(50)) == 50
+    assert len(running.ticks) == before + 51
+    assert running.ask(lambda: running.port.held)
+
+
+@pytest.mark.parametrize("events", [0, -1, MOST_EVENTS + 1])
+def test_steps_have_a_limit(running: Running, events: int) -> None:
+    with pytest.raises(ValueError, match=f"1 to 100000 events, not {events}"):
+        running.ask(lambda: running.port.step(events))
+
+
+def test_it_runs_to_a_time_and_stands_there(running: Running) -> None:
+    goal_ps = 30 * PS_PER_S  # far more than passes on the wall
+    arrived: Future[int] = running.ask(lambda: running.port.run_to(goal_ps))
+    assert arrived.result(SOON_S) == goal_ps
+    assert running.ask(lambda: (running.port.held, running.kernel.now)) == (True, goal_ps)
+    assert running.ticks[-1] == goal_ps - PS_PER_MS  # what happens at that time comes after it
+    with pytest.raises(ValueError, match=r"it is 30\.000000 s already, after 1\.000000 s"):
+        running.ask(lambda: running.port.run_to(PS_PER_S))
+
+
+def test_another_wish_ends_a_run(running: Running) -> None:
+    arrived: Future[int] = running.ask(lambda: running.port.run_to(10**9 * PS_PER_S))
+    running.ask(running.port.pause)
+    with pytest.raises(RuntimeError, match="it was held before it got there"):
+        arrived.result(SOON_S)
+
+
+def test_after_a_jump_nothing_is_made_up_for() -> None:
+    running = Running("real")
+    running.thread.start()
+    arrived: Future[int] = running.ask(lambda: running.port.run_to(1000 * PS_PER_S))
+    arrived.result(SOON_S)
+    running.ask(running.port.resume)
+    now_s = running.ask(lambda: running.kernel.now / PS_PER_S)
+    assert 1000 <= now_s < 1000 + SOON_S
+    running.end()
+
+
+@pytest.mark.parametrize("speed", [0.5, 20.0])
+def test_a_speed_is_kept_on_a_wall_clock_of_our_own(speed: float) -> None:
+    wall, kernel = [10**15], Kernel()
+
+    def wait(_watched: Any, timeout_s: float) -> None:
+        wall[0] += max(1000, int(timeout_s * 1e9))
+        if wall[0] > 10**15 + 2 * 10**9:
+            scheduler.stop()
+
+    port = ControlPort(kernel)
+    scheduler = RealtimeScheduler(
+        kernel, [port], lambda: False, pace="real", clock_ns=lambda: wall[0], wait=wait
+    )
+    port.scheduler = scheduler
+    port.set_pace("real", speed)
+    scheduler.run()
+    assert kernel.now / PS_PER_S == pytest.approx(2 * speed, rel=0.02)
+    port.close()
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan"), 1e6])
+def test_speeds_have_limits(running: Running, speed: float) -> None:
+    with pytest.raises(ValueError, match=r"0\.001 to 1000"):
+        running.ask(lambda: running.port.set_pace("real", speed))
+
+
+def test_who_holds_it_besides_is_told(running: Running) -> None:
+    running.ask(lambda: running.kernel.hold("debugger"))
+    with pytest.raises(ValueError, match="debugger holds it"):
+        running.ask(running.port.step)
+    running.ask(running.port.resume)
+    assert running.ask(lambda: running.port.held)
+
+
+def test_after_the_end_who_asks_is_told() -> None:
+    running = Running()
+    waiting = running.port.call(lambda: 1)  # nobody serves
+    running.port.close()
+    for asked in (waiting, running.port.call(lambda: 2)):
+        with pytest.raises(RuntimeError, match="the emulation has ended"):
+            asked.result(SOON_S)
