@@ -22,7 +22,7 @@ TABLES = ("firmware_model.interface", "firmware_model.formats")
 BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_model"), "host": TABLES}
 #: Parts of ``host`` that may import the other packages, as long as they do so lazily: listing
 #: devices and asking for help must load no emulator.
-LAZY = ("api", "cli", "devices", "experiments", "sensors", "pytest_plugin")
+LAZY = ("api", "cli", "devices", "experiments", "ground", "sensors", "pytest_plugin")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
@@ -50,7 +50,7 @@ ORDER = {
         "recording pictures",
         "devices",
         "shell",
-        "conformance experiments",
+        "conformance experiments ground",
         "sensors pytest_plugin",
         "cli",
         "api",

@@ -11,28 +11,40 @@ examples:
   cubestack emulate {second} --pty ./tty --record session.jsonl
   cubestack emulate {first} {second} {third} --i2c 7
       then: cubestack run --attach -- i2cdetect -y 7
+  cubestack emulate {first} --control 8700     pause, step, faults by HTTP
 """
 
 import argparse
+import os
 import signal
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.ports import add_port_arguments, open_ports
+from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, open_ports
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.options import flag
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import progress, say
 
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import SerialLine
+    from cubestack.emulator.ports.control import ControlPort
+    from cubestack.emulator.ports.endpoint import Endpoint
+
 ONE_DEVICE = (
     *("scene", "faults", "record", "trace", "set"),
     *("gdb", "gdb_wait", "profile_out", "coverage_out"),
 )
 """Options that belong to one device."""
+
+TOKEN = "CUBESTACK_TOKEN"
+"""Variable of the environment with the control port's token."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,6 +75,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("real", "fast"),
         default="real",
         help="real: virtual time is wall time; fast: ahead while there is work",
+    )
+    parser.add_argument(
+        "--control",
+        type=whole(0, LAST_PORT),
+        metavar="PORT",
+        help=f"HTTP port that steers it, with the token in ${TOKEN} or a new one (docs/control.md)",
     )
     device_options.add_record_arguments(parser)
     device_options.add_insight_arguments(parser)
@@ -109,6 +127,7 @@ def run(args: argparse.Namespace) -> int:
         board = emulated.board  # what records may have taken the place of its bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
+        control = _control(args, opened, served, stack)
         calls = []
         if args.i2c is not None:
             calls.append(I2cServer(socket_path(args.i2c), adapter))
@@ -116,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
         scheduler = stack.enter_context(
             open_scheduler(
                 board.kernel,
-                [*(endpoint for _, _, endpoint in served), *([gdb] if gdb is not None else [])],
+                [*(endpoint for _, _, endpoint in served), *(one for one in (gdb, control) if one)],
                 lambda: any(one.board.busy() for one in opened),
                 pace=args.pace,
                 i2c=adapter if calls else None,
@@ -124,6 +143,8 @@ def run(args: argparse.Namespace) -> int:
                 report=say,
             )
         )
+        if control is not None:
+            control.scheduler = scheduler
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: scheduler.stop())
         for one in opened:
@@ -137,3 +158,31 @@ def run(args: argparse.Namespace) -> int:
             say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
         scheduler.run()
     return 0
+
+
+def _control(
+    args: argparse.Namespace,
+    opened: Sequence[AnyEmulated],
+    served: "Sequence[tuple[AnyEmulated, SerialLine, Endpoint]]",
+    stack: ExitStack,
+) -> "ControlPort | None":
+    """The control port, served in a thread, if there is to be one."""
+    if args.control is None:
+        return None
+    from cubestack.emulator.ports.control import ControlPort
+    from cubestack.host.ground.control_api import control_app
+    from cubestack.host.ground.emulation import Emulation
+    from cubestack.host.ground.guard import Guard, new_token
+    from cubestack.host.ground.serving import Serving
+
+    port = ControlPort(opened[0].board.kernel)
+    ports: dict[str, list[str]] = {}
+    for owner, _, endpoint in served:
+        ports.setdefault(owner.device.name, []).append(endpoint.name)
+    token = os.environ.get(TOKEN) or new_token()
+    guard = Guard(control_app(Emulation(port, opened, ports)), token, any_host=args.allow_remote)
+    serving = Serving(guard, args.listen, args.control, allow_remote=args.allow_remote)
+    stack.enter_context(serving.running())
+    stack.callback(port.close)  # first, so that nobody waits for an answer any more
+    say(f"control on {serving.url}, token {token}")
+    return port

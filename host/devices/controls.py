@@ -50,7 +50,10 @@ class EmulatedControls:
                 self.fault(words)
             case ("scene", name):
                 with written(Document(name, control.text)) as path:
-                    self._emulated.scene = path
+                    try:
+                        self._emulated.scene = path
+                    except ValueError as error:
+                        raise ValueError(str(error).replace(str(path), name)) from None
                 self.on_act(control.words, control.text)
             case ("power", channel, "on" | "off" as state):
                 self.switch(channel, state == "on")

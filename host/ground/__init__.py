@@ -1,0 +1,1 @@
+"""Pages and programs that look at a sensor and steer it, by HTTP."""

@@ -1,0 +1,129 @@
+"""The control port: a program pauses, steps, disturbs a running emulation, and sees it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.sync.client import connect
+
+from cubestack.host.ground.control_api import CALLS
+
+from .conftest import SOON_S, TOKEN, Controlled
+
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+
+
+def test_it_tells_all_that_it_can(controlled: Controlled) -> None:
+    status, told = controlled.ask("GET", "/")
+    assert status == 200
+    assert [call["path"] for call in told["calls"]] == [call.path for call in CALLS]
+    assert told["devices"] == ["cubestar"]
+
+
+def test_the_page_has_every_call() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "control.md").read_text("utf-8")
+    for call in CALLS:
+        assert f"`{call.method} {call.path.replace('{device}', 'NAME')}`" in page
+        assert all(f"`{name}`" in page for name in call.takes)
+
+
+def test_time_is_held_stepped_and_sent_on(controlled: Controlled) -> None:
+    _, held = controlled.ask("POST", "/pause")
+    assert held["held"]
+    assert controlled.ask("GET", "/state")[1]["time_s"] == held["time_s"]
+    assert controlled.ask("POST", "/step") == (200, {"events": 0})  # it waits for its host
+    controlled.ask("POST", "/devices/cubestar/act", {"words": ["fault", "processor-reset"]})
+    assert controlled.ask("POST", "/step", {"events": 3}) == (200, {"events": 3})
+    status, there = controlled.ask("POST", "/run", {"to_s": 500})
+    assert (status, there["time_s"], there["held"]) == (200, 500.0, True)
+    _, resumed = controlled.ask("POST", "/resume")
+    assert not resumed["held"]
+    _, paced = controlled.ask("POST", "/pace", {"pace": "real", "speed": 4})
+    assert (paced["pace"], paced["speed"]) == ("real", 4)
+
+
+def test_what_the_shell_does_is_done(controlled: Controlled) -> None:
+    act = "/devices/cubestar/act"
+    before = controlled.ask("GET", "/state")[1]["devices"]["cubestar"]["currents_ma"]["total"]
+    _, state = controlled.ask("POST", act, {"words": ["power", "imager", "off"]})
+    assert state["devices"]["cubestar"]["currents_ma"]["total"] < before
+    about = controlled.ask("GET", "/devices/cubestar")[1]
+    assert "imager" in about["channels"]
+    kind = "processor-reset"
+    assert kind in about["faults"]
+    assert controlled.ask("POST", act, {"words": ["fault", kind]})[0] == 200
+    controlled.ask("POST", "/run", {"to_s": 100})
+    log = controlled.ask("GET", "/devices/cubestar/log")[1]
+    assert log["count"] == len(log["log"]) > 0
+    assert kind in log["log"][0]
+    assert controlled.ask("GET", "/state")[1]["devices"]["cubestar"]["probes"]["resets"] == 1
+
+
+def test_a_scene_is_sent_as_its_text(controlled: Controlled) -> None:
+    act = "/devices/cubestar/act"
+    before = controlled.emulated.scene
+    text = 'kind = "sky"\nra_deg = 12.0\ndec_deg = 3.0\nroll_deg = 0.0\n'
+    status, told = controlled.ask("POST", act, {"words": ["scene", "sky.toml"], "text": text})
+    assert status == 200, told
+    assert controlled.emulated.scene is not before
+    status, told = controlled.ask(
+        "POST", act, {"words": ["scene", "sky.toml"], "text": "[pointin]\n"}
+    )
+    assert status == 400
+    assert told["error"].startswith("sky.toml: ")
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status", "error"),
+    [
+        ("GET", "/stat", None, 404, "there is /devices"),
+        ("DELETE", "/state", None, 405, "Method Not Allowed"),
+        ("POST", "/step", b"{", 400, "the body is no JSON"),
+        ("POST", "/step", b"\xff\xfe", 400, "the body is no JSON"),
+        ("POST", "/step", b"[" * 100_000, 400, "the body is no JSON"),
+        ("POST", "/step", [], 400, "the body is a JSON object with events"),
+        ("POST", "/step", {"evnts": 1}, 400, "'evnts' means nothing to /step; it takes events"),
+        ("POST", "/step", {"events": "1"}, 400, "'events' of /step can not be '1'"),
+        ("POST", "/step", {"events": True}, 400, "'events' of /step can not be True"),
+        ("POST", "/step", {"events": 0}, 400, "a step is 1 to 100000 events, not 0"),
+        ("POST", "/run", {}, 400, "/run needs 'to_s'"),
+        ("POST", "/run", {"to_s": -1}, 400, "a time is 0 to 1e+08 s, not -1"),
+        ("POST", "/run", b'{"to_s": NaN}', 400, "a time is 0 to 1e+08 s, not nan"),
+        ("POST", "/pace", {"pace": "slow"}, 400, "a pace is real or fast, not 'slow'"),
+        ("GET", "/devices/cubestat", None, 400, "no device 'cubestat' is emulated here"),
+        ("POST", "/devices/cubestar/act", {"words": [1]}, 400, "'words' are texts"),
+        ("POST", "/devices/cubestar/act", {"words": ["dance"]}, 400, "nothing does 'dance'"),
+        ("POST", "/devices/cubestar/act", {"words": ["fault", "flod"]}, 400, "flod"),
+    ],
+)
+def test_what_makes_no_sense_is_told(
+    controlled: Controlled, method: str, path: str, body: Any, status: int, error: str
+) -> None:
+    found, told = controlled.ask(method, path, body)
+    assert (found, list(told)) == (status, ["error"])
+    assert error in told["error"]
+    assert controlled.ask("GET", "/state")[0] == 200
+
+
+def test_events_tell_how_it_is(controlled: Controlled) -> None:
+    with connect(
+        f"{controlled.events}?every_s=0.05", additional_headers=BEARER, open_timeout=SOON_S
+    ) as socket:
+        first = json.loads(socket.recv(SOON_S))
+        controlled.ask("POST", "/devices/cubestar/act", {"words": ["fault", "processor-reset"]})
+        controlled.ask("POST", "/run", {"to_s": 50})
+        while "log" not in (message := json.loads(socket.recv(SOON_S))):
+            pass
+        assert "processor-reset" in message["log"]["cubestar"][0]
+        assert message["state"]["time_s"] >= first["state"]["time_s"]
+        controlled.ask("POST", "/pause")
+        socket.send("whatever it is")
+        while not json.loads(socket.recv(SOON_S))["state"]["held"]:
+            pass
+
+
+def test_the_emulation_goes_on_when_its_watchers_are_gone(controlled: Controlled) -> None:
+    for _ in range(5):
+        connect(controlled.events, additional_headers=BEARER, open_timeout=SOON_S).socket.close()
+    assert controlled.ask("GET", "/state")[0] == 200

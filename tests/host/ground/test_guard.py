@@ -1,0 +1,142 @@
+"""What a hostile page or program can do at a port on loopback: nothing."""
+
+import http.client
+import json
+import socket
+
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from cubestack.host.errors import PortOpenError
+from cubestack.host.ground.guard import LARGEST_BODY
+from cubestack.host.ground.serving import MOST_CONNECTIONS, Serving, loopback_name
+
+from .conftest import SOON_S, TOKEN, Controlled
+
+BEARER = f"Bearer {TOKEN}"
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({}, 401),
+        ({"Authorization": "Bearer "}, 401),
+        ({"Authorization": "Bearer wrong"}, 401),
+        ({"Authorization": f"Basic {TOKEN}"}, 401),
+        ({"Cookie": "cubestack=wrong"}, 401),
+        ({"Authorization": BEARER}, 200),
+        ({"Authorization": BEARER, "Origin": "http://evil.example"}, 403),
+        ({"Authorization": BEARER, "Origin": "null"}, 403),
+        ({"Authorization": BEARER, "Host": "evil.example"}, 421),
+        ({"Authorization": BEARER, "Host": "evil.example:8700"}, 421),
+        ({"Authorization": BEARER, "Host": "localhost:1"}, 200),
+        ({"Authorization": BEARER, "Host": "[::1]"}, 200),
+    ],
+)
+def test_only_who_may_is_answered(
+    controlled: Controlled, headers: dict[str, str], status: int
+) -> None:
+    held = controlled.ask("GET", "/state")[1]["held"]
+    assert controlled.ask("POST", "/pause", headers=headers)[0] == status
+    assert controlled.ask("GET", "/state")[1]["held"] == (held or status == 200)
+
+
+def test_a_page_s_address_with_the_token_gives_a_cookie(controlled: Controlled) -> None:
+    connection = http.client.HTTPConnection(*controlled.serving.address, timeout=SOON_S)
+    connection.request("GET", f"/?token={TOKEN.replace(' ', '%20')}")
+    answer = connection.getresponse()
+    cookie = answer.getheader("set-cookie", "")
+    assert (answer.status, answer.getheader("location")) == (303, "/")
+    assert "HttpOnly" in cookie
+    assert "SameSite=strict" in cookie
+    answer.read()
+    assert controlled.ask("GET", "/state", headers={"Cookie": cookie.split(";")[0]})[0] == 200
+    connection.request("GET", "/?token=guess")
+    assert connection.getresponse().status == 401
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    "headers", [{}, {"Authorization": BEARER, "Origin": "http://evil.example"}]
+)
+def test_a_websocket_is_guarded_too(controlled: Controlled, headers: dict[str, str]) -> None:
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(controlled.events, additional_headers=headers, open_timeout=SOON_S)
+
+
+def test_a_huge_body_is_refused(controlled: Controlled) -> None:
+    with socket.create_connection(controlled.serving.address, SOON_S) as raw:
+        raw.sendall(
+            f"POST /step HTTP/1.1\r\nHost: localhost\r\nAuthorization: {BEARER}\r\n"
+            f"Content-Length: {100 * LARGEST_BODY}\r\n\r\n".encode()
+        )
+        try:
+            for _ in range(2 * LARGEST_BODY // (1 << 16)):
+                raw.sendall(bytes(1 << 16))
+        except OSError:  # it is cut off while it sends
+            pass
+    assert controlled.ask("GET", "/state")[0] == 200
+
+
+def test_noise_is_no_request(controlled: Controlled) -> None:
+    for noise in (b"\0" * 100_000, b"GET / HTTP/9\r\n\r\n", b"GET /" + b"a" * 1_000_000):
+        with socket.create_connection(controlled.serving.address, SOON_S) as raw:
+            try:
+                raw.sendall(noise)
+                raw.recv(100)
+            except OSError:
+                pass
+    assert controlled.ask("GET", "/state")[0] == 200
+
+
+def test_ten_thousand_connections_do_not_stop_the_emulation(controlled: Controlled) -> None:
+    kept = []
+    with connect(
+        f"{controlled.events}?every_s=0.05",
+        additional_headers={"Authorization": BEARER},
+        open_timeout=SOON_S,
+    ) as watching:
+        begun_s = json.loads(watching.recv(SOON_S))["state"]["time_s"]
+        for number in range(10_000):
+            raw = socket.create_connection(controlled.serving.address, SOON_S)
+            if number % 100:
+                raw.close()
+            else:
+                kept.append(raw)
+        while json.loads(watching.recv(SOON_S))["state"]["time_s"] <= begun_s + 0.5:
+            pass
+        assert sum(not closed(raw) for raw in kept) <= MOST_CONNECTIONS
+        for raw in kept:
+            raw.close()
+    assert controlled.ask("GET", "/state")[0] == 200
+
+
+def closed(raw: socket.socket) -> bool:
+    raw.setblocking(False)
+    try:
+        return raw.recv(1) == b""
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "192.0.2.1"])
+def test_other_machines_are_kept_out(address: str) -> None:
+    with pytest.raises(PortOpenError, match=f"{address} can be reached .* --allow-remote"):
+        Serving(None, address, 0)  # type: ignore[arg-type]
+
+
+def test_a_port_that_is_taken_is_told(controlled: Controlled) -> None:
+    host, port = controlled.serving.address
+    with pytest.raises(PortOpenError, match=f"can not listen on {host}:{port}: Address already"):
+        Serving(None, host, port)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "own"),
+    [("localhost", True), ("127.8.9.1", True), ("::1", True), ("", False), ("a", False)],
+)
+def test_names_of_this_machine(name: str, own: bool) -> None:
+    assert loopback_name(name) == own
