@@ -13,7 +13,8 @@ examples:
   cubestack campaign seu-cubesense           the whole atlas, resumable, on all cores
 """
 
-from functools import partial
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,10 +22,14 @@ import numpy as np
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS
-from cubestack.firmware_model.interface.cubesense.switches import DEFAULT_SWITCHES
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
-from cubestack.host.experiments.upsets.experiment import UpsetExperiment
-from cubestack.host.experiments.upsets.subject import BETWEEN, IDLE, STORING, Subject, Verdict
+from cubestack.host.experiments.upsets.experiment import UpsetExperiment, UpsetOptions
+from cubestack.host.experiments.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
+from cubestack.host.options import option
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
@@ -70,17 +75,36 @@ def _state(engine: "RtlEngine") -> str:
     return IDLE if set(commanded) == {Action.STANDBY} else READING
 
 
-def _wiring() -> "Wiring":
+@dataclass(frozen=True, kw_only=True)
+class CubeSenseUpsetOptions(UpsetOptions):
+    """Options of `cubestack upsets cubesense`."""
+
+    gateware: str = option(
+        DEFAULT_SWITCHES.gateware,
+        "of both FPGAs (default as-flown)",
+        choices=CubeSenseSwitches.declared()["gateware"].choices,
+    )
+
+
+def _wiring(gateware: str) -> "Wiring":
     from cubestack.emulator.boards.cubesense.board import wiring_of
 
-    return wiring_of(DEFAULT_SWITCHES.gateware)
+    return wiring_of(gateware)
+
+
+@cache
+def _rig_of(gateware: str) -> Rig:
+    subjects = tuple(
+        Subject(_scene, partial(_start, sram), _judge, _state, row_bytes=640) for sram in Sram
+    )
+    phases = (IDLE, STORING, BETWEEN, LINKED, READING)
+    board = {"set": f"gateware={gateware}"}
+    return Rig(subjects, partial(_wiring, gateware), phases, ("sun", "nadir"), board)
 
 
 EXPERIMENT = UpsetExperiment(
-    tuple(Subject(_scene, partial(_start, sram), _judge, _state, row_bytes=640) for sram in Sram),
-    _wiring,
-    (IDLE, STORING, BETWEEN, LINKED, READING),
-    ("sun", "nadir"),
+    lambda options: _rig_of(options.gateware),
     __doc__,
-    decides=("profile", "set", "mcu_addressing", "uart"),  # registers are the published gateware's
+    decides=("profile", "set", "mcu_addressing", "uart"),
+    options=CubeSenseUpsetOptions,
 )

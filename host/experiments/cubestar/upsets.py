@@ -11,15 +11,19 @@ examples:
   cubestack campaign seu-cubestar            the whole atlas, resumable, on all cores
 """
 
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cubestack.firmware_model.interface.cubestar.pins import ENABLE, RNW
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar.measure import wait_started
-from cubestack.host.experiments.upsets.experiment import UpsetExperiment
-from cubestack.host.experiments.upsets.subject import BETWEEN, IDLE, STORING, Subject, Verdict
+from cubestack.host.experiments.upsets.experiment import UpsetExperiment, UpsetOptions
+from cubestack.host.experiments.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
+from cubestack.host.options import option
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -29,6 +33,19 @@ if TYPE_CHECKING:
     from cubestack.host.devices.emulated import EmulatedDevice
 
 READING = "reading"
+
+#: Of a loop with each layout; but for the published one the FPGA leads the processor to its memory
+#: whenever it does not store.
+PHASES = dict.fromkeys(Layout, (STORING, BETWEEN, READING)) | {
+    Layout.COPIED: (IDLE, STORING, BETWEEN, READING)
+}
+
+MEMORIES = {
+    Layout.COPIED: ("SRAM", "external"),
+    Layout.SHARED: ("SRAM",),
+    Layout.TWO_MEMORIES: ("SRAM1", "SRAM2"),
+    Layout.TWO_BOARDS: ("SRAM1", "SRAM2"),
+}
 
 TIMEOUT_S = 20.0
 
@@ -56,21 +73,45 @@ def _judge(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> Verdict:
 
 
 def _state(engine: "RtlEngine") -> str:
-    if not engine.get_pin(ENABLE):
+    boards = BOARD_PREFIXES if len(engine.wiring.acknowledges) > 1 else ("",)
+    on = [board for board in boards if engine.get_pin(board + ENABLE)]
+    if not on:
         return IDLE
-    return READING if engine.get_pin(RNW) else STORING
+    return READING if all(engine.get_pin(board + RNW) for board in on) else STORING
 
 
-def _wiring() -> "Wiring":
-    from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+@dataclass(frozen=True, kw_only=True)
+class CubeStarUpsetOptions(UpsetOptions):
+    """Options of `cubestack upsets cubestar`."""
 
-    return cubestar_wiring()
+    layout: str = option(
+        Layout.COPIED.value,
+        "memory layout, and the gateware for it (default 1, the published one)",
+        choices=tuple(layout.value for layout in Layout),
+    )
+
+
+def _wiring(layout: Layout) -> "Wiring":
+    from cubestack.emulator.boards.cubestar.layouts import BOARDS
+
+    return BOARDS[layout].wiring()
+
+
+@cache
+def _rig_of(layout: Layout) -> Rig:
+    subject = Subject(_scene, _start, _judge, _state, row_bytes=1024, ready=wait_started)
+    return Rig(
+        (subject,),
+        partial(_wiring, layout),
+        PHASES[layout],
+        MEMORIES[layout],
+        {"layout": layout.value},
+    )
 
 
 EXPERIMENT = UpsetExperiment(
-    (Subject(_scene, _start, _judge, _state, row_bytes=1024, ready=wait_started),),
-    _wiring,
-    (IDLE, STORING, BETWEEN, READING),
-    ("SRAM", "external"),
+    lambda options: _rig_of(Layout(options.layout)),
     __doc__,
+    decides=("layout",),
+    options=CubeStarUpsetOptions,
 )

@@ -12,7 +12,6 @@ from functools import cached_property
 
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.upsets.sample import EFFECTS, UpsetResult
-from cubestack.host.experiments.upsets.subject import IDLE
 
 _NUMBER = re.compile(r"\$\d+")
 
@@ -120,9 +119,9 @@ def _is_seen(result: UpsetResult) -> bool:
 
 def _shares(results: Sequence[UpsetResult]) -> dict[str, float]:
     """Part of the time that the FPGAs are in each phase, the mean over the loops of ``results``."""
-    phases = {phase for one in results for phase in one.phases_s}
-    found = {
-        phase: sum(one.phases_s.get(phase, 0.0) / one.period_s for one in results) / len(results)
-        for phase in phases - {IDLE}
-    }
-    return found | {IDLE: 1 - sum(found.values())}
+    found: dict[str, float] = {}
+    for one in results:
+        whole_s = sum(one.phases_s.values())
+        for phase, seconds in one.phases_s.items():
+            found[phase] = found.get(phase, 0.0) + seconds / whole_s / len(results)
+    return found

@@ -24,7 +24,7 @@ LONGEST_S = 30.0
 
 
 class NoLoopError(RuntimeError):
-    """A loop that does not come to an end, or in which the FPGAs do nothing."""
+    """A loop that does not come to an end."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,8 @@ class CleanLoop:
     """A loop without upsets.
 
     Attributes:
-        intervals: of the phases, in their order; after the last one the FPGAs are idle.
-        over_ps: when the FPGAs are done.
+        intervals: of the phases, in their order.
+        over_ps: when the FPGAs are done: idle, or at the end.
         snapshot: then.
         verdict: on the answer.
     """
@@ -81,10 +81,10 @@ class CleanLoop:
         """When nothing was under way any more."""
         return self.intervals[-1].end_ps
 
-    @property
-    def seconds(self) -> dict[str, float]:
-        """How long the FPGAs are in each phase of a loop."""
-        found: dict[str, float] = {}
+    def seconds(self, period_s: float) -> dict[str, float]:
+        """How long the FPGAs are in each phase to the next loop, till when they stay as they are."""
+        rest_s = period_s - (self.end_ps - self.start_ps) / PS_PER_S
+        found = {self.intervals[-1].phase: max(0.0, rest_s)}
         for one in self.intervals:
             found[one.phase] = found.get(one.phase, 0.0) + (one.end_ps - one.start_ps) / PS_PER_S
         return found
@@ -124,9 +124,9 @@ def clean_loop(
             states.append(state)
             if state.state == IDLE:
                 snapshot = deepcopy(take(sites, watch))
-    if snapshot is None or states[-1].state != IDLE:
-        raise NoLoopError(f"the FPGAs of {emulated.device.name} are not idle after a loop")
     over_ps = states[-1].start_ps
+    if snapshot is None or states[-1].state != IDLE:  # they lead the processor to its memory
+        snapshot, over_ps = deepcopy(take(sites, watch)), kernel.now
     states.append(_State(kernel.now, IDLE, None))
     intervals = [
         one for state, then in pairwise(states) for one in _phases(state, then.start_ps, sites)

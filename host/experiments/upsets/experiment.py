@@ -30,7 +30,7 @@ from cubestack.host.experiments.upsets.sample import (
     UpsetResult,
     followed,
 )
-from cubestack.host.experiments.upsets.subject import Subject
+from cubestack.host.experiments.upsets.subject import Rig, Subject
 from cubestack.host.experiments.upsets.watch import PortWatch
 from cubestack.host.options import POSITIVE, TEXT, Options, option, whole
 from cubestack.host.pictures.upsets import effects
@@ -45,8 +45,8 @@ AT_ONCE = 200
 
 S_PER_DAY = 86_400
 
-SCENES = 20
-"""Scenes that are tried until the device measures one rightly."""
+SCENES = 200
+"""Scenes that are tried until the device measures one rightly; some profiles seldom do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,34 +77,32 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
     """Upsets of one device.
 
     Attributes:
-        subjects: how it is put to work; one of them by chance.
-        wiring: of its FPGAs, for the names of their registers.
-        phases: of a loop, those that there always are.
-        memories: of the board, by name, that are hit unless others are asked for.
+        rig: whose bits they are, by the options.
         description: for the help.
+        decides: options of the board that the rig chooses.
+        options: with those that choose the rig.
     """
 
-    subjects: tuple[Subject, ...]
-    wiring: "Callable[[], Wiring]"
-    phases: tuple[str, ...]
-    memories: tuple[str, ...]
+    rig: Callable[[Any], Rig]
     description: str
     decides: tuple[str, ...] = ()
+    options: type[UpsetOptions] = UpsetOptions
 
-    options = UpsetOptions
     title = "upsets, what they do, and what the firmware makes of them"
     columns = ("upset", "bit", "phase", "effect", "answer", "right after", "")
     label = "turning bits over"
 
     def count(self, options: UpsetOptions) -> int:
         """Each bit in each phase, as often as asked."""
-        return options.frames * len(self.phases) * len(self._targets(options))
+        rig = self.rig(options)
+        return options.frames * len(rig.phases) * len(_targets(rig, options))
 
     def run(self, opened: Opener[Any, Any], options: UpsetOptions) -> Iterator[UpsetResult]:
         """Yield one result for each upset, in the order of time."""
         rng = np.random.default_rng(options.seed)
-        subject = self.subjects[int(rng.integers(len(self.subjects)))]
-        with opened(subject.scene(rng), seed=options.seed) as emulated:
+        rig = self.rig(options)
+        subject = rig.subjects[int(rng.integers(len(rig.subjects)))]
+        with opened(subject.scene(rng), seed=options.seed, **rig.board) as emulated:
             subject.ready(emulated)
             sites = emulated.board.sites()
             watch = PortWatch(sites.engine, sites.engine.wiring.acknowledges)
@@ -114,11 +112,11 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
             render(clean, sites)
             sizes = dict(sites.engine.registers)
             sizes |= {name: 8 * memory.size for name, memory in sites.all_memories().items()}
-            targets = self._targets(options)
+            targets = _targets(rig, options)
             _check(targets, sizes)
             upsets = [
                 Upset(_moment(clean.intervals, phase, rng), phase, _drawn(target, sizes, rng))
-                for phase in self.phases
+                for phase in rig.phases
                 for target in targets
                 for _ in range(options.frames)
             ]
@@ -154,22 +152,23 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
         counts = {effect: [part.effects[effect] for part in parts] for effect in EFFECTS}
         yield Section("what they do", png=effects(named, counts, "upsets, in all phases alike"))
 
-    def _targets(self, options: UpsetOptions) -> list[Target]:
-        """Every bit of every register, and places for bits of memories, not yet drawn."""
-        registers = [
-            Target(name, bit)
-            for name, bits in _registers(self.wiring).items()
-            if fnmatchcase(name, options.registers)
-            for bit in range(bits)
-        ]
-        if not registers:
-            known = ", ".join(_registers(self.wiring))
-            raise ValueError(f"no register is like {options.registers!r}; there are {known}")
-        return registers + [
-            Target(name, 0, memory=True)
-            for name in (options.memories.split(",") if options.memories else self.memories)
-            for _ in range(options.memory_bits)
-        ]
+
+def _targets(rig: Rig, options: UpsetOptions) -> list[Target]:
+    """Every bit of every register, and places for bits of memories, not yet drawn."""
+    known = _registers(rig.wiring)
+    registers = [
+        Target(name, bit)
+        for name, bits in known.items()
+        if fnmatchcase(name, options.registers)
+        for bit in range(bits)
+    ]
+    if not registers:
+        raise ValueError(f"no register is like {options.registers!r}; there are {', '.join(known)}")
+    return registers + [
+        Target(name, 0, memory=True)
+        for name in (options.memories.split(",") if options.memories else rig.memories)
+        for _ in range(options.memory_bits)
+    ]
 
 
 def _begin(
@@ -208,7 +207,12 @@ class _About:
         return UpsetResult(
             *(target.name, target.bit, target.memory, one.phase, one.time_ps / PS_PER_S),
             *(outcome.effect, verdict.answer, verdict.reason, outcome.recovered),
-            *(self.clean.seconds, self.period_s, self.bits[target.name], self.hits_a_day),
+            *(
+                self.clean.seconds(self.period_s),
+                self.period_s,
+                self.bits[target.name],
+                self.hits_a_day,
+            ),
         )
 
 

@@ -60,7 +60,7 @@ class UpsetResult(Result):
         answer: of the loop that was hit: right, refused or wrong.
         reason: of a refusal.
         recovered: loops until an answer was right; 0 the one that was hit, None later than `LOOPS`.
-        phases_s: how long the FPGAs are in each phase of a loop.
+        phases_s: how long the FPGAs are in each phase from one loop to the next.
         period_s: from one loop to the next.
         bits: of the whole register or memory.
         hits_a_day: upsets of one bit a day, by flux and cross-section.

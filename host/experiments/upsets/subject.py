@@ -1,13 +1,14 @@
 """What is asked of a device whose bits are turned over: a loop of its work, judged."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 if TYPE_CHECKING:
     from cubestack.emulator.rtl.contract import RtlEngine
+    from cubestack.emulator.rtl.wiring import Wiring
 
 Answer = Literal["right", "refused", "wrong"]
 
@@ -49,3 +50,22 @@ class Subject:
     row_bytes: int
     period_s: float = 1.0
     ready: Callable[[Any], None] = lambda _emulated: None
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Whose bits are turned over, and in what work.
+
+    Attributes:
+        subjects: how it is put to work; one of them by chance.
+        wiring: of its FPGAs, for the names of their registers; the same object for the same ones.
+        phases: of a loop, those that there always are.
+        memories: of the board, by name, that are hit unless others are asked for.
+        board: keywords that choose it.
+    """
+
+    subjects: tuple[Subject, ...]
+    wiring: "Callable[[], Wiring]"
+    phases: tuple[str, ...]
+    memories: tuple[str, ...]
+    board: Mapping[str, Any] = field(default_factory=dict)

@@ -11,7 +11,7 @@ from cubestack.host.experiments.upsets.sample import UpsetResult
 
 RIGHT = UpsetResult(
     *("writer$3.row", 0, False, "storing", 1.0, "nothing", "right", "", 0),
-    *({"idle": 0.6, "storing": 0.25}, 1.0, 9, 2.0),
+    *({"idle": 0.75, "storing": 0.25}, 1.0, 9, 2.0),
 )
 PICTURE = replace(RIGHT, effect="picture", bit=1)
 WRONG = replace(PICTURE, answer="wrong", recovered=1)
@@ -30,7 +30,7 @@ def test_a_phase_counts_for_the_part_of_the_loop_that_it_takes() -> None:
     # Of what is stored in a quarter of the second two upsets of three are seen, of 9 bits.
     assert part.a_day == pytest.approx(2.0 * 9 * 0.25 * 2 / 3)
     (idle,) = atlas([replace(PICTURE, phase="idle")])
-    assert idle.a_day == pytest.approx(2.0 * 9 * 0.75)  # the rest of the second
+    assert idle.a_day == pytest.approx(2.0 * 9 * 0.75)
 
 
 def test_what_is_left_over_is_not_seen_unless_an_answer_is_bad() -> None:

@@ -18,6 +18,8 @@ from cubestack.host.experiments.upsets.sample import UpsetResult
 
 from .voted import VotedCounter
 
+STORES = ("storing", "between")
+
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
@@ -80,16 +82,35 @@ def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_a_voted_counter_is_immune(voted: None) -> None:
-    tested = replace(cubestar.EXPERIMENT, phases=("storing", "between"))
+    rig = replace(cubestar.EXPERIMENT.rig(cubestar.CubeStarUpsetOptions()), phases=STORES)
+    tested = replace(cubestar.EXPERIMENT, rig=lambda _options: rig)
     results = measured("cubestar", tested, registers="writer.counter.*", memory_bits=0)
     assert len({result.target for result in results}) == 6
     assert {result.effect for result in results} <= {"nothing", "left over"}
     assert {result.answer for result in results} == {"right"}
 
 
-def test_two_linked_fpgas() -> None:
-    results = measured("cubesense", cubesense.EXPERIMENT, registers="*_writer.ack", memory_bits=0)
-    assert {result.phase for result in results} == set(cubesense.EXPERIMENT.phases)
+@pytest.mark.parametrize("layout", ["2", "3", "two-boards"])
+def test_each_layout_has_its_registers(layout: str) -> None:
+    results = measured(
+        *("cubestar", cubestar.EXPERIMENT),
+        **{"layout": layout, "registers": "*store", "memory_bits": 1},
+    )
+    assert {result.phase for result in results} == {"storing", "between", "reading"}
+    assert len({one.target for one in results if one.memory}) == (1 if layout == "2" else 2)
+    assert {one.effect for one in results if one.phase == "storing"} - {"nothing"}
+    for result in results:
+        assert sum(result.phases_s.values()) == pytest.approx(result.period_s)
+
+
+@pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
+def test_two_linked_fpgas(gateware: str) -> None:
+    results = measured(
+        *("cubesense", cubesense.EXPERIMENT),
+        **{"gateware": gateware, "registers": "*_writer.ack", "memory_bits": 0},
+    )
+    phases = cubesense.EXPERIMENT.rig(cubesense.CubeSenseUpsetOptions()).phases
+    assert {result.phase for result in results} == set(phases)
     assert {result.effect for result in results if result.phase == "idle"} == {"nothing"}
     assert {result.effect for result in results} > {"nothing"}
 
