@@ -82,7 +82,7 @@ class CleanLoop:
         return self.intervals[-1].end_ps
 
     def seconds(self, period_s: float) -> dict[str, float]:
-        """How long the FPGAs are in each phase to the next loop, till when they stay as they are."""
+        """How long the FPGAs are in each phase; from the end of a loop to the next, as there."""
         rest_s = period_s - (self.end_ps - self.start_ps) / PS_PER_S
         found = {self.intervals[-1].phase: max(0.0, rest_s)}
         for one in self.intervals:
