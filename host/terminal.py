@@ -47,16 +47,19 @@ def progress_bar() -> bars.Progress:
     )
 
 
-def progress(items: Iterable[T], total: int, label: str, *, quiet: bool = False) -> Iterator[T]:
+def progress(
+    items: Iterable[T], total: int, label: str, *, quiet: bool = False, before: int = 0
+) -> Iterator[T]:
     """Pass ``items`` through with a bar, unless ``quiet``; it may be inside another's loop.
 
-    Off a terminal there is a line every `EVERY_S` of wall time instead.
+    The first ``before`` of them were done before, and tell nothing about the rate. Off a terminal
+    there is a line every `EVERY_S` of wall time instead.
     """
     if quiet:
         yield from items
         return
     if not _errors.is_terminal:
-        yield from _told(items, total, label)
+        yield from _told(items, total, label, before)
         return
     with _shown_bar() as bar:
         task = bar.add_task(label, total=total)
@@ -82,13 +85,13 @@ def _shown_bar() -> Iterator[bars.Progress]:
             _open.clear()
 
 
-def _told(items: Iterable[T], total: int, label: str) -> Iterator[T]:
+def _told(items: Iterable[T], total: int, label: str, before: int) -> Iterator[T]:
     """Pass ``items`` through; a thread says how far it is, as one may take long."""
     done, over, begun = 0, Event(), monotonic()
 
     def tell() -> None:
         while not over.wait(EVERY_S):
-            rate = done / (monotonic() - begun)
+            rate = max(0, done - before) / (monotonic() - begun)
             rest = f", {rate:.3g}/s, {(total - done) / rate:.0f} s left" if rate else ""
             say(f"{label}: {done} of {total}{rest}")
 

@@ -92,9 +92,10 @@ def run(args: argparse.Namespace) -> int:
     plan = Plan.read(path)
     folder = Folder.begun(args.out or campaigns.default_folder(path), plan, resume=args.resume)
     total, done = campaigns.count(plan), 0
+    before = sum(1 for _ in folder.rows())
     rows = campaigns.run(folder, args.workers or cores(), args.scheduler)
     try:
-        for _ in progress(rows, total, "measuring", quiet=args.json):
+        for _ in progress(rows, total, "measuring", quiet=args.json, before=before):
             done += 1
     except (KeyboardInterrupt, OSError):
         say(f"{done} of {total} results are in {folder.path}; --resume goes on")
