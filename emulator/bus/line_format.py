@@ -94,6 +94,9 @@ class Character(NamedTuple):
     parity_error: bool
 
 
+_HALF = Fraction(1, 2)
+
+
 class LineSampler:
     """A receiver at one end of a line whose other end may have another format.
 
@@ -124,15 +127,17 @@ class LineSampler:
 
     def next_ps(self) -> int | None:
         """When the next character will have been found if nothing more is put; None if none."""
+        if not self._edges:  # a quiet line, asked after each byte
+            return None
         found = self._next(0)
         return None if found is None else found.time_ps
 
     def _next(self, known_ps: int) -> Character | None:
         """The next character; noise that has ended by ``known_ps`` is forgotten."""
-        form, half, from_ps = self._form, Fraction(1, 2), self._from_ps
+        form, from_ps = self._form, self._from_ps
         count = 1 + form.data_bits + (form.parity != "N")
         while (start_ps := self._falling_edge(from_ps)) is not None:
-            times = [start_ps + form.after_ps(bit + half) for bit in range(count + 1)]
+            times = [start_ps + form.after_ps(bit + _HALF) for bit in range(count + 1)]
             start, *data, stop = self._sample(times)
             if start:
                 from_ps = times[0]

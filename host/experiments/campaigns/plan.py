@@ -22,8 +22,8 @@ from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import MEASURE, board_options, experiment_of, measure
 from cubestack.host.options import whole
 
-FRAMES = 25
-"""Frames of a block: a device is powered up once for so many."""
+FRAMES = 100
+"""Frames of a block: a device is powered up, and its threshold searched, once for so many."""
 
 DECIDED = ("frames", "seed")
 """Options of `measure` that the plan decides."""
