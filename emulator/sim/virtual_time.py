@@ -63,14 +63,12 @@ class Kernel(simpy.Environment):
         """
         if time_ps <= self._now:
             return
-        if "step" in vars(self):  # somebody stands before each step, and may hold this one
-            arrival = _Arrival(self, time_ps)
-            while not arrival.processed:
-                self.step()
+        if self.peek() >= time_ps and "step" not in vars(self):
+            self._now = time_ps  # nothing happens before, and nobody stands before each step
             return
-        while self.peek() < time_ps:
+        arrival = _Arrival(self, time_ps)  # what looks ahead meanwhile stops there
+        while not arrival.processed:
             self.step()
-        self._now = time_ps
 
 
 class _Arrival(simpy.Event):

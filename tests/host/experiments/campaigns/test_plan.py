@@ -13,6 +13,7 @@ TEXT = """
 device = "cubestar"
 frames = 100
 seed = 1
+block = 25
 [options]
 profile = "extended"
 [grid]
