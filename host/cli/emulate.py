@@ -28,6 +28,7 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, open_ports
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.options import flag
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import progress, say
@@ -42,9 +43,6 @@ ONE_DEVICE = (
     *("gdb", "gdb_wait", "profile_out", "coverage_out"),
 )
 """Options that belong to one device."""
-
-TOKEN = "CUBESTACK_TOKEN"
-"""Variable of the environment with the control port's token."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

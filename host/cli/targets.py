@@ -6,6 +6,7 @@ from pathlib import Path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.device_options import add_board_arguments, given_options, tell_notices
 from cubestack.host.devices.registry import device_names
+from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.devices.targets import FORMS, Target, open_target
 from cubestack.host.terminal import say
 
@@ -21,6 +22,9 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--baud", type=whole(1), help="of the serial line")
     parser.add_argument("--scene", type=Path, metavar="FILE", help="of an emulated device")
     parser.add_argument("--seed", type=whole(0), default=0, help="of an emulated device")
+    parser.add_argument(
+        "--control", metavar="URL", help=f"control port of its emulation; its token in ${TOKEN}"
+    )
     add_board_arguments(parser)
     parser.add_argument("--record", type=Path, metavar="FILE", help="what is said, to a recording")
 
@@ -37,6 +41,7 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
         scene=args.scene,
         seed=args.seed,
         record=args.record,
+        control=args.control,
         options=options,
     )
     if target.device is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from cubestack.firmware_model.formats.recording import Control
 from cubestack.firmware_model.formats.setup import Document
@@ -15,6 +15,52 @@ CLEAR = "clear"
 
 TIMES = ("at_s", "for_s")
 """When a fault begins, and how long it lasts."""
+
+
+class Controls(Protocol):
+    """What can be done to an emulated device past its ports, wherever it is emulated.
+
+    Attributes:
+        channels: supply channels.
+        faults: what ``fault`` takes: kind and target, and `CLEAR`.
+        fault_parameters: names of parameters by kind.
+    """
+
+    channels: tuple[str, ...]
+    faults: tuple[str, ...]
+    fault_parameters: Mapping[str, tuple[str, ...]]
+
+    def fault(self, words: list[str]) -> None:
+        """Let something break; ValueError for what is not in ``faults``."""
+
+    def fault_log(self) -> list[str]:
+        """A line for each thing that faults have done, with its virtual time."""
+
+    def scene(self, path: Path) -> None:
+        """Show the scene in a file; ValueError for one that is none."""
+
+    def currents(self) -> dict[str, float]:
+        """Supply currents in mA: all, and each channel's."""
+
+    def switch(self, channel: str, on: bool) -> None:
+        """Switch a channel; ValueError for an unknown one."""
+
+    def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
+        """Words of the processor that runs own firmware, with a text each, by name.
+
+        ValueError for what is not there.
+        """
+
+    def time_s(self) -> float:
+        """Virtual time."""
+
+    def advance(self, seconds: float) -> None:
+        """Let virtual time pass."""
+
+
+def spoken(kinds: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Words of ``fault`` for all kinds at their targets."""
+    return (*(f"{kind} {target}" for kind, at in kinds.items() for target in at), CLEAR)
 
 
 class EmulatedControls:
@@ -34,10 +80,7 @@ class EmulatedControls:
         board = self._board = emulated.board
         self.channels = tuple(board.power.table.channels)
         kinds = board.faults.kinds()
-        self.faults = (
-            *(f"{kind} {target}" for kind, targets in kinds.items() for target in targets),
-            CLEAR,
-        )
+        self.faults = spoken(kinds)
         self.fault_parameters: Mapping[str, tuple[str, ...]] = {
             kind: (*FAULTS[kind].parameters(), *TIMES[: 1 if FAULTS[kind].momentary else 2])
             for kind in kinds

@@ -27,11 +27,12 @@ from cubestack.host.clients.contract import Client
 from cubestack.host.clients.i2c import I2cBus, I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient, RegisterLine
-from cubestack.host.devices.controls import EmulatedControls
+from cubestack.host.devices.controls import Controls, EmulatedControls
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.emulated import node_client, open_device
 from cubestack.host.devices.records import create_file, start_recorder
 from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.devices.remote_controls import controlled
 from cubestack.host.errors import PortOpenError, TargetError
 from cubestack.host.recording.host_recorder import HostRecorder
 from cubestack.host.recording.playback import RecordedI2c, RecordedTransport
@@ -71,7 +72,7 @@ class Target:
     line: Transport | None = None
     registers: RegisterClient | None = None
     service_port: Transport | None = None
-    controls: EmulatedControls | None = None
+    controls: Controls | None = None
     device: AnyDevice | None = None
     on_close: list[Callable[[], None]] = field(default_factory=list)
 
@@ -99,6 +100,7 @@ def open_target(
     scene: Path | None = None,
     seed: int = 0,
     record: Path | None = None,
+    control: str | None = None,
     options: Mapping[str, Any] | None = None,
 ) -> Target:
     """Open the target that ``text`` names.
@@ -113,6 +115,7 @@ def open_target(
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.
         record: file for a recording of what is said; of an emulated device, at its pins.
+        control: control port of the process that emulates the device.
         options: of an emulated device's board, its profile among them.
 
     Raises:
@@ -123,6 +126,10 @@ def open_target(
     """
     if backup and text.startswith((EMULATED, RECORDED, I2C)):
         raise TargetError(f"--backup is for a serial line, not for {text}")
+    if control is not None and text.startswith((EMULATED, RECORDED)):
+        raise TargetError(
+            f"--control is for a device that another process emulates, not for {text}"
+        )
     if text.startswith(EMULATED):
         if service_port is not None:
             raise TargetError(f"{text} has its bench protocol already: leave out --bench")
@@ -136,7 +143,10 @@ def open_target(
         if text.startswith(RECORDED):
             target = _open_recorded(text)
         else:
-            target = _open_real(text, device, service_port, backup, baud, tape)
+            controls = None if control is None else controlled(control, device)
+            owner = device if controls is None else controls.device
+            target = _open_real(text, owner, service_port, backup, baud, tape)
+            target.controls = controls
         target.on_close.insert(0, stack.pop_all().close)
         return target
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from cubestack.host.devices.controls import EmulatedControls
+from cubestack.host.devices.controls import Controls
 from cubestack.host.devices.targets import Target
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
 
@@ -74,6 +74,6 @@ class ControlCommands:
         return Result(rows, {"values": {name: value for name, (value, _) in found.items()}})
 
     @property
-    def _controls(self) -> EmulatedControls:
+    def _controls(self) -> Controls:
         assert self.target.controls is not None  # else the shell has refused
         return self.target.controls

@@ -59,7 +59,7 @@ class Shell:
         command = self.commands[name]
         if command.emulated_only and self.target.controls is None:
             where = f"{self.target.name} is not emulated here"
-            raise ShellError(f"{name}: {where}: use emulated:DEVICE")
+            raise ShellError(f"{name}: {where}: use emulated:DEVICE, or --control URL")
         return command.run(arguments)
 
     def complete(self, line: str) -> list[str]:

@@ -1,0 +1,83 @@
+"""The shell's controls reach a device that another process emulates."""
+
+from pathlib import Path
+
+import pytest
+
+from cubestack.host.devices.controls import Controls, EmulatedControls
+from cubestack.host.devices.remote_controls import TOKEN as VARIABLE
+from cubestack.host.devices.remote_controls import ControlClient, RemoteControls, controlled
+from cubestack.host.errors import PortOpenError, TargetError
+
+from .conftest import TOKEN, Controlled
+
+
+@pytest.fixture
+def remote(controlled: Controlled) -> RemoteControls:
+    return RemoteControls(ControlClient(controlled.serving.url, TOKEN), "cubestar")
+
+
+def test_they_offer_what_a_device_in_this_process_does(
+    controlled: Controlled, remote: RemoteControls
+) -> None:
+    own: Controls = EmulatedControls(controlled.emulated)
+    assert (remote.channels, remote.faults) == (own.channels, own.faults)
+    assert remote.fault_parameters == own.fault_parameters
+    controlled.ask("POST", "/pause")
+    assert remote.currents() == own.currents()
+    assert remote.time_s() == pytest.approx(own.time_s())
+
+
+def test_they_do_what_is_asked(
+    controlled: Controlled, remote: RemoteControls, tmp_path: Path
+) -> None:
+    controlled.ask("POST", "/pause")
+    before_s = remote.time_s()
+    remote.fault(["processor-reset"])
+    remote.advance(2.5)
+    assert remote.time_s() == pytest.approx(before_s + 2.5)
+    assert "processor-reset" in remote.fault_log()[0]
+    assert controlled.ask("GET", "/state")[1]["held"]
+    remote.switch("imager", False)
+    assert remote.currents()["imager"] == 0.0
+    scene = tmp_path / "sky.toml"
+    scene.write_text('kind = "sky"\nra_deg = 1.0\ndec_deg = 2.0\nroll_deg = 3.0\n', "utf-8")
+    seen = controlled.emulated.scene
+    remote.scene(scene)
+    assert controlled.emulated.scene is not seen
+    with pytest.raises(TargetError, match="no channel .nobody."):
+        remote.switch("nobody", True)
+    with pytest.raises(ValueError, match="only where the device is emulated in this process"):
+        remote.peek("CMU")
+
+
+def test_time_goes_on_if_it_did(controlled: Controlled, remote: RemoteControls) -> None:
+    remote.advance(100.0)
+    assert not controlled.ask("GET", "/state")[1]["held"]
+
+
+def test_the_token_is_that_of_the_environment(
+    controlled: Controlled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found_at = controlled.serving.url
+    monkeypatch.setenv(VARIABLE, TOKEN)
+    assert controlled_device(found_at) == "cubestar"
+    monkeypatch.setenv(VARIABLE, "another")
+    with pytest.raises(PortOpenError, match=f"wants its token in .{VARIABLE}"):
+        controlled_device(found_at)
+
+
+def controlled_device(url: str) -> str:
+    return controlled(url).device
+
+
+@pytest.mark.parametrize("url", ["nonsense", "http://127.0.0.1", "http://127.0.0.1:99999", ""])
+def test_what_is_no_address_is_told(url: str) -> None:
+    with pytest.raises(TargetError, match="is no control port"):
+        ControlClient(url, "")
+
+
+def test_nobody_there_is_told(controlled: Controlled) -> None:
+    host, port = controlled.serving.address
+    with pytest.raises(PortOpenError, match="no control port answers"):
+        ControlClient(f"http://{host}:{port ^ 1}", TOKEN).ask("GET", "/")
