@@ -173,6 +173,10 @@ class Board(ABC):
         """What a trace shows of the firmware, as it is now, by name."""
         return {"awake": int(not self.processor.dozing), "resets": self.processor.resets}
 
+    def pictures(self) -> dict[str, NDArray[np.uint8]]:
+        """What the memories with pictures hold, each (rows, columns), by memory; live views."""
+        return {}
+
     def tell(self, say: Callable[[str], None]) -> None:
         """Give ``say`` what own firmware prints by debug channels, and reports of its faults."""
         del say  # a modelled program has none

@@ -18,6 +18,7 @@ DONE, FAILED, WRONG_CALL = 0, 1, 2
 #: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).
 COMMANDS = {
     "demo": "show the devices end to end, with pictures (what `make run` does)",
+    "ground": "a page in the browser: see, command and disturb a device",
     "emulate": "serve an emulated device on serial ports until Ctrl-C",
     "run": "run an unmodified program that sees an emulated I2C bus",
     "measure": "scene in, attitude or directions out: each result beside the truth",

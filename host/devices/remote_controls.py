@@ -15,6 +15,9 @@ from cubestack.host.recording.setups import read_document
 TOKEN = "CUBESTACK_TOKEN"
 """Variable of the environment with the control port's token."""
 
+HTTP_ERRORS = 400
+"""The first status of one."""
+
 TIMEOUT_S = 60.0
 """Wall time: a run to a time far away takes as long as it does."""
 
@@ -39,24 +42,30 @@ class ControlClient:
 
         Raises ValueError for what makes no sense there, TransportError when nobody answers.
         """
+        told: dict[str, Any] = json.loads(self.fetch(method, path, body))
+        return told
+
+    def fetch(self, method: str, path: str, body: object = None) -> bytes:
+        """The answer as it is; raises as ``ask`` does."""
         connection = http.client.HTTPConnection(*self._address, timeout=TIMEOUT_S)
         try:
             connection.request(
                 method, path, None if body is None else json.dumps(body), self._headers
             )
             answer = connection.getresponse()
-            told: dict[str, Any] = json.loads(answer.read())
+            content = answer.read()
+            error = json.loads(content).get("error", "") if answer.status >= HTTP_ERRORS else ""
         except ConnectionRefusedError:
             raise PortOpenError(f"no control port answers at {self.url}") from None
-        except (OSError, http.client.HTTPException, ValueError) as error:
-            raise TransportError(f"{self.url}{path}: {error or type(error).__name__}") from None
+        except (OSError, http.client.HTTPException, ValueError) as failure:
+            raise TransportError(f"{self.url}{path}: {failure or type(failure).__name__}") from None
         finally:
             connection.close()
         if answer.status == http.client.UNAUTHORIZED:
             raise PortOpenError(f"{self.url} wants its token in ${TOKEN}")
-        if "error" in told:
-            raise TargetError(str(told["error"]))
-        return told
+        if error:
+            raise TargetError(str(error))
+        return content
 
 
 class RemoteControls:

@@ -13,6 +13,7 @@ from http import HTTPStatus
 from importlib.metadata import version
 from typing import Any, TypeVar
 
+import numpy as np
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -22,6 +23,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cubestack.host.ground.emulation import Emulation, JsonObject
 from cubestack.host.ground.guard import TooLargeError, refused
+from cubestack.host.pictures.images import png
 
 T = TypeVar("T")
 
@@ -124,6 +126,8 @@ CALLS = (
     ),
     Call("GET", "/devices/{device}", "ports, faults and channels that it has", Emulation.about),
     Call("GET", "/devices/{device}/log", "what faults have done", Emulation.log),
+    Call("GET", "/devices/{device}/pictures", "those in its memories", Emulation.pictures),
+    Call("GET", "/devices/{device}/pictures/{name}", "one, as PNG", Emulation.picture),
     Call(
         *("POST", "/devices/{device}/act", "what the shell's fault, scene and power do"),
         _act,
@@ -160,6 +164,8 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
         if isinstance(found, Future):
             await asyncio.wrap_future(found)
             found = await _asked(emulation, emulation.state)
+        if isinstance(found, np.ndarray):
+            return Response(await asyncio.to_thread(png, found), media_type="image/png")
         return JSONResponse(found)
     except TooLargeError as error:
         return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)

@@ -4,6 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cubestack.firmware_model.formats.recording import Control
 from cubestack.host.devices.controls import EmulatedControls
@@ -32,6 +36,11 @@ class Emulation:
     port: "ControlPort"
     emulated: Sequence[AnyEmulated]
     ports: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Nothing has been looked at."""
+        self._known: dict[tuple[str, str], int] = {}
+        self._changes: dict[tuple[str, str], float] = {}
 
     @cached_property
     def _controls(self) -> dict[str, EmulatedControls]:
@@ -81,6 +90,25 @@ class Emulation:
         self._of(device)
         lines = self._controls[device].fault_log()
         return {"log": lines[max(0, since) :], "count": len(lines)}
+
+    def pictures(self, device: str) -> JsonObject:
+        """Pictures in its memories, and when each was found to be another one than before."""
+        found = {}
+        for name, picture in self._of(device).board.pictures().items():
+            key, known = (device, name), crc32(picture.tobytes())
+            if self._known.get(key) != known:
+                self._known[key] = known
+                self._changes[key] = self.port.kernel.now / PS_PER_S
+            rows, columns = picture.shape
+            found[name] = {"rows": rows, "columns": columns, "changed_s": self._changes[key]}
+        return {"pictures": found}
+
+    def picture(self, device: str, name: str) -> NDArray[np.uint8]:
+        """A copy of one of them; TargetError for one that there is not."""
+        pictures = self._of(device).board.pictures()
+        if name not in pictures:
+            raise TargetError(f"no picture {name!r}; there is {', '.join(pictures) or 'none'}")
+        return pictures[name].copy()
 
     def act(self, device: str, words: Sequence[str], text: str = "") -> None:
         """Do what the shell does with such words; ``text`` of a file that they name.

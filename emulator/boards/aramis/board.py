@@ -30,12 +30,12 @@ from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
 from cubestack.firmware_model.aramis.hardware import FrameEnd
-from cubestack.firmware_model.aramis.memory import FLASH_BYTES, SDRAM_BYTES
+from cubestack.firmware_model.aramis.memory import FLASH_BYTES, PICTURES_AT, SDRAM_BYTES
 from cubestack.firmware_model.aramis.program import AramisProgram
-from cubestack.firmware_model.interface.aramis import INTERFACE, ResetCause
+from cubestack.firmware_model.interface.aramis import IMAGE_BYTES, INTERFACE, ResetCause
 from cubestack.firmware_model.interface.aramis.codes import MeasurementOutcome, SensorState
 from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES, AramisSwitches
-from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS, ROWS
+from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, REGISTERS, ROWS
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
@@ -160,6 +160,13 @@ class AramisBoard(Board):
         if not 0 <= age < len(self._frames):
             return None
         return self.scene.truth(self._frames[-1 - age].mid_exposure_ps((ROWS - 1) / 2))
+
+    def pictures(self) -> dict[str, NDArray[np.uint8]]:
+        """See ``Board``."""
+        return {
+            f"picture {place}": self.sdram[at : at + IMAGE_BYTES].reshape(ROWS, COLUMNS)
+            for place, at in enumerate(PICTURES_AT)
+        }
 
     def irradiate(self, memory: Literal["flash", "sdram"], rate: float) -> int:
         """Turn over each bit of the catalogue's flash or of the SDRAM with probability ``rate``.

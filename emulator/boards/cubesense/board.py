@@ -7,6 +7,9 @@ microcontroller for both, its buses to the satellite, and its switches and curre
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cubestack.emulator.boards.contract import Board
 from cubestack.emulator.boards.cubesense.gpio import GpioPins
 from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
@@ -26,7 +29,7 @@ from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
-from cubestack.firmware_model.interface.cubesense.codes import ROWS, Camera, Sram
+from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OUTS, Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS, ENABLE
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
@@ -44,6 +47,9 @@ BOOT_US = 1_000
 
 HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
 """Name of each half's camera and memory in the engine, and of its parts in the power table."""
+
+ROW_BYTES = 1024
+"""Of a memory; a power of two, as addresses are row and column."""
 
 STORING = (Action.STORE, Action.STORE_OTHER)
 CLOCKED = (*STORING, Action.SEND_PICTURE)
@@ -179,6 +185,13 @@ class CubeSenseBoard(Board):
                 for camera, half in HALVES.items()
             },
         )
+
+    def pictures(self) -> dict[str, NDArray[np.uint8]]:
+        """See ``Board``; a row has a place for 1024 pixels."""
+        return {
+            f"memory {name}": memory.reshape(-1, ROW_BYTES)[:ROWS, :COLUMNS]
+            for name, memory in self.engine.memories.items()
+        }
 
     def truth(self, camera: Camera) -> SensorTruth | None:
         """What ``camera`` should have measured at mid-exposure of the stored frame's middle row.

@@ -25,7 +25,7 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES
-from cubestack.firmware_model.interface.cameras.mlx75412 import ROWS
+from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 
@@ -102,6 +102,15 @@ class CubeStarStack(Board):
             cameras={"imager": CameraSite(self.camera, self.camera.power, "imager")},
             memories={"external": self.external_ram} if self.layout.external_ram else {},
         )
+
+    def pictures(self) -> dict[str, NDArray[np.uint8]]:
+        """See ``Board``; the banks of a memory apart."""
+        found = {}
+        for name, memory in self.engine.memories.items():
+            banks = memory[: memory.size // (ROWS * COLUMNS) * ROWS * COLUMNS]
+            for number, bank in enumerate(banks.reshape(-1, ROWS, COLUMNS)):
+                found[f"{name}, bank {number}"] = bank
+        return found
 
     def _camera_changed(self) -> None:
         self.engine.stream_changed()

@@ -1,0 +1,121 @@
+"""A target that pages look at: opened once, asked by one thread, in the shell's words."""
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeVar
+
+from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.host.devices.remote_controls import RemoteControls
+from cubestack.host.devices.targets import Target
+from cubestack.host.errors import HostError
+from cubestack.host.export.field_text import field_details, field_json, picked
+from cubestack.host.shell.language import Shell
+from cubestack.host.shell.names import Names
+from cubestack.host.shell.result import ShellError
+
+T = TypeVar("T")
+
+JsonObject = dict[str, Any]
+
+FROM_A_PAGE = ("read", "write", "dump", "list", "bench", "raw", "fault", "power", "time", "help")
+"""Commands of the shell that touch no file of this machine, and end."""
+
+LONGEST_LINE = 10_000
+
+
+@dataclass
+class Link:
+    """How the link to a target is: requests, and those that failed; the last failure."""
+
+    requests: int = 0
+    failed: int = 0
+    error: str = ""
+
+
+class Desk:
+    """Attributes:
+    target: that is looked at.
+    link: how its link is.
+    """
+
+    def __init__(self, target: Target) -> None:
+        """Look at ``target``, which is closed with this."""
+        self.target, self.link = target, Link()
+        self._shell = Shell(target)
+        self._thread = ThreadPoolExecutor(1, "target")
+
+    @cached_property
+    def about(self) -> JsonObject:
+        """What it is, what can be asked and commanded, and what can not, with the reason."""
+        target, interface = self.target, self.target.interface
+        controls = target.controls
+        missing = {} if controls else {"controls": f"{target.name} is not emulated here"}
+        if target.line is None:
+            missing["raw"] = f"{target.name} is no serial line"
+        if target.service_port is None:
+            missing["bench"] = "no line with the bench protocol is open"
+        return {
+            "name": target.name,
+            "device": interface.name,
+            "telemetries": [_message(one) for one in interface.telemetries],
+            "telecommands": [_message(one) for one in interface.telecommands],
+            "registers": [one.name for one in Names(target).registers],
+            "faults": list(controls.faults) if controls else [],
+            "fault_parameters": dict(controls.fault_parameters) if controls else {},
+            "channels": list(controls.channels) if controls else [],
+            "missing": missing,
+        }
+
+    @property
+    def controls(self) -> RemoteControls | None:
+        """Those of its emulation in another process."""
+        controls = self.target.controls
+        return controls if isinstance(controls, RemoteControls) else None
+
+    def do(self, line: str) -> "Future[JsonObject]":
+        """What a line of the shell gives: ``rows`` for a reader, and ``data``.
+
+        Its exception: ShellError, InterfaceError, HostError.
+        """
+        return self._thread.submit(self._asked, lambda: self._do(line))
+
+    def read(self, names: Iterable[str]) -> "Future[JsonObject]":
+        """Telemetry by name: what it has, or the ``error`` in place of it."""
+        return self._thread.submit(lambda: {name: self._read(name) for name in names})
+
+    def close(self) -> None:
+        """Release the target."""
+        self._thread.shutdown(cancel_futures=True)
+        self.target.close()
+
+    def _do(self, line: str) -> JsonObject:
+        if len(line) > LONGEST_LINE:
+            raise ShellError(f"a line has {LONGEST_LINE} characters at most")
+        word = line.split(maxsplit=1)[0] if line.split() else ""
+        if word in self._shell.commands and word not in FROM_A_PAGE:
+            raise ShellError(f"{word}: not from a page; there are {', '.join(FROM_A_PAGE)}")
+        result = self._shell.execute(line)
+        return {"rows": result.rows if result else [], "data": result.data if result else {}}
+
+    def _read(self, name: str) -> JsonObject:
+        try:
+            return dict(self._asked(lambda: self._do(f"read {name}"))["data"]["values"])
+        except (HostError, ValueError) as error:
+            return {"error": str(error)}
+
+    def _asked(self, act: Callable[[], T]) -> T:
+        self.link.requests += 1
+        try:
+            return act()
+        except HostError as error:
+            self.link.failed += 1
+            self.link.error = str(error)
+            raise
+
+
+def _message(one: Message) -> JsonObject:
+    fields = [{**field_json(f), "details": field_details(f)} for f in one.fields]
+    about = picked(one, "id", "name", "meaning", "supported", "extension")
+    return about | {"changes": one.has_side_effect, "fields": fields}

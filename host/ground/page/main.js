@@ -1,0 +1,85 @@
+// The page: which target is looked at, and what the parts of the page have to do with each other.
+
+import { Commands } from "./commands.js";
+import { make } from "./dom.js";
+import { Emulation } from "./emulation.js";
+import { Pictures } from "./picture.js";
+import { ask, listen } from "./server.js";
+import { Telemetry } from "./telemetry.js";
+
+const KEPT_LINES = 500;
+
+const parts = ["picture", "emulation", "commands", "telemetry"];
+const lines = document.getElementById("lines");
+const link = document.getElementById("link");
+let live = null;
+
+function tell(text, kind = "") {
+  const time = new Date().toLocaleTimeString();
+  lines.prepend(make("li", { className: kind, textContent: `${time} ${text}` }));
+  while (lines.children.length > KEPT_LINES) lines.lastChild.remove();
+}
+
+async function told(what, asked) {
+  try {
+    const answer = await asked;
+    const rows = (answer.rows ?? []).map(([name, text]) => (name ? `${name}: ${text}` : text));
+    tell([what, ...rows].join("\n  "), "good");
+    return answer;
+  } catch (error) {
+    tell(`${what}\n  ${error.message}`, "bad");
+    return null;
+  }
+}
+
+function look(number, targets) {
+  live?.close();
+  const about = targets[number];
+  document.title = `${about.device} – cubestack`;
+  for (const part of parts) {
+    const place = document.getElementById(part);
+    place.replaceChildren(place.querySelector("h2"));
+  }
+  const place = (part) => document.getElementById(part);
+  const path = `/targets/${number}`;
+  const act = (line) => told(line, ask(`${path}/do`, { line }));
+  const steer = (call, body) => told(call, ask(`${path}/${call}`, body));
+  const wanted = [];
+  new Commands(place("commands"), about, act);
+  const emulation = new Emulation(place("emulation"), about, steer, act);
+  const pictures = new Pictures(place("picture"), about, `${path}/pictures`);
+  const telemetry = new Telemetry(place("telemetry"), about, (names) => {
+    wanted.splice(0, wanted.length, ...names);
+    live?.want({ show: wanted });
+  });
+  live = listen(
+    `${path}/live`,
+    (message) => {
+      const { requests, failed, error } = message.link;
+      link.className = failed ? "bad" : "";
+      link.textContent = `${about.name}: ${requests} requests, ${failed} failed ${error}`.trim();
+      if (message.values) telemetry.hear(message.values);
+      if (message.pictures) pictures.hear(message.pictures);
+      if (message.emulation) emulation.hear(message.emulation);
+      for (const line of message.log ?? []) tell(line);
+    },
+    () => {
+      link.className = "bad";
+      link.textContent = "the program behind this page has gone; waiting for it";
+    },
+  );
+  live.want({ show: wanted });
+  for (const [index, button] of [...document.getElementById("targets").children].entries())
+    button.setAttribute("aria-current", String(index === number));
+}
+
+async function start() {
+  const targets = await ask("/targets");
+  const buttons = targets.map((about, number) =>
+    make("button", { textContent: about.device, onclick: () => look(number, targets) }),
+  );
+  document.getElementById("targets").replaceChildren(...buttons);
+  look(0, targets);
+}
+
+start().catch((error) => tell(error.message, "bad"));

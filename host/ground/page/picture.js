@@ -1,0 +1,80 @@
+// The pictures in an emulation's memories: the newest by itself, brightened as one likes.
+
+import { choose, labelled, make } from "./dom.js";
+
+export class Pictures {
+  // `path` leads to the pictures by name.
+  constructor(place, about, path) {
+    this.path = path;
+    this.known = {};
+    this.bitmap = null;
+    this.name = choose([], { id: "picture-name", onchange: () => this.fetch() });
+    this.newest = make("input", { type: "checkbox", checked: true, id: "newest" });
+    const stretch = { type: "range", min: 0, max: 1, step: 0.02, value: 0.6, id: "stretch" };
+    this.stretch = make("input", { ...stretch, oninput: () => this.draw() });
+    this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
+    this.canvas.onmousemove = (event) => this.point(event);
+    this.value = make("p", { className: "quiet", textContent: "no picture yet" });
+    place.append(
+      make(
+        "div",
+        { className: "row" },
+        labelled("memory", this.name),
+        labelled("the newest", this.newest, { className: "beside" }),
+        labelled("brightness", this.stretch),
+      ),
+      this.canvas,
+      this.value,
+    );
+    if (about.missing.controls) this.value.textContent = about.missing.controls;
+  }
+
+  hear(pictures) {
+    const names = Object.keys(pictures);
+    if (names.length !== this.name.options.length)
+      this.name.replaceChildren(...names.map((name) => make("option", { textContent: name })));
+    const changed = names.filter((name) => pictures[name].changed_s !== this.known[name]);
+    const at = (name) => pictures[name].changed_s;
+    if (changed.length && this.newest.checked)
+      this.name.value = changed.reduce((a, b) => (at(b) > at(a) ? b : a));
+    for (const name of changed) this.known[name] = at(name);
+    if (changed.includes(this.name.value)) this.fetch();
+  }
+
+  async fetch() {
+    const name = this.name.value;
+    const answer = await fetch(`${this.path}/${encodeURIComponent(name)}`);
+    if (!answer.ok) return;
+    const bitmap = await createImageBitmap(await answer.blob());
+    const from = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+    from.drawImage(bitmap, 0, 0);
+    this.pixels = from.getImageData(0, 0, bitmap.width, bitmap.height);
+    this.canvas.width = bitmap.width;
+    this.canvas.height = bitmap.height;
+    this.canvas.setAttribute("aria-label", `${name}, ${bitmap.width} x ${bitmap.height}`);
+    this.value.textContent = `${name}: ${bitmap.width} x ${bitmap.height}, at ${this.known[name]} s`;
+    this.draw();
+  }
+
+  draw() {
+    if (!this.pixels) return;
+    const gamma = 1 - 0.9 * Number(this.stretch.value);
+    const table = Uint8ClampedArray.from({ length: 256 }, (_, v) => 255 * (v / 255) ** gamma);
+    const shown = new ImageData(this.pixels.width, this.pixels.height);
+    for (let at = 0; at < shown.data.length; at += 4) {
+      shown.data.fill(table[this.pixels.data[at]], at, at + 3);
+      shown.data[at + 3] = 255;
+    }
+    this.canvas.getContext("2d").putImageData(shown, 0, 0);
+  }
+
+  point(event) {
+    if (!this.pixels) return;
+    const { width, height } = this.pixels;
+    const box = this.canvas.getBoundingClientRect();
+    const column = Math.floor(((event.clientX - box.left) / box.width) * width);
+    const row = Math.floor(((event.clientY - box.top) / box.height) * height);
+    const value = this.pixels.data[4 * (row * width + column)];
+    this.value.textContent = `column ${column}, row ${row}: ${value}`;
+  }
+}

@@ -1,0 +1,143 @@
+// Telemetry frames as they come in, and any number in them over time.
+
+import { choose, labelled, make } from "./dom.js";
+import uPlot from "./vendor/uPlot.esm.js";
+
+const KEPT = 3600; // points of a plot: an hour at one a second
+
+const COLOURS = ["#2f81f7", "#d29922", "#3fb950", "#db61a2", "#a371f7", "#f0883e"];
+
+export class Telemetry {
+  // `want(names)` says which frames are to be read again and again.
+  constructor(place, about, want) {
+    this.byName = new Map(
+      about.telemetries.filter((one) => one.supported).map((one) => [one.name, one]),
+    );
+    this.want = want;
+    this.cells = new Map();
+    this.plotted = [];
+    this.times = [];
+    this.name = choose([...this.byName.keys()], { id: "frame", onchange: () => this.show() });
+    this.meaning = make("p", { className: "quiet" });
+    this.table = make("tbody");
+    this.figure = make("div", { id: "plot" });
+    place.append(
+      make("div", { className: "row" }, labelled("frame", this.name)),
+      this.meaning,
+      make("table", {}, this.table),
+      this.figure,
+    );
+    new ResizeObserver(() => this.fit()).observe(this.figure);
+    this.show();
+  }
+
+  // The frames that are shown or plotted.
+  names() {
+    return [...new Set([this.name.value, ...this.plotted.map((one) => one.frame)])];
+  }
+
+  show() {
+    const one = this.byName.get(this.name.value);
+    if (!one) return;
+    const note = one.changes ? "; reading it changes something" : "";
+    this.meaning.textContent = `${one.id}: ${one.meaning}${note}`;
+    this.cells.clear();
+    const rows = one.fields.map((field) => {
+      const value = make("td", { className: "value", textContent: "–" });
+      this.cells.set(field.name, value);
+      const number = !field.type.startsWith("bytes");
+      const plot = make("input", {
+        type: "checkbox",
+        checked: this.plotted.some((p) => p.frame === one.name && p.field.name === field.name),
+        onchange: () => this.toggle(one.name, field, plot.checked),
+        title: `plot ${field.name}`,
+        disabled: !number,
+      });
+      const name = make("th", { scope: "row", title: field.details, textContent: field.name });
+      return make(
+        "tr",
+        {},
+        name,
+        value,
+        make("td", { className: "quiet", textContent: field.unit }),
+        make("td", {}, labelled("plot", plot, { className: "beside" })),
+      );
+    });
+    this.table.replaceChildren(...rows);
+    this.want(this.names());
+  }
+
+  toggle(frame, field, on) {
+    this.plotted = this.plotted.filter((p) => p.frame !== frame || p.field !== field);
+    if (on) this.plotted.push({ frame, field, values: this.times.map(() => null) });
+    this.want(this.names());
+    this.draw();
+  }
+
+  hear(values) {
+    const shown = values[this.name.value];
+    const one = this.byName.get(this.name.value);
+    if (shown && one) {
+      for (const field of one.fields) {
+        const cell = this.cells.get(field.name);
+        cell.textContent = "error" in shown ? "–" : worded(field, shown[field.name]);
+      }
+      this.meaning.classList.toggle("bad", "error" in shown);
+      this.meaning.textContent = shown.error ?? `${one.id}: ${one.meaning}`;
+    }
+    if (!this.plotted.length) return;
+    this.times.push(Date.now() / 1000);
+    for (const p of this.plotted) p.values.push(Number(values[p.frame]?.[p.field.name] ?? NaN));
+    if (this.times.length > KEPT) {
+      this.times.shift();
+      for (const p of this.plotted) p.values.shift();
+    }
+    this.draw(true);
+  }
+
+  draw(more = false) {
+    const data = [this.times, ...this.plotted.map((p) => p.values)];
+    if (more && this.plot) {
+      this.plot.setData(data);
+      return;
+    }
+    this.plot?.destroy();
+    this.plot = null;
+    if (!this.plotted.length) {
+      this.times = [];
+      return;
+    }
+    const text = getComputedStyle(document.body).color;
+    const axis = { stroke: text, grid: { stroke: "#8884", width: 1 } };
+    const units = new Set(this.plotted.map((p) => p.field.unit).filter(Boolean));
+    const series = this.plotted.map((p, index) => ({
+      label: `${p.frame}.${p.field.name}${p.field.unit ? ` [${p.field.unit}]` : ""}`,
+      stroke: COLOURS[index % COLOURS.length],
+      dash: index < COLOURS.length ? [] : [6, 4],
+      points: { size: 5 },
+    }));
+    this.plot = new uPlot(
+      {
+        width: this.figure.clientWidth || 300,
+        height: 220,
+        axes: [axis, { ...axis, label: [...units].join(", ") || "value" }],
+        series: [{}, ...series],
+      },
+      data,
+      this.figure,
+    );
+  }
+
+  fit() {
+    this.plot?.setSize({ width: this.figure.clientWidth, height: 220 });
+  }
+}
+
+function worded(field, value) {
+  if (field.choices) {
+    const name = Object.keys(field.choices).find((one) => field.choices[one] === Number(value));
+    if (name) return `${name} (${value})`;
+  }
+  if (typeof value === "number" && !Number.isInteger(value)) return value.toPrecision(7);
+  return String(value);
+}

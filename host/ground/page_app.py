@@ -1,0 +1,185 @@
+"""The page's application: targets, what is asked of them, and what they tell, live."""
+
+import asyncio
+import json
+from collections.abc import Sequence
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from cubestack.host.errors import HostError
+from cubestack.host.ground.desk import Desk, JsonObject
+from cubestack.host.ground.guard import TooLargeError, refused
+
+PAGE = Path(__file__).parent / "page"
+
+EVERY_S, SHORTEST_S, LONGEST_S = 1.0, 0.2, 60.0
+"""Between two readings of what a tab shows, unless it wants another time; and its limits."""
+
+MOST_SHOWN = 32
+"""Telemetry frames that one tab may have read again and again."""
+
+STEERING = ("pause", "resume", "step", "run", "pace")
+"""Calls of the control port that pages pass on."""
+
+
+def page_app(desks: Sequence[Desk]) -> Starlette:
+    """The application, without a guard."""
+
+    async def page(_request: Request) -> Response:
+        return FileResponse(PAGE / "index.html")
+
+    async def targets(_request: Request) -> Response:
+        return JSONResponse([desk.about for desk in desks])
+
+    def of(handler: Any) -> Any:
+        async def answer(request: Request) -> Response:
+            number = request.path_params["number"]
+            if number >= len(desks):
+                return refused(f"there is no target {number}", HTTPStatus.NOT_FOUND)
+            return await _told(handler, desks[number], request)
+
+        return answer
+
+    async def live(socket: WebSocket) -> None:
+        number = socket.path_params["number"]
+        if number >= len(desks):
+            await socket.close()
+            return
+        await _live(desks[number], socket)
+
+    return Starlette(
+        routes=[
+            Route("/", page),
+            Route("/targets", targets),
+            Route("/targets/{number:int}/pictures/{name}", of(_picture)),
+            Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
+            Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
+            Route("/targets/{number:int}/{call:str}", of(_steer), methods=["POST"]),
+            WebSocketRoute("/targets/{number:int}/live", live),
+            Mount("/page", StaticFiles(directory=PAGE)),
+        ],
+        exception_handlers={HTTPException: _not_there},
+    )
+
+
+async def _told(handler: Any, desk: Desk, request: Request) -> Response:
+    """The answer of a handler, or what is wrong in words."""
+    try:
+        body = json.loads(await request.body() or b"{}")
+        if not isinstance(body, dict):
+            raise ValueError("the body is a JSON object")
+        found = await handler(desk, body, request.path_params)
+        if isinstance(found, bytes):
+            return Response(found, media_type="image/png")
+        return JSONResponse(found)
+    except TooLargeError as error:
+        return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        return refused(f"the body is no JSON: {error}", HTTPStatus.BAD_REQUEST)
+    except HostError as error:
+        return refused(str(error), HTTPStatus.BAD_GATEWAY)
+    except ValueError as error:
+        return refused(str(error), HTTPStatus.BAD_REQUEST)
+
+
+async def _do(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
+    line = body.get("line")
+    if not isinstance(line, str):
+        raise ValueError("'line' is a line of the shell")
+    return await asyncio.wrap_future(desk.do(line))
+
+
+async def _steer(desk: Desk, body: JsonObject, path: JsonObject) -> JsonObject:
+    call = path["call"]
+    if call not in STEERING:
+        raise ValueError(f"no call {call!r}; there are {', '.join(STEERING)}")
+    return await _control(desk, "POST", f"/{call}", body)
+
+
+async def _scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
+    text = body.get("text")
+    if not isinstance(text, str):
+        raise ValueError("'text' is that of a scene file")
+    device = desk.controls.device if desk.controls else ""
+    act = {"words": ["scene", "scene.toml"], "text": text}
+    return await _control(desk, "POST", f"/devices/{device}/act", act)
+
+
+async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> bytes:
+    if desk.controls is None:
+        raise ValueError(desk.about["missing"]["controls"])
+    at = f"/devices/{desk.controls.device}/pictures/{quote(path['name'])}"
+    return await asyncio.to_thread(desk.controls.client.fetch, "GET", at)
+
+
+async def _control(desk: Desk, method: str, path: str, body: object = None) -> JsonObject:
+    if desk.controls is None:
+        raise ValueError(desk.about["missing"]["controls"])
+    return await asyncio.to_thread(desk.controls.client.ask, method, path, body)
+
+
+async def _live(desk: Desk, socket: WebSocket) -> None:
+    """Tell a tab again and again what it shows, until it is gone."""
+    await socket.accept()
+    shown, every_s, logged = list[str](), EVERY_S, 0
+    hears = asyncio.create_task(socket.receive_json())
+    try:
+        while True:
+            if hears.done():
+                shown, every_s = _wanted(hears.result(), desk)
+                hears = asyncio.create_task(socket.receive_json())
+            told: JsonObject = {"link": vars(desk.link)}
+            if shown:
+                told["values"] = await asyncio.wrap_future(desk.read(shown))
+            if desk.controls is not None:
+                told |= await asyncio.to_thread(_emulation, desk, logged)
+                logged = told.get("logged", logged)
+            await socket.send_json(told)
+            await asyncio.wait([hears], timeout=every_s)
+    except (WebSocketDisconnect, RuntimeError, ValueError):  # gone, or talks nonsense
+        pass
+    finally:
+        hears.cancel()
+
+
+def _emulation(desk: Desk, logged: int) -> JsonObject:
+    """How the emulation is, and what its faults have done since line ``logged``."""
+    assert desk.controls is not None
+    client, device = desk.controls.client, desk.controls.device
+    try:
+        state = client.ask("GET", "/state")
+        log = client.ask("GET", f"/devices/{device}/log")["log"]
+        pictures = client.ask("GET", f"/devices/{device}/pictures")["pictures"]
+    except (HostError, ValueError) as error:
+        return {"emulation": {"error": str(error)}}
+    own = state["devices"][device]
+    emulation = {name: state[name] for name in ("time_s", "held", "pace", "speed")} | own
+    seen = {"pictures": pictures, "log": log[logged:], "logged": len(log)}
+    return {"emulation": emulation, **seen}
+
+
+def _wanted(message: object, desk: Desk) -> tuple[list[str], float]:
+    """What a tab wants to be told, and how often; ValueError for nonsense."""
+    if not isinstance(message, dict):
+        raise ValueError("a tab sends objects")
+    known = {one.name for one in desk.target.interface.telemetries}
+    names = [name for name in message.get("show", []) if name in known]
+    every_s = message.get("every_s", EVERY_S)
+    if not isinstance(every_s, int | float):
+        raise ValueError("'every_s' is a number")
+    return names[:MOST_SHOWN], min(max(float(every_s), SHORTEST_S), LONGEST_S)
+
+
+async def _not_there(_request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    return refused(error.detail, HTTPStatus(error.status_code))
