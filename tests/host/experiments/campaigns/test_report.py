@@ -6,6 +6,7 @@ from collections.abc import Callable
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
@@ -127,6 +128,18 @@ def test_the_page_holds_all_and_asks_for_nothing(make: Make) -> None:
     limits = binomtest(100, FRAMES).proportion_ci(0.95, "wilson")
     assert f"100 ({100 * limits.low:.2f} to {100 * limits.high:.2f} %)" in told.cells
     assert "false_stars = 9, hazard = ('moon',)" in told.cells
+
+
+def test_a_browser_shows_it_and_asks_for_nothing_else(make: Make, chromium: Any) -> None:
+    page, *figures = report.write(make("a", some("refused", 20)))
+    tab, asked = chromium.new_page(), list[str]()
+    tab.on("request", lambda one: asked.append(one.url))
+    tab.goto(page.as_uri())
+    widths = tab.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    assert len(widths) == len(figures)
+    assert min(widths) > 400
+    assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
+    tab.close()
 
 
 def test_the_page_compares(make: Make) -> None:

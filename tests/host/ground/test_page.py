@@ -1,0 +1,158 @@
+"""The page in a real browser, at emulations of all sensors."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from cubestack.host.devices.registry import device_names
+
+SOON_MS = 30_000
+
+
+@pytest.fixture(scope="module")
+def address(chromium: Any) -> Iterator[str]:
+    targets = [f"emulated:{name}" for name in device_names()]
+    call = [sys.executable, "-m", "cubestack", "ground", *targets, "--json"]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as station:
+        assert station.stdout is not None
+        yield json.loads(station.stdout.readline())["page"]
+        station.send_signal(signal.SIGINT)
+
+
+@pytest.fixture
+def page(chromium: Any, address: str) -> Iterator[Any]:
+    page = opened(chromium, address)
+    wrong = list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda one: wrong.append(one.url) if not local(one.url) else None)
+    yield page
+    page.context.close()
+    assert not wrong
+
+
+def opened(chromium: Any, address: str, **options: Any) -> Any:
+    page = chromium.new_context(**options).new_page()
+    page.set_default_timeout(SOON_MS)
+    page.goto(address)
+    look(page, "CubeStar")
+    return page
+
+
+def look(page: Any, device: str) -> None:
+    page.click(f"nav >> text={device}")
+    page.wait_for_function("document.querySelector('#time').textContent.endsWith(' s')")
+
+
+def local(url: str) -> bool:
+    return url.startswith(("http://127.0.0.1:", "data:", "blob:"))
+
+
+def line(page: Any, words: str) -> str:
+    """Do a line of the shell; what the page tells of it."""
+    before = page.locator("#lines li").count()
+    page.fill("#line", words)
+    page.press("#line", "Enter")
+    page.wait_for_function(f"document.querySelectorAll('#lines li').length > {before}")
+    return str(page.locator("#lines li").first.inner_text())
+
+
+def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
+    page.select_option("#command", "CaptureAndProcess")
+    page.click("#send")
+    page.wait_for_function("document.querySelector('#canvas').width === 1024")
+    lit = page.evaluate(
+        "() => { const c = document.querySelector('#canvas');"
+        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+        "return d.filter((v, i) => i % 4 === 0 && v > 200).length }"
+    )
+    assert 10 < lit < 100_000  # stars, on a dark sky
+    page.select_option("#frame", "AttitudeQuaternion")
+    page.wait_for_function("document.querySelector('#telemetry').innerText.includes('LOST_IN')")
+
+
+def test_a_command_has_its_effect(page: Any) -> None:
+    page.select_option("#frame", "DetectionThresholdValues")
+    page.select_option("#command", "setDetectionThresholds")
+    page.fill("[name=DetectionThreshold]", "33")
+    page.fill("[name=StarThreshold]", "34")
+    page.click("#send")
+    page.wait_for_function("document.querySelector('#telemetry').innerText.includes('33')")
+    page.check("[title='plot DetectionThreshold']")
+    page.wait_for_selector("#plot canvas")
+
+
+def test_mistakes_are_told_as_text(page: Any) -> None:
+    told = line(page, "read <img/src=x/onerror=document.hacked=1>")
+    assert "<img" in told
+    assert page.locator("#lines li.bad").count() == 1
+    assert page.evaluate("document.hacked") is None
+    assert page.locator("#lines img").count() == 0
+
+
+def test_time_is_paused_stepped_and_goes_on(page: Any) -> None:
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    page.click("#step")
+    page.wait_for_selector("#lines li.good >> text=step")
+    page.fill("#to", "5000")
+    page.click("#run")
+    page.wait_for_function("document.querySelector('#time').textContent.startsWith('5000.0')")
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=false]")
+
+
+def test_a_fault_is_injected_and_seen(page: Any) -> None:
+    page.select_option("#fault", "processor-reset pin")
+    page.click("#inject")
+    page.wait_for_selector("#lines li >> text=/processor-reset pin: /")
+
+
+def test_two_tabs_see_the_same(chromium: Any, address: str, page: Any) -> None:
+    other = opened(chromium, address)
+    page.click("#pause")
+    other.wait_for_selector("#pause[aria-pressed=true]")
+    other.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=false]")
+    other.context.close()
+
+
+def test_the_keyboard_is_enough(page: Any) -> None:
+    page.focus("#newest")
+    for _ in range(20):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "pause":
+            break
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    page.keyboard.press("Space")
+    page.wait_for_selector("#pause[aria-pressed=false]")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_is_cut_off(chromium: Any, address: str, width: int, scheme: str) -> None:
+    size = {"width": width, "height": 850}
+    page = opened(chromium, address, viewport=size, color_scheme=scheme)
+    for device in ("AraMiS", "CubeSense", "CubeStar"):
+        look(page, device)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    dark = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 28)"
+    assert dark == (scheme == "dark")
+    page.context.close()
+
+
+@pytest.mark.parametrize("device", ["AraMiS", "CubeSense", "CubeStar"])
+def test_every_message_has_its_form_or_table(page: Any, device: str) -> None:
+    look(page, device)
+    for chooser, shown in (("#command", "#commands form"), ("#frame", "#telemetry table")):
+        names = page.locator(f"{chooser} option").all_inner_texts()
+        assert len(names) > 10
+        for name in names:
+            page.select_option(chooser, name)
+            assert page.locator(shown).first.is_visible()
+    assert "Identification" in line(page, "list")

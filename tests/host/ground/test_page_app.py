@@ -1,0 +1,138 @@
+"""What a page can ask of its server, without a browser: of a device that is emulated in it."""
+
+import http.client
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from websockets.sync.client import connect
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.devices.targets import open_target
+from cubestack.host.ground.desk import FROM_A_PAGE, LONGEST_LINE, Desk
+from cubestack.host.ground.guard import Guard
+from cubestack.host.ground.page_app import page_app
+from cubestack.host.ground.serving import Serving
+
+from .conftest import SOON_S, TOKEN
+
+HEADERS = {"Authorization": f"Bearer {TOKEN}"}
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Serving]:
+    desk = Desk(open_target("emulated:cubestar"))
+    serving = Serving(Guard(page_app([desk]), TOKEN), "127.0.0.1", 0)
+    with serving.running():
+        yield serving
+    desk.close()
+
+
+def ask(served: Serving, method: str, path: str, body: Any = None) -> tuple[int, bytes]:
+    connection = http.client.HTTPConnection(*served.address, timeout=SOON_S)
+    try:
+        text = body if isinstance(body, bytes) or body is None else json.dumps(body)
+        connection.request(method, path, text, HEADERS)
+        answer = connection.getresponse()
+        return answer.status, answer.read()
+    finally:
+        connection.close()
+
+
+def do(served: Serving, line: str) -> tuple[int, Any]:
+    status, told = ask(served, "POST", "/targets/0/do", {"line": line})
+    return status, json.loads(told)
+
+
+def test_the_page_and_its_parts_are_there(served: Serving) -> None:
+    status, page = ask(served, "GET", "/")
+    assert status == 200
+    assert b"/page/main.js" in page
+    for part in ("main.js", "style.css", "vendor/uPlot.esm.js", "vendor/uPlot.LICENSE"):
+        assert ask(served, "GET", f"/page/{part}")[0] == 200
+
+
+@pytest.mark.parametrize("path", ["/page/../desk.py", "/page/%2e%2e/desk.py", "/page/none", "/x"])
+def test_nothing_else_is(served: Serving, path: str) -> None:
+    assert ask(served, "GET", path)[0] == 404
+
+
+def test_it_tells_all_messages_and_why_something_can_not_be(served: Serving) -> None:
+    (about,) = json.loads(ask(served, "GET", "/targets")[1])
+    assert [one["name"] for one in about["telecommands"]] == [
+        one.name for one in INTERFACE.telecommands
+    ]
+    assert [one["id"] for one in about["telemetries"]] == [one.id for one in INTERFACE.telemetries]
+    assert about["missing"]["bench"] == "no line with the bench protocol is open"
+
+
+def test_the_shell_s_words_are_done(served: Serving) -> None:
+    status, told = do(served, "read Identification")
+    assert status == 200
+    assert ["NodeType", str(told["data"]["values"]["NodeType"])] in told["rows"]
+    assert do(served, "write setDetectionThresholds 30 31")[0] == 200
+    values = do(served, "read DetectionThresholdValues")[1]["data"]["values"]
+    assert (values["DetectionThreshold"], values["StarThreshold"]) == (30, 31)
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "error"),
+    [
+        ("read Nonsense", 400, "nothing is called 'Nonsense'"),
+        ("write setDetectionThresholds 300 31", 400, "DetectionThreshold"),
+        ("image /tmp/a.png", 400, "image: not from a page"),
+        ("scene /etc/passwd", 400, "scene: not from a page"),
+        ("watch Identification 9999", 400, "watch: not from a page"),
+        ("read '", 400, "No closing quotation"),
+        ("read " + "x" * LONGEST_LINE, 400, "characters at most"),
+    ],
+)
+def test_what_can_not_be_is_told(served: Serving, line: str, status: int, error: str) -> None:
+    found, told = do(served, line)
+    assert found == status
+    assert error in told["error"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "status"),
+    [
+        ("/targets/1/do", {"line": "help"}, 404),
+        ("/targets/0/do", {}, 400),
+        ("/targets/0/do", [], 400),
+        ("/targets/0/do", b"{", 400),
+        ("/targets/0/pause", {}, 400),
+        ("/targets/0/dance", {}, 400),
+        ("/targets/0/scene", {"text": ""}, 400),
+    ],
+)
+def test_nonsense_is_refused(served: Serving, path: str, body: Any, status: int) -> None:
+    found, told = ask(served, "POST", path, body)
+    assert found == status
+    assert json.loads(told)["error"]
+
+
+def test_commands_from_a_page_touch_no_file() -> None:
+    assert not {"image", "scene", "watch"} & set(FROM_A_PAGE)
+
+
+def test_what_a_tab_shows_is_read_again_and_again(served: Serving) -> None:
+    address = served.url.replace("http:", "ws:") + "/targets/0/live"
+    with connect(address, additional_headers=HEADERS, open_timeout=SOON_S) as socket:
+        assert "values" not in json.loads(socket.recv(SOON_S))
+        show = ["Identification", "<script>", "TaskStatus"]
+        socket.send(json.dumps({"show": show, "every_s": 0.2}))
+        while "values" not in (told := json.loads(socket.recv(SOON_S))):
+            pass
+        assert list(told["values"]) == ["Identification", "TaskStatus"]
+        assert json.loads(socket.recv(SOON_S))["link"]["requests"] > told["link"]["requests"]
+
+
+@pytest.mark.parametrize("nonsense", ["[]", "{", '{"every_s": "often"}', '{"show": 3}'])
+def test_a_tab_that_talks_nonsense_is_left(served: Serving, nonsense: str) -> None:
+    address = served.url.replace("http:", "ws:") + "/targets/0/live"
+    with connect(address, additional_headers=HEADERS, open_timeout=SOON_S) as socket:
+        socket.send(nonsense)
+        for _ in socket:  # ends when the server closes it
+            pass
+    assert do(served, "read Identification")[0] == 200
