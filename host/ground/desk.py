@@ -49,9 +49,8 @@ class Desk:
     @cached_property
     def about(self) -> JsonObject:
         """What it is, what can be asked and commanded, and what can not, with the reason."""
-        target, interface = self.target, self.target.interface
-        controls = target.controls
-        missing = {} if controls else {"controls": f"{target.name} is not emulated here"}
+        target, interface, controls = self.target, self.target.interface, self.controls
+        missing = {} if controls else {"controls": f"{target.name} has no control port"}
         if target.line is None:
             missing["raw"] = f"{target.name} is no serial line"
         if target.service_port is None:

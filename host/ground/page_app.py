@@ -28,6 +28,9 @@ EVERY_S, SHORTEST_S, LONGEST_S = 1.0, 0.2, 60.0
 MOST_SHOWN = 32
 """Telemetry frames that one tab may have read again and again."""
 
+NONSENSE = 1003
+"""Closes a WebSocket whose other end sends what can not be taken."""
+
 STEERING = ("pause", "resume", "step", "run", "pace")
 """Calls of the control port that pages pass on."""
 
@@ -146,8 +149,10 @@ async def _live(desk: Desk, socket: WebSocket) -> None:
                 logged = told.get("logged", logged)
             await socket.send_json(told)
             await asyncio.wait([hears], timeout=every_s)
-    except (WebSocketDisconnect, RuntimeError, ValueError):  # gone, or talks nonsense
-        pass
+    except (WebSocketDisconnect, RuntimeError):
+        pass  # it is gone
+    except ValueError:
+        await socket.close(NONSENSE)
     finally:
         hears.cancel()
 
@@ -173,11 +178,12 @@ def _wanted(message: object, desk: Desk) -> tuple[list[str], float]:
     if not isinstance(message, dict):
         raise ValueError("a tab sends objects")
     known = {one.name for one in desk.target.interface.telemetries}
-    names = [name for name in message.get("show", []) if name in known]
-    every_s = message.get("every_s", EVERY_S)
-    if not isinstance(every_s, int | float):
-        raise ValueError("'every_s' is a number")
-    return names[:MOST_SHOWN], min(max(float(every_s), SHORTEST_S), LONGEST_S)
+    show, every_s = message.get("show", []), message.get("every_s", EVERY_S)
+    if not isinstance(show, list) or not isinstance(every_s, int | float):
+        raise ValueError("'show' is a list of names, 'every_s' a number")
+    return [name for name in show if name in known][:MOST_SHOWN], min(
+        max(float(every_s), SHORTEST_S), LONGEST_S
+    )
 
 
 async def _not_there(_request: Request, error: Exception) -> Response:

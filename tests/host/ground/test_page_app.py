@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
@@ -133,6 +134,6 @@ def test_a_tab_that_talks_nonsense_is_left(served: Serving, nonsense: str) -> No
     address = served.url.replace("http:", "ws:") + "/targets/0/live"
     with connect(address, additional_headers=HEADERS, open_timeout=SOON_S) as socket:
         socket.send(nonsense)
-        for _ in socket:  # ends when the server closes it
-            pass
+        with pytest.raises(ConnectionClosedError, match="1003"):
+            [*iter(lambda: socket.recv(SOON_S), None)]
     assert do(served, "read Identification")[0] == 200
