@@ -18,6 +18,7 @@ from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result, Section
 from cubestack.host.experiments.hazards import asked as hazards
 from cubestack.host.experiments.opener import MeasureOptions
+from cubestack.host.experiments.rates import wilson
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
 from cubestack.host.pictures.campaigns import sky_map
 
@@ -309,7 +310,7 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
             looking = [pointing_deg(np.array(each["truth"])) for each in known]
             ended = map(_ended, known)
             places = [(ra, dec, end) for (ra, dec, _), end in zip(looking, ended, strict=True)]
-            yield Section("right by where it looked", png=sky_map(places))
+            yield Section("right by where it looked", png=sky_map(places, wilson))
 
     def longest(self, results: Sequence[AttitudeResultT]) -> str:
         """The worst case of each step of the processing, beside what it may take; one phrase."""

@@ -1,6 +1,6 @@
 """Figures of campaigns: rates over what was swept, and distributions of errors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from math import log, radians, sin, sqrt
 from typing import TYPE_CHECKING, Any
@@ -99,11 +99,14 @@ def error_curves(
     return png(drawn)
 
 
-def sky_map(places: Sequence[tuple[float, float, str]]) -> bytes:
+def sky_map(
+    places: Sequence[tuple[float, float, str]], limits: Callable[[int, int], tuple[float, float]]
+) -> bytes:
     """A PNG of how often a sensor was right by where it looked, in cells of equal area.
 
     Args:
         places: right ascension and declination in degrees, and what became of the picture.
+        limits: 95 % limits of a rate, 0 to 1, from how many there are, of how many.
     """
     columns, rows = 18, 9
     counts = [[0] * columns for _ in range(rows)]
@@ -117,7 +120,7 @@ def sky_map(places: Sequence[tuple[float, float, str]]) -> bytes:
         [100 * good / of if of else float("nan") for good, of in zip(*both, strict=True)]
         for both in zip(right, counts, strict=True)
     ]
-    drawn = figure(8, 3.8)
+    drawn = figure(9, 4.4)
     panel = drawn.subplots()
     panel.patch.set(hatch="////", edgecolor="#aaaaaa")  # where nothing was measured
     shown = panel.imshow(
@@ -128,11 +131,12 @@ def sky_map(places: Sequence[tuple[float, float, str]]) -> bytes:
             x, y = (column + 0.5) * 360 / columns, (row + 0.5) * 2 / rows - 1
             dark = of and right[row][column] < of / 2
             ink = "white" if dark else "black"
-            told = str(of) if of else ""
-            panel.text(x, y, told, ha="center", va="center", fontsize="xx-small", color=ink)
+            low, high = limits(right[row][column], of) if of else (0.0, 0.0)
+            told = f"{of}\n{100 * low:.0f}-{100 * high:.0f}" if of else ""
+            panel.text(x, y, told, ha="center", va="center", fontsize=4.5, color=ink)
     ticks = (-90, -45, -20, 0, 20, 45, 90)
     panel.set_yticks([sin(radians(tick)) for tick in ticks], [str(tick) for tick in ticks])
     panel.set_xticks(range(0, 361, 60))
     panel.set(xlabel="right ascension, deg", ylabel="declination, deg")
-    drawn.colorbar(shown, label="% right; numbers: results")
+    drawn.colorbar(shown, label="% right; in a cell: results, 95 % limits")
     return png(drawn)

@@ -10,13 +10,17 @@ HATCHES = ("", "..", "//", "", "xx", "\\\\", "", "++", "")
 
 
 def effects(
-    parts: Sequence[tuple[str, int]], counts: Mapping[Any, Sequence[int]], what: str
+    parts: Sequence[tuple[str, int]],
+    counts: Mapping[Any, Sequence[int]],
+    seen: Sequence[tuple[float, float]],
+    what: str,
 ) -> bytes:
     """A PNG of bars, one a register or memory, of what share of its upsets did what.
 
     Args:
         parts: name, and number of upsets.
         counts: of each part, by effect; effects that never were are left out.
+        seen: of each part, 95 % limits of how often something is seen, 0 to 1.
         what: whose upsets they are.
     """
     shown = {effect: values for effect, values in counts.items() if any(values)}
@@ -37,6 +41,17 @@ def effects(
             linewidth=0.5,
         )
         before = [sum(both) for both in zip(before, shares, strict=True)]
+    middles = [100 - 50 * (low + high) for low, high in seen]
+    halves = [50 * (high - low) for low, high in seen]
+    panel.errorbar(
+        *(middles, places),
+        xerr=halves,
+        label="seen to the right, 95 %",
+        fmt="none",
+        ecolor="#cc3311",
+        capsize=2.5,
+        elinewidth=1.2,
+    )
     panel.set_yticks(places, [f"{name} ({of})" for name, of in parts], fontsize="x-small")
     panel.invert_yaxis()
     panel.set(xlabel=f"% of {what}", xlim=(0, 100))

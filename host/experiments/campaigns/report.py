@@ -113,7 +113,7 @@ def _page(
         if section.rows:
             parts += [f"<h2>{escape(section.title)}</h2>", _table(section.head, section.rows)]
     for name, png in pictures.items():
-        parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' '))}</h2>")
+        parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' ').replace('-', ' '))}</h2>")
         data = b64encode(png).decode("ascii")
         parts.append(f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">')
     if cases:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cubestack.host.devices.experiment import Experiment, Section
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.upsets.atlas import HEAD, atlas, lines, rows
 from cubestack.host.experiments.upsets.clean import (
     PS_PER_S,
@@ -150,7 +151,9 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
         yield Section("upsets by register and memory", HEAD, list(rows(parts)))
         named = [(part.name, len(part.results)) for part in parts]
         counts = {effect: [part.effects[effect] for part in parts] for effect in EFFECTS}
-        yield Section("what they do", png=effects(named, counts, "upsets, in all phases alike"))
+        seen = [wilson(part.seen, len(part.results)) for part in parts]
+        figure = effects(named, counts, seen, "upsets, in all phases alike")
+        yield Section("what they do", png=figure)
 
 
 def _targets(rig: Rig, options: UpsetOptions) -> list[Target]:
