@@ -12,7 +12,10 @@ examples:
 import argparse
 import signal
 import threading
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import LAST_PORT
@@ -21,6 +24,9 @@ from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.devices.targets import EMULATED, FORMS, open_target
 from cubestack.host.errors import TargetError
 from cubestack.host.terminal import say
+
+if TYPE_CHECKING:
+    from cubestack.host.ground.desk import Desk
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,8 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until SIGINT or SIGTERM."""
-    from cubestack.host.ground.desk import Desk
-    from cubestack.host.ground.emulators import emulated
     from cubestack.host.ground.guard import Guard, new_token
     from cubestack.host.ground.page_app import page_app
     from cubestack.host.ground.serving import LOOPBACK, Serving
@@ -49,27 +53,48 @@ def run(args: argparse.Namespace) -> int:
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: ended.set())
+    for text in args.targets:
+        _check(text)
     with ExitStack() as stack:
-        desks = []
-        for text in args.targets:
-            if text.startswith(EMULATED):
-                name = text.removeprefix(EMULATED)
-                if name not in device_names():
-                    known = ", ".join(EMULATED + one for one in device_names())
-                    raise TargetError(f"no device {name!r} can be emulated; known: {known}")
-                target = stack.enter_context(emulated(name))
-            else:
-                target = open_target(
-                    *(text, args.device),
-                    **{"service_port": args.bench, "baud": args.baud, "control": args.control},
-                )
-            desks.append(Desk(target))
-            stack.callback(desks[-1].close)
+        pool = stack.enter_context(ThreadPoolExecutor(len(args.targets)))
+        desks = [pool.submit(_open, text, args) for text in args.targets]
+        stack.callback(_close, desks)
         token = new_token()
         serving = Serving(Guard(page_app(desks), token), LOOPBACK, args.port)
         stack.enter_context(serving.running())
         address = f"{serving.url}/?token={token}"
         print(f'{{"page": "{address}"}}' if args.json else f"the page: {address}", flush=True)
+        for desk in desks:
+            desk.result()  # whatever does not open ends this
         say("Ctrl-C ends it")
         ended.wait()
     return 0
+
+
+def _check(text: str) -> None:
+    """TargetError for a device that can not be emulated."""
+    name = text.removeprefix(EMULATED)
+    if text.startswith(EMULATED) and name not in device_names():
+        known = ", ".join(EMULATED + one for one in device_names())
+        raise TargetError(f"no device {name!r} can be emulated; known: {known}")
+
+
+def _open(text: str, args: argparse.Namespace) -> "Desk":
+    from cubestack.host.ground.desk import Desk
+    from cubestack.host.ground.emulators import emulated
+
+    with ExitStack() as stack:
+        if text.startswith(EMULATED):
+            target = stack.enter_context(emulated(text.removeprefix(EMULATED)))
+        else:
+            target = open_target(
+                *(text, args.device),
+                **{"service_port": args.bench, "baud": args.baud, "control": args.control},
+            )
+        return Desk(target, stack.pop_all().close)
+
+
+def _close(desks: "Sequence[Future[Desk]]") -> None:
+    for desk in desks:
+        if desk.exception() is None:
+            desk.result().close()

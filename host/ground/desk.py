@@ -40,9 +40,9 @@ class Desk:
     link: how its link is.
     """
 
-    def __init__(self, target: Target) -> None:
-        """Look at ``target``, which is closed with this."""
-        self.target, self.link = target, Link()
+    def __init__(self, target: Target, on_close: Callable[[], None] = lambda: None) -> None:
+        """Look at ``target``, which is closed with this; ``on_close`` is called after that."""
+        self.target, self.link, self._on_close = target, Link(), on_close
         self._shell = Shell(target)
         self._thread = ThreadPoolExecutor(1, "target")
 
@@ -88,6 +88,7 @@ class Desk:
         """Release the target."""
         self._thread.shutdown(cancel_futures=True)
         self.target.close()
+        self._on_close()
 
     def _do(self, line: str) -> JsonObject:
         if len(line) > LONGEST_LINE:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Sequence
+from concurrent.futures import Future
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -35,21 +36,21 @@ STEERING = ("pause", "resume", "step", "run", "pace")
 """Calls of the control port that pages pass on."""
 
 
-def page_app(desks: Sequence[Desk]) -> Starlette:
-    """The application, without a guard."""
+def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
+    """The application, without a guard; its targets may still be about to open."""
 
     async def page(_request: Request) -> Response:
         return FileResponse(PAGE / "index.html")
 
     async def targets(_request: Request) -> Response:
-        return JSONResponse([desk.about for desk in desks])
+        return JSONResponse([(await _opened(desk)).about for desk in desks])
 
     def of(handler: Any) -> Any:
         async def answer(request: Request) -> Response:
             number = request.path_params["number"]
             if number >= len(desks):
                 return refused(f"there is no target {number}", HTTPStatus.NOT_FOUND)
-            return await _told(handler, desks[number], request)
+            return await _told(handler, await _opened(desks[number]), request)
 
         return answer
 
@@ -58,7 +59,7 @@ def page_app(desks: Sequence[Desk]) -> Starlette:
         if number >= len(desks):
             await socket.close()
             return
-        await _live(desks[number], socket)
+        await _live(await _opened(desks[number]), socket)
 
     return Starlette(
         routes=[
@@ -73,6 +74,10 @@ def page_app(desks: Sequence[Desk]) -> Starlette:
         ],
         exception_handlers={HTTPException: _not_there},
     )
+
+
+async def _opened(desk: "Future[Desk]") -> Desk:
+    return await asyncio.shield(asyncio.wrap_future(desk))
 
 
 async def _told(handler: Any, desk: Desk, request: Request) -> Response:

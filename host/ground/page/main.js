@@ -74,6 +74,7 @@ function look(number, targets) {
 }
 
 async function start() {
+  link.textContent = "waiting for the devices to start";
   const targets = await ask("/targets");
   const buttons = targets.map((about, number) =>
     make("button", { textContent: about.device, onclick: () => look(number, targets) }),

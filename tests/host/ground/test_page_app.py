@@ -3,6 +3,7 @@
 import http.client
 import json
 from collections.abc import Iterator
+from concurrent.futures import Future
 from typing import Any
 
 import pytest
@@ -24,7 +25,9 @@ HEADERS = {"Authorization": f"Bearer {TOKEN}"}
 @pytest.fixture(scope="module")
 def served() -> Iterator[Serving]:
     desk = Desk(open_target("emulated:cubestar"))
-    serving = Serving(Guard(page_app([desk]), TOKEN), "127.0.0.1", 0)
+    opened = Future[Desk]()
+    opened.set_result(desk)
+    serving = Serving(Guard(page_app([opened]), TOKEN), "127.0.0.1", 0)
     with serving.running():
         yield serving
     desk.close()
