@@ -2,8 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Self, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Interface, Message
@@ -134,6 +134,22 @@ class Client(Closable):
             raise CommandRefusedError(message.name, known.get(error, error))
 
 
+class FoundStar(Protocol):
+    """A centroid in a picture, and the star's Hipparcos number when it is identified."""
+
+    @property
+    def x_px(self) -> float:
+        """Column."""
+
+    @property
+    def y_px(self) -> float:
+        """Row."""
+
+    @property
+    def hipparcos(self) -> int | None:
+        """None when it is not identified."""
+
+
 class DeviceClient(Closable):
     """A device as a program uses it, through any client of its node.
 
@@ -166,6 +182,13 @@ class DeviceClient(Closable):
         Raises TargetError for a device or a line that carries no picture, and the client's errors.
         """
         raise TargetError(f"{self.client.interface.name} sends no picture")
+
+    def stars(self) -> Sequence[FoundStar]:
+        """The stars of the latest picture.
+
+        Raises TargetError for a device that looks for none, and the client's errors.
+        """
+        raise TargetError(f"{self.client.interface.name} looks for no stars")
 
     def profile(self) -> Switches:
         """The switches that the device runs with; their ``profile`` says of which one they are.

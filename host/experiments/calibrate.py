@@ -15,11 +15,10 @@ import numpy as np
 
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
-from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.contract import DeviceClient, FoundStar
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import PATH, Options, option, whole
-from cubestack.host.pictures.images import Star
 from cubestack.host.pictures.residuals import save_residuals
 
 if TYPE_CHECKING:
@@ -157,7 +156,7 @@ class StarCalibration(
         """Tell the device its camera, and what else it needs for a picture, if it is one."""
 
     @abstractmethod
-    def identify(self, client: ClientT) -> Sequence[Star]:
+    def identify(self, client: ClientT) -> Sequence[FoundStar]:
         """Take a picture; the stars that the device finds, where it has an attitude."""
 
     def board(self, camera: Camera) -> Mapping[str, Any]:

@@ -7,10 +7,12 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
+from cubestack.host.pictures.star_names import star_name
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.result import ShellError
@@ -53,6 +55,8 @@ class Desk:
         missing = {} if controls else {"controls": f"{target.name} has no control port"}
         if target.line is None:
             missing["raw"] = f"{target.name} is no serial line"
+        if not self._finds_stars:
+            missing["stars"] = f"{interface.name} looks for no stars"
         if target.service_port is None:
             missing["bench"] = "no line with the bench protocol is open"
         return {
@@ -84,11 +88,36 @@ class Desk:
         """Telemetry by name: what it has, or the ``error`` in place of it."""
         return self._thread.submit(lambda: {name: self._read(name) for name in names})
 
+    def stars(self) -> "Future[list[JsonObject]]":
+        """Stars of its latest picture: column, row, and their names, empty of unknown ones."""
+        return self._thread.submit(self._asked, self._stars)
+
     def close(self) -> None:
         """Release the target."""
         self._thread.shutdown(cancel_futures=True)
         self.target.close()
         self._on_close()
+
+    @cached_property
+    def _client(self) -> DeviceClient | None:
+        device = self.target.device
+        return None if device is None else device.client(self.target.node)
+
+    @property
+    def _finds_stars(self) -> bool:
+        return self._client is not None and type(self._client).stars is not DeviceClient.stars
+
+    def _stars(self) -> list[JsonObject]:
+        if self._client is None:
+            raise ValueError(f"{self.target.name} is no device that is known")
+        return [
+            {
+                "x": star.x_px,
+                "y": star.y_px,
+                "name": "" if star.hipparcos is None else star_name(star.hipparcos),
+            }
+            for star in self._client.stars()
+        ]
 
     def _do(self, line: str) -> JsonObject:
         if len(line) > LONGEST_LINE:

@@ -66,6 +66,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/", page),
             Route("/targets", targets),
             Route("/targets/{number:int}/pictures/{name}", of(_picture)),
+            Route("/targets/{number:int}/stars", of(_stars)),
             Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
             Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
             Route("/targets/{number:int}/{call:str}", of(_steer), methods=["POST"]),
@@ -121,6 +122,10 @@ async def _scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     device = desk.controls.device if desk.controls else ""
     act = {"words": ["scene", "scene.toml"], "text": text}
     return await _control(desk, "POST", f"/devices/{device}/act", act)
+
+
+async def _stars(desk: Desk, _body: JsonObject, _path: JsonObject) -> JsonObject:
+    return {"stars": await asyncio.wrap_future(desk.stars())}
 
 
 async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> bytes:

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from cubestack.host.clients.contract import FoundStar
 from cubestack.host.pictures.star_names import star_name
 
 RADIUS_PX = 9
@@ -18,22 +18,6 @@ UNKNOWN = (255, 140, 90)
 
 #: Display gamma: lifts faint stars out of the black without touching the file with the raw values.
 GAMMA = 0.5
-
-
-class Star(Protocol):
-    """What is marked: a centroid, and the star's Hipparcos number when it is identified."""
-
-    @property
-    def x_px(self) -> float:
-        """Column."""
-
-    @property
-    def y_px(self) -> float:
-        """Row."""
-
-    @property
-    def hipparcos(self) -> int | None:
-        """None when it is not identified."""
 
 
 def save_picture(picture: NDArray[np.uint8], path: Path) -> None:
@@ -48,7 +32,7 @@ def png(picture: NDArray[np.uint8]) -> bytes:
     return file.getvalue()
 
 
-def annotate(picture: NDArray[np.uint8], stars: Sequence[Star], path: Path) -> None:
+def annotate(picture: NDArray[np.uint8], stars: Sequence[FoundStar], path: Path) -> None:
     """Write ``picture`` brightened, each star circled and, when identified, named."""
     lifted = (255 * (picture / 255.0) ** GAMMA).astype(np.uint8)
     image = Image.fromarray(lifted).convert("RGB")

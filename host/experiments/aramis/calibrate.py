@@ -19,8 +19,8 @@ from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.clients.aramis.client import Aramis
+from cubestack.host.clients.contract import FoundStar
 from cubestack.host.experiments.calibrate import CalibrateOptions, StarCalibration
-from cubestack.host.pictures.images import Star
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.optics import Optics
@@ -57,7 +57,7 @@ class _Experiment(StarCalibration[Aramis]):
         client.client.wait_processed(1.0)
         client.activate()
 
-    def identify(self, client: Aramis) -> Sequence[Star]:
+    def identify(self, client: Aramis) -> Sequence[FoundStar]:
         return client.stars() if client.measure().valid else []
 
 

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IdMode
 from cubestack.host.calibration.camera import Camera
+from cubestack.host.clients.contract import FoundStar
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.experiments.calibrate import CalibrateOptions, StarCalibration
-from cubestack.host.pictures.images import Star
 
 if TYPE_CHECKING:
     from cubestack.emulator.camera.common.optics import Optics
@@ -52,7 +52,7 @@ class _Experiment(StarCalibration[CubeStar]):
         if light is not None:
             find_threshold(client)
 
-    def identify(self, client: CubeStar) -> Sequence[Star]:
+    def identify(self, client: CubeStar) -> Sequence[FoundStar]:
         client.client.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
         client.capture_and_process()
         return client.stars() if client.attitude().valid else []

@@ -32,7 +32,7 @@ export class Commands {
     );
     const row = make("div", { className: "row" }, labelled("telecommand", this.name));
     place.append(row, this.meaning, this.fields, shell);
-    const missing = Object.entries(about.missing).filter(([what]) => what !== "controls");
+    const missing = Object.entries(about.missing).filter(([what]) => ["bench", "raw"].includes(what));
     for (const [what, why] of missing)
       place.append(make("p", { className: "quiet", textContent: `no ${what}: ${why}` }));
     this.show();

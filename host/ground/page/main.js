@@ -47,7 +47,7 @@ function look(number, targets) {
   const wanted = [];
   new Commands(place("commands"), about, act);
   const emulation = new Emulation(place("emulation"), about, steer, act);
-  const pictures = new Pictures(place("picture"), about, `${path}/pictures`);
+  const pictures = new Pictures(place("picture"), about, path);
   const telemetry = new Telemetry(place("telemetry"), about, (names) => {
     wanted.splice(0, wanted.length, ...names);
     live?.want({ show: wanted });
@@ -59,7 +59,7 @@ function look(number, targets) {
       link.className = failed ? "bad" : "";
       link.textContent = `${about.name}: ${requests} requests, ${failed} failed ${error}`.trim();
       if (message.values) telemetry.hear(message.values);
-      if (message.pictures) pictures.hear(message.pictures);
+      if (message.pictures) pictures.hear(message.pictures, message.emulation.busy);
       if (message.emulation) emulation.hear(message.emulation);
       for (const line of message.log ?? []) tell(line);
     },

@@ -1,15 +1,27 @@
 // The pictures in an emulation's memories: the newest by itself, brightened as one likes.
 
 import { choose, labelled, make } from "./dom.js";
+import { ask } from "./server.js";
+
+const RADIUS = 9;
 
 export class Pictures {
-  // `path` leads to the pictures by name.
+  // `path` leads to the target.
   constructor(place, about, path) {
     this.path = path;
     this.known = {};
-    this.bitmap = null;
+    this.stars = [];
+    this.late = false;
     this.name = choose([], { id: "picture-name", onchange: () => this.fetch() });
     this.newest = make("input", { type: "checkbox", checked: true, id: "newest" });
+    const none = about.missing.stars;
+    this.marks = make("input", {
+      type: "checkbox",
+      id: "marks",
+      disabled: Boolean(none),
+      title: none ?? "read over the wire after each picture; they are those of its latest one",
+      onchange: () => this.find(),
+    });
     const stretch = { type: "range", min: 0, max: 1, step: 0.02, value: 0.6, id: "stretch" };
     this.stretch = make("input", { ...stretch, oninput: () => this.draw() });
     this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
@@ -21,6 +33,7 @@ export class Pictures {
         { className: "row" },
         labelled("memory", this.name),
         labelled("the newest", this.newest, { className: "beside" }),
+        labelled("stars that it found", this.marks, { className: "beside" }),
         labelled("brightness", this.stretch),
       ),
       this.canvas,
@@ -29,7 +42,7 @@ export class Pictures {
     if (about.missing.controls) this.value.textContent = about.missing.controls;
   }
 
-  hear(pictures) {
+  hear(pictures, busy) {
     const names = Object.keys(pictures);
     if (names.length !== this.name.options.length)
       this.name.replaceChildren(...names.map((name) => make("option", { textContent: name })));
@@ -38,12 +51,31 @@ export class Pictures {
     if (changed.length && this.newest.checked)
       this.name.value = changed.reduce((a, b) => (at(b) > at(a) ? b : a));
     for (const name of changed) this.known[name] = at(name);
+    if (changed.length) {
+      this.late = true; // what it finds in a new picture comes when it is done with that
+      this.stars = [];
+    }
     if (changed.includes(this.name.value)) this.fetch();
+    else if (this.late && !busy) this.find();
+  }
+
+  async find() {
+    this.late = false;
+    this.stars = [];
+    if (this.marks.checked)
+      try {
+        this.stars = (await ask(`${this.path}/stars`)).stars;
+        const known = this.stars.filter((star) => star.name).length;
+        this.value.textContent = `${this.stars.length} stars found, ${known} identified`;
+      } catch (error) {
+        this.value.textContent = error.message;
+      }
+    this.draw();
   }
 
   async fetch() {
     const name = this.name.value;
-    const answer = await fetch(`${this.path}/${encodeURIComponent(name)}`);
+    const answer = await fetch(`${this.path}/pictures/${encodeURIComponent(name)}`);
     if (!answer.ok) return;
     const bitmap = await createImageBitmap(await answer.blob());
     const from = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
@@ -65,7 +97,19 @@ export class Pictures {
       shown.data.fill(table[this.pixels.data[at]], at, at + 3);
       shown.data[at + 3] = 255;
     }
-    this.canvas.getContext("2d").putImageData(shown, 0, 0);
+    const pen = this.canvas.getContext("2d");
+    pen.putImageData(shown, 0, 0);
+    pen.font = "13px system-ui, sans-serif";
+    for (const { x, y, name } of this.stars) {
+      pen.strokeStyle = pen.fillStyle = name ? "#78ff78" : "#ff8c5a";
+      pen.setLineDash(name ? [] : [3, 3]);
+      pen.beginPath();
+      pen.arc(x, y, RADIUS, 0, 2 * Math.PI);
+      pen.stroke();
+      const width = pen.measureText(name).width;
+      const left = x + RADIUS + 3 + width > shown.width ? x - RADIUS - 3 - width : x + RADIUS + 3;
+      pen.fillText(name, left, Math.min(Math.max(y + 4, 12), shown.height - 3));
+    }
   }
 
   point(event) {

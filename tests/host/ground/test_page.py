@@ -71,6 +71,8 @@ def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
         "const lit = d.filter((v, i) => i % 4 === 0 && v > 200).length;"
         "return c.width === 1024 && lit > 10 && lit < 20000 }"
     )
+    page.check("#marks")
+    page.wait_for_selector("#picture >> text=/stars found, .* identified/")
     page.select_option("#frame", "AttitudeQuaternion")
     page.wait_for_function(
         "() => document.querySelector('#telemetry').innerText.includes('LOST_IN')"

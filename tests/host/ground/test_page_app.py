@@ -80,6 +80,17 @@ def test_the_shell_s_words_are_done(served: Serving) -> None:
     assert (values["DetectionThreshold"], values["StarThreshold"]) == (30, 31)
 
 
+def test_stars_are_those_that_the_device_found(served: Serving) -> None:
+    assert do(served, "write CaptureAndProcess")[0] == 200
+    status, told = ask(served, "GET", "/targets/0/stars")
+    stars = json.loads(told)["stars"]
+    assert status == 200
+    summary = do(served, "read DetectionSummary")[1]["data"]["values"]
+    assert len(stars) == summary["NumStarsDetected"] > 3
+    assert all(0 <= star["x"] < 1024 and 0 <= star["y"] < 512 for star in stars)
+    assert any(star["name"] for star in stars)
+
+
 @pytest.mark.parametrize(
     ("line", "status", "error"),
     [
