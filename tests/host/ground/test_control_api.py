@@ -29,9 +29,10 @@ def test_the_page_has_every_call() -> None:
 
 
 def test_time_is_held_stepped_and_sent_on(controlled: Controlled) -> None:
+    controlled.ask("POST", "/run", {"to_s": 20.0})  # it has booted
     _, held = controlled.ask("POST", "/pause")
     assert held["held"]
-    assert controlled.ask("GET", "/state")[1]["time_s"] == held["time_s"]
+    assert controlled.ask("GET", "/state")[1]["time_s"] == held["time_s"] == 20.0
     assert controlled.ask("POST", "/step") == (200, {"events": 0})  # it waits for its host
     controlled.ask("POST", "/devices/cubestar/act", {"words": ["fault", "processor-reset"]})
     assert controlled.ask("POST", "/step", {"events": 3}) == (200, {"events": 3})
