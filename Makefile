@@ -42,10 +42,10 @@ run: .venv/ready-run
 	@$(BIN)/cubestack demo --out out --photographs "$(PHOTOGRAPHS)"
 
 test: .venv/ready-dev
-	@$(BIN)/pytest -n auto
+	@$(BIN)/pytest -n auto --dist loadgroup
 
 test-all: .venv/ready-dev
-	@$(BIN)/pytest -n auto -m "slow or not slow"
+	@$(BIN)/pytest -n auto --dist loadgroup -m "slow or not slow"
 
 firmware: .venv/ready-run
 	@command -v arm-none-eabi-gcc >/dev/null 2>&1 || { \

@@ -13,6 +13,8 @@ from cubestack.host.devices.registry import device_names
 
 SOON_MS = 30_000
 
+pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are started once
+
 
 @pytest.fixture(scope="module")
 def address(chromium: Any) -> Iterator[str]:
