@@ -106,7 +106,8 @@ def test_ten_thousand_connections_do_not_stop_the_emulation(controlled: Controll
                 kept.append(raw)
         while json.loads(watching.recv(SOON_S))["state"]["time_s"] <= begun_s + 0.5:
             pass
-        assert sum(not closed(raw) for raw in kept) <= MOST_CONNECTIONS
+        while sum(not closed(raw) for raw in kept) > MOST_CONNECTIONS:
+            watching.recv(SOON_S)
         for raw in kept:
             raw.close()
     assert controlled.ask("GET", "/state")[0] == 200
