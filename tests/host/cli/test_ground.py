@@ -7,6 +7,8 @@ import pytest
 
 from cubestack.host.cli.main import main
 
+CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
+
 
 def test_a_device_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["ground", "emulated:nothing"]) == 2
@@ -19,3 +21,15 @@ def test_a_port_that_there_is_not() -> None:
     assert ended.returncode == 1
     (line,) = ended.stderr.splitlines()
     assert "/dev/nothing" in line
+
+
+@pytest.mark.parametrize("words", [["ground", "emulated:cubestar"], CONTROLLED])
+def test_what_must_be_installed_is_told(words: list[str]) -> None:
+    text = (
+        "import sys; sys.modules['uvicorn'] = None; from cubestack.host.cli.main import main; "
+        f"sys.exit(main({words}))"
+    )
+    call = [sys.executable, "-c", text]
+    ended = subprocess.run(call, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 2
+    assert "needs uvicorn, which is not installed: pip install cubestack[ground]" in ended.stderr
