@@ -5,6 +5,7 @@ The page is served on this machine alone, at an address with a token in it.
 examples:
   cubestack ground emulated:{first}
   cubestack ground emulated:{first} emulated:{second}
+  cubestack ground emulated:{first} --profile extended --scene sky.toml
   cubestack ground /dev/ttyUSB0 --device {second}
   cubestack ground ./tty --device {first} --control http://127.0.0.1:8700
 """
@@ -18,11 +19,13 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.device_options import add_board_arguments, given_options
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
 from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.devices.targets import EMULATED, FORMS, open_target
 from cubestack.host.errors import TargetError
+from cubestack.host.options import flag
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
@@ -38,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of its emulation; its token in ${TOKEN}"
     )
+    parser.add_argument("--scene", metavar="FILE", help="of an emulated device")
+    parser.add_argument("--seed", type=whole(0), help="of an emulated device")
+    add_board_arguments(parser)
     parser.add_argument(
         "--port", type=whole(0, LAST_PORT), default=0, help="of the page (default: any free one)"
     )
@@ -53,11 +59,11 @@ def run(args: argparse.Namespace) -> int:
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: ended.set())
-    for text in args.targets:
-        _check(text)
+    options = _options(args)
+    _check(args.targets, options)
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(len(args.targets)))
-        desks = [pool.submit(_open, text, args) for text in args.targets]
+        desks = [pool.submit(_open, text, options, args) for text in args.targets]
         stack.callback(_close, desks)
         token = new_token()
         serving = Serving(Guard(page_app(desks), token), LOOPBACK, args.port)
@@ -71,21 +77,34 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check(text: str) -> None:
-    """TargetError for a device that can not be emulated."""
-    name = text.removeprefix(EMULATED)
-    if text.startswith(EMULATED) and name not in device_names():
-        known = ", ".join(EMULATED + one for one in device_names())
-        raise TargetError(f"no device {name!r} can be emulated; known: {known}")
+def _check(targets: Sequence[str], options: Sequence[str]) -> None:
+    """TargetError for a device that can not be emulated, or options where none is."""
+    emulated = [one.removeprefix(EMULATED) for one in targets if one.startswith(EMULATED)]
+    for name in emulated:
+        if name not in device_names():
+            known = ", ".join(EMULATED + one for one in device_names())
+            raise TargetError(f"no device {name!r} can be emulated; known: {known}")
+    if options and not emulated:
+        raise TargetError(f"{' '.join(options)} is for emulated:DEVICE")
 
 
-def _open(text: str, args: argparse.Namespace) -> "Desk":
+def _options(args: argparse.Namespace) -> list[str]:
+    """Those of emulated devices that were given, as `cubestack emulate` takes them."""
+    given = {"scene": args.scene, "seed": args.seed, **given_options(args)}
+    words: list[str] = []
+    for name, value in given.items():
+        if value is not None:
+            words += [flag(name)] if value is True else [flag(name), str(value)]
+    return words
+
+
+def _open(text: str, options: Sequence[str], args: argparse.Namespace) -> "Desk":
     from cubestack.host.ground.desk import Desk
     from cubestack.host.ground.emulators import emulated
 
     with ExitStack() as stack:
         if text.startswith(EMULATED):
-            target = stack.enter_context(emulated(text.removeprefix(EMULATED)))
+            target = stack.enter_context(emulated(text.removeprefix(EMULATED), options))
         else:
             target = open_target(
                 *(text, args.device),

@@ -74,13 +74,14 @@ class RemoteControls:
     Attributes:
         client: of the control port.
         device: name of the device.
+        chosen: its seed, profile, switches and firmware, where they were given.
     """
 
     def __init__(self, client: ControlClient, device: str) -> None:
         """Look what there is; raises what ``ControlClient.ask`` does."""
         self.client, self.device = client, device
         about = client.ask("GET", f"/devices/{device}")
-        self.ports: tuple[str, ...] = tuple(about["ports"])
+        self.chosen = {"seed": str(about["seed"]), **about["chosen"]}
         self.channels = tuple(about["channels"])
         self.faults = spoken({kind: one["targets"] for kind, one in about["faults"].items()})
         self.fault_parameters: Mapping[str, tuple[str, ...]] = {

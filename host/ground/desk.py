@@ -68,6 +68,7 @@ class Desk:
             "faults": list(controls.faults) if controls else [],
             "fault_parameters": dict(controls.fault_parameters) if controls else {},
             "channels": list(controls.channels) if controls else [],
+            "chosen": controls.chosen if controls else {},
             "missing": missing,
         }
 

@@ -68,8 +68,10 @@ export class Emulation {
       labelled("its file's text", this.scene),
       button("Show", "show-scene", () => steer("scene", { text: this.scene.value })),
     );
+    const chosen = Object.entries(about.chosen).map(([name, value]) => `${name} ${value}`);
     place.append(
       make("p", {}, "virtual time ", this.time),
+      make("p", { className: "quiet", id: "chosen", textContent: chosen.join(", ") }),
       this.state,
       time,
       faults,

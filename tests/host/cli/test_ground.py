@@ -15,6 +15,20 @@ def test_a_device_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert "no device 'nothing' can be emulated; known: emulated:" in capsys.readouterr().err
 
 
+def test_options_are_for_what_is_emulated(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["ground", "/dev/nothing", "--device", "cubestar", "--profile", "extended"]
+    assert main(words) == 2
+    assert "--profile extended is for emulated:DEVICE" in capsys.readouterr().err
+
+
+def test_an_emulation_that_does_not_start_is_told() -> None:
+    call = [sys.executable, "-m", "cubestack", "ground", "emulated:cubestar"]
+    call += ["--scene", "/none.toml"]
+    ended = subprocess.run(call, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1
+    assert "/none.toml" in ended.stderr
+
+
 def test_a_port_that_there_is_not() -> None:
     call = [sys.executable, "-m", "cubestack", "ground", "/dev/nothing", "--device", "cubestar"]
     ended = subprocess.run(call, capture_output=True, text=True, timeout=60)

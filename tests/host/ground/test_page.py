@@ -19,7 +19,7 @@ pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are start
 @pytest.fixture(scope="module")
 def address(chromium: Any) -> Iterator[str]:
     targets = [f"emulated:{name}" for name in device_names()]
-    call = [sys.executable, "-m", "cubestack", "ground", *targets, "--json"]
+    call = [sys.executable, "-m", "cubestack", "ground", *targets, "--json", "--seed", "5"]
     with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as station:
         assert station.stdout is not None
         yield json.loads(station.stdout.readline())["page"]
@@ -98,6 +98,10 @@ def test_mistakes_are_told_as_text(page: Any) -> None:
     assert page.locator("#lines li.bad").count() == 1
     assert page.evaluate("document.hacked") is None
     assert page.locator("#lines img").count() == 0
+
+
+def test_it_tells_what_was_chosen(page: Any) -> None:
+    assert "seed 5" in page.inner_text("#chosen")
 
 
 def test_time_is_paused_stepped_and_goes_on(page: Any) -> None:
