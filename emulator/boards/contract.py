@@ -177,6 +177,14 @@ class Board(ABC):
         """What the memories with pictures hold, each (rows, columns), by memory; live views."""
         return {}
 
+    def truths(self) -> dict[str, NDArray[np.float64]]:
+        """What should be measured in what was stored last, by what it is of.
+
+        An attitude is a quaternion (4,), a direction a pair of angles (alpha, beta) in degrees. For
+        whoever compares results, never for the firmware.
+        """
+        return {}
+
     def tell(self, say: Callable[[str], None]) -> None:
         """Give ``say`` what own firmware prints by debug channels, and reports of its faults."""
         del say  # a modelled program has none

@@ -55,8 +55,10 @@ class Desk:
         missing = {} if controls else {"controls": f"{target.name} has no control port"}
         if target.line is None:
             missing["raw"] = f"{target.name} is no serial line"
-        if not self._finds_stars:
+        if not self._has("stars"):
             missing["stars"] = f"{interface.name} looks for no stars"
+        if not self._has("latest"):
+            missing["results"] = f"{interface.name} has no results that could be logged"
         if target.service_port is None:
             missing["bench"] = "no line with the bench protocol is open"
         return {
@@ -93,6 +95,10 @@ class Desk:
         """Stars of its latest picture: column, row, and their names, empty of unknown ones."""
         return self._thread.submit(self._asked, self._stars)
 
+    def results(self) -> "Future[JsonObject]":
+        """Its latest result as a line of a log, or the ``error`` in place of it."""
+        return self._thread.submit(self._results)
+
     def close(self) -> None:
         """Release the target."""
         self._thread.shutdown(cancel_futures=True)
@@ -104,9 +110,10 @@ class Desk:
         device = self.target.device
         return None if device is None else device.client(self.target.node)
 
-    @property
-    def _finds_stars(self) -> bool:
-        return self._client is not None and type(self._client).stars is not DeviceClient.stars
+    def _has(self, method: str) -> bool:
+        """Whether its client does what not all can."""
+        own = getattr(type(self._client), method, None)
+        return own is not None and own is not getattr(DeviceClient, method)
 
     def _stars(self) -> list[JsonObject]:
         if self._client is None:
@@ -119,6 +126,12 @@ class Desk:
             }
             for star in self._client.stars()
         ]
+
+    def _results(self) -> JsonObject:
+        try:
+            return {} if self._client is None else dict(self._asked(self._client.latest))
+        except (HostError, ValueError) as error:
+            return {"error": str(error)}
 
     def _do(self, line: str) -> JsonObject:
         if len(line) > LONGEST_LINE:

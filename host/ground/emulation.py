@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.formats.recording import Control
+from cubestack.host.clients.quaternions import attitude_columns
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.virtual_serial import PS_PER_S
@@ -64,6 +65,7 @@ class Emulation:
             "busy": one.board.busy(),
             "currents_ma": controls.currents(),
             "probes": dict(one.board.probes()),
+            "truth": _columns(one.board.truths()),
             "faults_logged": len(one.board.faults.log),
         }
 
@@ -147,6 +149,21 @@ class Emulation:
         known = ", ".join(one.device.name for one in self.emulated)
         raise TargetError(f"no device {name!r} is emulated here; there is {known}")
 
+
+def _columns(truths: Mapping[str, NDArray[np.float64]]) -> dict[str, float | None]:
+    """What is true, by the columns in which a log has what was measured."""
+    found: dict[str, float | None] = {}
+    for name, truth in truths.items():
+        if truth.size == ATTITUDE:
+            found |= attitude_columns(truth)
+        else:
+            angles = zip(ANGLES, map(float, truth), strict=True)
+            found |= {f"{name}_{angle}_deg": value for angle, value in angles}
+    return found
+
+
+ATTITUDE, ANGLES = 4, ("alpha", "beta")
+"""Numbers of an attitude; what the two of a direction are called."""
 
 LATEST_S = 1e8
 """Virtual time that can be run to: three years."""

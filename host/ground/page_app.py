@@ -4,6 +4,7 @@ import asyncio
 import json
 from collections.abc import Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -144,21 +145,23 @@ async def _control(desk: Desk, method: str, path: str, body: object = None) -> J
 async def _live(desk: Desk, socket: WebSocket) -> None:
     """Tell a tab again and again what it shows, until it is gone."""
     await socket.accept()
-    shown, every_s, logged = list[str](), EVERY_S, 0
+    wanted, logged = Wanted(), 0
     hears = asyncio.create_task(socket.receive_json())
     try:
         while True:
             if hears.done():
-                shown, every_s = _wanted(hears.result(), desk)
+                wanted = _wanted(hears.result(), desk)
                 hears = asyncio.create_task(socket.receive_json())
             told: JsonObject = {"link": vars(desk.link)}
-            if shown:
-                told["values"] = await asyncio.wrap_future(desk.read(shown))
+            if wanted.show:
+                told["values"] = await asyncio.wrap_future(desk.read(wanted.show))
+            if wanted.results:
+                told["results"] = await asyncio.wrap_future(desk.results())
             if desk.controls is not None:
                 told |= await asyncio.to_thread(_emulation, desk, logged)
                 logged = told.get("logged", logged)
             await socket.send_json(told)
-            await asyncio.wait([hears], timeout=every_s)
+            await asyncio.wait([hears], timeout=wanted.every_s)
     except (WebSocketDisconnect, RuntimeError):
         pass  # it is gone
     except ValueError:
@@ -183,17 +186,26 @@ def _emulation(desk: Desk, logged: int) -> JsonObject:
     return {"emulation": emulation, **seen}
 
 
-def _wanted(message: object, desk: Desk) -> tuple[list[str], float]:
-    """What a tab wants to be told, and how often; ValueError for nonsense."""
+@dataclass(frozen=True)
+class Wanted:
+    """What a tab wants to be told: telemetry by name, results, and how often."""
+
+    show: Sequence[str] = ()
+    results: bool = False
+    every_s: float = EVERY_S
+
+
+def _wanted(message: object, desk: Desk) -> Wanted:
+    """What a tab says that it wants; ValueError for nonsense."""
     if not isinstance(message, dict):
         raise ValueError("a tab sends objects")
-    known = {one.name for one in desk.target.interface.telemetries}
     show, every_s = message.get("show", []), message.get("every_s", EVERY_S)
     if not isinstance(show, list) or not isinstance(every_s, int | float):
         raise ValueError("'show' is a list of names, 'every_s' a number")
-    return [name for name in show if name in known][:MOST_SHOWN], min(
-        max(float(every_s), SHORTEST_S), LONGEST_S
-    )
+    known = {one.name for one in desk.target.interface.telemetries}
+    names = [name for name in show if name in known][:MOST_SHOWN]
+    results = bool(message.get("results")) and "results" not in desk.about["missing"]
+    return Wanted(names, results, min(max(float(every_s), SHORTEST_S), LONGEST_S))
 
 
 async def _not_there(_request: Request, error: Exception) -> Response:

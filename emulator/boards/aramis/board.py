@@ -168,6 +168,11 @@ class AramisBoard(Board):
             for place, at in enumerate(PICTURES_AT)
         }
 
+    def truths(self) -> dict[str, NDArray[np.float64]]:
+        """See ``Board``."""
+        truth = self.truth()
+        return {} if truth is None else {"attitude": truth}
+
     def irradiate(self, memory: Literal["flash", "sdram"], rate: float) -> int:
         """Turn over each bit of the catalogue's flash or of the SDRAM with probability ``rate``.
 

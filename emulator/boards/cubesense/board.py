@@ -204,6 +204,15 @@ class CubeSenseBoard(Board):
         middle_ps = shutter.mid_exposure_ps((ROWS - 1) / 2)
         return self.scene.truth(Target[camera.name], middle_ps, FIELD_DEG)
 
+    def truths(self) -> dict[str, NDArray[np.float64]]:
+        """See ``Board``; of what a camera sees."""
+        found = {camera.name.lower(): self.truth(camera) for camera in self.cameras}
+        return {
+            name: np.array([truth.alpha_deg, truth.beta_deg])
+            for name, truth in found.items()
+            if truth is not None and truth.visible
+        }
+
     def stored_frame(self, camera: Camera) -> RollingShutter | None:
         """Exposure of the frame of ``camera`` that was stored last; None before."""
         return self._stored.get(camera)

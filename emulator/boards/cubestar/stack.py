@@ -112,6 +112,11 @@ class CubeStarStack(Board):
                 found[f"{name}, bank {number}"] = bank
         return found
 
+    def truths(self) -> dict[str, NDArray[np.float64]]:
+        """See ``Board``."""
+        truth = self.truth()
+        return {} if truth is None else {"attitude": truth}
+
     def _camera_changed(self) -> None:
         self.engine.stream_changed()
         self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")

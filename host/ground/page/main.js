@@ -4,12 +4,13 @@ import { Commands } from "./commands.js";
 import { make } from "./dom.js";
 import { Emulation } from "./emulation.js";
 import { Pictures } from "./picture.js";
+import { Results } from "./results.js";
 import { ask, listen } from "./server.js";
 import { Telemetry } from "./telemetry.js";
 
 const KEPT_LINES = 500;
 
-const parts = ["picture", "emulation", "commands", "telemetry"];
+const parts = ["picture", "results", "emulation", "commands", "telemetry"];
 const lines = document.getElementById("lines");
 const link = document.getElementById("link");
 let live = null;
@@ -44,14 +45,17 @@ function look(number, targets) {
   const path = `/targets/${number}`;
   const act = (line) => told(line, ask(`${path}/do`, { line }));
   const steer = (call, body) => told(call, ask(`${path}/${call}`, body));
-  const wanted = [];
+  const wanted = { show: [], results: false };
+  const want = (more) => {
+    Object.assign(wanted, more);
+    live?.want(wanted);
+  };
   new Commands(place("commands"), about, act);
   const emulation = new Emulation(place("emulation"), about, steer, act);
   const pictures = new Pictures(place("picture"), about, path);
-  const telemetry = new Telemetry(place("telemetry"), about, (names) => {
-    wanted.splice(0, wanted.length, ...names);
-    live?.want({ show: wanted });
-  });
+  live = null; // what the parts want is told when it is there
+  const results = new Results(place("results"), about, (on) => want({ results: on }));
+  const telemetry = new Telemetry(place("telemetry"), about, (names) => want({ show: names }));
   live = listen(
     `${path}/live`,
     (message) => {
@@ -59,6 +63,7 @@ function look(number, targets) {
       link.className = failed ? "bad" : "";
       link.textContent = `${about.name}: ${requests} requests, ${failed} failed ${error}`.trim();
       if (message.values) telemetry.hear(message.values);
+      if (message.results) results.hear(message.results, message.emulation?.truth);
       if (message.pictures) pictures.hear(message.pictures, message.emulation.busy);
       if (message.emulation) emulation.hear(message.emulation);
       for (const line of message.log ?? []) tell(line);
@@ -68,7 +73,7 @@ function look(number, targets) {
       link.textContent = "the program behind this page has gone; waiting for it";
     },
   );
-  live.want({ show: wanted });
+  live.want(wanted);
   for (const [index, button] of [...document.getElementById("targets").children].entries())
     button.setAttribute("aria-current", String(index === number));
 }

@@ -1,0 +1,146 @@
+// What the device answered last, beside the truth where it is emulated, on the sky, and in a log.
+
+import { labelled, make } from "./dom.js";
+
+const KEPT = 100_000; // lines of the log: more than a day at one a second
+const TRAIL = 600;
+const GRID_DEG = 30;
+
+export class Results {
+  // `want(on)` says whether results are to be read again and again.
+  constructor(place, about, want) {
+    this.lines = [];
+    const none = about.missing.results;
+    this.on = make("input", { type: "checkbox", id: "results-on", disabled: Boolean(none) });
+    this.on.checked = !none;
+    this.on.onchange = () => want(this.on.checked);
+    this.count = make("span", { className: "quiet" });
+    this.table = make("tbody");
+    this.sky = make("canvas", { width: 720, height: 400, role: "img", hidden: true });
+    this.sky.setAttribute("aria-label", "where the sensor looks on the sky");
+    const heads = ["", "answer", "truth", "error"].map((text) => make("th", { textContent: text }));
+    const save = make("button", {
+      textContent: "Save log as CSV",
+      id: "save",
+      type: "button",
+      disabled: Boolean(none),
+      onclick: () => this.save(about.device),
+    });
+    place.append(
+      make(
+        "div",
+        { className: "row" },
+        labelled("read every second", this.on, { className: "beside" }),
+        save,
+        this.count,
+      ),
+      make("table", {}, make("thead", {}, make("tr", {}, ...heads)), this.table),
+      this.sky,
+    );
+    if (none) this.count.textContent = none;
+    want(this.on.checked);
+  }
+
+  hear(results, truth = {}) {
+    if ("error" in results) {
+      this.count.textContent = results.error;
+      return;
+    }
+    const errors = {};
+    const rows = Object.entries(results).map(([name, value]) => {
+      const true_ = name.endsWith("_deg") ? truth[name] : undefined;
+      const known = true_ !== undefined && true_ !== null && value !== null;
+      if (known) errors[`${name.slice(0, -4)}_error_deg`] = turned(value - true_);
+      const cell = (text) => make("td", { className: "value", textContent: text });
+      return make(
+        "tr",
+        {},
+        make("th", { scope: "row", textContent: name }),
+        cell(worded(name, value)),
+        cell(known ? worded(name, true_) : ""),
+        cell(known ? turned(value - true_).toFixed(4) : ""),
+      );
+    });
+    this.table.replaceChildren(...rows);
+    this.lines.push({ utc: new Date().toISOString(), ...results, ...errors });
+    if (this.lines.length > KEPT) this.lines.shift();
+    this.count.textContent = `${this.lines.length} lines`;
+    if ("ra_deg" in results) this.draw(truth);
+  }
+
+  draw(truth) {
+    this.sky.hidden = false;
+    const pen = this.sky.getContext("2d");
+    const { width, height } = this.sky;
+    const style = getComputedStyle(document.body);
+    const margin = 34;
+    const x = (ra) => margin + (1 - ra / 360) * (width - 2 * margin); // east is left
+    const y = (dec) => 12 + (0.5 - dec / 180) * (height - 2 * margin);
+    pen.clearRect(0, 0, width, height);
+    pen.font = "15px system-ui, sans-serif";
+    pen.strokeStyle = "#8886";
+    pen.fillStyle = style.color;
+    pen.textAlign = "center";
+    for (let ra = 0; ra <= 360; ra += 2 * GRID_DEG) {
+      line(pen, x(ra), y(-90), x(ra), y(90));
+      if (ra < 360) pen.fillText(`${ra}°`, x(ra), y(-90) + 18);
+    }
+    pen.textAlign = "right";
+    for (let dec = -90; dec <= 90; dec += GRID_DEG) {
+      line(pen, x(360), y(dec), x(0), y(dec));
+      pen.fillText(`${dec}°`, x(360) - 4, y(dec) + 5);
+    }
+    pen.textAlign = "center";
+    pen.fillText("right ascension; declination upward", width / 2, height - 4);
+    pen.fillStyle = "#2f81f7";
+    const seen = this.lines.slice(-TRAIL).filter((one) => one.ra_deg !== null);
+    for (const one of seen) dot(pen, x(one.ra_deg), y(one.dec_deg), 2);
+    const last = seen.at(-1);
+    if (last) dot(pen, x(last.ra_deg), y(last.dec_deg), 6);
+    if (truth.ra_deg !== undefined) {
+      pen.strokeStyle = "#d29922";
+      pen.lineWidth = 2;
+      pen.beginPath();
+      pen.arc(x(truth.ra_deg), y(truth.dec_deg), 11, 0, 2 * Math.PI);
+      pen.stroke();
+      pen.lineWidth = 1;
+    }
+  }
+
+  save(device) {
+    const names = [...new Set(this.lines.flatMap((one) => Object.keys(one)))];
+    const rows = [names, ...this.lines.map((one) => names.map((name) => one[name] ?? ""))];
+    const text = rows.map((row) => row.map(quoted).join(",")).join("\r\n") + "\r\n";
+    const address = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+    make("a", { href: address, download: `${device.toLowerCase()}.csv` }).click();
+    URL.revokeObjectURL(address);
+  }
+}
+
+function turned(deg) {
+  return ((((deg + 180) % 360) + 360) % 360) - 180;
+}
+
+function worded(name, value) {
+  if (value === null) return "–";
+  const whole = typeof value !== "number" || (Number.isInteger(value) && !name.endsWith("_deg"));
+  return whole ? String(value) : value.toFixed(5);
+}
+
+function quoted(value) {
+  const text = String(value);
+  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
+
+function line(pen, fromX, fromY, toX, toY) {
+  pen.beginPath();
+  pen.moveTo(fromX, fromY);
+  pen.lineTo(toX, toY);
+  pen.stroke();
+}
+
+function dot(pen, x, y, radius) {
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  pen.fill();
+}
