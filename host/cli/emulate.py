@@ -80,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help=f"HTTP port that steers it, with the token in ${TOKEN} or a new one (docs/control.md)",
     )
+    parser.add_argument("--lifeline", type=whole(0), help=argparse.SUPPRESS)
     device_options.add_record_arguments(parser)
     device_options.add_insight_arguments(parser)
 
@@ -89,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.i2cdev.adapter import I2cAdapter
     from cubestack.emulator.i2cdev.scheduler import open_scheduler
     from cubestack.emulator.i2cdev.server import I2cServer
+    from cubestack.emulator.ports.lifeline import Lifeline
 
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
@@ -125,6 +127,7 @@ def run(args: argparse.Namespace) -> int:
         board = emulated.board  # what records may have taken the place of its bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
+        lifeline = None if args.lifeline is None else Lifeline(args.lifeline)
         control = _control(args, opened, served, stack)
         calls = []
         if args.i2c is not None:
@@ -133,7 +136,10 @@ def run(args: argparse.Namespace) -> int:
         scheduler = stack.enter_context(
             open_scheduler(
                 board.kernel,
-                [*(endpoint for _, _, endpoint in served), *(one for one in (gdb, control) if one)],
+                [
+                    *(endpoint for _, _, endpoint in served),
+                    *(one for one in (gdb, control, lifeline) if one),
+                ],
                 lambda: any(one.board.busy() for one in opened),
                 pace=args.pace,
                 i2c=adapter if calls else None,
@@ -143,6 +149,9 @@ def run(args: argparse.Namespace) -> int:
         )
         if control is not None:
             control.scheduler = scheduler
+        if lifeline is not None:
+            stack.callback(lifeline.close)
+            lifeline.on_end = scheduler.stop
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: scheduler.stop())
         for one in opened:

@@ -1,9 +1,10 @@
 """Entry point of the ``cubestack`` command.
 
-Exit codes: 0 done, 1 the run failed, 2 the call was wrong. An error is one line: what, where, and
-what would be right.
+Exit codes: 0 done, 1 the run failed, 2 the call was wrong, 128 and the signal's number when it was
+ended by one. An error is one line: what, where, and what would be right.
 """
 
+import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -14,6 +15,7 @@ from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
+SIGNALLED = 128
 
 #: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).
 COMMANDS = {
@@ -68,12 +70,27 @@ def _with_names(text: str) -> str:
     return text
 
 
+def _end_in_order() -> None:
+    """Have signals that end a process close what is open: ports, links, processes of its own."""
+
+    def end(number: int, _frame: object) -> None:
+        raise SystemExit(SIGNALLED + number)
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:  # not that of nohup
+            signal.signal(number, end)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line ``arguments`` (default: the process's own); returns the exit code."""
+    if arguments is None:
+        _end_in_order()
     args = make_parser().parse_args(arguments)
     try:
         return int(args.run(args) or DONE)
-    except (KeyboardInterrupt, BrokenPipeError):
+    except KeyboardInterrupt:
+        return SIGNALLED + signal.SIGINT
+    except BrokenPipeError:
         return FAILED
     except ValueError as error:  # all bad input is a ValueError with a full sentence
         print(f"cubestack {args.command}: {error}", file=sys.stderr)

@@ -114,13 +114,19 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
         look_at = insight(args, stack) if hasattr(args, "gdb") else lambda _emulated: None
         opened = Opener(device, getattr(args, "engine", "auto"), board, bar, look_at)
         shown = bar(experiment.run(opened, options), experiment.count(options), experiment.label)
-        for result in shown:
-            results.append(result)
-            if least is not None and not hasattr(result, "right"):
-                what = f"results of {device.name} do not say what is right"
-                raise ValueError(f"{what}: no --min-right")
-            if args.json:
-                print(json.dumps(result.as_dict() | runs), flush=True)
+        try:
+            for result in shown:
+                results.append(result)
+                if least is not None and not hasattr(result, "right"):
+                    what = f"results of {device.name} do not say what is right"
+                    raise ValueError(f"{what}: no --min-right")
+                if args.json:
+                    print(json.dumps(result.as_dict() | runs), flush=True)
+        except KeyboardInterrupt:
+            if results and not args.json:
+                _report(experiment, results, time.monotonic() - started, runs)
+            say(f"stopped after {len(results)} of {experiment.count(options)}")
+            raise
     if not args.json:
         _report(experiment, results, time.monotonic() - started, runs)
     enough = least is None or _are_right(results, least)

@@ -1,7 +1,5 @@
 """What demonstrations share: a device served by another process, a client, and what is told."""
 
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,11 +11,11 @@ from numpy.typing import NDArray
 from cubestack.host.clients.contract import Progress
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device
+from cubestack.host.devices.emulating import emulating
 from cubestack.host.errors import PortClosedError, PortOpenError
 from cubestack.host.terminal import console, progress_bar, say
 from cubestack.host.transport.streams import open_transport
 
-BOOT_TIMEOUT_S = 120.0  # the first start compiles the FPGA
 ANSWER_TIMEOUT_S = 5.0
 
 
@@ -64,24 +62,18 @@ class Demo:
 @contextmanager
 def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
     """An emulator process, of what ``words`` say, that serves on ``port``."""
-    command = [sys.executable, "-m", "cubestack", "emulate", *words]
-    command += ["--pty", str(port), "--pace", "fast"]
     say("starting the emulator; its first start on a machine compiles what it needs")
-    emulator = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    line = ""
     try:
-        assert emulator.stderr is not None
-        line = emulator.stderr.readline().strip()
-        if not port.exists():
-            raise PortOpenError(line or "the emulator did not start")
-        say(line)
-        yield port
+        with emulating([*words, "--pty", str(port), "--pace", "fast"]) as said:
+            line = next(said, "")
+            if not port.exists():
+                raise PortOpenError(line or "the emulator did not start")
+            say(line)
+            yield port
     except PortClosedError:
-        emulator.kill()
-        say(f"the emulator ended: {emulator.communicate()[1].strip().splitlines()[-1]}")
+        say(f"the emulator ended: {[line, *said][-1]}")
         raise
-    finally:
-        emulator.terminate()
-        emulator.communicate(timeout=BOOT_TIMEOUT_S)
 
 
 def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArray[np.uint8]:

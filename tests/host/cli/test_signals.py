@@ -1,0 +1,73 @@
+"""Signals end a command in order: what is open is closed, what is done is shown."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOON_S = 60.0
+CALL = [sys.executable, "-m", "cubestack"]
+
+
+def begun(*words: str) -> "subprocess.Popen[str]":
+    pipe = subprocess.PIPE
+    return subprocess.Popen([*CALL, *words], stdout=pipe, stderr=pipe, text=True)
+
+
+def alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
+    return state != "Z"
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+def test_no_link_is_left(number: signal.Signals, tmp_path: Path) -> None:
+    link = tmp_path / "tty"
+    with begun("emulate", "cubestar", "--pty", str(link)) as process:
+        assert process.stderr is not None
+        assert "serves on" in process.stderr.readline()
+        assert link.is_symlink()
+        process.send_signal(number)
+        process.communicate(timeout=SOON_S)
+    assert not link.is_symlink()
+    assert process.returncode == (128 + number if number is signal.SIGHUP else 0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_no_emulation_is_left(number: signal.Signals) -> None:
+    with begun("ground", "emulated:cubestar") as process:
+        assert process.stderr is not None
+        assert "Ctrl-C" in process.stderr.readline()
+        (child,) = children(process.pid)
+        process.send_signal(number)
+        process.wait(SOON_S)
+        if alive(child):  # its end is something to wait for
+            waiting = os.pidfd_open(child)
+            assert select.select([waiting], [], [], SOON_S)[0]
+            os.close(waiting)
+    assert not alive(child)
+
+
+def children(process: int) -> set[int]:
+    """Processes that any thread of ``process`` has begun."""
+    tasks = Path(f"/proc/{process}/task").glob("*/children")
+    return {int(one) for task in tasks for one in task.read_text("utf-8").split()}
+
+
+def test_what_was_measured_is_shown() -> None:
+    with begun("measure", "cubestar", "--frames", "5000", "--threshold", "25") as process:
+        assert process.stderr is not None
+        while " of 5000, " not in (line := process.stderr.readline()):
+            assert line
+        process.send_signal(signal.SIGINT)
+        shown, told = process.communicate(timeout=SOON_S)
+    assert process.returncode == 128 + signal.SIGINT
+    assert "stopped after " in told
+    assert "frames" in shown or "%" in shown
