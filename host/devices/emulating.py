@@ -34,11 +34,14 @@ def emulating(
     said = SimpleQueue[str | None]()
 
     def listen() -> None:  # what it says must not fill the pipe, whoever asks for it
-        for line in process.stderr or ():
-            said.put(line.strip())
+        assert process.stderr is not None
+        with process.stderr:
+            for line in process.stderr:
+                said.put(line.strip())
         said.put(None)
 
-    Thread(target=listen, daemon=True).start()
+    listener = Thread(target=listen, daemon=True)
+    listener.start()
     try:
         yield iter(said.get, None)
     finally:
@@ -49,3 +52,4 @@ def emulating(
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+        listener.join(ENDING_S)
