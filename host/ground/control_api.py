@@ -30,7 +30,7 @@ T = TypeVar("T")
 EVERY_S, SHORTEST_S, LONGEST_S = 0.2, 0.05, 60.0
 """Between two messages of `events`, unless the client wants another time; and its limits."""
 
-OPTIONAL = object()
+REQUIRED = object()
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Call:
         meaning: one phrase.
         act: (emulation, values of path and body) -> the answer, in the emulation's thread; a
             future is waited for.
-        takes: types of the body's members by name; each with its default, `OPTIONAL` for none.
+        takes: types of the body's members by name; each with its default, or `REQUIRED`.
     """
 
     method: str
@@ -67,7 +67,7 @@ class Call:
                 raise ValueError(f"{name!r} means nothing to {self.path}; it takes {known}")
         found = {}
         for name, (types, default) in self.takes.items():
-            if name not in body and default is OPTIONAL:
+            if name not in body and default is REQUIRED:
                 raise ValueError(f"{self.path} needs {name!r}")
             value = body.get(name, default)
             if not isinstance(value, types) or (isinstance(value, bool) and types is not bool):
@@ -117,7 +117,7 @@ CALLS = (
     Call(
         *("POST", "/run", "go on to a virtual time as fast as it gets, then hold"),
         lambda emulation, to_s: emulation.run_to(to_s),
-        {"to_s": (NUMBER, OPTIONAL)},
+        {"to_s": (NUMBER, REQUIRED)},
     ),
     Call(
         *("POST", "/pace", "real: speed virtual seconds a second; fast: ahead while there is work"),
@@ -131,7 +131,7 @@ CALLS = (
     Call(
         *("POST", "/devices/{device}/act", "what the shell's fault, scene and power do"),
         _act,
-        {"words": (list, OPTIONAL), "text": (str, "")},
+        {"words": (list, REQUIRED), "text": (str, "")},
     ),
 )
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.contract import DeviceClient
@@ -12,14 +12,13 @@ from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
+from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.pictures.star_names import star_name
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.result import ShellError
 
 T = TypeVar("T")
-
-JsonObject = dict[str, Any]
 
 FROM_A_PAGE = ("read", "write", "dump", "list", "bench", "raw", "fault", "power", "time", "help")
 """Commands of the shell that touch no file of this machine, and end."""

@@ -19,7 +19,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cubestack.host.errors import HostError
-from cubestack.host.ground.desk import Desk, JsonObject
+from cubestack.host.ground.desk import Desk
+from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.guard import TooLargeError, refused
 
 PAGE = Path(__file__).parent / "page"

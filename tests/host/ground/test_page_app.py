@@ -96,7 +96,7 @@ def test_stars_are_those_that_the_device_found(served: Serving) -> None:
     [
         ("read Nonsense", 400, "nothing is called 'Nonsense'"),
         ("write setDetectionThresholds 300 31", 400, "DetectionThreshold"),
-        ("image /tmp/a.png", 400, "image: not from a page"),
+        ("image a.png", 400, "image: not from a page"),
         ("scene /etc/passwd", 400, "scene: not from a page"),
         ("watch Identification 9999", 400, "watch: not from a page"),
         ("read '", 400, "No closing quotation"),
