@@ -14,14 +14,13 @@ When a transfer begins, paced: the way of a call to us and of the answer back is
   to ``TURNAROUND_NS``, and by what the last answer was late, up to ``MAX_DEBT_NS``.
 """
 
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Literal
 
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.pacing import Watch, sharpen_timers, wait_precisely
 from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.pace import PS_PER_NS, Mode, Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
 
@@ -44,8 +43,6 @@ that it takes to be quicker."""
 VISIT_NS = 5_000_000
 """Wall time between two looks at the other ports."""
 
-PS_PER_NS = 1000
-
 
 class I2cScheduler(Endpoint):
     """Ports that lead to one bus, as one port of the scheduler of all ports.
@@ -60,8 +57,8 @@ class I2cScheduler(Endpoint):
         adapter: I2cAdapter,
         ports: Sequence[Endpoint],
         busy: Callable[[], bool],
+        pace: Pace,
         *,
-        fast: bool,
         always_asleep: bool = False,
     ) -> None:
         """Serve ``ports``, whose calls go to ``adapter``.
@@ -71,7 +68,8 @@ class I2cScheduler(Endpoint):
             adapter: the master of the bus; from now on driven.
             ports: where calls come from; closed by their owner.
             busy: whether devices have work of their own.
-            fast: whether virtual time need not follow wall time.
+            pace: how virtual time follows wall time; all other ports are so far back on its scale
+                that a call may begin before it came.
             always_asleep: whether the next call is never waited for awake.
         """
         self.name = name
@@ -79,37 +77,24 @@ class I2cScheduler(Endpoint):
         self._adapter = adapter
         self._ports = ports
         self._busy = busy
-        self._fast = fast
-        self._behind_ns = 0 if fast else TURNAROUND_NS
-        self._origin_ns = 0
-        self._begun = False
+        self._pace = pace
         self._watch = Watch(ports, always_asleep=always_asleep)
         self._came_ns = self._answered_ns = self._told_ns = self._late_ns = self._spare_ns = 0
         self._quickest_ns = TURNAROUND_NS
         adapter.driven = True
-        adapter.holding = not fast
 
-    def clock_ns(self) -> int:
-        """Wall time by which all ports are paced, so far back that a call may begin before it came.
-
-        It is virtual time at the start, so that both have one scale.
-        """
-        if not self._begun:
-            self._origin_ns = time.monotonic_ns() - self._kernel.now // PS_PER_NS - self._behind_ns
-        return time.monotonic_ns() - self._origin_ns - self._behind_ns
-
-    def _now_ns(self) -> int:
-        """Likewise, less what the kernel was paused."""
-        return time.monotonic_ns() - self._origin_ns - self._kernel.held_ns
+    def _ahead_ps(self) -> int:
+        """How far this port is ahead of the others on the scale of virtual time."""
+        return 0 if self._pace.fast else round(TURNAROUND_NS * PS_PER_NS * self._pace.speed)
 
     def watched(self) -> list[tuple[int, int]]:
         """Those of all its ports."""
         return [item for port in self._ports for item in port.watched()]
 
     def release_ps(self, count: int) -> int | None:
-        """When the next answer is due, on the scale of ``clock_ns``."""
+        """When the next answer is due, on the scale of the other ports."""
         due_ps = self._adapter.release_ps()
-        return None if due_ps is None else due_ps - self._behind_ns * PS_PER_NS
+        return None if due_ps is None else due_ps - self._ahead_ps()
 
     def close(self) -> None:
         """Watch no longer; the ports are their owner's."""
@@ -117,25 +102,25 @@ class I2cScheduler(Endpoint):
 
     def exchange(self, now_ps: int) -> None:
         """Serve calls; goes on as long as they come one after the other, up to ``VISIT_NS``."""
-        self._begun = True
         if self._kernel.paused:
             return
+        self._adapter.holding = not self._pace.fast
         came = bool(self._watch.wait(0))
         self._serve(self._ports, came=came)
-        leave_ns = self._now_ns() + VISIT_NS
-        while self._turn() or (self._now_ns() < leave_ns and self._await_call()):
+        leave_ns = self._pace.now_ns() + VISIT_NS
+        while self._turn() or (self._pace.now_ns() < leave_ns and self._await_call()):
             pass
 
     def _serve(self, ports: Iterable[Endpoint], *, came: bool) -> None:
         """Look at ``ports``; ``came`` says whether there is something to see."""
         if came:
-            self._came_ns = self._now_ns()
+            self._came_ns = self._pace.now_ns()
             self._quickest_ns = min(self._quickest_ns, self._came_ns - self._answered_ns)
         now_ps = self._kernel.now
         for port in ports:
             port.exchange(now_ps)
         if came and not self._pending():  # calls without a transfer are answered at once
-            self._answered_ns = self._now_ns()
+            self._answered_ns = self._pace.now_ns()
 
     def _pending(self) -> bool:
         """Whether an answer is due."""
@@ -148,26 +133,26 @@ class I2cScheduler(Endpoint):
             told = adapter.told
             self._drive()
             if adapter.told > told:
-                self._answered_ns = self._told_ns = self._now_ns()
+                self._answered_ns = self._told_ns = self._pace.now_ns()
                 return True
             if adapter.busy and not adapter.beginning:
                 return False
         due_ps = adapter.release_ps()
-        return due_ps is not None and self._release(-(-due_ps // PS_PER_NS))
+        return due_ps is not None and self._release(due_ps)
 
     def _drive(self) -> None:
         """Run transfers as far as virtual time may."""
         kernel, adapter = self._kernel, self._adapter
-        clock = time.monotonic_ns
+        clock = self._pace.clock_ns
         end_ns = clock() + VISIT_NS
-        if self._fast:
+        if self._pace.fast:
 
             def goes_on() -> bool:
                 return clock() < end_ns and not kernel.paused
         else:
             if adapter.beginning:
-                kernel.advance_to(self._start_ns() * PS_PER_NS)
-            limit_ps = self._now_ns() * PS_PER_NS + AHEAD_PS
+                kernel.advance_to(self._pace.ps_at(self._start_ns()) + self._ahead_ps())
+            limit_ps = self._pace.now_ps() + self._ahead_ps() + AHEAD_PS
 
             def goes_on() -> bool:
                 ahead = (kernel.horizon() or 0) > limit_ps
@@ -184,29 +169,30 @@ class I2cScheduler(Endpoint):
         way_ns = self._quickest_ns if self._quickest_ns < TURNAROUND_NS else 0
         return self._came_ns - way_ns - min(self._late_ns, MAX_DEBT_NS)
 
-    def _release(self, due_ns: int) -> bool:
+    def _release(self, due_ps: int) -> bool:
         """Give the answer that is due next, unless that is too far away."""
-        clock, origin_ns = time.monotonic_ns, self._origin_ns + self._kernel.held_ns
-        left_ns = due_ns - (clock() - origin_ns)
+        clock_ns, due_ns = self._pace.now_ns, self._pace.ns_at(due_ps - self._ahead_ps())
+        left_ns = 0 if self._pace.fast else due_ns - clock_ns()
         if left_ns > SPIN_NS:
             return False
         self._spare_ns = left_ns
         self._watch.nap(left_ns)
-        while (now_ns := clock() - origin_ns) < due_ns:
+        while left_ns > 0 and clock_ns() < due_ns:
             pass
-        self._late_ns = now_ns - due_ns
-        self._adapter.release(now_ns * PS_PER_NS)
-        self._answered_ns = self._told_ns = self._now_ns()
+        now_ns = clock_ns()
+        self._late_ns = max(0, now_ns - due_ns)
+        self._adapter.release(max(due_ps, self._pace.ps_at(now_ns) + self._ahead_ps()))
+        self._answered_ns = self._told_ns = self._pace.now_ns()
         return True
 
     def _await_call(self) -> bool:
         """Virtual time stands still for a moment: most programs call again at once."""
-        if self._pending() or (self._fast and self._busy()):
+        if self._pending() or (self._pace.fast and self._busy()):
             return False
-        left_ns = self._answered_ns + TURNAROUND_NS - self._now_ns()
+        left_ns = self._answered_ns + TURNAROUND_NS - self._pace.now_ns()
         if left_ns <= 0:
             return False
-        awake = self._fast or self._spare_ns < SPARE_NS
+        awake = self._pace.fast or self._spare_ns < SPARE_NS
         ready = self._watch.wait(left_ns, awake=awake)
         if ready:
             self._serve(ready, came=True)
@@ -219,7 +205,7 @@ def open_scheduler(
     endpoints: Sequence[Endpoint],
     busy: Callable[[], bool],
     *,
-    pace: Literal["real", "fast"],
+    pace: Mode,
     i2c: I2cAdapter | None = None,
     i2c_ports: Sequence[Endpoint] = (),
     always_asleep: bool = False,
@@ -228,9 +214,8 @@ def open_scheduler(
     """A scheduler for ``endpoints`` and a bus, to be run in a ``with`` block.
 
     Serial ports alone are served by a :class:`RealtimeScheduler`. With an I2C bus, an
-    :class:`I2cScheduler` stands before it: it takes the bus's calls as they come, and tells the
-    wall time by which both of them pace. ``run()`` serves until ``stop()``, which a thread, a
-    signal handler or a port may call::
+    :class:`I2cScheduler` stands before it: it takes the bus's calls as they come. ``run()`` serves
+    until ``stop()``, which a thread, a signal handler or a port may call::
 
         with open_scheduler(board.kernel, [endpoint], board.busy, pace="fast") as scheduler:
             signal.signal(signal.SIGINT, lambda _number, _frame: scheduler.stop())
@@ -247,22 +232,20 @@ def open_scheduler(
             processor.
         report: receives a line when pace "real" can not be kept.
     """
+    scale = Pace(kernel, pace)
     if i2c is None:
-        yield RealtimeScheduler(kernel, endpoints, busy, pace=pace, report=report)
+        yield RealtimeScheduler(kernel, endpoints, busy, scale, report=report)
         return
     adapter = i2c
     sharpen_timers()
-    calls = I2cScheduler(
-        "I2C bus", adapter, i2c_ports, busy, fast=pace == "fast", always_asleep=always_asleep
-    )
+    calls = I2cScheduler("I2C bus", adapter, i2c_ports, busy, scale, always_asleep=always_asleep)
     try:
         yield RealtimeScheduler(
             kernel,
             [calls, *endpoints],
             lambda: adapter.busy or busy(),
-            pace=pace,
+            scale,
             report=report,
-            clock_ns=calls.clock_ns,
             wait=wait_precisely,
         )
     finally:

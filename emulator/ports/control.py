@@ -14,9 +14,10 @@ from contextlib import suppress
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.pace import Mode
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 if TYPE_CHECKING:
@@ -125,12 +126,12 @@ class ControlPort(Endpoint):
         self._ring()
         return self._arrived
 
-    def set_pace(self, pace: Literal["real", "fast"], speed: float = 1.0) -> None:
-        """See ``RealtimeScheduler.set_pace``; ValueError for a speed out of range."""
+    def set_pace(self, mode: Mode, speed: float = 1.0) -> None:
+        """See ``Pace.change``; ValueError for a speed out of range."""
         if not SLOWEST <= speed <= FASTEST:
             raise ValueError(f"a speed is {SLOWEST:g} to {FASTEST:g}, not {speed:g}")
         assert self.scheduler is not None
-        self.scheduler.set_pace(pace, speed)
+        self.scheduler.pace.change(mode, speed)
 
     # --- for the scheduler ----------------------------------------------------------------------
 
@@ -184,7 +185,7 @@ class ControlPort(Endpoint):
     def _release(self) -> None:
         self.kernel.release(HOLDER)
         if self.scheduler is not None:
-            self.scheduler.align()
+            self.scheduler.pace.align()
 
     def _check_debugger(self) -> None:
         others = self.kernel.holders - {HOLDER}

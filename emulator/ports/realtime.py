@@ -9,12 +9,11 @@ count, so nothing catches up afterwards.
 """
 
 import select
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass
-from typing import Literal
+from dataclasses import dataclass
 
 from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 SLICE_S = 0.005
@@ -30,7 +29,6 @@ LAG_WORTH_SAYING_S = 0.5
 LAG_REPORT_S = 5.0
 """Wall time between two reports of a lag."""
 
-PS_PER_NS = 1000
 NS_PER_S = 10**9
 
 Watched = Sequence[tuple[int, int]]
@@ -55,55 +53,34 @@ class RealtimeScheduler:
         env: kernel; its time is in ps.
         endpoints: open ports.
         busy: whether the device has work, or bytes are on a wire.
-        pace: whether virtual time follows wall time or runs ahead (text of the module); see
-            ``set_pace``.
+        pace: how virtual time follows wall time (text of the module).
         report: receives a line when pace "real" can not be kept.
-        clock_ns: wall time in ns from any origin; never runs back.
         wait: waits for descriptors, at most so many s, as ``wait_ready`` does.
     """
 
     env: Kernel
     endpoints: Sequence[Endpoint]
     busy: Callable[[], bool]
-    _: KW_ONLY
-    pace: Literal["real", "fast"]
+    pace: Pace
     report: Callable[[str], None] = lambda _text: None
-    clock_ns: Callable[[], int] = time.monotonic_ns
     wait: Callable[[Watched, float], None] = wait_ready
 
     def __post_init__(self) -> None:
         """Prepare to serve."""
         self._stopped = False
-        self._speed = 1.0
-        self._offset_ps = 0  # virtual less wall time
-        self._reported_ns = self.clock_ns()
+        self._reported_ns = self.pace.clock_ns()
 
     def stop(self) -> None:
         """Make ``run`` return soon; for other threads, and for signal handlers."""
         self._stopped = True
 
-    @property
-    def speed(self) -> float:
-        """Virtual seconds in a second of wall time, where virtual time follows that."""
-        return self._speed
-
-    def set_pace(self, pace: Literal["real", "fast"], speed: float = 1.0) -> None:
-        """Go on at another pace; of "real", ``speed`` times as fast as wall time."""
-        self.pace, self._speed = pace, speed
-        self.align()
-
-    def align(self) -> None:
-        """Go on from here: what virtual time is ahead of wall time, or behind, does not count."""
-        self._offset_ps = 0
-        self._offset_ps = self.env.now - self._wall_ps()
-
     def run(self) -> None:
         """Serve until ``stop``."""
-        self.align()
+        self.pace.align()
         while not self._stopped:
-            ahead = self.pace == "fast" and self._run_ahead()
+            ahead = self.pace.fast and self._run_ahead()
             if ahead:
-                self.align()
+                self.pace.align()
             elif not self.env.paused:
                 self._follow()
             for endpoint in self.endpoints:
@@ -112,15 +89,8 @@ class RealtimeScheduler:
                 watched = [item for endpoint in self.endpoints for item in endpoint.watched()]
                 self.wait(watched, self._until_next_s())
 
-    def _wall_ps(self) -> int:
-        """Wall time on the scale of virtual time."""
-        wall_ps = (self.clock_ns() - self.env.held_ns) * PS_PER_NS
-        if self._speed != 1.0:
-            wall_ps = round(wall_ps * self._speed)
-        return wall_ps + self._offset_ps
-
     def _slice_end_ns(self) -> int:
-        return self.clock_ns() + int(SLICE_S * NS_PER_S)
+        return self.pace.clock_ns() + int(SLICE_S * NS_PER_S)
 
     def _run_ahead(self) -> bool:
         """Work for a slice of wall time, or until everything waits for the host.
@@ -131,7 +101,7 @@ class RealtimeScheduler:
             return False
         progress = False
         end_ns = self._slice_end_ns()
-        while self.clock_ns() < end_ns and not self.env.paused:
+        while self.pace.clock_ns() < end_ns and not self.env.paused:
             horizon, release = self.env.horizon(), self._release_ps(BURST_BYTES)
             if release is None and not self.busy():
                 break
@@ -153,18 +123,18 @@ class RealtimeScheduler:
 
     def _follow(self) -> None:
         """Bring virtual time up to wall time, as far as a slice of wall time allows."""
-        target_ps = self._wall_ps()
+        target_ps = self.pace.now_ps()
         end_ns = self._slice_end_ns()
         while (horizon := self.env.horizon()) is not None and horizon <= target_ps:
             self.env.step()
-            if self.clock_ns() >= end_ns or self.env.paused:
+            if self.pace.clock_ns() >= end_ns or self.env.paused:
                 break
         else:
             self.env.advance_to(target_ps)
-        self._report_lag((self._wall_ps() - self.env.now) / PS_PER_S)
+        self._report_lag((self.pace.now_ps() - self.env.now) / PS_PER_S)
 
     def _report_lag(self, lag_s: float) -> None:
-        now_ns = self.clock_ns()
+        now_ns = self.pace.clock_ns()
         due_ns = self._reported_ns + int(LAG_REPORT_S * NS_PER_S)
         if lag_s > LAG_WORTH_SAYING_S and now_ns >= due_ns:
             self._reported_ns = now_ns
@@ -177,5 +147,5 @@ class RealtimeScheduler:
         times = [ps for ps in (self._release_ps(1), self.env.horizon()) if ps is not None]
         if not times:
             return IDLE_S
-        left_s = (min(times) - self._wall_ps()) / PS_PER_S / self._speed
+        left_s = (min(times) - self.pace.now_ps()) / PS_PER_S / self.pace.speed
         return min(IDLE_S, max(0.0, left_s))

@@ -54,8 +54,8 @@ class Emulation:
         return {
             "time_s": self.port.kernel.now / PS_PER_S,
             "held": self.port.held,
-            "pace": scheduler.pace,
-            "speed": scheduler.speed,
+            "pace": scheduler.pace.mode,
+            "speed": scheduler.pace.speed,
             "devices": {one.device.name: self._state(one) for one in self.emulated},
         }
 

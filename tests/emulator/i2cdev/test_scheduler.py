@@ -15,8 +15,9 @@ from cubestack.emulator.i2cdev import scheduler as module
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.scheduler import TURNAROUND_NS, I2cScheduler
 from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
-from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 from .conftest import Registers
 
@@ -136,7 +137,6 @@ class ScheduledWorld:
         busy: Callable[[], bool] = lambda: False,
     ) -> None:
         self.world = World()
-        patch.setattr(module, "time", self.world)
         patch.setattr(module, "Watch", AtWork)
         self.kernel = Kernel()
         bus = I2cBus(self.kernel, 10**9 // BIT_NS)
@@ -144,13 +144,13 @@ class ScheduledWorld:
         self.adapter = I2cAdapter(self.kernel, bus)
         self.running = 0
         port = Port(self.world)
-        self.calls = I2cScheduler("calls", self.adapter, [port], busy, fast=fast)
+        self.pace = Pace(self.kernel, "fast" if fast else "real", self.world.monotonic_ns)
+        self.calls = I2cScheduler("calls", self.adapter, [port], busy, self.pace)
         self.scheduler = RealtimeScheduler(
             self.kernel,
             [self.calls, port],
             lambda: self.adapter.busy or busy(),
-            pace="fast" if fast else "real",
-            clock_ns=self.calls.clock_ns,
+            self.pace,
             wait=self._wait,
         )
 
@@ -228,6 +228,21 @@ def test_a_call_now_and_then_takes_the_time_of_the_wire(make, think_us):
     program = bench.quick_and_slow(think_ns=think_us * US, calls=20)
     bench.scheduler.run()
     assert program.durations == pytest.approx([READ_NS] * 20, abs=5 * US)
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
+def test_answers_come_in_time_after_virtual_time_was_sent_elsewhere(make, speed):
+    """Neither ahead nor at another speed does a program wait for what wall time never gets to."""
+    bench = make()
+
+    def send() -> None:
+        bench.kernel.advance_to(bench.kernel.now + 100 * PS_PER_S)
+        bench.pace.change("real", speed)
+
+    bench.world.arrive(bench.world.now_ns + 1_000 * US, send)
+    after = bench.program(think_ns=8 * US, calls=51, wait_ns=2_000 * US)
+    bench.scheduler.run()
+    assert after.span / 50 == pytest.approx(max(READ_NS / speed, 2 * WAY_NS + 8 * US), rel=0.05)
 
 
 def test_nothing_is_known_of_the_first_call(make):

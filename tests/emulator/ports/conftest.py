@@ -18,6 +18,7 @@ import pytest
 
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import Endpoint, poll_now
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler, wait_ready
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
@@ -141,7 +142,9 @@ def ready(port: Endpoint) -> list[int]:
 @contextlib.contextmanager
 def served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
     """The endpoint is served by a scheduler in a thread."""
-    scheduler = RealtimeScheduler(device.kernel, [endpoint], lambda: device.uart.busy, pace=pace)
+    scheduler = RealtimeScheduler(
+        device.kernel, [endpoint], lambda: device.uart.busy, Pace(device.kernel, pace)
+    )
     thread = threading.Thread(target=scheduler.run)
     thread.start()
     try:

@@ -12,6 +12,7 @@ from typing import Any
 from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT
@@ -47,7 +48,7 @@ def serve(kernel: Kernel, ports, busy, waits: int, step: Callable[[int], None]) 
         if number == waits:
             scheduler.stop()
 
-    scheduler = RealtimeScheduler(kernel, ports, busy, pace="real", clock_ns=clock, wait=wait)
+    scheduler = RealtimeScheduler(kernel, ports, busy, Pace(kernel, "real", clock), wait=wait)
     scheduler.run()
 
 

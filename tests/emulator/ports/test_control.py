@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.ports.control import MOST_EVENTS, ControlPort
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
@@ -25,7 +26,9 @@ class Running:
 
     def __post_init__(self) -> None:
         self.port = ControlPort(self.kernel)
-        self.scheduler = RealtimeScheduler(self.kernel, [self.port], lambda: False, pace=self.pace)
+        self.scheduler = RealtimeScheduler(
+            self.kernel, [self.port], lambda: False, Pace(self.kernel, self.pace)
+        )
         self.port.scheduler = self.scheduler
         self.kernel.process(self._tick())
         self.thread = threading.Thread(target=self.scheduler.run)
@@ -126,7 +129,7 @@ def test_a_speed_is_kept_on_a_wall_clock_of_our_own(speed: float) -> None:
 
     port = ControlPort(kernel)
     scheduler = RealtimeScheduler(
-        kernel, [port], lambda: False, pace="real", clock_ns=lambda: wall[0], wait=wait
+        kernel, [port], lambda: False, Pace(kernel, "real", lambda: wall[0]), wait=wait
     )
     port.scheduler = scheduler
     port.set_pace("real", speed)

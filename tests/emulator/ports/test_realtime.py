@@ -12,6 +12,7 @@ import pytest
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports import realtime
 from cubestack.emulator.ports.endpoint import Endpoint
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import IDLE_S, SLICE_S, RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
 
@@ -79,9 +80,8 @@ class TimedPort:
             self.kernel,
             [self.port],
             lambda: self.busy(),
-            pace=pace,
+            Pace(self.kernel, pace, self.wall.clock),
             report=lambda text: self.reports.append((self.wall.ms, text)),
-            clock_ns=self.wall.clock,
             wait=self.wall.wait,
         )
         self.port.on_exchange = lambda: scheduler.stop() if self.wall.ms >= wall_ms else None
@@ -245,7 +245,7 @@ def test_busy_device_without_events_does_not_make_the_scheduler_spin(bench):
 
 
 def test_stop_before_the_start():
-    scheduler = RealtimeScheduler(Kernel(), [], lambda: False, pace="real")
+    scheduler = RealtimeScheduler(Kernel(), [], lambda: False, Pace(Kernel(), "real"))
     scheduler.stop()
     scheduler.run()
 
@@ -255,7 +255,7 @@ def test_stop_from_a_signal_handler(bench):
         bench.kernel,
         [],
         lambda: False,
-        pace="real",
+        Pace(bench.kernel, "real"),
         wait=lambda _watched, _timeout: signal.raise_signal(signal.SIGUSR1),
     )
     before = signal.signal(signal.SIGUSR1, lambda _number, _frame: scheduler.stop())
@@ -268,7 +268,7 @@ def test_stop_from_a_signal_handler(bench):
 @pytest.mark.parametrize("pace", ["real", "fast"])
 def test_stop_from_another_thread_while_the_device_is_busy(bench, pace):
     bench.tick(PS_PER_MS)
-    scheduler = RealtimeScheduler(bench.kernel, [], lambda: True, pace=pace)
+    scheduler = RealtimeScheduler(bench.kernel, [], lambda: True, Pace(bench.kernel, pace))
     thread = threading.Thread(target=scheduler.run)
     thread.start()
     scheduler.stop()

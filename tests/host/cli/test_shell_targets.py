@@ -10,6 +10,7 @@ import pytest
 from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
@@ -52,7 +53,7 @@ def serving(kind, folder):
             target = port.name
         stack.callback(port.close)
         scheduler = RealtimeScheduler(
-            board.kernel, [port], lambda: board.busy() or adapter.busy, pace="fast"
+            board.kernel, [port], lambda: board.busy() or adapter.busy, Pace(board.kernel, "fast")
         )
         thread = threading.Thread(target=scheduler.run)
         thread.start()

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.ports.control import ControlPort
+from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.ground.control_api import control_app
@@ -54,7 +55,7 @@ def controlled() -> Iterator[Controlled]:
     emulated = open_device("cubestar")
     kernel = emulated.board.kernel
     port = ControlPort(kernel)
-    scheduler = RealtimeScheduler(kernel, [port], emulated.board.busy, pace="real")
+    scheduler = RealtimeScheduler(kernel, [port], emulated.board.busy, Pace(kernel, "real"))
     port.scheduler = scheduler
     app = Guard(control_app(Emulation(port, [emulated])), TOKEN)
     serving = Serving(app, "127.0.0.1", 0)
