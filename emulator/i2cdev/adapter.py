@@ -76,7 +76,8 @@ class I2cAdapter:
         self.driven = False
         self._bus = bus
         self._errors = {errno.ENXIO: address_errno, errno.EIO: data_errno}
-        self._pending = 0
+        self._open: list[Done] = []
+        self._gone = False
         self._waiting: deque[tuple[list[I2cMessage], Done]] = deque()
         self._driven: _Driven | None = None
         self._held: deque[tuple[int, int, Done]] = deque()
@@ -84,7 +85,7 @@ class I2cAdapter:
     @property
     def busy(self) -> bool:
         """Whether a transfer is under way or waits for the wire."""
-        return self._pending > 0
+        return len(self._open) > len(self._held)
 
     @property
     def beginning(self) -> bool:
@@ -96,8 +97,10 @@ class I2cAdapter:
 
         Read data lands in the messages.
         """
-        self._pending += 1
-        if self.driven:
+        self._open.append(done)
+        if self._gone:
+            self._tell(-errno.EIO, done)
+        elif self.driven:
             self._waiting.append((messages, done))
         else:
             self.env.process(self._perform(messages, done))
@@ -121,7 +124,6 @@ class I2cAdapter:
             if result != -errno.EAGAIN or self.env.now > give_up_ps:
                 break
             yield self.env.timeout(self._bus.bit_ps)  # so that it does give up
-        self._pending -= 1
         if self.holding:
             self._held.append((self.env.now, result, done))
         else:
@@ -137,7 +139,20 @@ class I2cAdapter:
 
     def _tell(self, result: int, done: Done) -> None:
         self.told += 1
+        self._open.remove(done)
         done(result)
+
+    def pull(self) -> None:
+        """Leave the bus: what is under way fails, and whatever comes, until ``plug``."""
+        self._gone, self._driven = True, None
+        self._waiting.clear()
+        self._held.clear()
+        for done in list(self._open):
+            self._tell(-errno.EIO, done)
+
+    def plug(self, bus: I2cBus) -> None:
+        """Become a master of another bus of the same kernel."""
+        self._gone, self._bus = False, bus
 
     def release(self, time_ps: int) -> None:
         """Tell of the transfers that ended by ``time_ps``."""

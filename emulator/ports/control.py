@@ -123,6 +123,7 @@ class ControlPort(Endpoint):
         self._forget("sent elsewhere")
         self.kernel.hold(HOLDER)
         self._until_ps, self._arrived = time_ps, Future[int]()
+        self._arrived.set_running_or_notify_cancel()  # who asked may be gone by then
         self._ring()
         return self._arrived
 

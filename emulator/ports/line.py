@@ -69,6 +69,15 @@ class HostLine:
             self._blocks.popleft()
         return bytes(taken)
 
+    def move(self, uart: Uart) -> None:
+        """Into another device's ``uart``, with the format of this end."""
+        form = self.uart.host_form
+        self.unplug()
+        self.uart = uart
+        uart.line = self._deliver
+        uart.host_form = form
+        self._sampler = None if form == uart.form else LineSampler(form)
+
     def unplug(self) -> None:
         """Take the plug out: what the device sends from now on is lost."""
         self._blocks.clear()

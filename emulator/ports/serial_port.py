@@ -32,6 +32,7 @@ class SerialPort(Endpoint):
         self._line = HostLine(uart)
         self._unread = bytearray()
         self._served: object = None
+        self._plugged = True
 
     @property
     def congested(self) -> bool:
@@ -40,6 +41,8 @@ class SerialPort(Endpoint):
 
     def exchange(self, now_ps: int) -> None:
         """Client to line as far as there is room; line to the client that is there."""
+        if not self._plugged:
+            return
         while (room := self._room()) > 0 and (data := self._read(room)):
             self._line.uart.host_writes(data)
         arrived = self._line.take(now_ps)
@@ -52,6 +55,17 @@ class SerialPort(Endpoint):
         del self._unread[:-MAX_UNREAD]
         if self._unread:
             del self._unread[: self._write(self._unread)]
+
+    def pull(self) -> None:
+        """Take the plug out: clients stay, and what they write waits, until ``plug``."""
+        self._line.unplug()
+        self._unread.clear()
+        self._plugged = False
+
+    def plug(self, uart: Uart) -> None:
+        """Plug into another device's ``uart``; what was on the wire is lost."""
+        self._line.move(uart)
+        self._plugged = True
 
     def release_ps(self, count: int) -> int | None:
         """When the line has delivered the next ``count`` bytes, or all; None without any."""

@@ -38,6 +38,12 @@ class Recorder:
         """The device was told so, from outside of its ports; see ``Control``."""
         self._writer.write(rec.Control(time_ps, words, text))
 
+    def flush(self) -> None:
+        """Write what is pending, so that the file is whole."""
+        for tap in self._taps:
+            tap.flush()
+        self._writer.flush()
+
     def close(self) -> None:
         """Write what is pending and detach."""
         for tap in self._taps:
@@ -64,23 +70,23 @@ class _LineTap(UartTap):
         self._add("host", bytes([byte]), start_ps)
 
     def framing_error(self, time_ps: int) -> None:
-        self._flush()
+        self.flush()
         self._writer.write(rec.LineError(time_ps, self._port))
 
     def close(self) -> None:
-        self._flush()
+        self.flush()
         self._uart.taps.remove(self)
         self._uart.host_taps.remove(self._host_sent)
 
     def _add(self, side: rec.Side, data: bytes, start_ps: int) -> None:
         next_ps = self._start_ps + len(self._data) * self._uart.byte_ps
         if side != self._side or start_ps != next_ps or len(self._data) >= BLOCK_BYTES:
-            self._flush()
+            self.flush()
         if not self._data:
             self._side, self._start_ps = side, start_ps
         self._data += data
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
         if self._data:
             start_ps, data, byte_ps = self._start_ps, bytes(self._data), self._uart.byte_ps
             self._writer.write(rec.LineBytes(start_ps, self._port, self._side, data, byte_ps))
@@ -104,6 +110,9 @@ class _BusTap(I2cTap):
         self._writer.write(
             rec.BusTransfer(began_ps, self._port, self._bus.kernel.now, found, errno)
         )
+
+    def flush(self) -> None:
+        """Every transfer was written at its end."""
 
     def close(self) -> None:
         self._bus.taps.remove(self)

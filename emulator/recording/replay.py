@@ -50,6 +50,7 @@ class Replay:
         self._kernel = kernel
         self._heard = {port: _Listener(uart) for port, uart in uarts.items()}
         self._bus_found: list[rec.BusTransfer] = []
+        self._stopped = False
         for port, uart in uarts.items():
             kernel.process(self._write(port, uart))
         kernel.process(self._transfer(bus))
@@ -66,13 +67,23 @@ class Replay:
         lines = [self._compare_line(interface, *heard) for heard in self._heard.items()]
         return [text for text in (*lines, self._compare_bus(interface)) if text is not None]
 
+    def stop(self) -> None:
+        """Play no more; what is on a wire gets there."""
+        self._stopped = True
+
+    def _until(self, time_ps: int) -> Generator[simpy.Event, Any, bool]:
+        """Wait for a time; whether it is to be played on."""
+        yield self._kernel.timeout(max(0, time_ps - self._kernel.now))
+        return not self._stopped
+
     def _write(self, port: str, uart: Uart) -> Generator[simpy.Event, Any, None]:
         for event in self._recording.events:
             if not isinstance(event, rec.LineBytes | rec.LineError) or event.port != port:
                 continue
             if isinstance(event, rec.LineBytes) and event.side == "device":
                 continue
-            yield self._kernel.timeout(max(0, event.time_ps - self._kernel.now))
+            if not (yield from self._until(event.time_ps)):
+                return
             if isinstance(event, rec.LineBytes):
                 uart.host_writes(event.data)
             else:
@@ -80,12 +91,14 @@ class Replay:
 
     def _act(self, act: Callable[[rec.Control], None]) -> Generator[simpy.Event, Any, None]:
         for control in self._recording.controls:
-            yield self._kernel.timeout(max(0, control.time_ps - self._kernel.now))
+            if not (yield from self._until(control.time_ps)):
+                return
             act(control)
 
     def _transfer(self, bus: I2cBus) -> Generator[simpy.Event, Any, None]:
         for transfer in self._recording.transfers:
-            yield self._kernel.timeout(max(0, transfer.time_ps - self._kernel.now))
+            if not (yield from self._until(transfer.time_ps)):
+                return
             messages = [
                 I2cMessage(m.address, read=len(m.data), probe_read=not m.data)
                 if m.read

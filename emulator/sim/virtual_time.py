@@ -1,5 +1,6 @@
 """Virtual time: an integer number of picoseconds, its kernel, and clocks that convert exactly."""
 
+from itertools import count
 from time import monotonic_ns
 
 import simpy
@@ -50,6 +51,12 @@ class Kernel(simpy.Environment):
     def now(self) -> int:
         """Virtual time in ps."""
         return self._now  # type: ignore[return-value]  # all delays are whole numbers
+
+    def restart(self) -> None:
+        """Begin at 0 again with nothing to come; who holds it still does."""
+        self._queue.clear()
+        self._eid = count()
+        self._now = 0
 
     def horizon(self) -> int | None:
         """Time of the next scheduled event in ps; None when there is none."""

@@ -120,6 +120,11 @@ class Recording:
         """All that was done from outside of the ports."""
         return [event for event in self.events if isinstance(event, Control)]
 
+    def until(self, end_ps: int) -> "Recording":
+        """What had begun by ``end_ps``."""
+        begun = (_begun(event, end_ps) for event in self.events if event.time_ps <= end_ps)
+        return replace(self, events=tuple(begun))
+
     @property
     def end_ps(self) -> int:
         """When the last event has ended; 0 without any."""
@@ -140,6 +145,10 @@ class RecordingWriter:
     def write(self, event: Event) -> None:
         """Write an event."""
         self._line(_to_json(event))
+
+    def flush(self) -> None:
+        """Whoever reads the file finds all events."""
+        self._stream.flush()
 
     def _line(self, content: dict[str, object]) -> None:
         self._stream.write(json.dumps(content, separators=(",", ":")) + "\n")
@@ -219,6 +228,13 @@ def _message(content: Any) -> BusMessage:
     read = "read" in content
     data = bytes.fromhex(content["read" if read else "write"])
     return BusMessage(int(content["address"]), data, read)
+
+
+def _begun(event: Event, end_ps: int) -> Event:
+    """An event without the bytes that begin after ``end_ps``."""
+    if not isinstance(event, LineBytes):
+        return event
+    return replace(event, data=event.data[: (end_ps - event.time_ps) // event.byte_ps + 1])
 
 
 def _end_ps(event: Event) -> int:

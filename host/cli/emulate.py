@@ -17,6 +17,7 @@ examples:
 import argparse
 import os
 import signal
+import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -27,6 +28,7 @@ from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, open_ports
 from cubestack.host.devices.emulated import AnyEmulated, power_up
+from cubestack.host.devices.past import Past
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.options import flag
@@ -36,13 +38,17 @@ from cubestack.host.terminal import progress, say
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
     from cubestack.emulator.ports.control import ControlPort
-    from cubestack.emulator.ports.endpoint import Endpoint
+    from cubestack.emulator.ports.serial_port import SerialPort
+    from cubestack.firmware_model.formats.setup import Setup
 
 ONE_DEVICE = (
     *("scene", "faults", "record", "trace", "set"),
     *("gdb", "gdb_wait", "profile_out", "coverage_out"),
 )
 """Options that belong to one device."""
+
+FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out")
+"""Options whose files or whose doings can not be taken back."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -101,7 +107,9 @@ def run(args: argparse.Namespace) -> int:
                 raise ValueError(f"{flag(name)} belongs to one device, and there are several")
     with ExitStack() as stack:
         opened: list[AnyEmulated] = []
+        setups: list[Setup] = []
         gdb = None
+        stack.callback(_close, opened)
         for name in args.devices:
             found = device(name)
             options = device_options.chosen_options(args, found)
@@ -115,20 +123,20 @@ def run(args: argparse.Namespace) -> int:
                 beside=opened[0] if opened else None,
                 **options,
             )
-            stack.callback(emulated.close)
-            emulated.board.tell(say)
             opened.append(emulated)
+            setups.append(emulated_setup(args.seed, args.scene, args.faults, options))
             device_options.tell_notices(found, options, say)
         if len(opened) == 1:
-            device_options.inject_plan(emulated.faults, args.faults, say)
-            setup = emulated_setup(args.seed, args.scene, args.faults, options)
-            device_options.record(args, emulated, stack, setup)
+            device_options.inject_plan(emulated.faults, args.faults)
             gdb = device_options.insight(args, stack)(emulated)
+        for one in opened:
+            _listen(one)
+        past = _past(args, opened, setups, stack)
         board = emulated.board  # what records may have taken the place of its bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
         lifeline = None if args.lifeline is None else Lifeline(args.lifeline)
-        control = _control(args, opened, served, stack)
+        control = _control(args, opened, served, past, stack)
         calls = []
         if args.i2c is not None:
             calls.append(I2cServer(socket_path(args.i2c), adapter))
@@ -163,14 +171,47 @@ def run(args: argparse.Namespace) -> int:
             say(f"{one.device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
         if args.i2c is not None:
             say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
+        if isinstance(past, Past):
+            past.on_arrival = _listen
+            past.bus = adapter
+            past.ports = [(opened.index(owner), line.name, end) for owner, line, end in served]
         scheduler.run()
     return 0
+
+
+def _close(opened: list[AnyEmulated]) -> None:
+    """Those that there are in the end."""
+    for one in opened:
+        one.close()
+
+
+def _listen(emulated: AnyEmulated) -> None:
+    """Tell what it has to say, and what its faults do."""
+    emulated.board.tell(say)
+    emulated.faults.on_event = lambda event: say(str(event))
+
+
+def _past(
+    args: argparse.Namespace, opened: list[AnyEmulated], setups: "Sequence[Setup]", stack: ExitStack
+) -> Past | str:
+    """What is kept of all that is done; or why nothing is by which one could go back."""
+    given = [flag(name) for name in FORWARD_ONLY if getattr(args, name) is not None]
+    if args.control is None or given:
+        if len(opened) == 1:
+            device_options.record(args, opened[0], stack, setups[0])
+        return f"{given[0]} goes forward only" if given else "nothing is on record"
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-")))
+    files = [args.record or folder / f"{one.device.name}.rec" for one in opened]
+    past = Past(opened, setups, files, args.engine)
+    stack.callback(past.close)
+    return past
 
 
 def _control(
     args: argparse.Namespace,
     opened: Sequence[AnyEmulated],
-    served: "Sequence[tuple[AnyEmulated, SerialLine, Endpoint]]",
+    served: "Sequence[tuple[AnyEmulated, SerialLine, SerialPort]]",
+    past: Past | str,
     stack: ExitStack,
 ) -> "ControlPort | None":
     """The control port, served in a thread, if there is to be one."""
@@ -187,7 +228,8 @@ def _control(
     for owner, _, endpoint in served:
         ports.setdefault(owner.device.name, []).append(endpoint.name)
     token = os.environ.get(TOKEN) or new_token()
-    guard = Guard(control_app(Emulation(port, opened, ports)), token, any_host=args.allow_remote)
+    emulation = Emulation(port, opened, ports, past)
+    guard = Guard(control_app(emulation), token, any_host=args.allow_remote)
     serving = Serving(guard, args.listen, args.control, allow_remote=args.allow_remote)
     stack.enter_context(serving.running())
     stack.callback(port.close)  # first, so that nobody waits for an answer any more

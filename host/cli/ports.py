@@ -13,7 +13,7 @@ from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
-    from cubestack.emulator.ports.endpoint import Endpoint
+    from cubestack.emulator.ports.serial_port import SerialPort
 
 LOOPBACK = "127.0.0.1"
 LAST_PORT = 65535
@@ -59,7 +59,7 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
 
 def open_ports(
     args: argparse.Namespace, devices: Sequence[AnyEmulated], stack: ExitStack
-) -> "list[tuple[AnyEmulated, SerialLine, Endpoint]]":
+) -> "list[tuple[AnyEmulated, SerialLine, SerialPort]]":
     """A port for each serial line of each device, in order; ``stack`` closes them.
 
     Raises ValueError when there are not enough ports from the given one on, or a strict line is
@@ -74,9 +74,9 @@ def open_ports(
     kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     lines = [(opened, line) for opened in devices for line in opened.board.lines]
-    served: list[tuple[AnyEmulated, SerialLine, Endpoint]] = []
+    served: list[tuple[AnyEmulated, SerialLine, SerialPort]] = []
     for index, (opened, line) in enumerate(lines):
-        endpoint: Endpoint
+        endpoint: SerialPort
         if first is None:
             name = opened.device.title.upper()
             path = args.pty or Path(f"tty{name}")

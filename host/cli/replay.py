@@ -14,18 +14,14 @@ examples:
 
 import argparse
 import json
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
-from cubestack.firmware_model.formats.recording import Recording, load_recording
-from cubestack.firmware_model.formats.setup import Setup
+from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
 from cubestack.host.devices.controls import EmulatedControls
-from cubestack.host.devices.device import Engine
-from cubestack.host.devices.emulated import AnyEmulated, power_up
-from cubestack.host.devices.registry import device
-from cubestack.host.recording.setups import setup_for, written
+from cubestack.host.devices.past import Recipe
+from cubestack.host.recording.setups import setup_for
 from cubestack.host.terminal import say
 
 
@@ -45,12 +41,8 @@ def run(args: argparse.Namespace) -> int:
     recording = load_recording(args.recording)
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
     with ExitStack() as stack:
-        opened = _open(recording, setup, args.engine)
+        opened = Recipe.of(recording, setup).make(args.engine)
         stack.callback(opened.close)
-        if setup.faults is not None:
-            from cubestack.emulator.faults.plan import parse_plan
-
-            opened.faults.load(parse_plan(setup.faults.text, setup.faults.name))
         recorder = record(args, opened, stack, setup)
         board = opened.board
         controls = EmulatedControls(opened)
@@ -64,26 +56,3 @@ def run(args: argparse.Namespace) -> int:
         duration_s = recording.end_ps / 1e12
         print("\n".join(differences) or f"{duration_s:.3f} s replayed: no difference")
     return int(bool(differences))
-
-
-def _open(recording: Recording, setup: Setup, engine: Engine) -> AnyEmulated:
-    """The device, made as ``setup`` says."""
-    found = device(recording.device)
-    options: dict[str, Any] = dict(setup.options)
-    made = recording.setup
-    if found.switches.declared() and "profile" not in options and not (made and made.target):
-        options["profile"] = "extended"
-        if made is not None:
-            say(f"{recording.name} names no profile: it is older than they are, and runs extended")
-    unknown = options.keys() - {option.name for option in found.all_options}
-    if unknown:
-        raise ValueError(f"{recording.name}: its setup has an unknown option {min(unknown)!r}")
-    with nullcontext() if setup.scene is None else written(setup.scene) as scene:
-        return power_up(
-            found,
-            scene,
-            seed=setup.seed,
-            engine=engine,
-            baud=recording.bauds.get("uart"),
-            **options,
-        )

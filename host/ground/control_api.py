@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -120,6 +121,16 @@ CALLS = (
         {"to_s": (NUMBER, REQUIRED)},
     ),
     Call(
+        *("POST", "/snapshot", "remember now by a name, to go back to"),
+        lambda emulation, name: _done(lambda one: one.snapshot(name))(emulation),
+        {"name": (str, REQUIRED)},
+    ),
+    Call(
+        *("POST", "/back", "go back to a time or a snapshot, and hold there"),
+        lambda emulation, to: emulation.back(to),
+        {"to": ((int, float, str), REQUIRED)},
+    ),
+    Call(
         *("POST", "/pace", "real: speed virtual seconds a second; fast: ahead while there is work"),
         _pace,
         {"pace": (str, "real"), "speed": (NUMBER, 1.0)},
@@ -128,6 +139,7 @@ CALLS = (
     Call("GET", "/devices/{device}/log", "what faults have done", Emulation.log),
     Call("GET", "/devices/{device}/pictures", "those in its memories", Emulation.pictures),
     Call("GET", "/devices/{device}/pictures/{name}", "one, as PNG", Emulation.picture),
+    Call("GET", "/devices/{device}/recording", "what passed its ports", Emulation.recording),
     Call(
         *("POST", "/devices/{device}/act", "what the shell's fault, scene and power do"),
         _act,
@@ -166,6 +178,8 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
             found = await _asked(emulation, emulation.state)
         if isinstance(found, np.ndarray):
             return Response(await asyncio.to_thread(png, found), media_type="image/png")
+        if isinstance(found, tuple):
+            return Response(await asyncio.to_thread(_start_of, *found), media_type="text/plain")
         return JSONResponse(found)
     except TooLargeError as error:
         return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
@@ -175,6 +189,12 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
         return refused(str(error), HTTPStatus.BAD_REQUEST)
     except RuntimeError as error:
         return refused(str(error), HTTPStatus.CONFLICT)
+
+
+def _start_of(path: Path, count: int) -> bytes:
+    """The first ``count`` bytes of a file that gets longer."""
+    with path.open("rb") as stream:
+        return stream.read(count)
 
 
 async def _asked(emulation: Emulation, act: Callable[[], T]) -> T:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 from zlib import crc32
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from cubestack.emulator.ports.control import ControlPort
+    from cubestack.host.devices.past import Past
 
 JsonObject = dict[str, Any]
 
@@ -32,20 +33,30 @@ class Emulation:
         port: by which its thread is reached.
         emulated: the devices.
         ports: of each device, where its serial lines are served.
+        past: what was done to them, by which one can go back; or why there is none.
     """
 
     port: "ControlPort"
     emulated: Sequence[AnyEmulated]
     ports: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    past: "Past | str" = "nothing is on record"
 
     def __post_init__(self) -> None:
         """Nothing has been looked at."""
+        self._snapshots: dict[str, int] = {}
+        self._look_anew()
+
+    def _look_anew(self) -> None:
         self._known: dict[tuple[str, str], int] = {}
         self._changes: dict[tuple[str, str], float] = {}
 
-    @cached_property
-    def _controls(self) -> dict[str, EmulatedControls]:
-        return {one.device.name: EmulatedControls(one) for one in self.emulated}
+        made = (
+            map(EmulatedControls, self.emulated)
+            if isinstance(self.past, str)
+            else self.past.controls()
+        )
+        names = (one.device.name for one in self.emulated)
+        self._controls = dict(zip(names, made, strict=True))
 
     def state(self) -> JsonObject:
         """How it is now."""
@@ -56,6 +67,8 @@ class Emulation:
             "held": self.port.held,
             "pace": scheduler.pace.mode,
             "speed": scheduler.pace.speed,
+            "snapshots": {name: ps / PS_PER_S for name, ps in self._snapshots.items()},
+            "goes_back": not isinstance(self.past, str) and self.past.again,
             "devices": {one.device.name: self._state(one) for one in self.emulated},
         }
 
@@ -78,6 +91,7 @@ class Emulation:
             "seed": one.seed,
             "ports": list(self.ports.get(device, ())),
             "channels": list(controls.channels),
+            "no_past": self.past if isinstance(self.past, str) else "",
             "faults": {
                 kind: {
                     "targets": list(targets),
@@ -118,6 +132,8 @@ class Emulation:
         Raises ValueError for what makes no sense.
         """
         self._of(device)
+        if not isinstance(self.past, str) and self.past.again:
+            raise RuntimeError("it goes back: wait until it is there")
         self._controls[device].act(Control(self.port.kernel.now, tuple(words), text))
 
     def pause(self) -> None:
@@ -137,6 +153,49 @@ class Emulation:
         if not 0 <= to_s <= LATEST_S:
             raise ValueError(f"a time is 0 to {LATEST_S:g} s, not {to_s:g}")
         return self.port.run_to(round(to_s * PS_PER_S))
+
+    def snapshot(self, name: str) -> None:
+        """Remember now as ``name``, to go back to."""
+        self._recorded()
+        if len(self._snapshots) >= MOST_SNAPSHOTS and name not in self._snapshots:
+            raise ValueError(f"{MOST_SNAPSHOTS} snapshots are kept at most")
+        self._snapshots[name] = self.port.kernel.now
+
+    def back(self, to: float | str) -> "Future[int]":
+        """Go back to a time in s, or to a snapshot, and hold there; when it is there.
+
+        All that was done by then is done again, as fast as it gets; ValueError for a time that was
+        not yet.
+        """
+        past = self._recorded()
+        if isinstance(to, str):
+            if to not in self._snapshots:
+                known = ", ".join(self._snapshots) or "none"
+                raise ValueError(f"no snapshot {to!r}; there are {known}")
+            to_ps = self._snapshots[to]
+        else:
+            to_ps = round(to * PS_PER_S) if 0 <= to <= LATEST_S else -1
+        now_ps = self.port.kernel.now
+        if not 0 <= to_ps <= now_ps:
+            raise ValueError(f"back is 0 to {now_ps / PS_PER_S:.6f} s, which it is now, not {to}")
+        self.port.pause()
+        past.begin_again(to_ps)
+        self._look_anew()
+        self._snapshots = {name: ps for name, ps in self._snapshots.items() if ps <= to_ps}
+        arrived = self.port.run_to(to_ps)
+        arrived.add_done_callback(lambda _arrived: past.arrive())
+        return arrived
+
+    def recording(self, device: str) -> tuple[Path, int]:
+        """The file with all that passed a device's ports, and how long it is by now."""
+        one, past = self._of(device), self._recorded()
+        path = past.file(self.emulated.index(one))
+        return path, path.stat().st_size
+
+    def _recorded(self) -> "Past":
+        if isinstance(self.past, str):
+            raise TargetError(f"there is no way back: {self.past}")
+        return self.past
 
     def set_pace(self, pace: Literal["real", "fast"], speed: float) -> None:
         """Of virtual time."""
@@ -164,6 +223,8 @@ def _columns(truths: Mapping[str, NDArray[np.float64]]) -> dict[str, float | Non
 
 ATTITUDE, ANGLES = 4, ("alpha", "beta")
 """Numbers of an attitude; what the two of a direction are called."""
+
+MOST_SNAPSHOTS = 100
 
 LATEST_S = 1e8
 """Virtual time that can be run to: three years."""

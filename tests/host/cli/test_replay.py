@@ -8,8 +8,8 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
-from cubestack.host.cli import replay
 from cubestack.host.cli.device_options import inject_plan, record
+from cubestack.host.devices import past
 from cubestack.host.devices.emulated import open_device, power_up
 from cubestack.host.recording.setups import emulated_setup
 
@@ -162,7 +162,7 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, run, monkeypatch
         options.append(mcu_addressing)
         return power_up(*arguments, **others)
 
-    monkeypatch.setattr(replay, "power_up", with_usual_fpgas)
+    monkeypatch.setattr(past, "power_up", with_usual_fpgas)
     check_same(run("replay", made))
     assert options == [True]
     changed = made.read_text().replace("seed = 9", "seed = 8")

@@ -5,6 +5,7 @@ import json
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,10 +14,12 @@ from cubestack.emulator.ports.control import ControlPort
 from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.devices.past import Past
 from cubestack.host.ground.control_api import control_app
 from cubestack.host.ground.emulation import Emulation
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.serving import Serving
+from cubestack.host.recording.setups import emulated_setup
 
 TOKEN = "the token of the tests"
 SOON_S = 30.0
@@ -27,22 +30,35 @@ class Controlled:
     """A control port that is served, and what is behind it."""
 
     serving: Serving
-    emulated: AnyEmulated
+    devices: list[AnyEmulated]
+    emulation: Emulation
     scheduler: RealtimeScheduler
 
     def ask(
-        self, method: str, path: str, body: object = None, headers: dict[str, str] | None = None
+        self,
+        method: str,
+        path: str,
+        body: object = None,
+        headers: dict[str, str] | None = None,
+        *,
+        as_text: bool = False,
     ) -> tuple[int, Any]:
-        """Status and answer of a request with the token."""
+        """Status and answer of a request with the token; as JSON, unless ``as_text``."""
         text = body if isinstance(body, bytes) else None if body is None else json.dumps(body)
         own = {"Authorization": f"Bearer {TOKEN}"} if headers is None else headers
         connection = http.client.HTTPConnection(*self.serving.address, timeout=SOON_S)
         try:
             connection.request(method, path, text, own)
             answer = connection.getresponse()
-            return answer.status, json.loads(answer.read() or b"null")
+            content = answer.read().decode()
+            return answer.status, content if as_text else json.loads(content or "null")
         finally:
             connection.close()
+
+    @property
+    def emulated(self) -> AnyEmulated:
+        """The device as it is now."""
+        return self.devices[0]
 
     @property
     def events(self) -> str:
@@ -51,19 +67,25 @@ class Controlled:
 
 
 @pytest.fixture
-def controlled() -> Iterator[Controlled]:
+def controlled(tmp_path: Path) -> Iterator[Controlled]:
     emulated = open_device("cubestar")
+    devices = [emulated]
+    past = Past(devices, [emulated_setup(0, None)], [tmp_path / "a.rec"])
     kernel = emulated.board.kernel
     port = ControlPort(kernel)
-    scheduler = RealtimeScheduler(kernel, [port], emulated.board.busy, Pace(kernel, "real"))
+    scheduler = RealtimeScheduler(
+        kernel, [port], lambda: devices[0].board.busy(), Pace(kernel, "real")
+    )
     port.scheduler = scheduler
-    app = Guard(control_app(Emulation(port, [emulated])), TOKEN)
+    emulation = Emulation(port, devices, past=past)
+    app = Guard(control_app(emulation), TOKEN)
     serving = Serving(app, "127.0.0.1", 0)
     thread = threading.Thread(target=scheduler.run)
     thread.start()
     with serving.running():
-        yield Controlled(serving, emulated, scheduler)
+        yield Controlled(serving, devices, emulation, scheduler)
         scheduler.stop()
         thread.join(SOON_S)
         port.close()
-    emulated.close()
+    past.close()
+    devices[0].close()

@@ -78,7 +78,7 @@ def test_a_scene_is_sent_as_its_text(controlled: Controlled) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "body", "status", "error"),
     [
-        ("GET", "/stat", None, 404, "there is /devices"),
+        ("GET", "/stat", None, 404, "there is /back"),
         ("DELETE", "/state", None, 405, "Method Not Allowed"),
         ("POST", "/step", b"{", 400, "the body is no JSON"),
         ("POST", "/step", b"\xff\xfe", 400, "the body is no JSON"),
@@ -91,6 +91,8 @@ def test_a_scene_is_sent_as_its_text(controlled: Controlled) -> None:
         ("POST", "/run", {}, 400, "/run needs 'to_s'"),
         ("POST", "/run", {"to_s": -1}, 400, "a time is 0 to 1e+08 s, not -1"),
         ("POST", "/run", b'{"to_s": NaN}', 400, "a time is 0 to 1e+08 s, not nan"),
+        ("POST", "/back", b'{"to": NaN}', 400, "back is 0 to "),
+        ("POST", "/back", {"to": True}, 400, "'to' of /back can not be True"),
         ("POST", "/pace", {"pace": "slow"}, 400, "a pace is real or fast, not 'slow'"),
         ("GET", "/devices/cubestat", None, 400, "no device 'cubestat' is emulated here"),
         ("POST", "/devices/cubestar/act", {"words": [1]}, 400, "'words' are texts"),
@@ -128,3 +130,47 @@ def test_the_emulation_goes_on_when_its_watchers_are_gone(controlled: Controlled
     for _ in range(5):
         connect(controlled.events, additional_headers=BEARER, open_timeout=SOON_S).socket.close()
     assert controlled.ask("GET", "/state")[0] == 200
+
+
+def test_it_goes_back_to_a_time_and_to_a_snapshot(controlled: Controlled) -> None:
+    act = "/devices/cubestar/act"
+    controlled.ask("POST", "/run", {"to_s": 20})
+    at_rest = controlled.ask("GET", "/state")[1]["devices"]
+    assert controlled.ask("POST", "/snapshot", {"name": "rest"})[1]["snapshots"] == {"rest": 20.0}
+    controlled.ask("POST", "/run", {"to_s": 30})
+    controlled.ask("POST", act, {"words": ["power", "imager", "off"]})
+    controlled.ask("POST", act, {"words": ["fault", "processor-reset"]})
+    controlled.ask("POST", "/run", {"to_s": 40})
+    _, late = controlled.ask("POST", "/snapshot", {"name": "late"})
+    assert late["devices"] != at_rest
+    status, there = controlled.ask("POST", "/back", {"to": "rest"})
+    assert (status, there["time_s"], there["held"], there["goes_back"]) == (200, 20.0, True, False)
+    assert there["devices"] == at_rest
+    assert list(there["snapshots"]) == ["rest"]
+    status, told = controlled.ask("POST", "/back", {"to": "late"})
+    assert (status, told["error"]) == (400, "no snapshot 'late'; there are rest")
+    for never in (20.5, -1, 1e300):
+        assert controlled.ask("POST", "/back", {"to": never})[0] == 400
+    assert controlled.ask("POST", "/back", {"to": 0})[1]["time_s"] == 0
+
+
+def test_the_recording_is_whole_at_any_time(controlled: Controlled) -> None:
+    controlled.ask("POST", "/run", {"to_s": 20})
+    controlled.ask("POST", "/devices/cubestar/act", {"words": ["power", "imager", "off"]})
+    status, text = controlled.ask("GET", "/devices/cubestar/recording", as_text=True)
+    lines = [json.loads(line) for line in text.splitlines()]
+    assert (status, lines[0]["device"]) == (200, "cubestar")
+    assert lines[-1]["control"] == ["power", "imager", "off"]
+    assert lines[-1]["ps"] == 20 * 10**12
+
+
+def test_without_a_record_there_is_no_way_back(controlled: Controlled) -> None:
+    controlled.emulation.past = "--gdb goes forward only"
+    for method, path, body in (
+        ("POST", "/back", {"to": 0}),
+        ("POST", "/snapshot", {"name": "a"}),
+        ("GET", "/devices/cubestar/recording", None),
+    ):
+        status, told = controlled.ask(method, path, body)
+        assert (status, told["error"]) == (400, "there is no way back: --gdb goes forward only")
+    assert controlled.ask("GET", "/devices/cubestar")[1]["no_past"] == "--gdb goes forward only"
