@@ -19,7 +19,10 @@ HTTP_ERRORS = 400
 """The first status of one."""
 
 TIMEOUT_S = 60.0
-"""Wall time: a run to a time far away takes as long as it does."""
+"""Wall time for an answer."""
+
+PATIENT = ("/run", "/back")
+"""What takes as long as it does."""
 
 
 class ControlClient:
@@ -47,7 +50,8 @@ class ControlClient:
 
     def fetch(self, method: str, path: str, body: object = None) -> bytes:
         """The answer as it is; raises as ``ask`` does."""
-        connection = http.client.HTTPConnection(*self._address, timeout=TIMEOUT_S)
+        timeout_s = None if path in PATIENT else TIMEOUT_S
+        connection = http.client.HTTPConnection(*self._address, timeout=timeout_s)
         try:
             connection.request(
                 method, path, None if body is None else json.dumps(body), self._headers
@@ -75,6 +79,7 @@ class RemoteControls:
         client: of the control port.
         device: name of the device.
         chosen: its seed, profile, switches and firmware, where they were given.
+        no_past: why nobody can go back there; empty where one can.
     """
 
     def __init__(self, client: ControlClient, device: str) -> None:
@@ -82,6 +87,7 @@ class RemoteControls:
         self.client, self.device = client, device
         about = client.ask("GET", f"/devices/{device}")
         self.chosen = {"seed": str(about["seed"]), **about["chosen"]}
+        self.no_past = str(about["no_past"])
         self.channels = tuple(about["channels"])
         self.faults = spoken({kind: one["targets"] for kind, one in about["faults"].items()})
         self.fault_parameters: Mapping[str, tuple[str, ...]] = {

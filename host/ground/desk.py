@@ -52,6 +52,8 @@ class Desk:
         """What it is, what can be asked and commanded, and what can not, with the reason."""
         target, interface, controls = self.target, self.target.interface, self.controls
         missing = {} if controls else {"controls": f"{target.name} has no control port"}
+        if controls and controls.no_past:
+            missing["past"] = f"there is no way back: {controls.no_past}"
         if target.line is None:
             missing["raw"] = f"{target.name} is no serial line"
         if not self._has("stars"):

@@ -18,6 +18,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.errors import HostError
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.emulation import JsonObject
@@ -34,7 +35,10 @@ MOST_SHOWN = 32
 NONSENSE = 1003
 """Closes a WebSocket whose other end sends what can not be taken."""
 
-STEERING = ("pause", "resume", "step", "run", "pace")
+SHARED = ("time_s", "held", "pace", "speed", "snapshots", "goes_back")
+"""Of the state of an emulation, what all its devices have in common."""
+
+STEERING = ("pause", "resume", "step", "run", "pace", "snapshot", "back")
 """Calls of the control port that pages pass on."""
 
 
@@ -68,6 +72,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/", page),
             Route("/targets", targets),
             Route("/targets/{number:int}/pictures/{name}", of(_picture)),
+            Route("/targets/{number:int}/recording", of(_recording)),
             Route("/targets/{number:int}/stars", of(_stars)),
             Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
             Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
@@ -90,9 +95,7 @@ async def _told(handler: Any, desk: Desk, request: Request) -> Response:
         if not isinstance(body, dict):
             raise ValueError("the body is a JSON object")
         found = await handler(desk, body, request.path_params)
-        if isinstance(found, bytes):
-            return Response(found, media_type="image/png")
-        return JSONResponse(found)
+        return found if isinstance(found, Response) else JSONResponse(found)
     except TooLargeError as error:
         return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
@@ -121,26 +124,40 @@ async def _scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     text = body.get("text")
     if not isinstance(text, str):
         raise ValueError("'text' is that of a scene file")
-    device = desk.controls.device if desk.controls else ""
     act = {"words": ["scene", "scene.toml"], "text": text}
-    return await _control(desk, "POST", f"/devices/{device}/act", act)
+    return await _control(desk, "POST", f"/devices/{_controls(desk).device}/act", act)
 
 
 async def _stars(desk: Desk, _body: JsonObject, _path: JsonObject) -> JsonObject:
     return {"stars": await asyncio.wrap_future(desk.stars())}
 
 
-async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> bytes:
-    if desk.controls is None:
-        raise ValueError(desk.about["missing"]["controls"])
-    at = f"/devices/{desk.controls.device}/pictures/{quote(path['name'])}"
-    return await asyncio.to_thread(desk.controls.client.fetch, "GET", at)
+async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:
+    content = await _fetched(desk, f"pictures/{quote(path['name'])}")
+    return Response(content, media_type="image/png")
+
+
+async def _recording(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response:
+    name = f'attachment; filename="{desk.target.interface.name.lower()}.rec"'
+    content = await _fetched(desk, "recording")
+    return Response(content, media_type="text/plain", headers={"content-disposition": name})
+
+
+async def _fetched(desk: Desk, what: str) -> bytes:
+    """What the control port has of the device."""
+    controls = _controls(desk)
+    path = f"/devices/{controls.device}/{what}"
+    return await asyncio.to_thread(controls.client.fetch, "GET", path)
 
 
 async def _control(desk: Desk, method: str, path: str, body: object = None) -> JsonObject:
+    return await asyncio.to_thread(_controls(desk).client.ask, method, path, body)
+
+
+def _controls(desk: Desk) -> RemoteControls:
     if desk.controls is None:
         raise ValueError(desk.about["missing"]["controls"])
-    return await asyncio.to_thread(desk.controls.client.ask, method, path, body)
+    return desk.controls
 
 
 async def _live(desk: Desk, socket: WebSocket) -> None:
@@ -182,7 +199,7 @@ def _emulation(desk: Desk, logged: int) -> JsonObject:
     except (HostError, ValueError) as error:
         return {"emulation": {"error": str(error)}}
     own = state["devices"][device]
-    emulation = {name: state[name] for name in ("time_s", "held", "pace", "speed")} | own
+    emulation = {name: state[name] for name in SHARED} | own
     seen = {"pictures": pictures, "log": log[logged:], "logged": len(log)}
     return {"emulation": emulation, **seen}
 

@@ -3,8 +3,9 @@
 import { choose, labelled, make } from "./dom.js";
 
 export class Emulation {
-  // `steer(call, body)` asks the emulation, `act(line)` does a line of the shell.
-  constructor(place, about, steer, act) {
+  // `steer(call, body)` asks the emulation, `act(line)` does a line of the shell, `path` leads to
+  // the target.
+  constructor(place, about, steer, act, path) {
     const why = about.missing.controls;
     this.time = make("output", { id: "time", className: "value" });
     this.state = make("p", { className: "quiet", id: "state" });
@@ -19,7 +20,11 @@ export class Emulation {
       steer("pace", fast ? { pace: "fast" } : { pace: "real", speed: Number(this.speed.value) });
     };
     const step = () => steer("step", { events: Number(this.events.value) });
-    const run = () => steer("run", { to_s: Number(this.to.value) });
+    const go = () => {
+      const to = Number(this.to.value);
+      if (to < this.now) steer("back", { to });
+      else steer("run", { to_s: to });
+    };
     const time = make(
       "div",
       { className: "row" },
@@ -27,8 +32,21 @@ export class Emulation {
       labelled("events", this.events),
       button("Step", "step", step),
       labelled("to [s]", this.to),
-      button("Run", "run", run),
+      button("Go", "go", go),
       labelled("speed", this.speed),
+    );
+    this.snapshots = choose([], { id: "snapshots" });
+    const take = () => steer("snapshot", { name: `${this.now.toFixed(3)} s` });
+    const back = () => steer("back", { to: this.snapshots.value });
+    const past = make(
+      "div",
+      { className: "row" },
+      button("Snapshot", "snapshot", take),
+      labelled("snapshots", this.snapshots),
+      button("Go back", "back", back),
+      button("Save recording", "recording", () =>
+        make("a", { href: `${path}/recording`, download: "" }).click(),
+      ),
     );
     this.fault = choose(about.faults, { id: "fault" });
     this.parameters = make("input", { id: "parameters", size: 26, placeholder: "for_s=2" });
@@ -74,17 +92,14 @@ export class Emulation {
       make("p", { className: "quiet", id: "chosen", textContent: chosen.join(", ") }),
       this.state,
       time,
+      past,
       faults,
       this.channels,
       scene,
     );
-    if (why) {
-      this.state.textContent = why;
-      for (const one of place.querySelectorAll("button, input, select, textarea")) {
-        one.disabled = true;
-        one.title = why;
-      }
-    }
+    if (why) this.state.textContent = why;
+    if (why) grey(place, why);
+    else if (about.missing.past) grey(past, about.missing.past);
   }
 
   hear(emulation) {
@@ -94,6 +109,12 @@ export class Emulation {
       return;
     }
     this.isHeld = emulation.held;
+    this.now = emulation.time_s;
+    const names = Object.keys(emulation.snapshots);
+    if (names.join() !== [...this.snapshots.options].map((one) => one.value).join()) {
+      this.snapshots.replaceChildren(...choose(names).children);
+      this.snapshots.selectedIndex = names.length - 1;
+    }
     this.held.textContent = emulation.held ? "Resume" : "Pause";
     this.held.setAttribute("aria-pressed", String(emulation.held));
     this.time.textContent = `${emulation.time_s.toFixed(6)} s`;
@@ -107,6 +128,13 @@ export class Emulation {
       .join(", ");
     const busy = emulation.held ? "held" : emulation.busy ? "at work" : "waits for the host";
     this.state.className = "quiet";
-    this.state.textContent = `${busy}; ${probes}; ${currents}`;
+    this.state.textContent = `${emulation.goes_back ? "goes back" : busy}; ${probes}; ${currents}`;
+  }
+}
+
+function grey(place, why) {
+  for (const one of place.querySelectorAll("button, input, select, textarea")) {
+    one.disabled = true;
+    one.title = why;
   }
 }

@@ -51,7 +51,7 @@ function look(number, targets) {
     live?.want(wanted);
   };
   new Commands(place("commands"), about, act);
-  const emulation = new Emulation(place("emulation"), about, steer, act);
+  const emulation = new Emulation(place("emulation"), about, steer, act, path);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there
   const results = new Results(place("results"), about, (on) => want({ results: on }));

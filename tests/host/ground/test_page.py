@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -59,7 +60,11 @@ def line(page: Any, words: str) -> str:
     before = page.locator("#lines li").count()
     page.fill("#line", words)
     page.press("#line", "Enter")
-    page.wait_for_function(f"() => document.querySelectorAll('#lines li').length > {before}")
+    page.wait_for_function(
+        "([words, before]) => { const told = document.querySelectorAll('#lines li');"
+        "return told.length > before && told[0].innerText.includes(words) }",
+        arg=[words, before],
+    )
     return str(page.locator("#lines li").first.inner_text())
 
 
@@ -110,10 +115,40 @@ def test_time_is_paused_stepped_and_goes_on(page: Any) -> None:
     page.click("#step")
     page.wait_for_selector("#lines li.good >> text=step")
     page.fill("#to", "5000")
-    page.click("#run")
+    page.click("#go")
     page.wait_for_function("() => document.querySelector('#time').textContent.startsWith('5000.0')")
     page.click("#pause")
     page.wait_for_selector("#pause[aria-pressed=false]")
+
+
+def test_it_goes_back_to_a_snapshot(page: Any) -> None:
+    """What was commanded after it is undone, and the line stays open."""
+    look(page, "CubeSense")
+    line(page, "write DetectionThreshold1 7")
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    page.click("#snapshot")
+    page.wait_for_function("() => document.querySelector('#snapshots').options.length === 1")
+    page.click("#pause")
+    line(page, "write DetectionThreshold1 9")
+    assert "Threshold1: 9" in line(page, "read Configuration")
+    page.click("#back")
+    page.wait_for_selector("#lines li.good >> text=back")
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=false]")
+    assert "Threshold1: 7" in line(page, "read Configuration")
+
+
+def test_the_recording_can_be_saved_and_replayed(page: Any, tmp_path: Path) -> None:
+    look(page, "CubeSense")
+    line(page, "read Identification")
+    with page.expect_download() as saving:
+        page.click("#recording")
+    saved = tmp_path / saving.value.suggested_filename
+    saving.value.save_as(saved)
+    assert saved.name == "cubesense.rec"
+    call = [sys.executable, "-m", "cubestack", "replay", str(saved)]
+    assert subprocess.run(call, stdout=subprocess.DEVNULL).returncode == 0
 
 
 def test_a_fault_is_injected_and_seen(page: Any) -> None:
