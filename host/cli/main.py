@@ -34,6 +34,7 @@ COMMANDS = {
     "log": "log a device's results to a CSV file",
     "conformance": "check a device's protocol against the tables",
     "replay": "play a recording to an emulated device, compare what it says",
+    "decode": "tell what was said in a recording, or write it as a table",
     "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",
     "costs": "measure what a device's program costs as compiled code",
     "bench": "measure the cost of the hot paths on this machine",

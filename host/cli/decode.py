@@ -1,0 +1,80 @@
+"""Tell what was said in a recording of the node protocol, message by message.
+
+Every request with its answer, on the serial line and on I2C: when, its name, and its
+fields by the device's table. A file has a row for each field.
+
+examples:
+  cubestack emulate {second} --record run.rec
+  cubestack decode run.rec
+  cubestack decode run.rec --out run.csv        or run.parquet (cubestack[parquet])
+  cubestack decode run.rec --json               an object a line
+"""
+
+import argparse
+import csv
+import json
+from contextlib import ExitStack
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.host.devices.records import create_file
+from cubestack.host.devices.registry import device
+from cubestack.host.recording.said import COLUMNS, Said, said
+from cubestack.host.terminal import say
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
+    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="or FILE.parquet")
+    parser.add_argument("--json", action="store_true", help="one object for each message, a line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Decode; returns 0."""
+    recording = load_recording(args.recording)
+    messages = said(recording, device(recording.device).interface)
+    if args.out is not None:
+        _write(args.out, messages)
+        say(f"wrote {len(messages)} messages to {args.out}")
+    for one in messages if args.out is None else ():
+        print(json.dumps(_object(one)) if args.json else _line(one))
+    return 0
+
+
+def _write(path: Path, messages: list[Said]) -> None:
+    rows = [row for one in messages for row in one.rows()]
+    if path.suffix == ".parquet":
+        try:
+            arrow: Any = import_module("pyarrow")
+            files: Any = import_module("pyarrow.parquet")
+        except ModuleNotFoundError:
+            raise ValueError("Parquet needs pyarrow: pip install cubestack[parquet]") from None
+        numbers = ("time_s", "value")
+        schema = [
+            (name, arrow.float64() if name in numbers else arrow.string()) for name in COLUMNS
+        ]
+        files.write_table(arrow.Table.from_pylist(rows, arrow.schema(schema)), path)
+    elif path.suffix == ".csv":
+        with ExitStack() as stack:
+            writer = csv.DictWriter(create_file(path, stack), COLUMNS)
+            writer.writeheader()
+            writer.writerows(rows)
+    else:
+        raise ValueError(f"{path}: a table is .csv or .parquet, not {path.suffix}")
+
+
+def _object(one: Said) -> dict[str, object]:
+    values = {k: v.hex() if isinstance(v, bytes) else v for k, v in one.values.items()}
+    about = {"time_s": one.time_s, "port": one.port, "kind": one.kind, "message": one.name}
+    return about | {"error": one.error, "values": values}
+
+
+def _line(one: Said) -> str:
+    fields = () if one.message is None else one.message.fields
+    told = [f"{f.name} {f.label(one.values[f.name])}" for f in fields]
+    error = [f"({one.error})"] if one.error else []
+    words = " ".join([one.kind, one.name, *error])
+    return f"{one.time_s:14.6f} s  {one.port}  {words}" + (f": {', '.join(told)}" if told else "")

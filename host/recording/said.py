@@ -1,0 +1,146 @@
+"""What a recording's host and device said to each other, message by message, by the tables.
+
+Node protocol only, on the serial line and on I2C: a device answers one request at a time, so an
+answer belongs to the last request before it.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from cubestack.firmware_model.formats.recording import BusTransfer, LineBytes, Recording
+from cubestack.firmware_model.interface.codec.field import Value
+from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent
+from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+
+PS_PER_S = 10**12
+
+LINE = "uart"
+"""The port with the node protocol."""
+
+LONGEST_PAYLOAD = 4096
+
+
+@dataclass(frozen=True)
+class Said:
+    """A request and its answer.
+
+    Attributes:
+        time_s: when the request was whole; on I2C when the transfer began.
+        port: where.
+        kind: telecommand or telemetry.
+        name: of the message, or its ID where the tables have none.
+        values: of a telecommand's parameters, or of the telemetry; nothing without an answer.
+        message: what the tables have of it; None without values.
+        error: what is wrong with it; empty where nothing is.
+    """
+
+    time_s: float
+    port: str
+    kind: str
+    name: str
+    values: Mapping[str, Value] = field(default_factory=dict)
+    message: Message | None = None
+    error: str = ""
+
+    def rows(self) -> list[dict[str, str | float | None]]:
+        """A row for each field, or one where there is none; for a table of everything said."""
+        told: dict[str, str | float | None] = {
+            "time_s": self.time_s,
+            **{"port": self.port, "kind": self.kind, "message": self.name, "error": self.error},
+        }
+        if self.message is None or not self.values:
+            return [told | dict.fromkeys(FIELD_COLUMNS)]
+        rows = []
+        for one in self.message.fields:
+            value = self.values[one.name]
+            number = None if isinstance(value, bytes) else float(value)
+            named = isinstance(value, bytes) or one.choices is not None
+            text = one.label(value) if named else ""
+            cells = one.name, number, text, one.unit
+            rows.append(told | dict(zip(FIELD_COLUMNS, cells, strict=True)))
+        return rows
+
+
+FIELD_COLUMNS = ("field", "value", "text", "unit")
+
+COLUMNS = ("time_s", "port", "kind", "message", "error", *FIELD_COLUMNS)
+"""Of a row."""
+
+
+def said(recording: Recording, interface: Interface) -> list[Said]:
+    """All requests of the node protocol in a recording, in the order of time."""
+    found = [*_on_the_line(recording.line(LINE), interface)]
+    found += (one for transfer in recording.transfers if (one := _on_the_bus(transfer, interface)))
+    return sorted(found, key=lambda one: one.time_s)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    time_s: float
+    payload: bytes
+
+
+def _on_the_line(blocks: Iterable[LineBytes], interface: Interface) -> Iterator[Said]:
+    decoders = {side: FrameDecoder(LONGEST_PAYLOAD) for side in ("host", "device")}
+    asked: _Asked | None = None
+    for block in blocks:
+        for index, byte in enumerate(block.data):
+            if decoders[block.side].feed(byte) is not FrameEvent.FRAME:
+                continue
+            payload = decoders[block.side].payload
+            if block.side == "host":
+                if asked is not None:
+                    yield _exchange(asked, None, interface)
+                end_ps = block.time_ps + (index + 1) * block.byte_ps
+                asked = _Asked(end_ps / PS_PER_S, payload)
+                decoders["device"].reset()
+            elif asked is not None:
+                yield _exchange(asked, payload, interface)
+                asked = None  # what comes unasked is a picture's next frame
+    if asked is not None:
+        yield _exchange(asked, None, interface)
+
+
+def _exchange(asked: _Asked, answer: bytes | None, interface: Interface) -> Said:
+    message = interface.find(asked.payload[0]) if asked.payload else None
+    if message is None:
+        return _unknown(asked.time_s, LINE, asked.payload[:1])
+    if message.kind is Kind.TELEMETRY:
+        return _told(asked.time_s, LINE, message, answer or b"", "" if answer else "no answer")
+    error = "no acknowledge"
+    if answer is not None and len(answer) == 1:
+        codes = {int(code): code.name for code in interface.ack_errors}
+        error = codes.get(answer[0], f"error {answer[0]}") if answer[0] else ""
+    elif answer is not None:
+        error = f"an acknowledge of {len(answer)} bytes"
+    return _told(asked.time_s, LINE, message, asked.payload[1:], error)
+
+
+def _on_the_bus(transfer: BusTransfer, interface: Interface) -> Said | None:
+    """None for a transfer with another device, or with its registers."""
+    messages = [one for one in transfer.messages if one.address == interface.i2c_address]
+    written = b"".join(one.data for one in messages if not one.read)
+    read = b"".join(one.data for one in messages if one.read)
+    if not written:
+        return None
+    time_s, error = transfer.time_ps / PS_PER_S, f"errno {transfer.errno}"
+    message = interface.find(written[0])
+    if message is None:
+        return _unknown(time_s, transfer.port, written[:1])
+    answer = read if message.kind is Kind.TELEMETRY else written[1:]
+    return _told(time_s, transfer.port, message, answer, error if transfer.errno else "")
+
+
+def _told(time_s: float, port: str, message: Message, data: bytes, error: str) -> Said:
+    """A message that carries ``data``, if any; ``error`` is what is wrong with it so far."""
+    about = time_s, port, message.kind.value, message.name
+    if not data and error:
+        return Said(*about, error=error)
+    if len(data) != message.length:
+        return Said(*about, error=f"{len(data)} bytes, not {message.length}")
+    return Said(*about, message.unpack(data), message, error)
+
+
+def _unknown(time_s: float, port: str, identifier: bytes) -> Said:
+    name = str(identifier[0]) if identifier else "nothing"
+    return Said(time_s, port, "unknown", name, error="not in the tables")

@@ -1,0 +1,153 @@
+"""What was said in a recording, beside what the clients that said it got."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.firmware_model.formats.recording import (
+    BusMessage,
+    BusTransfer,
+    LineBytes,
+    Recording,
+    load_recording,
+)
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.host.cli.main import main
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.devices.emulated import open_device
+from cubestack.host.devices.records import start_recorder
+from cubestack.host.devices.registry import device, device_names
+from cubestack.host.recording.said import COLUMNS, LINE, Said, said
+
+INTERFACE = device("cubesense").interface
+CONFIGURATION = INTERFACE.telemetry("Configuration")
+THRESHOLD = INTERFACE.telecommand("DetectionThreshold1")
+BYTE_PS = 173_611_111
+
+
+def on_the_line(*frames: tuple[str, bytes]) -> list[Said]:
+    blocks = [
+        LineBytes(index * 10**12, LINE, side, encode_frame(payload), BYTE_PS)  # type: ignore[arg-type]
+        for index, (side, payload) in enumerate(frames)
+    ]
+    return said(Recording("a", "cubesense", {LINE: 57600}, tuple(blocks)), INTERFACE)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+@pytest.mark.parametrize("name", device_names())
+def test_all_that_clients_got_is_there(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    with open_device(name, seed=2) as opened, path.open("w") as stream:
+        recorder = start_recorder(opened, stream)
+        interface = opened.device.interface
+        bus = opened.board.i2c()
+        clients = (opened.client.client, I2cClient(bus, interface, wait=bus.wait))
+        asked = [one.name for one in interface.telemetries if one.supported and one.length]
+        got = [(one, client.telemetry(one)) for client in clients for one in asked]
+        recorder.close()
+    found = said(load_recording(path), interface)
+    assert [(one.name, dict(one.values)) for one in found if not one.error] == got
+    assert {one.port for one in found} == {"uart", "i2c"}
+
+
+def test_a_telecommand_has_its_parameters_and_its_acknowledge() -> None:
+    request = bytes([THRESHOLD.id]) + THRESHOLD.pack(Threshold=9)
+    code = next(iter(INTERFACE.ack_errors))
+    good, bad = on_the_line(
+        ("host", request), ("device", b"\0"), ("host", request), ("device", b"\1")
+    )
+    assert (good.kind, good.name, good.error) == ("telecommand", "DetectionThreshold1", "")
+    assert good.values == bad.values == {"Threshold": 9}
+    assert good.time_s == pytest.approx(len(encode_frame(request)) * BYTE_PS / 1e12)
+    assert bad.error == type(code)(1).name
+
+
+@pytest.mark.parametrize(
+    ("frames", "error"),
+    [
+        ([("host", bytes([CONFIGURATION.id]))], "no answer"),
+        ([("host", bytes([CONFIGURATION.id])), ("device", b"ab")], "2 bytes, not "),
+        ([("host", bytes([THRESHOLD.id, 9]))], "no acknowledge"),
+        ([("host", bytes([THRESHOLD.id, 9])), ("device", b"abc")], "an acknowledge of 3 bytes"),
+        ([("host", bytes([THRESHOLD.id, 9])), ("device", b"\xfe")], "error 254"),
+        ([("host", bytes([THRESHOLD.id]) + b"abcdef"), ("device", b"\0")], "6 bytes, not "),
+        ([("host", b"\x7e")], "not in the tables"),
+        ([("host", b"")], "not in the tables"),
+    ],
+)
+def test_what_is_wrong_is_told(frames: list[tuple[str, bytes]], error: str) -> None:
+    (one,) = on_the_line(*frames)
+    assert one.error.startswith(error)
+
+
+def test_an_answer_belongs_to_the_request_before_it() -> None:
+    answer = ("device", bytes(CONFIGURATION.length))
+    ask = ("host", bytes([CONFIGURATION.id]))
+    lost, late = on_the_line(answer, ask, ask, answer, answer)
+    assert (lost.error, late.error) == ("no answer", "")
+
+
+def test_other_devices_of_the_bus_are_left_out() -> None:
+    def transfer(address: int, errno: int) -> BusTransfer:
+        ask = BusMessage(address, bytes([CONFIGURATION.id]), read=False)
+        answer = BusMessage(address, b"" if errno else bytes(CONFIGURATION.length), read=True)
+        return BusTransfer(10**12, "i2c", 2 * 10**12, (ask, answer), errno)
+
+    own, other = INTERFACE.i2c_address, INTERFACE.i2c_address + 8
+    events = (transfer(own, 0), transfer(other, 0), transfer(own, 6))
+    good, bad = said(Recording("a", "cubesense", events=events), INTERFACE)
+    assert (good.time_s, good.port, good.error) == (1.0, "i2c", "")
+    assert list(good.values) == [one.name for one in CONFIGURATION.fields]
+    assert (bad.error, bad.values) == ("errno 6", {})
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    path = tmp_path / "a.rec"
+    spoken = (
+        (10**12, "host", bytes([CONFIGURATION.id])),
+        (2 * 10**12, "device", bytes(CONFIGURATION.length)),
+        (3 * 10**12, "host", bytes([THRESHOLD.id, 9])),
+    )
+    lines: list[object] = [{"recording": 1, "device": "cubesense", "lines": {LINE: 57600}}]
+    lines += (
+        {"ps": at, "port": LINE, "from": side, "data": encode_frame(data).hex(), "byte_ps": 1}
+        for at, side, data in spoken
+    )
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return path
+
+
+def test_tables_have_a_row_for_each_field(recording: Path, tmp_path: Path) -> None:
+    arrow = pytest.importorskip("pyarrow.parquet")
+    for end in ("csv", "parquet"):
+        assert main(["decode", str(recording), "--out", str(tmp_path / f"a.{end}")]) == 0
+    with (tmp_path / "a.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    columns = arrow.read_table(tmp_path / "a.parquet").to_pylist()
+    assert list(rows[0]) == list(columns[0]) == list(COLUMNS)
+    for table in (rows, columns):
+        assert [row["field"] for row in table[:-1]] == [one.name for one in CONFIGURATION.fields]
+        assert [float(row["value"]) for row in table[:-1]] == [0.0] * (len(table) - 1)
+        assert (table[-1]["message"], table[-1]["field"]) == ("DetectionThreshold1", "Threshold")
+        assert (table[-1]["error"], float(table[-1]["value"])) == ("no acknowledge", 9.0)
+
+
+def test_lines_for_readers_and_for_programs(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["decode", str(recording)]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert "telemetry Configuration: " in first
+    assert second.endswith("telecommand DetectionThreshold1 (no acknowledge): Threshold 9 DN")
+    assert main(["decode", str(recording), "--json"]) == 0
+    objects = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert objects[1]["values"] == {"Threshold": 9}
+
+
+def test_another_table_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["decode", str(recording), "--out", "a.xls"]) != 0
+    assert "a.xls: a table is .csv or .parquet" in capsys.readouterr().err
