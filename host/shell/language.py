@@ -10,7 +10,9 @@ from collections.abc import Callable, Iterable
 
 from cubestack.firmware_model.interface.codec.field import suggestion
 from cubestack.firmware_model.interface.codec.message import Kind
+from cubestack.host.clients.diagnosis import why_silent
 from cubestack.host.devices.targets import Target
+from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.shell.controls import LOG, ON_OFF, ControlCommands
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.ports import PortCommands
@@ -33,6 +35,8 @@ class Shell:
         """Use ``target``, which stays its owner's."""
         self.target = target
         self._names = Names(target)
+        self._answered = False
+        self._silent_because: str | None = None
         self.on_row: Callable[[Result], None] = lambda _result: None
         commands = [
             *RegisterCommands(target, self._names, lambda row: self.on_row(row)).commands(),
@@ -45,7 +49,8 @@ class Shell:
     def execute(self, line: str) -> Result | None:
         """Run one command; None for an empty line or a comment (#).
 
-        Raises ShellError, InterfaceError, TransportError, NodeError.
+        Raises ShellError, InterfaceError, TransportError, NodeError. Of a node that has not
+        answered yet, the error tells what is likely to be wrong.
         """
         try:
             words = shlex.split(line, comments=True)
@@ -60,7 +65,22 @@ class Shell:
         if command.emulated_only and self.target.controls is None:
             where = f"{self.target.name} is not emulated here"
             raise ShellError(f"{name}: {where}: use emulated:DEVICE, or --control URL")
-        return command.run(arguments)
+        try:
+            result = command.run(arguments)
+        except (NoAnswerError, BadAnswerError) as error:
+            why = self._why_silent()
+            raise (type(error)(f"{error}; {why}") if why else error) from None
+        self._answered = True
+        return result
+
+    def _why_silent(self) -> str:
+        """Looked for once: what was told stays true until there is an answer."""
+        line = self.target.line
+        if self._answered or line is None or self.target.registers is not None:
+            return ""
+        if self._silent_because is None:
+            self._silent_because = why_silent(line, self.target.interface)
+        return self._silent_because
 
     def complete(self, line: str) -> list[str]:
         """Words that may stand where ``line`` ends, in the order of the tables."""

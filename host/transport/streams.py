@@ -53,6 +53,21 @@ class SerialTransport:
         except (serial.SerialException, OSError, ValueError) as error:
             raise PortOpenError(f"can not open {port}: {_reason(error)}") from error
 
+    @property
+    def baud(self) -> int:
+        """Baud rate of this end."""
+        return int(self._port.baudrate)
+
+    def set_baud(self, baud: int) -> bool:
+        """Change it; whether the port can. Raises PortClosedError."""
+        try:
+            self._port.baudrate = baud
+        except ValueError:
+            return False
+        except (serial.SerialException, OSError) as error:
+            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
+        return True
+
     def write(self, data: bytes) -> None:
         """Send all of ``data``; raises PortClosedError."""
         try:

@@ -15,7 +15,14 @@ CALL = [sys.executable, "-m", "cubestack"]
 
 def begun(*words: str) -> "subprocess.Popen[str]":
     pipe = subprocess.PIPE
-    return subprocess.Popen([*CALL, *words], stdout=pipe, stderr=pipe, text=True)
+    call = [*CALL, *words]
+    return subprocess.Popen(call, stdout=pipe, stderr=pipe, text=True, preexec_fn=heard)
+
+
+def heard() -> None:
+    """Under nohup, and behind a script's &, signals would be ignored from the start."""
+    for number in (signal.SIGHUP, signal.SIGINT):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def alive(process: int) -> bool:
