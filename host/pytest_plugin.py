@@ -9,10 +9,12 @@
 
 Marker ``cubestack(scene=…, seed=…, faults=…)`` sets a device up: ``scene`` and ``faults`` are
 paths, or a scene of the emulator and the text of a plan. It takes every option of the device's
-board too: ``profile="extended"``. Seed, virtual time and number of fault
+board too: ``profile="extended"``. ``time.sleep`` and the clocks of the code under test are virtual
+but with ``wall_time=True``. Seed, virtual time and number of fault
 events go into the JUnit report; what the faults did is shown below a test that failed.
 """
 
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, get_args
@@ -22,6 +24,7 @@ import pytest
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
 from cubestack.host.devices.device import Engine
 from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.virtual_clock import VirtualClock
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
@@ -29,10 +32,11 @@ if TYPE_CHECKING:
     from cubestack.host.devices.emulated import AnyEmulated
 
 MARKER = "cubestack"
-KEYS = ("scene", "seed", "faults")
+KEYS = ("scene", "seed", "faults", "wall_time")
 LINES_SHOWN = 40
 
 _DEVICES = pytest.StashKey[dict[str, Any]]()
+_CLOCK = VirtualClock()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -52,13 +56,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default="auto",
         help="how the FPGA is run (default: compiled where there is a compiler)",
     )
+    group.addoption(
+        "--cubestack-wall-time",
+        action="store_true",
+        help="leave time.sleep and the clocks of drivers alone (default: they are virtual)",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker, and a fixture for each device."""
     config.addinivalue_line(
         "markers",
-        f"{MARKER}(scene, seed, faults, profile, ...): set up the emulated device of this test",
+        f"{MARKER}({', '.join(KEYS)}, profile, ...): set up the emulated device of this test",
     )
     fixtures = ModuleType("cubestack_fixtures")
     for name in device_names():
@@ -88,7 +97,9 @@ def _fixture(name: str) -> Any:
                 text = isinstance(plan, str) and ("\n" in plan or "=" in plan)
                 opened.faults.load(parse_plan(plan) if text else load_plan(Path(plan)))
             request.node.stash.setdefault(_DEVICES, {})[name] = opened
-            yield opened
+            wall_time = options.get("wall_time", config.getoption("--cubestack-wall-time"))
+            with nullcontext() if wall_time else _CLOCK.follow(opened):
+                yield opened
             for key, value in (
                 ("seed", seed),
                 ("virtual_time_s", f"{opened.time_s:.9f}"),

@@ -50,7 +50,7 @@ ORDER = {
         "recording pictures",
         "devices",
         "shell",
-        "conformance experiments ground",
+        "conformance experiments ground virtual_clock",
         "sensors pytest_plugin",
         "cli",
         "api",

@@ -12,6 +12,7 @@ import pytest
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.registry import device_names
+from cubestack.host.pytest_plugin import KEYS
 
 PLUGIN = "cubestack.host.pytest_plugin"
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -74,7 +75,7 @@ def test_seed_and_profile_are_the_marker_s_or_the_command_line_s(run: Run) -> No
     assert done.returncode == 0, done.stdout
 
 
-TAKES = "marker cubestack takes scene, seed, faults, layout, firmware, semihosting, profile, set"
+TAKES = f"marker cubestack takes {', '.join(KEYS)}, layout, firmware, semihosting, profile, set"
 WRONG_MARKERS = {
     "(3)": TAKES,
     "(sead=3)": TAKES,
@@ -117,3 +118,25 @@ def test_the_plugin_costs_nothing_before_it_is_used(run: Run) -> None:
 def test_the_entry_point_leads_to_the_plugin() -> None:
     project = Path(__file__).parents[2] / "pyproject.toml"
     assert f'cubestack = "{PLUGIN}"' in project.read_text()
+
+
+def test_a_driver_that_sleeps_is_left_as_it_is(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "driver.py").write_text(
+        "from time import monotonic, sleep\n"
+        "def measure(port):\n"
+        "    port.write(bytes([0x1F, 0x7F, 30, 3, 0x1F, 0xFF]))\n"
+        "    began = monotonic()\n"
+        "    while not port.in_waiting:\n"
+        "        sleep(0.1)\n"
+        "        if monotonic() - began > 600:\n"
+        "            return None\n"
+        "    return monotonic() - began\n"
+    )
+    test = "    assert driver.measure(cubestar.serial()) == pytest.approx(0.1, abs=0.001)\n"
+    done = run(f"import driver, time\ndef test_it(cubestar):\n{test}    time.sleep(3000)\n")
+    assert done.returncode == 0, done.stdout
+    done = run(
+        "import time\nSLEEP = time.sleep\n@pytest.mark.cubestack(wall_time=True)\n"
+        "def test_it(cubestar):\n    assert time.sleep is SLEEP\n"
+    )
+    assert done.returncode == 0, done.stdout
