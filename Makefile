@@ -14,7 +14,7 @@ SIMULATOR ?= icarus
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run test test-all test-hdl firmware mutants lint bench bench-engines clean
+.PHONY: help venv run test test-all test-hdl firmware mutants lint libraries bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -24,6 +24,7 @@ help:
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make lint      ruff and mypy"
+	@echo "make libraries  build the compiled FPGAs that come along anew, for x86-64 and aarch64"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
 	@echo "make clean     remove .venv, out and caches"
@@ -67,6 +68,10 @@ lint: .venv/ready-dev
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench
+
+libraries: .venv/ready-dev
+	@$(BIN)/python -m pip install -q ziglang
+	@$(BIN)/python -m cubestack.host.devices.libraries
 
 bench-engines: .venv/ready-dev
 	@$(BIN)/python -m tests.benchmarks.engines

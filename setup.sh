@@ -48,8 +48,11 @@ if [ "$kind" = dev ]; then
             >/dev/null 2>&1 || say "could not install$missing; tests that need them are skipped"
     fi
 fi
+# The compiled FPGAs of the shipped sensors come along for these; tests compile others too.
+ready_made() { [ "$kind" = run ] && getconf GNU_LIBC_VERSION >/dev/null 2>&1 &&
+    case $(uname -m) in x86_64 | aarch64) ;; *) false ;; esac; }
 compiler() { command -v "${CXX:-c++}" || command -v g++ || command -v clang++; }
-if ! compiler >/dev/null 2>&1; then
+if ! ready_made && ! compiler >/dev/null 2>&1; then
     if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1; then
         need "a C++ compiler, for the compiled FPGA" g++
     else

@@ -1,8 +1,9 @@
 """Keeps shared libraries in the user's cache folder.
 
 The key covers everything that a library depends on: what its builder says, the compiler and its
-flags. A library's file name carries the hash of its own bytes, so that a damaged one is noticed,
-and it appears by renaming, so that two processes may build at once.
+flags; not the compiler where the library came along ready-made. A library's file name carries the
+hash of its own bytes, so that a damaged one is noticed, and it appears by renaming, so that two
+processes may build at once.
 """
 
 import hashlib
@@ -12,18 +13,44 @@ import platform
 import stat
 import tempfile
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from cubestack.emulator.native import compiler as compilers
 from cubestack.emulator.native.compiler import Compiler, CompilerError, NoCompilerError
+from cubestack.emulator.native.ready_made import hash_of, ready_made
 
 UNUSED_S = 90 * 86_400
 """Wall time after which a library that nobody used makes room for others."""
 
 _log = logging.getLogger(__name__)
+
+Build = Callable[[Compiler, Path, Path], Path]
+"""Gets the compiler, a scratch folder and where its log goes, and returns the library."""
+
+
+class Wanted(NamedTuple):
+    """A library that somebody asked for: all that it is made of, and how."""
+
+    inputs: bytes
+    build: Build
+
+
+_asked: list[list[Wanted]] = []
+
+
+@contextmanager
+def noted() -> Iterator[list[Wanted]]:
+    """Note every library that is asked for meanwhile."""
+    wanted: list[Wanted] = []
+    _asked.append(wanted)
+    try:
+        yield wanted
+    finally:
+        _asked.remove(wanted)
 
 
 def cache_folder() -> Path:
@@ -54,42 +81,67 @@ def _private_folder(wanted: Path) -> Path:
 
 
 def cached_library(
-    content: str,
-    sources: Iterable[Path],
-    build: Callable[[Compiler, Path, Path], Path],
-    folder: Path | None = None,
+    content: str, sources: Iterable[Path], build: Build, folder: Path | None = None
 ) -> Path:
-    """Shared library of what ``content`` and the files ``sources`` say, from the cache or built.
+    """Shared library of what ``content`` and the files ``sources`` say.
 
-    ``build`` gets the compiler, a scratch folder and where its log goes, and returns the library.
-    ``folder`` replaces :func:`cache_folder`.
+    From the cache, of those that come along, or built. ``folder`` replaces :func:`cache_folder`.
 
     Raises:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
-    compiler = compilers.find_compiler()
-    if compiler is None:
-        raise NoCompilerError("no C++ compiler (c++, g++, clang++ or the ziglang wheel) found")
+    inputs = _inputs(content, sources)
+    for wanted in _asked:
+        wanted.append(Wanted(inputs, build))
     folder = folder or cache_folder()
-    key = _key(content, sources, compiler)
+    ready = ready_made(inputs)
     try:
-        for candidate in folder.glob(f"{key}-*.so"):
-            if candidate.name == _library_name(key, candidate.read_bytes()):
-                with suppress(OSError):
-                    os.utime(candidate)  # it is in use
-                return candidate
-            candidate.unlink(missing_ok=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            built = build(compiler, Path(scratch), folder / f"{key}.log")
-            library = folder / _library_name(key, built.read_bytes())
-            built.replace(library)
-        _prune(folder)
+        if ready is not None:
+            digest, library = ready
+            path = folder / f"{hash_of(inputs)}-{digest}.so"
+            return _found(folder, hash_of(inputs)) or _kept(path, library)
+        compiler = compilers.find_compiler()
+        if compiler is None:
+            raise NoCompilerError(
+                "no C++ compiler (c++, g++, clang++ or that of pip install 'cubestack[compiler]') "
+                "found"
+            )
+        key = hash_of(inputs + f"{platform.machine()} {compiler.identity}".encode())
+        return _found(folder, key) or _built(folder, key, compiler, build)
     except OSError as error:
         text = f"can not use the cache folder {folder} ({error.strerror})"
         raise CompilerError(f"{text}; XDG_CACHE_HOME names another one") from error
+
+
+def _found(folder: Path, key: str) -> Path | None:
+    for candidate in folder.glob(f"{key}-*.so"):
+        if candidate.stem == f"{key}-{hash_of(candidate.read_bytes())}":
+            with suppress(OSError):
+                os.utime(candidate)  # it is in use
+            return candidate
+        candidate.unlink(missing_ok=True)
+    return None
+
+
+def _built(folder: Path, key: str, compiler: Compiler, build: Build) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        built = build(compiler, Path(scratch), folder / f"{key}.log")
+        library = folder / f"{key}-{hash_of(built.read_bytes())}.so"
+        built.replace(library)
+    _prune(folder)
     return library
+
+
+def _kept(path: Path, library: bytes) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
+        written = Path(scratch) / path.name
+        written.write_bytes(library)
+        written.replace(path)
+    _prune(path.parent)
+    return path
 
 
 def _prune(folder: Path) -> None:
@@ -102,14 +154,11 @@ def _prune(folder: Path) -> None:
                     path.unlink()
 
 
-def _key(content: str, sources: Iterable[Path], compiler: Compiler) -> str:
+def _inputs(content: str, sources: Iterable[Path]) -> bytes:
+    """All that a library is made of, on any machine and by any compiler."""
     digest = hashlib.sha256()
-    for text in (content, compiler.identity, platform.machine(), *compilers.FLAGS):
+    for text in (content, *compilers.FLAGS):
         digest.update(text.encode() + b"\0")
     for source in sources:
         digest.update(source.read_bytes())
-    return digest.hexdigest()[:24]
-
-
-def _library_name(key: str, content: bytes) -> str:
-    return f"{key}-{hashlib.sha256(content).hexdigest()[:24]}.so"
+    return digest.digest()

@@ -62,7 +62,7 @@ class Demo:
 @contextmanager
 def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
     """An emulator process, of what ``words`` say, that serves on ``port``."""
-    say("starting the emulator; its first start on a machine compiles what it needs")
+    say("starting the emulator")
     line = ""
     try:
         with emulating([*words, "--pty", str(port), "--pace", "fast"]) as said:

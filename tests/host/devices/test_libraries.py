@@ -1,0 +1,51 @@
+"""The libraries that come along are those of what is shipped."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.native.cache import Wanted
+from cubestack.emulator.native.ready_made import FOLDER, TARGETS, hash_of
+from cubestack.host.devices import libraries
+
+MAKE = "python -m cubestack.host.devices.libraries"
+
+
+@pytest.fixture(scope="module")
+def needed() -> list[Wanted]:
+    return libraries.needed()
+
+
+def test_each_device_has_its_own_for_every_machine_and_there_are_no_others(
+    needed: list[Wanted],
+) -> None:
+    wanted = {f"{machine}-{hash_of(one.inputs)}" for one in needed for machine in TARGETS}
+    found = {path.name.rpartition("-")[0] for path in FOLDER.iterdir()}
+    assert found == wanted, f"what they are made of has changed: {MAKE}"
+
+
+def test_a_device_starts_compiled_where_there_is_no_compiler(tmp_path: Path) -> None:
+    program = (
+        "from cubestack.emulator.native import compiler\n"
+        "from cubestack.host.devices.emulated import open_device\n"
+        "compiler.find_compiler = lambda: None\n"
+        "with open_device('cubesense', engine='compiled') as device:\n"
+        "    print(device.client.capture(1))\n"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    environment.pop("CXX", None)
+    call = [sys.executable, "-W", "error", "-c", program]
+    subprocess.run(call, check=True, env=environment, timeout=120)
+    assert [path.suffix for path in (tmp_path / "cubestack").iterdir()] == [".so"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="no compiler for all")
+def test_they_are_what_their_sources_give(tmp_path: Path, needed: list[Wanted]) -> None:
+    libraries.make(needed[:1], tmp_path, print)
+    made = {path.name for path in tmp_path.iterdir()}
+    assert made <= {path.name for path in FOLDER.iterdir()}
