@@ -1,0 +1,97 @@
+"""Files around the code: of one version, and workflows that call what there is."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parent.parent
+
+
+def project() -> dict[str, Any]:
+    own: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    return own
+
+
+def text_of(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    version = project()["version"]
+    releases = re.findall(r"^## \[(\d.*?)\] - (\d{4}-\d\d-\d\d)$", text_of("CHANGELOG.md"), re.M)
+    citation = yaml.safe_load(text_of("CITATION.cff"))
+    assert releases[0] == (version, str(citation["date-released"]))
+    assert citation["version"] == version
+    assert citation["license"] == project()["license"]
+    assert releases == sorted(releases, key=lambda one: one[1], reverse=True)
+
+
+def test_every_release_of_the_changelog_has_its_link() -> None:
+    text = text_of("CHANGELOG.md")
+    names = re.findall(r"^## \[(.*?)\]", text, re.M)
+    assert names == re.findall(r"^\[(.*?)\]: https://", text, re.M)
+    kinds = set(re.findall(r"^### (.*)$", text, re.M))
+    assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+def workflows() -> Iterator[tuple[str, Any]]:
+    for path in sorted((ROOT / ".github" / "workflows").glob("*.yml")):
+        yield path.name, yaml.safe_load(path.read_text())
+    blocks = re.findall(r"```yaml\n(.*?)```", text_of("docs/ci.md"), re.DOTALL)
+    yield from ((f"docs/ci.md, {number}", yaml.safe_load(one)) for number, one in enumerate(blocks))
+
+
+def commands(workflow: Any) -> Iterator[str]:
+    """Shell commands of a GitHub or GitLab workflow, one by one."""
+    jobs = workflow.get("jobs", workflow).values()
+    for job in (job for job in jobs if isinstance(job, dict)):
+        steps = [step.get("run", "") for step in job.get("steps", ())] + job.get("script", [])
+        yield from (part.strip() for step in steps for part in re.split("&&|\n", step))
+
+
+@pytest.mark.parametrize(("name", "workflow"), list(workflows()))
+def test_workflows_call_what_there_is(name: str, workflow: Any) -> None:
+    targets = re.findall(r"^([\w-]+):", text_of("Makefile"), re.M)
+    extras = project()["optional-dependencies"]
+    found = list(commands(workflow))
+    assert len(found) > 5
+    for words in (command.split() for command in found):
+        if words[:1] == ["make"]:
+            assert words[1] in targets
+    for named in re.findall(r"cubestack\[(.*?)\]", " ".join(found)):
+        assert set(named.split(",")) <= set(extras)
+
+
+def test_pytest_knows_the_options_of_the_workflows() -> None:
+    call = [sys.executable, "-m", "pytest", "-p", "cubestack.host.pytest_plugin", "--help"]
+    known = subprocess.run(call, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    for option in set(re.findall(r"--(?:cubestack-[\w-]+|junitxml)", text_of("docs/ci.md"))):
+        assert option in known
+
+
+def test_the_measurement_of_the_workflows_passes(run: Any) -> None:
+    (words,) = {
+        one.partition("cubestack ")[2]
+        for _, workflow in list(workflows())[1:]
+        for one in commands(workflow)
+        if one.startswith("cubestack measure")
+    }
+    assert run(*words.split()).code == 0
+
+
+def test_the_image_is_of_what_is_in_the_tree() -> None:
+    lines = text_of("Dockerfile").splitlines()
+    assert [line for line in lines if line.startswith("COPY")] == [
+        "COPY . /source",
+        "COPY --from=build /opt/cubestack /opt/cubestack",
+    ]
+    assert lines.index("USER cubestack") < lines.index('ENTRYPOINT ["cubestack"]')
+    (extra,) = re.findall(r'"/source\[(\w+)\]"', text_of("Dockerfile"))
+    assert extra in project()["optional-dependencies"]
