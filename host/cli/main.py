@@ -29,6 +29,7 @@ COMMANDS = {
     "fidelity": "measure published figures: theirs, ours in both profiles, and how ours come about",
     "calibrate": "fit a camera's lens to pictures of known stars or lights",
     "registers": "list a device's telecommands and telemetry",
+    "export": "write them for other programs: C, Python, XTCE, COSMOS, Wireshark, SVD",
     "shell": "read, write and watch registers by name",
     "picture": "make the picture that a star tracker takes at a known attitude",
     "log": "log a device's results to a CSV file",

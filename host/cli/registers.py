@@ -1,12 +1,11 @@
 """List a device's telecommands, telemetry and registers, from the tables that
-firmware and host share; or the switches of its firmware.
+firmware and host share; or the switches of its firmware. For programs: cubestack export.
 
 examples:
   cubestack registers {first}
-  cubestack registers {first} --format c > {first}.h
   cubestack registers {first} --format json
   cubestack registers {first} --switches
-  cubestack registers {first} --processor --format c > processor.h
+  cubestack registers {first} --processor
 """
 
 import argparse
@@ -29,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--switches",
         action="store_true",
-        help="where the firmware can do what its documents print, or better (not as C)",
+        help="where the firmware can do what its documents print, or better",
     )
 
 

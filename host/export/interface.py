@@ -1,11 +1,10 @@
-"""Renders an interface for readers and other programs: text table, Markdown, C header, JSON."""
+"""Renders an interface for readers: text table, Markdown, and JSON."""
 
 import json
 from collections.abc import Callable
 
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.host.export import field_text
-from cubestack.host.export.c_header import c_header
 from cubestack.host.export.side_protocols import side_json, side_markdown, side_table
 
 
@@ -87,7 +86,6 @@ def _json(interface: Interface) -> str:
 FORMATS: dict[str, Callable[[Interface], str]] = {
     "table": _table,
     "markdown": _markdown,
-    "c": c_header,
     "json": _json,
 }
 

@@ -1,4 +1,4 @@
-"""Renders a processor's registers, and what its pins lead to: text table, Markdown, C, JSON."""
+"""Renders a processor's registers, and what its pins lead to: table, Markdown, JSON, C header."""
 
 import json
 from collections.abc import Iterator
@@ -12,7 +12,8 @@ def render_processor(tables: Processor, format_name: str) -> str:
     return _FORMATS[format_name](tables)
 
 
-def _c(tables: Processor) -> str:
+def processor_header(tables: Processor) -> str:
+    """A C header."""
     head, end, _ = c_header(tables.layouts).rpartition("#endif\n")
     return f"{head}{tables.pins_header()}\n{end}"
 
@@ -80,4 +81,4 @@ def _json(tables: Processor) -> str:
     return json.dumps({"name": tables.name, "registers": registers}, indent=1) + "\n"
 
 
-_FORMATS = {"table": _table, "markdown": _markdown, "c": _c, "json": _json}
+_FORMATS = {"table": _table, "markdown": _markdown, "json": _json}

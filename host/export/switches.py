@@ -8,12 +8,10 @@ from cubestack.firmware_model.interface.codec.switches import Switches
 
 
 def render_switches(title: str, switches: type[Switches], format_name: str) -> str:
-    """The switches of the sensor that is called ``title``; ValueError for a format they lack."""
+    """The switches of the sensor that is called ``title``."""
     declared = switches.declared()
     if format_name == "json":
         return json.dumps({name: asdict(one) for name, one in declared.items()}, indent=2) + "\n"
-    if format_name == "c":
-        raise ValueError("switches have no C header: table, markdown or json")
     if format_name == "table":
         return (
             "".join(

@@ -10,7 +10,7 @@ import pytest
 
 from cubestack.firmware_model.interface.cubestar.processor_header import PROCESSOR
 from cubestack.host.cli.main import main
-from cubestack.host.export.processor import render_processor
+from cubestack.host.export.processor import processor_header, render_processor
 
 
 @pytest.mark.parametrize("format_name", ["table", "markdown", "json"])
@@ -32,7 +32,7 @@ def test_every_register_is_listed_at_its_address(format_name: str) -> None:
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 def test_the_c_header_compiles_and_has_the_pins(tmp_path: Path) -> None:
-    (tmp_path / "processor.h").write_text(render_processor(PROCESSOR, "c"), encoding="utf-8")
+    (tmp_path / "processor.h").write_text(processor_header(PROCESSOR), encoding="utf-8")
     source = '#include "processor.h"\n_Static_assert(FPGA_DATA % 16 == 0, "a byte");\n'
     source += "unsigned baud(void) { return SATELLITE_UART->CLKDIV & USART_CLKDIV_DIV; }\n"
     (tmp_path / "main.c").write_text(source, encoding="utf-8")

@@ -33,10 +33,5 @@ def test_each_format_says_all_of_each_switch(name: str, run: Run) -> None:
             assert part in text
 
 
-def test_what_has_no_switches_says_so_and_c_is_refused(run: Run) -> None:
+def test_what_has_no_switches_says_so() -> None:
     assert render_switches("Glow", Switches, "table") == "Glow has no switches\n"
-    outcome = run("registers", "cubestar", "--switches", "--format", "c")
-    assert outcome.code == 2
-    assert outcome.line == (
-        "cubestack registers: switches have no C header: table, markdown or json"
-    )

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.host.devices.registry import device
-from cubestack.host.export.processor import render_processor
+from cubestack.host.export.processor import processor_header
 
 PROGRAMS = Path(__file__).parent / "firmware"
 COMPILER = shutil.which("arm-none-eabi-gcc")
@@ -27,7 +27,7 @@ needs_toolchain = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-non
 
 def build(name: str, folder: Path) -> Path:
     """The ELF file of a program, made in ``folder``."""
-    (folder / "processor.h").write_text(render_processor(device("cubestar").processor(), "c"))
+    (folder / "processor.h").write_text(processor_header(device("cubestar").processor()))
     target = folder / f"{name}.elf"
     inputs = [PROGRAMS / "start.c", PROGRAMS / f"{name}.c", "-T", PROGRAMS / "board.ld", "-lgcc"]
     command = [COMPILER or "", *FLAGS, f"-I{folder}", *inputs, "-o", target]

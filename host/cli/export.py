@@ -1,0 +1,44 @@
+"""Write a device's interface for other programs, from the tables that firmware and
+host share. To read it: cubestack registers.
+
+  c            C99 header: IDs, offsets, scales, accessors
+  python       module with a dataclass for each message; needs nothing else
+  xtce         XTCE 1.2, for mission control systems
+  cosmos       OpenC3 COSMOS commands and telemetry (a file of cmd_tlm)
+  wireshark    dissector in Lua, for what a TCP port carries
+  processor-c  C header of the processor's registers, and what its pins lead to
+  svd          CMSIS-SVD of these, for debuggers
+
+examples:
+  cubestack export {first} --format c --out {first}.h
+  cubestack export {first} --format xtce --out {first}.xml
+"""
+
+import argparse
+from pathlib import Path
+
+from cubestack.host.devices.registry import device, device_names
+from cubestack.host.export.programs import OF_INTERFACE, OF_PROCESSOR
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("device", choices=device_names(), help="device whose interface is written")
+    parser.add_argument("--format", choices=(*OF_INTERFACE, *OF_PROCESSOR), required=True)
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the text."""
+    found = device(args.device)
+    if args.format in OF_INTERFACE:
+        text = OF_INTERFACE[args.format](found.interface)
+    elif found.processor is None:
+        raise ValueError(f"the processor of {found.name} runs no firmware of your own")
+    else:
+        text = OF_PROCESSOR[args.format](found.processor())
+    if args.out is None:
+        print(text, end="")
+    else:
+        args.out.write_text(text, encoding="utf-8")
+    return 0

@@ -1,0 +1,25 @@
+"""What other programs read: each format is made of the tables that firmware and host share."""
+
+from collections.abc import Callable
+
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.efm32gg.table import Processor
+from cubestack.host.export.c_header import c_header
+from cubestack.host.export.cosmos import cosmos
+from cubestack.host.export.processor import processor_header
+from cubestack.host.export.python_module import python_module
+from cubestack.host.export.svd import svd
+from cubestack.host.export.wireshark import wireshark
+from cubestack.host.export.xtce import xtce
+
+#: Format to the function that makes it of an interface.
+OF_INTERFACE: dict[str, Callable[[Interface], str]] = {
+    "c": c_header,
+    "python": python_module,
+    "xtce": xtce,
+    "cosmos": cosmos,
+    "wireshark": wireshark,
+}
+
+#: Format to the function that makes it of a processor's registers.
+OF_PROCESSOR: dict[str, Callable[[Processor], str]] = {"processor-c": processor_header, "svd": svd}

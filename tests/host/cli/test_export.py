@@ -1,0 +1,31 @@
+"""The command that writes a device's interface for other programs."""
+
+from pathlib import Path
+
+import pytest
+
+from cubestack.host.devices.registry import devices
+from cubestack.host.export.programs import OF_INTERFACE, OF_PROCESSOR
+from tests.conftest import Run
+
+
+@pytest.mark.parametrize("form", [*OF_INTERFACE, *OF_PROCESSOR])
+def test_it_writes_what_it_prints(form: str, run: Run, tmp_path: Path) -> None:
+    for device in devices():
+        printed = run("export", device.name, "--format", form)
+        if form in OF_PROCESSOR and device.processor is None:
+            assert (printed.code, printed.line) == (
+                2,
+                f"cubestack export: the processor of {device.name} runs no firmware of your own",
+            )
+            continue
+        assert (printed.code, printed.err) == (0, "")
+        path = tmp_path / "file"
+        assert run("export", device.name, "--format", form, "--out", path) == (0, "", "")
+        assert path.read_text(encoding="utf-8") == printed.out
+
+
+def test_a_folder_that_is_not_there_is_named(run: Run, tmp_path: Path) -> None:
+    outcome = run("export", "aramis", "--format", "c", "--out", tmp_path / "not" / "there.h")
+    assert outcome.code != 0
+    assert "there.h" in outcome.line

@@ -1,0 +1,43 @@
+"""Random frames of every interface, and what this project's codec makes of them."""
+
+import random
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.field import Field
+from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.host.devices.registry import devices
+
+INTERFACES = [device.interface for device in devices()]
+
+EACH = pytest.mark.parametrize("interface", INTERFACES, ids=lambda interface: interface.name)
+
+COUNTS = pytest.mark.parametrize("count", [10, pytest.param(1000, marks=pytest.mark.slow)])
+
+
+def messages(interface: Interface, kind: Kind) -> list[Message]:
+    return [message for message in interface.messages if message.kind is kind]
+
+
+def frames(message: Message, count: int) -> Iterator[tuple[bytes, dict[str, Any]]]:
+    """Data and their values; all bits are random, but named numbers are named ones."""
+    rng = random.Random(message.id)
+    for _ in range(count):
+        data = bytearray(rng.randbytes(message.length))
+        for field in message.fields:
+            at = field.bit_offset // 8
+            if field.choices is not None:
+                data[at] = int(rng.choice(list(field.choices)))
+            if field.type == "f32":  # not-a-numbers are not equal to themselves
+                data[at : at + 4] = struct.pack("<f", rng.uniform(-1e6, 1e6))
+        yield bytes(data), message.unpack(bytes(data))
+
+
+def same(field: Field, theirs: Any, ours: Any) -> bool:
+    """Within the rounding of one multiplication where a count is scaled, else exactly."""
+    if field.scale != 1:
+        return theirs == pytest.approx(ours, rel=1e-15)
+    return bool(theirs == ours)

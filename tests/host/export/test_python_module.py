@@ -1,0 +1,86 @@
+"""The exported module runs alone, and codes as this project does."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.frames import encode_frame
+from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.host.export.python_module import python_module
+from tests.host.export.frames import EACH, INTERFACES, frames
+
+CUBESTAR = INTERFACES[0]
+
+
+def module(interface: Interface) -> Any:
+    made = ModuleType("exported")
+    sys.modules["exported"] = made  # where dataclasses look their fields' types up
+    exec(compile(python_module(interface), "exported", "exec"), made.__dict__)
+    return made
+
+
+def test_it_needs_nothing_but_python(tmp_path: Path) -> None:
+    for interface in INTERFACES:
+        (tmp_path / "exported.py").write_text(python_module(interface))
+        call = [sys.executable, "-I", "-S", "-W", "error", str(tmp_path / "exported.py")]
+        assert subprocess.run(call, capture_output=True, check=True).stdout == b""
+
+
+@EACH
+def test_every_message_both_ways(interface: Interface) -> None:
+    exported = module(interface)
+    for message in interface.messages:
+        prefix = "Tlm" if message.kind is Kind.TELEMETRY else "Tc"
+        cls = getattr(exported, prefix + message.name)
+        assert (message.id, message.length) == (cls.MESSAGE_ID, cls.MESSAGE_LENGTH)
+        assert cls().encode() == message.pack(**message.reset_values())
+        for data, values in frames(message, 20):
+            decoded = cls.decode(data)
+            assert vars(decoded) == values
+            assert decoded.encode() == message.pack(**values)
+        with pytest.raises(ValueError, match=f"{message.name} has {message.length} bytes, not"):
+            cls.decode(bytes(message.length + 1))
+
+
+@EACH
+def test_frames_are_those_of_the_line(interface: Interface) -> None:
+    exported = module(interface)
+    for message in interface.messages:
+        for data, _ in frames(message, 3):
+            payload = bytes([message.id, 0x1F]) + data
+            assert exported.frame(payload) == encode_frame(payload)
+            assert exported.payload(encode_frame(payload)) == payload
+        if message.kind is Kind.TELEMETRY:
+            request = getattr(exported, f"Tlm{message.name}").request()
+        else:
+            request = getattr(exported, f"Tc{message.name}")().frame()
+            payload = exported.payload(request)
+            assert payload[1:] == message.pack(**message.reset_values())
+        assert exported.payload(request)[0] == message.id
+
+
+def test_what_does_not_fit_is_named() -> None:
+    exported = module(CUBESTAR)
+    for value in (-1, 1 << 16):
+        with pytest.raises(ValueError, match=rf"^exposure: {value} does not fit$"):
+            exported.TcExposure(**{next(iter(exported.TcExposure.MESSAGE_FIELDS)): value}).encode()
+    with pytest.raises(ValueError, match="not a frame: 00"):
+        exported.payload(b"\0")
+
+
+def test_named_numbers_have_their_names() -> None:
+    exported = module(CUBESTAR)
+    message = next(one for one in CUBESTAR.messages if any(f.choices for f in one.fields))
+    named = next(one for one in message.fields if one.choices)
+    prefix = "Tlm" if message.kind is Kind.TELEMETRY else "Tc"
+    data = bytearray(message.length)
+    for choice in named.choices or ():
+        data[named.bit_offset // 8] = int(choice)
+        decoded = getattr(exported, prefix + message.name).decode(bytes(data))
+        assert getattr(decoded, named.name).name == choice.name
+    assert json.dumps(int(getattr(decoded, named.name)))
