@@ -16,6 +16,9 @@ def step(number: int, text: str, good: bool) -> None:
         sys.exit(1)
 
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python bringup.py TARGET")
+
 with cubestack.connect(sys.argv[1], "cubestar") as cubestar:
     client = cubestar.client
     interface = client.interface

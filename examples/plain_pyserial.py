@@ -6,6 +6,9 @@ import time
 
 import serial
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python plain_pyserial.py PORT")
+
 port = serial.serial_for_url(sys.argv[1], baudrate=57600, timeout=2)
 
 

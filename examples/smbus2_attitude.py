@@ -19,6 +19,9 @@ def telemetry(bus: SMBus, identifier: int, length: int) -> bytes:
     return bytes(answer)
 
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python smbus2_attitude.py BUS")
+
 with SMBus(int(sys.argv[1])) as bus:
     bus.write_byte(ADDRESS, 36)  # CaptureAndProcess
     while telemetry(bus, 131, 1) != b"\1":  # TcmdProcessed

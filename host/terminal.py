@@ -7,13 +7,18 @@ from time import monotonic
 from typing import TypeVar
 
 from rich import progress as bars
-from rich.console import Console
+from rich.console import Console, RenderableType
+from rich.measure import Measurement
+from rich.table import Table
 from rich.text import Text
 
 console = Console()
 _errors = Console(stderr=True)
 
 T = TypeVar("T")
+
+_WIDEST = 10_000
+"""Columns that no table has."""
 
 EVERY_S = 5.0
 """Between two lines that tell how far it is, where there is no terminal to draw a bar on."""
@@ -27,9 +32,40 @@ class _Rate(bars.ProgressColumn):
         return Text("" if speed is None else f"{speed:.3g}/s", style="progress.data.speed")
 
 
+def hush(quiet: bool) -> None:
+    """Show neither progress nor lines for the reader while ``quiet``."""
+    _errors.quiet = quiet
+
+
 def say(text: str) -> None:
     """A line for the reader, not for a script: on standard error."""
     _errors.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def show(table: Table) -> None:
+    """Print a table: drawn where the terminal is wide enough, else plain lines that lose nothing.
+
+    Plain is a line for each row, its cells in columns, and the title above.
+    """
+    options = console.options.update(max_width=_WIDEST)
+    width = Measurement.get(console, options, table).maximum
+    if console.is_terminal and width <= console.width:
+        console.print(table)
+        return
+    if table.title is not None:
+        console.print(table.title, soft_wrap=True, markup=False, highlight=False)
+    plain = Table(box=None)
+    for column in table.columns:
+        plain.add_column(column.header, justify=column.justify, no_wrap=True)
+    for cells in zip(*(column.cells for column in table.columns), strict=True):
+        plain.add_row(*(_on_one_line(cell) for cell in cells))
+    for line in console.render_lines(plain, options, pad=False):
+        text = "".join(segment.text for segment in line).rstrip()
+        console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+def _on_one_line(cell: RenderableType) -> RenderableType:
+    return cell.replace("\n", "  ") if isinstance(cell, str) else cell
 
 
 def progress_bar() -> bars.Progress:
@@ -42,7 +78,7 @@ def progress_bar() -> bars.Progress:
         bars.TimeElapsedColumn(),
         bars.TimeRemainingColumn(),
         console=_errors,
-        disable=not _errors.is_terminal,
+        disable=_errors.quiet or not _errors.is_terminal,
         transient=True,
     )
 

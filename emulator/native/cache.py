@@ -100,6 +100,7 @@ def cached_library(
         if ready is not None:
             digest, library = ready
             path = folder / f"{hash_of(inputs)}-{digest}.so"
+            _log.info("ready-made library %s", path.name)
             return _found(folder, hash_of(inputs)) or _kept(path, library)
         compiler = compilers.find_compiler()
         if compiler is None:
@@ -126,6 +127,7 @@ def _found(folder: Path, key: str) -> Path | None:
 
 def _built(folder: Path, key: str, compiler: Compiler, build: Build) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
+    _log.info("compiling into %s with %s", folder, " ".join(compiler.command))
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         built = build(compiler, Path(scratch), folder / f"{key}.log")
         library = folder / f"{key}-{hash_of(built.read_bytes())}.so"

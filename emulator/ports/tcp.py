@@ -121,7 +121,7 @@ def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
     except (socket.gaierror, UnicodeError) as error:
         raise PortError(f"no address of this machine is called {host!r}; try 127.0.0.1") from error
     if not allow_remote and not ipaddress.ip_address(address[0]).is_loopback:
-        raise PortError(f"{host} is open to other machines: listen on 127.0.0.1 or allow that")
+        raise PortError(f"{host} is open to other machines: listen on 127.0.0.1 or --allow-remote")
     try:
         server = socket.create_server((str(address[0]), port), family=family)
     except OSError as error:

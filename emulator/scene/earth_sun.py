@@ -15,10 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
-from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_zero
+from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_outside, refuse_zero
 from cubestack.emulator.scene.hazards import Clouds, EarthHazard
 from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.sim.virtual_time import PS_PER_S
+
+FASTEST_DEG_S = 1000.0
+"""Body rate about one axis, at most (assumed)."""
+
+HIGHEST_KM = 1e6
+"""Altitude at most (assumed): from there the Earth is half a pixel."""
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
@@ -141,10 +147,14 @@ class EarthSunScene:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _unit(name, getattr(self, name)))
         rate = np.asarray(self.rate_deg_s, np.float64)
-        if rate.shape != (3,) or not np.all(np.isfinite(rate)):
-            raise SceneError(f"rate_deg_s must be 3 numbers in deg/s, not {self.rate_deg_s!r}")
+        if rate.shape != (3,) or not np.all(np.abs(rate) <= FASTEST_DEG_S):
+            raise SceneError(
+                f"rate_deg_s must be 3 numbers in deg/s, at most {FASTEST_DEG_S:g} each, not "
+                f"{self.rate_deg_s!r}"
+            )
         refuse_zero(self, "altitude_km")
-        refuse_negative(self, "unevenness", "glow_km", "seed")
+        refuse_negative(self, "seed")
+        refuse_outside(self, altitude_km=(0, HIGHEST_KM), unevenness=(0, 10), glow_km=(0, 1000))
         refuse_strangers(self.hazards)
         radius = np.radians(angular_radius_deg(self.altitude_km))
         for hazard in self.hazards:

@@ -36,6 +36,18 @@ def refuse_zero(thing: Any, *names: str) -> None:
             raise SceneError(f"{name} must be above 0, not {getattr(thing, name)}")
 
 
+def refuse_outside(thing: Any, **limits: tuple[float, float]) -> None:
+    """Raise SceneError when one of these attributes, or a number in it, is not within its limits.
+
+    None is within all.
+    """
+    for name, (low, high) in limits.items():
+        value = getattr(thing, name)
+        for one in value if isinstance(value, tuple) else (value,):
+            if one is not None and not low <= one <= high:
+                raise SceneError(f"{name} must be {low:g} to {high:g}, not {one:g}")
+
+
 DEVICE_KEYS = ("profile", "set")
 """Keys of a scene file that are for the device that looks at it: which switches it runs with."""
 
@@ -104,6 +116,21 @@ def number(value: Any) -> float:
     if type(value) not in (int, float) or not abs(value) <= sys.float_info.max:
         raise SceneError(f"must be a number, not {value!r}")
     return float(value)
+
+
+def within(low: float, high: float) -> Callable[[Any], float]:
+    """A reader of a number in these limits."""
+
+    def read(value: Any) -> float:
+        if not low <= number(value) <= high:
+            raise SceneError(f"must be {low:g} to {high:g}, not {value:g}")
+        return float(value)
+
+    return read
+
+
+angle = within(-360, 360)
+declination = within(-90, 90)
 
 
 def _exactly(kind: type[V], what: str) -> Callable[[Any], V]:

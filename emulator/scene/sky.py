@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
-from cubestack.emulator.scene.file import SceneError, refuse_negative
+from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_outside
 from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
 from cubestack.emulator.scene.picture import PictureScene, check_quaternion
@@ -21,6 +21,14 @@ FASTEST_DEG_S = 100.0
 
 The time to render a frame grows with the rate; it is ten seconds there.
 """
+
+EPOCHS = (1800.0, 2200.0)
+"""Julian years in which proper motions, which are taken as straight, still are."""
+
+MAGNITUDES = (-30.0, 30.0)
+"""From brighter than the Sun to fainter than any telescope sees."""
+
+MOST_FALSE_STARS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +68,10 @@ class SkyScene:
         quaternion: attitude (4,) at time 0, scalar last, inertial (ICRS at ``epoch``) to camera.
         rate_deg_s: body rate (3,) in camera axes.
         poses: later poses, each holding from its start on; in the order of their starts.
-        epoch: Julian year of the stars' positions.
+        epoch: Julian year of the stars' positions, one of ``EPOCHS``.
         mag_limit: stars with V strictly below it are seen; None for all that the camera resolves.
-        false_stars: number of lights at random places of the picture that no catalogue has.
+        false_stars: number of lights at random places of the picture that no catalogue has, at most
+            ``MOST_FALSE_STARS``.
         false_star_mag: range of their magnitudes, brightest first, uniform (assumed).
         atmosphere: the air that the stars, and only they, are seen through; None in space.
         hazards: what else gives light, or stands in the stars' way.
@@ -88,7 +97,9 @@ class SkyScene:
         starts = [pose.start_s for pose in self._all_poses]
         if sorted(starts) != starts:
             raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
-        refuse_negative(self, "false_stars", "seed")
+        refuse_negative(self, "seed")
+        refuse_outside(self, epoch=EPOCHS, mag_limit=MAGNITUDES, false_star_mag=MAGNITUDES)
+        refuse_outside(self, false_stars=(0, MOST_FALSE_STARS))
         refuse_strangers(self.hazards)
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:

@@ -32,7 +32,7 @@ from cubestack.host.experiments.campaigns.statistics import Change, compared
 from cubestack.host.experiments.campaigns.worst import worst
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.workers import cores
-from cubestack.host.terminal import console, progress, say
+from cubestack.host.terminal import progress, say, show
 
 REPLAY, REPORT, PARQUET = "replay", "report", "parquet"
 WORST = 6
@@ -158,7 +158,7 @@ def _show(folder: Folder, *, as_json: bool) -> int:
             cells.append(f"{ended[ending]}\n{low:.1f}-{high:.1f} %")
         table.add_row(*(str(value) for _, value in point), *cells)
     if not as_json:
-        console.print(table)
+        show(table)
     failed = sum(ended["failed"] for ended in found.values())
     if failed:
         say(f'{failed} failed: "outcome": "failed" in {folder.path}; replay shows how')

@@ -18,7 +18,7 @@ from rich.table import Table
 from cubestack.host.devices.costs import CostReport, Measurement
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
-from cubestack.host.terminal import console
+from cubestack.host.terminal import console, show
 
 _BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
 
@@ -77,7 +77,7 @@ def _show(report: CostReport, found: list[Measurement]) -> None:
     for name, charged in report.table.items():
         if name in first[0].operations:
             table.add_row(name, f"{charged:g}", *(f"{one.operations[name]:g}" for one in first))
-    console.print(table)
+    show(table)
 
 
 def _rewrite(page: Path, table: str) -> None:

@@ -23,7 +23,7 @@ from cubestack.host.experiments.hazards import curves
 from cubestack.host.experiments.hazards.asked import known
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.workers import cores
-from cubestack.host.terminal import console, progress, say
+from cubestack.host.terminal import progress, say, show
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,7 +85,7 @@ def _list() -> None:
     for name, kind in sorted(known().items()):
         values = ", ".join(f"{value:g}" for value in kind.strength.values)
         table.add_row(name, kind.meaning, f"{kind.strength.key}: {values} {kind.strength.unit}")
-    console.print(table)
+    show(table)
 
 
 def _show(points: list[curves.Point]) -> None:
@@ -104,4 +104,4 @@ def _show(points: list[curves.Point]) -> None:
         table.add_row(
             *(point.device, point.hazard, strength, right, str(point.refused), wrong, reasons)
         )
-    console.print(table)
+    show(table)

@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 the run failed, 2 the call was wrong, 128 and the signal's
 ended by one. An error is one line: what, where, and what would be right.
 """
 
+import logging
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,9 +14,13 @@ from importlib.metadata import version
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
+from cubestack.host.terminal import hush
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
 SIGNALLED = 128
+
+LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
+"""Of the log, by the number of times that --verbose stands there."""
 
 #: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).
 COMMANDS = {
@@ -39,6 +44,7 @@ COMMANDS = {
     "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",
     "costs": "measure what a device's program costs as compiled code",
     "bench": "measure the cost of the hot paths on this machine",
+    "completion": "print what has bash, zsh or fish complete this command",
 }
 
 
@@ -50,6 +56,13 @@ def make_parser() -> Parser:
         epilog=_with_names("Try: cubestack measure {first}, or cubestack COMMAND --help"),
     )
     parser.add_argument("--version", action="version", version=f"cubestack {version('cubestack')}")
+    loud = parser.add_mutually_exclusive_group()
+    loud.add_argument(
+        "-v", "--verbose", action="count", default=0, help="log what is going on; -vv everything"
+    )
+    loud.add_argument(
+        "-q", "--quiet", action="store_true", help="nothing but results and errors: no progress"
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         module = import_module(f"cubestack.host.cli.{name}")
@@ -83,11 +96,22 @@ def _end_in_order() -> None:
             signal.signal(number, end)
 
 
+def _set_loudness(verbose: int, *, quiet: bool) -> None:
+    """What goes to standard error beside errors: warnings, with ``verbose`` more, or nothing."""
+    hush(quiet)
+    own = logging.getLogger("cubestack")
+    own.setLevel(logging.ERROR if quiet else LEVELS[min(verbose, len(LEVELS) - 1)])
+    if not own.handlers:
+        own.addHandler(handler := logging.StreamHandler())
+        handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line ``arguments`` (default: the process's own); returns the exit code."""
     if arguments is None:
         _end_in_order()
     args = make_parser().parse_args(arguments)
+    _set_loudness(args.verbose, quiet=args.quiet)
     try:
         return int(args.run(args) or DONE)
     except KeyboardInterrupt:

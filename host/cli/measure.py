@@ -33,7 +33,7 @@ from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import between
-from cubestack.host.terminal import console, progress, say
+from cubestack.host.terminal import console, progress, say, show
 
 PERCENT = between(0, 100, "a number of percent in 0..100")
 SHOWN = 40
@@ -159,7 +159,7 @@ def _report(
         table.add_column(experiment.columns[-1], overflow="fold")
         for number, result in enumerate(results[:SHOWN]):
             table.add_row(*experiment.row(number, result))
-        console.print(table)
+        show(table)
         if len(results) > SHOWN:
             console.print(f"... and {len(results) - SHOWN} more; --json lists them all")
     for line in experiment.summarise(results, wall_s):

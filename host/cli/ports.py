@@ -71,6 +71,8 @@ def open_ports(
 
     if args.strict_line and args.tcp is not None:
         raise ValueError("--strict-line: a TCP client sets no baud rate; use --pty or --rfc2217")
+    if args.listen != LOOPBACK and args.tcp is args.rfc2217 is args.control is None:
+        raise ValueError("--listen: of which port? It goes with --tcp, --rfc2217 or --control")
     kind = TcpEndpoint if args.rfc2217 is None else Rfc2217Endpoint
     first = args.tcp if args.rfc2217 is None else args.rfc2217
     lines = [(opened, line) for opened in devices for line in opened.board.lines]

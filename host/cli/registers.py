@@ -19,7 +19,7 @@ from cubestack.host.export.switches import render_switches
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("device", choices=device_names(), help="device whose interface is listed")
-    parser.add_argument("--format", choices=FORMATS, default="table", help="default: table")
+    parser.add_argument("--format", choices=tuple(FORMATS), default="table", help="default: table")
     parser.add_argument(
         "--processor",
         action="store_true",

@@ -33,7 +33,7 @@ class Reports:
         """Declare the device, and the options of all that can be it."""
         first = next(iter(self.found))
         parser.add_argument(
-            "device", nargs="?", choices=self.found, default=first, help=f"default {first}"
+            "device", nargs="?", choices=tuple(self.found), default=first, help=f"default {first}"
         )
         parser.add_argument("--json", action="store_true", help="one JSON object a result")
         add_options(parser, *(experiment.options for _, experiment in self.found.values()))

@@ -1,4 +1,4 @@
-"""Makes the libraries that come along anew: of every registered device, with every choice it has.
+"""Makes the libraries that come along anew: of every shipped device, with every choice it has.
 
 ``python -m cubestack.host.devices.libraries`` needs ``cubestack[compiler]``, whose compiler builds
 for every machine, and writes below ``emulator/native``. A test says when that is due.
@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.devices.emulated import open_device
-from cubestack.host.devices.registry import devices
+from cubestack.host.devices.registry import BUILT_IN
+from cubestack.host.devices.registry import device as registered
 
 if TYPE_CHECKING:
     from cubestack.emulator.native.cache import Wanted
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def choices() -> Iterator[tuple[str, dict[str, Any]]]:
     """Every device as it comes, and with each of its options alone."""
-    for device in devices():
+    for device in map(registered, BUILT_IN):
         yield device.name, {}
         for option in device.all_options:
             values = option.choices or (() if option.metavar else (True,))

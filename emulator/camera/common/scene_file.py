@@ -65,9 +65,9 @@ _OPTICS: file.Readers = {
     if f.name not in ("columns", "rows", "residuals")
 }
 _POSE: file.Readers = {
-    "ra_deg": file.number,
-    "dec_deg": file.number,
-    "roll_deg": file.number,
+    "ra_deg": file.angle,
+    "dec_deg": file.declination,
+    "roll_deg": file.angle,
     "quaternion": file.several(4, file.number),
     "rate_deg_s": file.several(3, file.number),
 }

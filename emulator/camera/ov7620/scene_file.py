@@ -131,7 +131,7 @@ _SCENE: file.Readers = {
     "hot_pairs": file.whole,
     "noise": file.flag,
     "seed": file.whole,
-    "hazards": dict,
+    "hazards": lambda value: value,
 }
 _BALL_SCENE: file.Readers = {
     "angle_deg": file.several(2, file.number),

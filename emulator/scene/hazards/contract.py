@@ -163,6 +163,11 @@ def direction(name: str, values: ArrayLike) -> Vectors:
     """
     v = np.asarray(values, np.float64)
     if v.shape == (2,) and np.all(np.isfinite(v)):
+        if not (abs(v[0]) <= 360 and abs(v[1]) <= 90):
+            raise SceneError(
+                f"{name} must be a right ascension of -360 to 360 deg and a declination of -90 to "
+                f"90, not {values!r}"
+            )
         ra, dec = np.radians(v)
         v = np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
     if v.shape != (3,) or not 0 < np.linalg.norm(v) < np.inf:

@@ -36,7 +36,7 @@ class Debris(SkyHazard):
     )
     rate_deg_s: float = key(0.5, "how fast it moves, deg/s", 0, 20)
     v_mag: float = key(2.0, "its magnitude", -10, 10)
-    time_s: float = key(0.0, "when it is there, s")
+    time_s: float = key(0.0, "when it is there, s", -1e6, 1e6)
 
     name: ClassVar[str] = "debris"
     meaning: ClassVar[str] = "an object that crosses the field"

@@ -39,7 +39,9 @@ class SunGlare(SkyHazard):
     direction: tuple[float, ...] = key(
         (0.0, 0.0, 1.0), "of the source: three numbers, or right ascension and declination in deg"
     )
-    v_mag: float = key(SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73")
+    v_mag: float = key(
+        SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73", -30, 30
+    )
     transmittance: float = key(1e-7, "brightness a steradian at 45 deg, by its light", 0, 1)
     decade_deg: float = key(15.0, "angle in which that falls to a tenth, deg", 1, 180)
     slope_deg: float = key(30.0, "angle across the picture in which it falls to 1/e, deg", 1, 1e6)

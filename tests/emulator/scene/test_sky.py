@@ -47,7 +47,7 @@ def test_false_lights_are_those_of_the_seed() -> None:
 
 
 def test_wrong_values_in_python() -> None:
-    with pytest.raises(SceneError, match="false_stars must not be negative"):
+    with pytest.raises(SceneError, match="false_stars must be 0 to 10000, not -1"):
         SkyScene([0, 0, 0, 1], false_stars=-1)
     with pytest.raises(SceneError, match="rate_deg_s must be 3 numbers"):
         SkyScene([0, 0, 0, 1], rate_deg_s=(0, np.nan, 0))

@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -292,3 +294,25 @@ def test_a_wrong_plan_is_a_wrong_call(run: Run, tmp_path: Path, text: str, messa
     outcome = run("measure", "cubesense", "--frames", "1", "--faults", plan)
     assert outcome.code == WRONG_CALL
     assert outcome.err.splitlines()[-1].startswith(f"cubestack measure: {plan}: {message}")
+
+
+def loudness(*words: str, environment: dict[str, str]) -> str:
+    call = [sys.executable, "-m", "cubestack", *words, "measure", "cubesense", "--frames", "1"]
+    done = subprocess.run(
+        call, capture_output=True, text=True, check=True, env={**os.environ, **environment}
+    )
+    assert "wall time" in done.stdout
+    return done.stderr
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_verbose_tells_of_what_is_loaded_and_quiet_of_nothing(tmp_path: Path) -> None:
+    environment = {"XDG_CACHE_HOME": str(tmp_path)}
+    told = loudness("-v", environment=environment)
+    assert "INFO cubestack.emulator.native.cache: " in told
+    assert loudness("--quiet", environment=environment) == ""
+    assert "INFO" not in loudness(environment=environment)
+
+
+def test_verbose_and_quiet_do_not_go_together(run: Run) -> None:
+    assert run("-v", "-q", "bench").code == WRONG_CALL

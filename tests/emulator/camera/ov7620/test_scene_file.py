@@ -99,7 +99,7 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
         (f"{KIND}nadir_deg = [1]", "nadir_deg must be a list of 2 numbers, not [1]"),
         (f"{KIND}altitude_km = 0", "altitude_km must be above 0, not 0.0"),
         (f"{KIND}bloom_px = -1", "bloom_px must be above 0, not -1.0"),
-        (f"{KIND}unevenness = -0.1", "unevenness must not be negative, not -0.1"),
+        (f"{KIND}unevenness = -0.1", "unevenness must be 0 to 10, not -0.1"),
         (f"{KIND}hot_pairs = -3", "hot_pairs must not be negative, not -3"),
         (f"{KIND}seed = 0.5", "seed must be a whole number, not 0.5"),
         (f"{KIND}noise = 0", "noise must be true or false, not 0"),
