@@ -50,9 +50,20 @@ def test_nothing_else_names_it() -> None:
             assert "sunslit" not in path.read_text(encoding="utf-8").lower(), path
 
 
-@pytest.mark.parametrize("form", ["table", "markdown", "c", "json"])
+@pytest.mark.parametrize("form", ["table", "markdown", "json"])
 def test_registers(cubestack: Command, form: str) -> None:
-    text = cubestack("registers", "sunslit", "--format", form)
+    told(cubestack("registers", "sunslit", "--format", form))
+
+
+@pytest.mark.parametrize("form", ["c", "python", "xtce", "cosmos", "wireshark"])
+def test_exports(cubestack: Command, form: str, tmp_path: Path) -> None:
+    cubestack("export", "sunslit", "--format", form, "--out", tmp_path)
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    told("".join(path.read_text(encoding="utf-8") for path in files))
+
+
+def told(text: str) -> None:
+    """All messages are there, however a format spells them."""
     for message in device("sunslit").interface.messages:
         assert message.name.lower() in text.lower().replace("_", "")
 
