@@ -47,7 +47,7 @@ ONE_DEVICE = (
 )
 """Options that belong to one device."""
 
-FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out")
+FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out", "orbit")
 """Options whose files or whose doings can not be taken back."""
 
 
@@ -66,6 +66,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help=f"TOML scene of the one device; default: {', or '.join(scenes)}",
+    )
+    parser.add_argument(
+        "--orbit",
+        type=Path,
+        metavar="FILE",
+        help="TOML orbit of the satellite that all devices are on (docs/orbit.md)",
     )
     add_port_arguments(parser)
     parser.add_argument(
@@ -129,6 +135,8 @@ def run(args: argparse.Namespace) -> int:
         if len(opened) == 1:
             device_options.inject_plan(emulated.faults, args.faults)
             gdb = device_options.insight(args, stack)(emulated)
+        if args.orbit is not None:
+            _fly(args.orbit, opened)
         for one in opened:
             _listen(one)
         past = _past(args, opened, setups, stack)
@@ -177,6 +185,18 @@ def run(args: argparse.Namespace) -> int:
             past.ports = [(opened.index(owner), line.name, end) for owner, line, end in served]
         scheduler.run()
     return 0
+
+
+def _fly(path: Path, opened: list[AnyEmulated]) -> None:
+    """Have all see what there is on the orbit of a file."""
+    from cubestack.emulator.scene.orbit_file import load_orbit
+    from cubestack.host.devices.orbiting import follow
+
+    orbit = load_orbit(path)
+    try:
+        follow(orbit, opened)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
 def _close(opened: list[AnyEmulated]) -> None:

@@ -39,6 +39,8 @@ def run(args: argparse.Namespace) -> int:
         text = OF_PROCESSOR[args.format](found.processor())
     if args.out is None:
         print(text, end="")
+    elif args.out.is_dir():
+        raise ValueError(f"--out {args.out} is a folder; name a file in it")
     else:
         args.out.write_text(text, encoding="utf-8")
     return 0

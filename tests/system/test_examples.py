@@ -115,3 +115,23 @@ def test_without_a_target_each_says_how_it_is_called(name: str) -> None:
     assert done.returncode == 1
     assert done.stderr.startswith(f"usage: python {name} ")
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_attitude_loop_settles() -> None:
+    done = subprocess.run(
+        [sys.executable, HERE / "attitude_loop.py"], capture_output=True, text=True, check=True
+    )
+    errors = [float(line.split()[2]) for line in done.stdout.splitlines()]
+    assert len(errors) == 60
+    assert errors[0] > 3.0
+    assert max(errors[45:]) < 0.005
+
+
+def test_a_part_of_an_orbit_is_flown(tmp_path: Path) -> None:
+    orbit = HERE / "orbits" / "sun-synchronous.toml"
+    call = [sys.executable, HERE / "one_orbit.py", orbit, tmp_path, "8"]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    assert "star tracker, attitude: 6 of 6 found" in done.stdout
+    rows = (tmp_path / "results.csv").read_text().splitlines()
+    assert len(rows) == 7
+    assert (tmp_path / "errors.png").stat().st_size > 10_000

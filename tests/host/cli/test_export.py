@@ -29,3 +29,9 @@ def test_a_folder_that_is_not_there_is_named(run: Run, tmp_path: Path) -> None:
     outcome = run("export", "aramis", "--format", "c", "--out", tmp_path / "not" / "there.h")
     assert outcome.code != 0
     assert "there.h" in outcome.line
+
+
+def test_a_folder_in_place_of_a_file_is_named(run: Run, tmp_path: Path) -> None:
+    outcome = run("export", "aramis", "--format", "c", "--out", tmp_path)
+    assert outcome.code == 2
+    assert outcome.line == (f"cubestack export: --out {tmp_path} is a folder; name a file in it")

@@ -1,0 +1,365 @@
+"""A satellite on its orbit: where Earth, Sun and Moon stand, how it points, what its cameras see.
+
+- Orbit: SGP4 (Vallado and others 2006, AIAA 2006-6753, the package `sgp4`), in the axes of date
+  (TEME), turned to ICRS by the precession of Lieske 1977 (A&A 58, 1). Nutation is left out: 20
+  arcsec at most, which moves the Earth's centre by less than any sensor here sees.
+- Sun: `hazards.ephemeris`. Moon: the Astronomical Almanac's low-precision formulae (page D22),
+  0.3 deg; as the satellite sees it, not the Earth's centre.
+- Body axes: what a mounting makes of them is a camera's. Rates are those of the attitude profile.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from sgp4.api import SGP4_ERRORS, WGS72, Satrec, jday
+
+from cubestack.emulator.scene.attitude import (
+    matrix_from_quaternion,
+    propagate,
+    quaternion_from_matrix,
+)
+from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards import SKY_HAZARDS
+from cubestack.emulator.scene.hazards.contract import SkyHazard
+from cubestack.emulator.scene.hazards.ephemeris import AU_KM, J2000, OBLIQUITY_RAD, heliocentric
+from cubestack.emulator.scene.sky import Pose, SkyScene
+
+SUN_RADIUS_KM = 696_000.0
+GM_KM3_S2 = 398_600.8
+"""Of the Earth, as in WGS 72, which two-line elements are made for."""
+
+DAY_S = 86_400.0
+EPOCH_1950 = 2433281.5  # of the days that SGP4's elements count from
+
+STEP_S = 1e-3
+"""Over which a body rate is the difference of two attitudes."""
+
+Vector = NDArray[np.float64]
+
+
+class Attitude(Protocol):
+    """How the satellite points: inertial to body."""
+
+    def matrix(self, surroundings: "Surroundings") -> Vector:
+        """Rotation (3, 3) from ICRS to body axes."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What is around the satellite at a time; directions are ICRS.
+
+    Attributes:
+        time_s: since the orbit's start.
+        position_km, velocity_km_s: (3,) from the Earth's centre.
+        sun, moon: unit vectors (3,) as the satellite sees them.
+        sun_km: distance of the Sun.
+    """
+
+    time_s: float
+    position_km: Vector
+    velocity_km_s: Vector
+    sun: Vector
+    moon: Vector
+    sun_km: float
+
+    @property
+    def altitude_km(self) -> float:
+        """Above a sphere of the equator's radius."""
+        return float(np.linalg.norm(self.position_km)) - EARTH_RADIUS_KM
+
+    @property
+    def nadir(self) -> Vector:
+        """Unit vector (3,) to the Earth's centre."""
+        return -self.position_km / np.linalg.norm(self.position_km)
+
+    @property
+    def shadow(self) -> float:
+        """Share of the Sun's disc that the Earth hides, 0 to 1; both are discs."""
+        earth = np.radians(angular_radius_deg(self.altitude_km))
+        sun = np.arcsin(SUN_RADIUS_KM / self.sun_km)
+        apart = np.arccos(np.clip(self.sun @ self.nadir, -1, 1))
+        return hidden_share(float(sun), float(earth), float(apart))
+
+
+def hidden_share(radius: float, other: float, apart: float) -> float:
+    """Share of a disc that another, not smaller one hides; all three angles in one unit."""
+    if apart >= radius + other:
+        return 0.0
+    if apart <= other - radius:
+        return 1.0
+    first = (apart**2 + radius**2 - other**2) / (2 * apart)  # to the common chord
+    second = apart - first
+    area = radius**2 * np.arccos(np.clip(first / radius, -1, 1))
+    area += other**2 * np.arccos(np.clip(second / other, -1, 1))
+    area -= apart * np.sqrt(max(radius**2 - first**2, 0.0))
+    return float(area / (np.pi * radius**2))
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Points at one place of the sky, or turns about one body axis from there.
+
+    Attributes:
+        quaternion: (4,) at the start, scalar last, ICRS to body.
+        rate_deg_s: body rate (3,).
+    """
+
+    quaternion: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
+    rate_deg_s: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    def matrix(self, surroundings: Surroundings) -> Vector:
+        """See `Attitude`."""
+        turned = propagate(self.quaternion, self.rate_deg_s, surroundings.time_s)
+        return matrix_from_quaternion(turned)
+
+
+@dataclass(frozen=True)
+class NadirPointing:
+    """Body z to the Earth's centre, body y against the orbit's normal, then turned.
+
+    Attributes:
+        offset_deg: rotation vector (3,) in body axes by which it is off.
+    """
+
+    offset_deg: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    def matrix(self, surroundings: Surroundings) -> Vector:
+        """See `Attitude`."""
+        z = surroundings.nadir
+        y = -np.cross(surroundings.position_km, surroundings.velocity_km_s)
+        y /= np.linalg.norm(y)
+        level = quaternion_from_matrix(np.array([np.cross(y, z), y, z]))
+        return matrix_from_quaternion(propagate(level, self.offset_deg, 1.0))
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Quaternions at times; between two of them the satellite turns at a constant rate.
+
+    Attributes:
+        points: (time in s, quaternion (4,) ICRS to body), in the order of time.
+    """
+
+    points: tuple[tuple[float, tuple[float, ...]], ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what has no order."""
+        times = [time_s for time_s, _ in self.points]
+        if not times or sorted(set(times)) != times:
+            raise SceneError(f"points must be one after the other, not at {times} s")
+
+    def matrix(self, surroundings: Surroundings) -> Vector:
+        """See `Attitude`; before the first and after the last point it stands still."""
+        now = surroundings.time_s
+        begun = [number for number, (time_s, _) in enumerate(self.points) if time_s <= now]
+        if not begun or begun[-1] == len(self.points) - 1:
+            return matrix_from_quaternion(self.points[begun[-1] if begun else 0][1])
+        (since, first), (until, second) = self.points[begun[-1] : begun[-1] + 2]
+        first_matrix, second_matrix = map(matrix_from_quaternion, (first, second))
+        rate = rate_between(first_matrix, second_matrix, until - since)
+        return matrix_from_quaternion(propagate(first, rate, now - since))
+
+
+def rate_between(first: Vector, second: Vector, seconds: float) -> Vector:
+    """Body rate (3,) in deg/s that turns one attitude (3, 3) into another in this time."""
+    x, y, z, w = quaternion_from_matrix(second @ first.T)
+    axis = np.array([x, y, z])
+    size = float(np.linalg.norm(axis))
+    if size == 0:
+        return np.zeros(3)
+    return np.asarray(-np.degrees(2 * np.arctan2(size, w)) * axis / size / seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A satellite, its attitude, and how its cameras are mounted.
+
+    Attributes:
+        satellite: elements, as SGP4 has them.
+        start: date and time of virtual time 0, UTC.
+        attitude: how it points.
+        mountings: of cameras that look at the sky, by device; body z where there is none.
+        hazards: whether Earth, Sun and Moon disturb cameras that look at the sky.
+    """
+
+    satellite: Satrec
+    start: datetime
+    attitude: Attitude = field(default_factory=NadirPointing)
+    mountings: dict[str, Mounting] = field(default_factory=dict)
+    hazards: bool = True
+
+    @cached_property
+    def _start_days(self) -> tuple[float, float]:
+        at = self.start.astimezone(UTC)
+        days, part = jday(at.year, at.month, at.day, at.hour, at.minute, at.second)
+        return days, part + at.microsecond / 1e6 / DAY_S
+
+    @property
+    def period_s(self) -> float:
+        """Of a revolution, from node to node without the Earth's flattening."""
+        return float(2 * np.pi / self.satellite.no_kozai * 60)
+
+    def around(self, time_s: float) -> Surroundings:
+        """What is around the satellite; SceneError where its elements do not hold any more."""
+        days, part = self._start_days
+        part += time_s / DAY_S
+        error, position, velocity = self.satellite.sgp4(days, part)
+        if error:
+            raise SceneError(f"no orbit {time_s:g} s after the start: {SGP4_ERRORS[error]}")
+        date = days + part
+        to_icrs = precession(date).T
+        place = to_icrs @ np.array(position)
+        sun_km = -AU_KM * heliocentric("earth", date) - place
+        moon_km = to_icrs @ moon(date) - place
+        return Surroundings(
+            time_s,
+            place,
+            to_icrs @ np.array(velocity),
+            sun_km / np.linalg.norm(sun_km),
+            moon_km / np.linalg.norm(moon_km),
+            float(np.linalg.norm(sun_km)),
+        )
+
+    def body(self, time_s: float) -> tuple[Vector, Vector]:
+        """Rotation (3, 3) from ICRS to body axes, and the body rate (3,) in deg/s."""
+        now = self.attitude.matrix(self.around(time_s))
+        soon = self.attitude.matrix(self.around(time_s + STEP_S))
+        return now, rate_between(now, soon, STEP_S)
+
+    def sky(self, time_s: float, scene: SkyScene, name: str) -> SkyScene:
+        """What the camera of the device ``name`` sees from then on; else as ``scene``."""
+        around = self.around(time_s)
+        body, rate = self.body(time_s)
+        mounting = self.mountings.get(name, BODY_Z).matrix
+        camera = mounting @ body
+        pose = Pose(quaternion_from_matrix(camera), mounting @ rate, time_s)
+        hazards = _near(around, camera[2]) if self.hazards else ()
+        others = tuple(one for one in scene.hazards if one.name not in DISTURBING)
+        return replace(
+            scene,
+            quaternion=pose.at(0.0),
+            rate_deg_s=pose.rate_deg_s,
+            poses=(),
+            hazards=(*others, *hazards),
+        )
+
+    def below(self, time_s: float, scene: EarthSunScene, lasts_s: float = 0.0) -> EarthSunScene:
+        """What a satellite's sun and nadir cameras see from then on; else as ``scene``.
+
+        A scene's Earth stands still while the satellite turns, so it stands where it is in the
+        middle of the time ``lasts_s`` for which the scene is looked at.
+        """
+        around = self.around(time_s + lasts_s / 2)
+        body, rate = self.body(time_s)
+        # Scene axes are those of the body at virtual time 0, had it always turned like that.
+        back = matrix_from_quaternion(propagate((0, 0, 0, 1), rate, time_s)).T @ body
+        return replace(
+            scene,
+            nadir=back @ around.nadir,
+            sun=back @ around.sun,
+            moon=back @ around.moon,
+            altitude_km=around.altitude_km,
+            rate_deg_s=tuple(rate),
+        )
+
+
+BODY_Z = Mounting((0.0, 0.0, 1.0))
+
+DISTURBING = {"earth-limb": 60.0, "moon": 60.0, "sun-glare": 100.0}
+"""Hazards for cameras that look at the sky, and the angle beyond which they are left out, deg."""
+
+
+def _near(around: Surroundings, boresight: Vector) -> tuple[SkyHazard, ...]:
+    def away_deg(direction: Vector) -> float:
+        return float(np.degrees(np.arccos(np.clip(boresight @ direction, -1, 1))))
+
+    def triple(vector: Vector) -> tuple[float, ...]:
+        return tuple(vector.tolist())
+
+    limb_deg = away_deg(around.nadir) - angular_radius_deg(around.altitude_km)
+    found: dict[str, dict[str, Any]] = {}
+    if limb_deg < DISTURBING["earth-limb"]:
+        stands = {"nadir": triple(around.nadir), "sun": triple(around.sun)}
+        found["earth-limb"] = {**stands, "altitude_km": around.altitude_km}
+    if away_deg(around.moon) < DISTURBING["moon"]:
+        found["moon"] = {"direction": triple(around.moon), "sun": triple(around.sun)}
+    if around.shadow < 1 and away_deg(around.sun) < DISTURBING["sun-glare"]:
+        found["sun-glare"] = {"direction": triple(around.sun)}
+    return tuple(SKY_HAZARDS[name](**values) for name, values in found.items())
+
+
+def precession(julian_date: float) -> Vector:
+    """Rotation (3, 3) from the axes of J2000 to those of date; Lieske 1977, angles in arcsec."""
+    t = (julian_date - J2000) / 36525
+    zeta = 2306.2181 * t + 0.30188 * t**2 + 0.017998 * t**3
+    z = 2306.2181 * t + 1.09468 * t**2 + 0.018203 * t**3
+    theta = 2004.3109 * t - 0.42665 * t**2 - 0.041833 * t**3
+    a, b, c = np.radians(np.array([zeta, z, theta]) / 3600)
+    tilt = np.array([[np.cos(c), 0, -np.sin(c)], [0, 1, 0], [np.sin(c), 0, np.cos(c)]])
+    return np.asarray(_about_z(-b) @ tilt @ _about_z(-a))
+
+
+def _about_z(angle: float) -> Vector:
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+
+
+def moon(julian_date: float) -> Vector:
+    """Position (3,) of the Moon from the Earth's centre, axes of date, km."""
+    t = (julian_date - J2000) / 36525
+
+    def terms(function: Any, rows: Sequence[tuple[float, float, float]]) -> float:
+        return float(sum(size * function(np.radians(at + rate * t)) for size, at, rate in rows))
+
+    longitude = 218.32 + 481267.881 * t + terms(np.sin, _LONGITUDE)
+    latitude = terms(np.sin, _LATITUDE)
+    parallax = 0.9508 + terms(np.cos, _PARALLAX)
+    along, above = np.radians([longitude, latitude])
+    distance = EARTH_RADIUS_KM / np.sin(np.radians(parallax))
+    ecliptic = np.array(
+        [np.cos(above) * np.cos(along), np.cos(above) * np.sin(along), np.sin(above)]
+    )
+    tilt = OBLIQUITY_RAD - np.radians(0.0130042) * t
+    cosine, sine = np.cos(tilt), np.sin(tilt)
+    return np.asarray(
+        distance * np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]]) @ ecliptic
+    )
+
+
+# Size, and argument at J2000 with its change in a century; all in degrees.
+_LONGITUDE = (
+    (6.29, 135.0, 477198.87), (-1.27, 259.3, -413335.36), (0.66, 235.7, 890534.22),
+    (0.21, 269.9, 954397.74), (-0.19, 357.5, 35999.05), (-0.11, 186.5, 966404.03),
+)  # fmt: skip
+_LATITUDE = (
+    (5.13, 93.3, 483202.02), (0.28, 228.2, 960400.89), (-0.28, 318.3, 6003.15),
+    (-0.17, 217.6, -407332.21),
+)  # fmt: skip
+_PARALLAX = (
+    (0.0518, 135.0, 477198.87), (0.0095, 259.3, -413335.36), (0.0078, 235.7, 890534.22),
+    (0.0028, 269.9, 954397.74),
+)  # fmt: skip
+
+
+def circular(
+    start: datetime, altitude_km: float, inclination_deg: float, node_deg: float, along_deg: float
+) -> Satrec:
+    """Elements of a circular orbit, without drag; ``along_deg`` from the ascending node."""
+    axis = EARTH_RADIUS_KM + altitude_km
+    at = start.astimezone(UTC)
+    days, part = jday(at.year, at.month, at.day, at.hour, at.minute, at.second)
+    satellite = Satrec()
+    rate = np.sqrt(GM_KM3_S2 / axis**3) * 60
+    inclination, node, along = np.radians([inclination_deg, node_deg, along_deg])
+    epoch = days + part - EPOCH_1950
+    elements = (0.0, 0.0, 0.0, 0.0, 0.0, inclination, along, rate, node)
+    satellite.sgp4init(WGS72, "i", 0, epoch, *elements)
+    return satellite

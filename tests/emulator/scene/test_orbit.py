@@ -1,0 +1,215 @@
+"""The orbit against what others publish, and against geometry."""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import pytest
+from sgp4.api import WGS72, Satrec
+
+from cubestack.emulator.scene.angles import angles_from_vector
+from cubestack.emulator.scene.attitude import (
+    matrix_from_quaternion,
+    propagate,
+    quaternion_from_pointing,
+)
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Target
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.orbit import (
+    DISTURBING,
+    EARTH_RADIUS_KM,
+    Inertial,
+    NadirPointing,
+    Orbit,
+    Waypoints,
+    circular,
+    hidden_share,
+    moon,
+    precession,
+    rate_between,
+)
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+
+START = datetime(2026, 11, 24, 12, tzinfo=UTC)
+
+VALLADO = (
+    "1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753",
+    "2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667",
+)
+"""The first case of Vallado and others 2006 (AIAA 2006-6753)."""
+
+
+def orbit(**changes: Any) -> Orbit:
+    return replace(Orbit(circular(START, 600, 97.8, 20, 180), START), **changes)
+
+
+def test_the_published_case_comes_out() -> None:
+    satellite = Satrec.twoline2rv(*VALLADO, WGS72)
+    start = datetime(2000, 6, 27, 18, 50, 19, 733568, tzinfo=UTC)  # day 179.78495062
+    around = Orbit(satellite, start).around(0.0)
+    of_date = precession(satellite.jdsatepoch + satellite.jdsatepochF) @ around.position_km
+    assert of_date == pytest.approx((7022.46529266, -1400.08296755, 0.03995155), abs=1e-2)
+
+
+def test_precession_turns_the_pole_as_published() -> None:
+    """Explanatory Supplement: the pole of 2050 is 1002 arcsec from that of 2000."""
+    pole = precession(2451545.0 + 50 * 365.25)[2]
+    assert np.degrees(np.arccos(pole[2])) * 3600 == pytest.approx(1002.1, abs=0.5)
+    assert precession(2451545.0) == pytest.approx(np.eye(3))
+
+
+def test_the_moon_is_where_the_text_book_has_it() -> None:
+    """Meeus, Astronomical Algorithms, example 47.a: 1992 April 12, 0 h TD."""
+    tilt = np.radians(23.440636)
+    x, y, z = moon(2448724.5)
+    ecliptic = np.array(
+        [x, y * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - y * np.sin(tilt)]
+    )
+    along, above = np.radians([133.162655, -3.229126])
+    theirs = np.array([np.cos(above) * np.cos(along), np.cos(above) * np.sin(along), np.sin(above)])
+    distance = float(np.linalg.norm(ecliptic))
+    assert np.degrees(np.arccos(theirs @ ecliptic / distance)) < 0.3
+    assert distance == pytest.approx(368_409.7, rel=0.003)
+
+
+@pytest.mark.parametrize(("when", "dec_deg"), [((3, 20, 14, 46), 0.0), ((6, 21, 8, 24), 23.44)])
+def test_the_sun_is_on_the_equator_at_an_equinox(when: Any, dec_deg: float) -> None:
+    """Equinox and solstice of 2026, by the almanacs; in the axes of date."""
+    start = datetime(2026, *when, tzinfo=UTC)
+    around = orbit(start=start).around(0.0)
+    sun = precession(2461119.5 + (start - datetime(2026, 3, 20, tzinfo=UTC)).days) @ around.sun
+    assert np.degrees(np.arcsin(sun[2])) == pytest.approx(dec_deg, abs=0.02)
+
+
+def test_a_circular_orbit_stays_as_high_and_comes_back() -> None:
+    own = orbit()
+    heights = [own.around(at).altitude_km for at in np.linspace(0, own.period_s, 50)]
+    assert heights == pytest.approx([600] * 50, abs=20)  # the Earth is no ball
+    axis = EARTH_RADIUS_KM + 600
+    assert own.period_s == pytest.approx(2 * np.pi * np.sqrt(axis**3 / 398_600.8), rel=1e-6)
+    first, again = own.around(0.0), own.around(own.period_s)
+    assert first.nadir @ again.nadir == pytest.approx(1.0, abs=1e-4)
+
+
+def test_the_shadow_lasts_as_long_as_geometry_says() -> None:
+    """A cylinder behind the Earth: half the shadow's arc, for a Sun that is b from the orbit."""
+    own = orbit()
+    times = np.arange(0, own.period_s, 2.0)
+    around = [own.around(at) for at in times]
+    normal = np.cross(around[0].position_km, around[0].velocity_km_s)
+    sine = float(around[0].sun @ normal / np.linalg.norm(normal))
+    height = around[0].altitude_km
+    ratio = np.sqrt(height**2 + 2 * EARTH_RADIUS_KM * height) / (EARTH_RADIUS_KM + height)
+    expected = np.arccos(ratio / np.sqrt(1 - sine**2)) / np.pi
+    found = np.mean([one.shadow for one in around])
+    assert found == pytest.approx(expected, abs=0.005)
+    assert any(0 < one.shadow < 1 for one in around)
+
+
+@pytest.mark.parametrize(
+    ("apart", "share"), [(3.0, 0.0), (3.1, 0.0), (1.0, 1.0), (0.0, 1.0), (2.0, None)]
+)
+def test_how_much_of_a_disc_is_hidden(apart: float, share: float | None) -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1, 1, (200_000, 2))
+    points = points[np.hypot(*points.T) < 1]
+    counted = np.mean(np.hypot(points[:, 0] - apart, points[:, 1]) < 2)
+    assert hidden_share(1.0, 2.0, apart) == pytest.approx(counted, abs=5e-3)
+    assert share is None or hidden_share(1.0, 2.0, apart) == share
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_rate_is_what_propagates_one_attitude_to_the_other(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first, rate = rng.standard_normal(4), rng.uniform(-5, 5, 3)
+    second = propagate(first, rate, 7.0)
+    found = rate_between(matrix_from_quaternion(first), matrix_from_quaternion(second), 7.0)
+    assert found == pytest.approx(rate, abs=1e-9)
+    assert rate_between(np.eye(3), np.eye(3), 1.0) == pytest.approx(np.zeros(3))
+
+
+def test_nadir_pointing_points_there_and_turns_once_an_orbit() -> None:
+    own = orbit(attitude=NadirPointing())
+    body, rate = own.body(1000.0)
+    around = own.around(1000.0)
+    assert body @ around.nadir == pytest.approx((0, 0, 1), abs=1e-9)
+    assert body @ around.velocity_km_s / 7.5 == pytest.approx((1, 0, 0), abs=0.02)
+    assert rate == pytest.approx((0, -360 / own.period_s, 0), abs=2e-4)
+    off, _ = replace(own, attitude=NadirPointing((0.0, 5.0, 0.0))).body(1000.0)
+    angle = np.degrees(np.arccos((off @ around.nadir)[2]))
+    assert angle == pytest.approx(5.0)
+
+
+def test_waypoints_are_met_and_the_way_between_is_even() -> None:
+    first, second = (tuple(quaternion_from_pointing(ra, 10, 0).tolist()) for ra in (20, 60))
+    profile = Waypoints(((100.0, first), (200.0, second)))
+    own = orbit(attitude=profile)
+    for at, expected in ((0, first), (100, first), (200, second), (300, second)):
+        assert own.body(at)[0] == pytest.approx(matrix_from_quaternion(expected), abs=1e-9)
+    rates = [own.body(at)[1] for at in (101.0, 150.0, 199.0)]
+    assert rates[1:] == [pytest.approx(rates[0], abs=1e-6)] * 2
+    assert np.linalg.norm(rates[0]) * 100 == pytest.approx(40.0)  # about the pole
+    with pytest.raises(SceneError, match="points must be one after the other"):
+        Waypoints(((2.0, first), (1.0, second)))
+
+
+@pytest.mark.parametrize("at", [0.0, 0.5, 30.0, 2000.0])
+def test_a_sky_camera_sees_the_attitude_of_its_mounting(at: float) -> None:
+    mounting = Mounting((0.0, -1.0, 0.0))
+    own = orbit(mountings={"camera": mounting})
+    scene = own.sky(at, SkyScene([0, 0, 0, 1], seed=5, epoch=2026.0), "camera")
+    assert (scene.seed, scene.epoch) == (5, 2026.0)
+    for later in (at, at + 0.7):
+        expected = mounting.matrix @ own.body(later)[0]
+        found = matrix_from_quaternion(scene.truth(round(later * PS_PER_S)))
+        assert found == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("at", [0.0, 30.0, 2000.0])
+def test_the_satellites_cameras_see_earth_and_sun(at: float) -> None:
+    own = orbit(attitude=Inertial(rate_deg_s=(0.3, -0.2, 0.1)))
+    scene = own.below(at, EarthSunScene(seed=3))
+    assert scene.seed == 3
+    for later in (at, at + 0.9):
+        around, time_ps = own.around(later), round(later * PS_PER_S)
+        body, _ = own.body(later)
+        for target, mounting, direction in (
+            (Target.SUN, scene.sun_camera, around.sun),
+            (Target.NADIR, scene.nadir_camera, around.nadir),
+        ):
+            truth = scene.truth(target, time_ps)
+            expected = mounting.matrix @ body @ direction
+            assert truth.vector == pytest.approx(expected, abs=2e-3 if later > at else 1e-9)
+            assert (truth.alpha_deg, truth.beta_deg) == angles_from_vector(truth.vector)
+    assert scene.altitude_km == pytest.approx(own.around(at).altitude_km)
+    assert scene.hidden(scene.sun) == (own.around(at).shadow > 0.5)
+
+
+def test_only_what_is_near_disturbs_the_sky() -> None:
+    own = orbit()
+    seen = set()
+    for direction in ((0, 0, 1), (0, 0, -1), (0, -1, 0), (1, 0, 0)):
+        turned = replace(own, mountings={"camera": Mounting(direction, (0.6, 0.8, 0.0))})
+        for at in np.arange(0, 5800, 600.0):
+            around = own.around(at)
+            camera = turned.mountings["camera"].matrix @ own.body(at)[0]
+            names = {h.name for h in turned.sky(at, SkyScene([0, 0, 0, 1]), "camera").hazards}
+            seen |= names
+            sun_deg = np.degrees(np.arccos(np.clip(camera[2] @ around.sun, -1, 1)))
+            glares = around.shadow < 1 and sun_deg < DISTURBING["sun-glare"]
+            assert ("sun-glare" in names) == glares
+    assert seen >= {"earth-limb", "sun-glare"}
+    assert own.sky(0.0, SkyScene([0, 0, 0, 1]), "camera").hazards
+    assert not replace(own, hazards=False).sky(0.0, SkyScene([0, 0, 0, 1]), "camera").hazards
+
+
+def test_elements_that_hold_no_more_are_told() -> None:
+    lines = (
+        "1 28350U 04020A   06167.21788666  .16154492  76267-5  18678-3 0  8894",
+        "2 28350  64.9977 345.6130 0024870 260.7578  99.9590 16.47856722116490",
+    )  # decays within days: Vallado and others 2006
+    own = Orbit(Satrec.twoline2rv(*lines), datetime(2006, 6, 16, tzinfo=UTC))
+    with pytest.raises(SceneError, match=r"no orbit 5e\+06 s after the start: "):
+        own.around(5e6)
