@@ -61,9 +61,11 @@ class Client(Closable):
 
     Attributes:
         interface: the node's messages.
+        repeated: how often telemetry had to be asked for again.
     """
 
     interface: Interface
+    repeated: int = 0
 
     @abstractmethod
     def command(self, name: str, **parameters: object) -> None:

@@ -88,8 +88,12 @@ class I2cClient(Client):
     def telemetry(self, name: str) -> dict[str, Value]:
         """Read a telemetry frame; one that steps may skip a record when a transfer broke off."""
         message = self._asked(name)
+        tried = 0
 
         def read() -> bytes:
+            nonlocal tried
+            self.repeated += tried > 0
+            tried += 1
             answer = i2c_msg.read(self._address, message.length)
             self._bus.i2c_rdwr(i2c_msg.write(self._address, [message.id]), answer)
             return bytes(answer)

@@ -61,7 +61,8 @@ class NodeClient(Client):
         """Ask for a telemetry frame; one that steps may skip a record when an answer was lost."""
         message = self._asked(name)
         answer = None
-        for _ in range(1 + self._retries):
+        for attempt in range(1 + self._retries):
+            self.repeated += attempt > 0
             answer = self.request(bytes([message.id]))
             if answer is not None and len(answer) == message.length:
                 return message.unpack(answer)

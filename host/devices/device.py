@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cubestack.host.devices.costs import CostReport
     from cubestack.host.devices.experiment import AnyExperiment
     from cubestack.host.devices.fidelity import Fidelity
+    from cubestack.host.pictures.overlay import Overlay
 
 #: How an FPGA is run: compiled where there is a compiler, always compiled, compiled with every
 #: clock made one by one, or Amaranth's simulator.
@@ -169,6 +170,8 @@ class Device(Generic[BoardT_co, ClientT_co]):
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
         costs: what its program costs as compiled code; None where there is none to compile.
+        overlay: what its client found in the picture of a name, to be drawn over it; None where
+            that is its stars, or nothing.
         processor: its processor as firmware of one's own sees it; None where that can not run.
     """
 
@@ -196,6 +199,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
     costs: "Callable[[], CostReport] | None" = None
     processor: "Callable[[], Processor] | None" = None
+    overlay: "Callable[[Any, str], Overlay] | None" = None
 
     def __post_init__(self) -> None:
         """Refuse a name that can not be everywhere: ValueError."""

@@ -4,16 +4,16 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.devices.targets import Target
-from cubestack.host.errors import HostError
+from cubestack.host.errors import CommandRefusedError, HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
-from cubestack.host.pictures.star_names import star_name
+from cubestack.host.pictures.overlay import Overlay, star_overlay
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.result import ShellError
@@ -28,10 +28,13 @@ LONGEST_LINE = 10_000
 
 @dataclass
 class Link:
-    """How the link to a target is: requests, and those that failed; the last failure."""
+    """How the link to a target is: requests, those that the device refused, those without a right
+    answer, telemetry that had to be asked for again; the last failure."""
 
     requests: int = 0
+    refused: int = 0
     failed: int = 0
+    repeated: int = 0
     error: str = ""
 
 
@@ -56,8 +59,8 @@ class Desk:
             missing["past"] = f"there is no way back: {controls.no_past}"
         if target.line is None:
             missing["raw"] = f"{target.name} is no serial line"
-        if not self._has("stars"):
-            missing["stars"] = f"{interface.name} looks for no stars"
+        if self._overlay is None:
+            missing["found"] = f"{interface.name} does not tell what it found in a picture"
         if not self._has("latest"):
             missing["results"] = f"{interface.name} has no results that could be logged"
         if target.service_port is None:
@@ -92,9 +95,10 @@ class Desk:
         """Telemetry by name: what it has, or the ``error`` in place of it."""
         return self._thread.submit(lambda: {name: self._read(name) for name in names})
 
-    def stars(self) -> "Future[list[JsonObject]]":
-        """Stars of its latest picture: column, row, and their names, empty of unknown ones."""
-        return self._thread.submit(self._asked, self._stars)
+    def found(self, picture: str) -> "Future[JsonObject]":
+        """What it found in the memory called ``picture``: ``marks`` with column, row and name,
+        empty of unknown ones, and ``lines`` of columns and rows."""
+        return self._thread.submit(self._asked, lambda: self._found(picture))
 
     def results(self) -> "Future[JsonObject]":
         """Its latest result as a line of a log, or the ``error`` in place of it."""
@@ -116,17 +120,19 @@ class Desk:
         own = getattr(type(self._client), method, None)
         return own is not None and own is not getattr(DeviceClient, method)
 
-    def _stars(self) -> list[JsonObject]:
-        if self._client is None:
-            raise ValueError(f"{self.target.name} is no device that is known")
-        return [
-            {
-                "x": star.x_px,
-                "y": star.y_px,
-                "name": "" if star.hipparcos is None else star_name(star.hipparcos),
-            }
-            for star in self._client.stars()
-        ]
+    @property
+    def _overlay(self) -> Callable[[Any, str], Overlay] | None:
+        own = None if self.target.device is None else self.target.device.overlay
+        return own or (star_overlay if self._has("stars") else None)
+
+    def _found(self, picture: str) -> JsonObject:
+        if self._overlay is None:
+            raise ValueError(self.about["missing"]["found"])
+        found = self._overlay(self._client, picture)
+        return {
+            "marks": [{"x": one.x_px, "y": one.y_px, "name": one.name} for one in found.marks],
+            "lines": [line.tolist() for line in found.lines],
+        }
 
     def _results(self) -> JsonObject:
         try:
@@ -153,10 +159,15 @@ class Desk:
         self.link.requests += 1
         try:
             return act()
+        except CommandRefusedError:
+            self.link.refused += 1
+            raise
         except HostError as error:
             self.link.failed += 1
             self.link.error = str(error)
             raise
+        finally:
+            self.link.repeated = self.target.node.repeated
 
 
 def _message(one: Message) -> JsonObject:

@@ -73,7 +73,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets", targets),
             Route("/targets/{number:int}/pictures/{name}", of(_picture)),
             Route("/targets/{number:int}/recording", of(_recording)),
-            Route("/targets/{number:int}/stars", of(_stars)),
+            Route("/targets/{number:int}/found/{name}", of(_found)),
             Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
             Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
             Route("/targets/{number:int}/{call:str}", of(_steer), methods=["POST"]),
@@ -128,8 +128,8 @@ async def _scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     return await _control(desk, "POST", f"/devices/{_controls(desk).device}/act", act)
 
 
-async def _stars(desk: Desk, _body: JsonObject, _path: JsonObject) -> JsonObject:
-    return {"stars": await asyncio.wrap_future(desk.stars())}
+async def _found(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObject:
+    return await asyncio.wrap_future(desk.found(path["name"]))
 
 
 async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:

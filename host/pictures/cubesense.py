@@ -15,7 +15,8 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
-from cubestack.host.clients.cubesense.client import direction
+from cubestack.host.clients.cubesense.client import CubeSense, direction
+from cubestack.host.pictures.overlay import Mark, Overlay
 
 SCALE = 2
 INSET_SCALE = 16
@@ -49,6 +50,32 @@ def limb(alpha_deg: float, beta_deg: float, radius_deg: float) -> Pixels:
     circle = np.outer(np.cos(around), side) + np.outer(np.sin(around), np.cross(axis, side))
     rho = np.radians(radius_deg)
     return pixel(Camera.NADIR, np.cos(rho) * axis + np.sin(rho) * circle)
+
+
+def overlay(cubesense: CubeSense, picture: str) -> Overlay:
+    """What was found in the memory called ``picture``: edges and limb, or the Sun and its window.
+
+    Nothing where no camera's latest picture lies. Raises the client's errors.
+    """
+    marks, lines = list[Mark](), list[Pixels]()
+    for camera in Camera:
+        measured, details = cubesense.result(camera), cubesense.details(camera)
+        if not picture.endswith(f" {Camera(int(details['Sram'])).name.lower()}"):
+            continue
+        angles = (measured.alpha_deg, measured.beta_deg)
+        if camera is Camera.NADIR and measured.capture.stored:
+            marks += [Mark(x, y, "edge") for x, y in cubesense.edges().tolist()]
+            if measured.detected:
+                lines.append(limb(*angles, float(details["Radius"]) / PIXELS_PER_DEGREE))
+        elif measured.detected:
+            x, y = pixel(camera, direction(*angles)[None])[0].tolist()
+            marks.append(Mark(x, y, "Sun"))
+            first = int(details["FirstX"]), int(details["FirstY"])
+            left, top = FULL_SIZE.window_origin(*first)
+            right, bottom = left + FULL_SIZE.window, top + FULL_SIZE.window
+            corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+            lines.append(np.array(corners, np.float64))
+    return Overlay(marks, lines)
 
 
 def annotate_nadir(

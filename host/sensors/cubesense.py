@@ -55,6 +55,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
         ),
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
+    overlay=call("cubestack.host.pictures.cubesense:overlay"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
     campaigns=EXPERIMENTS,

@@ -1,16 +1,30 @@
 // The page: which target is looked at, and what the parts of the page have to do with each other.
 
+import { Attitude } from "./attitude.js";
 import { Commands } from "./commands.js";
 import { make } from "./dom.js";
 import { Emulation } from "./emulation.js";
+import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
 import { Results } from "./results.js";
 import { ask, listen } from "./server.js";
 import { Telemetry } from "./telemetry.js";
+import { Timeline } from "./timeline.js";
 
 const KEPT_LINES = 500;
 
-const parts = ["picture", "results", "emulation", "commands", "telemetry"];
+const begun = Date.now();
+
+const parts = [
+  "picture",
+  "attitude",
+  "results",
+  "loop",
+  "health",
+  "emulation",
+  "commands",
+  "telemetry",
+];
 const lines = document.getElementById("lines");
 const link = document.getElementById("link");
 let live = null;
@@ -33,6 +47,10 @@ async function told(what, asked) {
   }
 }
 
+function worded(results = {}) {
+  return Object.fromEntries(Object.entries(results).filter(([, v]) => typeof v === "string"));
+}
+
 function look(number, targets) {
   live?.close();
   const about = targets[number];
@@ -46,26 +64,46 @@ function look(number, targets) {
   const act = (line) => told(line, ask(`${path}/do`, { line }));
   const steer = (call, body) => told(call, ask(`${path}/${call}`, body));
   const wanted = { show: [], results: false };
+  const frames = {}; // by the part that shows them
   const want = (more) => {
     Object.assign(wanted, more);
     live?.want(wanted);
+  };
+  const show = (part, names) => {
+    frames[part] = names;
+    want({ show: [...new Set(Object.values(frames).flat())] });
   };
   new Commands(place("commands"), about, act);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there
+  const attitude = new Attitude(place("attitude"), about);
+  const timeline = new Timeline(place("loop"), about);
+  const lamps = new Lamps(place("health"), about, (names) => show("lamps", names));
   const results = new Results(place("results"), about, (on) => want({ results: on }));
-  const telemetry = new Telemetry(place("telemetry"), about, (names) => want({ show: names }));
+  const telemetry = new Telemetry(place("telemetry"), about, (names) => show("telemetry", names));
   live = listen(
     `${path}/live`,
     (message) => {
-      const { requests, failed, error } = message.link;
-      link.className = failed ? "bad" : "";
-      link.textContent = `${about.name}: ${requests} requests, ${failed} failed ${error}`.trim();
-      if (message.values) telemetry.hear(message.values);
-      if (message.results) results.hear(message.results, message.emulation?.truth);
+      link.className = message.link.failed ? "bad" : "";
+      link.textContent = about.name;
+      lamps.hearLink(message.link);
+      const { truth, time_s } = message.emulation ?? {};
+      if (message.values) {
+        telemetry.hear(message.values);
+        lamps.hear(message.values);
+      }
+      if (message.results) {
+        results.hear(message.results, truth);
+        attitude.hear(message.results, truth);
+      }
+      const words = { ...worded(message.results), ...telemetry.words() };
+      timeline.hear(words, time_s ?? (Date.now() - begun) / 1000);
       if (message.pictures) pictures.hear(message.pictures, message.emulation.busy);
-      if (message.emulation) emulation.hear(message.emulation);
+      if (message.emulation) {
+        emulation.hear(message.emulation);
+        lamps.hearEmulation(message.emulation);
+      }
       for (const line of message.log ?? []) tell(line);
     },
     () => {

@@ -4,17 +4,20 @@ import { choose, labelled, make } from "./dom.js";
 import { ask } from "./server.js";
 
 const RADIUS = 9;
+const EDGE = 4; // of a mark whose name all others have too
+const LARGEST = 8;
 
 export class Pictures {
   // `path` leads to the target.
   constructor(place, about, path) {
     this.path = path;
     this.known = {};
-    this.stars = [];
+    this.found = { marks: [], lines: [] };
+    this.zoom = 1;
     this.late = false;
     this.name = choose([], { id: "picture-name", onchange: () => this.fetch() });
     this.newest = make("input", { type: "checkbox", checked: true, id: "newest" });
-    const none = about.missing.stars;
+    const none = about.missing.found;
     this.marks = make("input", {
       type: "checkbox",
       id: "marks",
@@ -26,6 +29,13 @@ export class Pictures {
     this.stretch = make("input", { ...stretch, oninput: () => this.draw() });
     this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
     this.canvas.onmousemove = (event) => this.point(event);
+    this.frame = make("div", { className: "frame", id: "frame-of-picture", tabIndex: 0 });
+    this.frame.setAttribute("aria-label", "picture; + and - enlarge it, arrow keys move it");
+    this.frame.append(this.canvas);
+    this.frame.onkeydown = ({ key }) => {
+      if (key === "+" || key === "-") this.enlarge(key === "+" ? 2 : 0.5, 0.5, 0.5);
+    };
+    this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.value = make("p", { className: "quiet", textContent: "no picture yet" });
     place.append(
       make(
@@ -33,10 +43,10 @@ export class Pictures {
         { className: "row" },
         labelled("memory", this.name),
         labelled("the newest", this.newest, { className: "beside" }),
-        labelled("stars that it found", this.marks, { className: "beside" }),
+        labelled("what it found", this.marks, { className: "beside" }),
         labelled("brightness", this.stretch),
       ),
-      this.canvas,
+      this.frame,
       this.value,
     );
     if (about.missing.controls) this.value.textContent = about.missing.controls;
@@ -53,7 +63,7 @@ export class Pictures {
     for (const name of changed) this.known[name] = at(name);
     if (changed.length) {
       this.late = true; // what it finds in a new picture comes when it is done with that
-      this.stars = [];
+      this.found = { marks: [], lines: [] };
     }
     if (changed.includes(this.name.value)) this.fetch();
     else if (this.late && !busy) this.find();
@@ -61,12 +71,13 @@ export class Pictures {
 
   async find() {
     this.late = false;
-    this.stars = [];
+    this.found = { marks: [], lines: [] };
     if (this.marks.checked)
       try {
-        this.stars = (await ask(`${this.path}/stars`)).stars;
-        const known = this.stars.filter((star) => star.name).length;
-        this.value.textContent = `${this.stars.length} stars found, ${known} identified`;
+        this.found = await ask(`${this.path}/found/${encodeURIComponent(this.name.value)}`);
+        const { marks } = this.found;
+        const known = marks.filter((mark) => mark.name).length;
+        this.value.textContent = `${marks.length} found, ${known} of them known`;
       } catch (error) {
         this.value.textContent = error.message;
       }
@@ -100,16 +111,46 @@ export class Pictures {
     const pen = this.canvas.getContext("2d");
     pen.putImageData(shown, 0, 0);
     pen.font = "13px system-ui, sans-serif";
-    for (const { x, y, name } of this.stars) {
+    pen.strokeStyle = "#78aaff";
+    pen.setLineDash([]);
+    for (const line of this.found.lines) {
+      pen.beginPath();
+      for (const [x, y] of line) pen.lineTo(x, y);
+      pen.closePath();
+      pen.stroke();
+    }
+    const often = new Set(this.found.marks.map((mark) => mark.name)).size < 2;
+    for (const { x, y, name } of this.found.marks) {
       pen.strokeStyle = pen.fillStyle = name ? "#78ff78" : "#ff8c5a";
       pen.setLineDash(name ? [] : [3, 3]);
       pen.beginPath();
-      pen.arc(x, y, RADIUS, 0, 2 * Math.PI);
+      pen.arc(x, y, often && name ? EDGE : RADIUS, 0, 2 * Math.PI);
       pen.stroke();
+      if (often && this.found.marks.length > 1) continue;
       const width = pen.measureText(name).width;
       const left = x + RADIUS + 3 + width > shown.width ? x - RADIUS - 3 - width : x + RADIUS + 3;
       pen.fillText(name, left, Math.min(Math.max(y + 4, 12), shown.height - 3));
     }
+  }
+
+  wheel(event) {
+    if (!event.ctrlKey && !event.altKey) return; // the page scrolls
+    event.preventDefault();
+    const box = this.canvas.getBoundingClientRect();
+    const across = (event.clientX - box.left) / box.width;
+    const down = (event.clientY - box.top) / box.height;
+    this.enlarge(event.deltaY < 0 ? 1.25 : 0.8, across, down);
+  }
+
+  // By a factor, and the place at these shares of width and height stays where it is.
+  enlarge(factor, across, down) {
+    const { frame, canvas } = this;
+    const before = canvas.getBoundingClientRect();
+    this.zoom = Math.min(Math.max(this.zoom * factor, 1), LARGEST);
+    canvas.style.width = `${100 * this.zoom}%`;
+    const after = canvas.getBoundingClientRect();
+    frame.scrollLeft += across * (after.width - before.width);
+    frame.scrollTop += down * (after.height - before.height);
   }
 
   point(event) {

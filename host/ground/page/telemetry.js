@@ -74,6 +74,12 @@ export class Telemetry {
     this.draw();
   }
 
+  // Of the frame that is shown, what has a name.
+  words() {
+    const named = [...this.cells].filter(([, cell]) => / \(\d+\)$/.test(cell.textContent));
+    return Object.fromEntries(named.map(([name, cell]) => [name, cell.textContent]));
+  }
+
   hear(values) {
     const shown = values[this.name.value];
     const one = this.byName.get(this.name.value);

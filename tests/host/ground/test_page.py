@@ -79,11 +79,51 @@ def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
         "return c.width === 1024 && lit > 10 && lit < 20000 }"
     )
     page.check("#marks")
-    page.wait_for_selector("#picture >> text=/stars found, .* identified/")
+    page.wait_for_selector("#picture >> text=/found, .* of them known/")
     page.select_option("#frame", "AttitudeQuaternion")
     page.wait_for_function(
         "() => document.querySelector('#telemetry').innerText.includes('LOST_IN')"
     )
+
+
+def test_attitude_words_and_flags_are_shown(page: Any) -> None:
+    page.select_option("#command", "CaptureAndProcess")
+    page.click("#send")
+    told = page.locator("#attitude-told")
+    page.wait_for_function(
+        "() => / error [0-9.]+° in all$/.test(document.querySelector('#attitude-told').textContent)"
+    )
+    assert float(told.inner_text().split("error ")[1].split("°")[0]) < 0.1
+    before = page.evaluate("document.querySelector('#sphere').toDataURL()")
+    page.press("#sphere", "ArrowLeft")
+    assert page.evaluate("document.querySelector('#sphere').toDataURL()") != before
+    page.wait_for_selector("#timeline-told >> text=/task CALCULATED/")
+    # More stars than it lists, which is a flag of its own.
+    page.wait_for_selector("#health li.lit >> text=MaxStarsDetection")
+    assert page.locator("#health li.lit").count() == 1
+    assert " 0 failed" in page.inner_text("#link-health")
+    assert "imager" in page.inner_text("#supplies")
+
+
+def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
+    look(page, "CubeSense")
+    page.wait_for_selector("#attitude-told >> text=CubeSense answers no attitude")
+    page.check("#marks")
+    line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
+    page.wait_for_selector("#picture >> text=/^[1-9][0-9]* found/")
+    green = (
+        "() => { const c = document.querySelector('#canvas');"
+        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+        "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 1] > d[i] + 60) n++;"
+        "return n }"
+    )
+    assert page.evaluate(green) > 50
+    wide = "document.querySelector('#canvas').clientWidth"
+    before = page.evaluate(wide)
+    page.press("#frame-of-picture", "+")
+    assert page.evaluate(wide) == pytest.approx(2 * before, abs=2)
+    page.press("#frame-of-picture", "-")
+    assert page.evaluate(wide) == before
 
 
 def test_a_command_has_its_effect(page: Any) -> None:

@@ -82,8 +82,8 @@ def test_the_shell_s_words_are_done(served: Serving) -> None:
 
 def test_stars_are_those_that_the_device_found(served: Serving) -> None:
     assert do(served, "write CaptureAndProcess")[0] == 200
-    status, told = ask(served, "GET", "/targets/0/stars")
-    stars = json.loads(told)["stars"]
+    status, told = ask(served, "GET", "/targets/0/found/SRAM")
+    stars = json.loads(told)["marks"]
     assert status == 200
     summary = do(served, "read DetectionSummary")[1]["data"]["values"]
     assert len(stars) == summary["NumStarsDetected"] > 3
