@@ -178,12 +178,24 @@ class DeviceClient(Closable):
         """Release the port."""
         self._on_close()
 
-    def picture(self, source: str | None = None) -> "NDArray[np.uint8]":
+    def picture(
+        self, source: str | None = None, progress: Progress | None = None
+    ) -> "NDArray[np.uint8]":
         """The picture (rows, columns) in the device's memory, or in the memory ``source``.
 
-        Raises TargetError for a device or a line that carries no picture, and the client's errors.
+        ``progress`` is told after each block how many of how many there are; what it raises ends
+        the download. Raises TargetError for a device or a line that carries no picture, and the
+        client's errors.
         """
         raise TargetError(f"{self.client.interface.name} sends no picture")
+
+    def upload(self, picture: "NDArray[np.uint8]", progress: Progress | None = None) -> None:
+        """Put grey values (rows, columns) into the device's memory in place of its own picture.
+
+        Raises TargetError for a device that takes none, ValueError for another shape, and the
+        client's errors.
+        """
+        raise TargetError(f"{self.client.interface.name} takes no picture by the wire")
 
     def stars(self) -> Sequence[FoundStar]:
         """The stars of the latest picture.

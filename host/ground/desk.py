@@ -13,6 +13,7 @@ from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
+from cubestack.host.ground.transfer import Transfer, grey_values
 from cubestack.host.pictures.overlay import Overlay, star_overlay
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.names import Names
@@ -42,11 +43,13 @@ class Desk:
     """Attributes:
     target: that is looked at.
     link: how its link is.
+    carried: the latest picture that went over the wire; None for none.
     """
 
     def __init__(self, target: Target, on_close: Callable[[], None] = lambda: None) -> None:
         """Look at ``target``, which is closed with this; ``on_close`` is called after that."""
         self.target, self.link, self._on_close = target, Link(), on_close
+        self.carried: Transfer | None = None
         self._shell = Shell(target)
         self._thread = ThreadPoolExecutor(1, "target")
 
@@ -63,6 +66,10 @@ class Desk:
             missing["found"] = f"{interface.name} does not tell what it found in a picture"
         if not self._has("latest"):
             missing["results"] = f"{interface.name} has no results that could be logged"
+        if not self._has("picture"):
+            missing["download"] = f"{interface.name} sends no picture"
+        if not self._has("upload"):
+            missing["upload"] = f"{interface.name} takes no picture by the wire"
         if target.service_port is None:
             missing["bench"] = "no line with the bench protocol is open"
         return {
@@ -75,6 +82,7 @@ class Desk:
             "fault_parameters": dict(controls.fault_parameters) if controls else {},
             "channels": list(controls.channels) if controls else [],
             "chosen": controls.chosen if controls else {},
+            "sources": list(self._client.picture_sources) if self._client else [],
             "missing": missing,
         }
 
@@ -104,8 +112,31 @@ class Desk:
         """Its latest result as a line of a log, or the ``error`` in place of it."""
         return self._thread.submit(self._results)
 
+    def transfer(self, what: str, source: str | None = None, content: bytes = b"") -> Transfer:
+        """Start a "download", of the memory ``source``, or an "upload" of a picture file.
+
+        Nothing else is asked meanwhile. ValueError where it can not be, or another one runs.
+        """
+        client = self._client
+        if what in self.about["missing"]:
+            raise ValueError(self.about["missing"][what])
+        if self.carried is not None and self.carried.runs:
+            raise ValueError("another picture is on its way")
+        assert client is not None
+        if source is not None and source not in client.picture_sources:
+            raise ValueError(f"no memory {source!r}; known: {', '.join(client.picture_sources)}")
+        if what == "download":
+            self.carried = Transfer(what, lambda progress: client.picture(source, progress))
+        else:
+            picture = grey_values(content)
+            self.carried = Transfer(what, lambda progress: client.upload(picture, progress))
+        self._thread.submit(self._asked, self.carried.run)
+        return self.carried
+
     def close(self) -> None:
         """Release the target."""
+        if self.carried is not None:
+            self.carried.give_up()
         self._thread.shutdown(cancel_futures=True)
         self.target.close()
         self._on_close()

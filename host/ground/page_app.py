@@ -1,6 +1,7 @@
 """The page's application: targets, what is asked of them, and what they tell, live."""
 
 import asyncio
+import base64
 import json
 from collections.abc import Sequence
 from concurrent.futures import Future
@@ -74,6 +75,10 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets/{number:int}/pictures/{name}", of(_picture)),
             Route("/targets/{number:int}/recording", of(_recording)),
             Route("/targets/{number:int}/found/{name}", of(_found)),
+            Route("/targets/{number:int}/carried", of(_carried)),
+            Route("/targets/{number:int}/download", of(_download), methods=["POST"]),
+            Route("/targets/{number:int}/upload", of(_upload), methods=["POST"]),
+            Route("/targets/{number:int}/transfer/{act}", of(_transfer), methods=["POST"]),
             Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
             Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
             Route("/targets/{number:int}/{call:str}", of(_steer), methods=["POST"]),
@@ -143,6 +148,36 @@ async def _recording(desk: Desk, _body: JsonObject, _path: JsonObject) -> Respon
     return Response(content, media_type="text/plain", headers={"content-disposition": name})
 
 
+async def _download(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
+    return desk.transfer("download", body.get("source")).state
+
+
+async def _upload(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
+    text = body.get("picture")
+    if not isinstance(text, str):
+        raise ValueError("'picture' is a picture file in base 64")
+    content = base64.b64decode(text, validate=True)
+    return (await asyncio.to_thread(desk.transfer, "upload", None, content)).state
+
+
+async def _transfer(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObject:
+    if desk.carried is None:
+        raise ValueError("no picture is on its way")
+    acts = {"hold": desk.carried.hold, "go-on": desk.carried.go_on, "give-up": desk.carried.give_up}
+    if path["act"] not in acts:
+        raise ValueError(f"no act {path['act']!r}; there are {', '.join(acts)}")
+    acts[path["act"]]()
+    return desk.carried.state
+
+
+async def _carried(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response:
+    if desk.carried is None or desk.carried.picture is None:
+        raise ValueError("no picture has come over the wire")
+    name = f'attachment; filename="{desk.target.interface.name.lower()}.png"'
+    headers = {"content-disposition": name}
+    return Response(desk.carried.picture, media_type="image/png", headers=headers)
+
+
 async def _fetched(desk: Desk, what: str) -> bytes:
     """What the control port has of the device."""
     controls = _controls(desk)
@@ -171,9 +206,12 @@ async def _live(desk: Desk, socket: WebSocket) -> None:
                 wanted = _wanted(hears.result(), desk)
                 hears = asyncio.create_task(socket.receive_json())
             told: JsonObject = {"link": vars(desk.link)}
-            if wanted.show:
+            carried = desk.carried
+            told["carried"] = carried.state if carried else None
+            free = carried is None or not carried.runs
+            if wanted.show and free:
                 told["values"] = await asyncio.wrap_future(desk.read(wanted.show))
-            if wanted.results:
+            if wanted.results and free:
                 told["results"] = await asyncio.wrap_future(desk.results())
             if desk.controls is not None:
                 told |= await asyncio.to_thread(_emulation, desk, logged)

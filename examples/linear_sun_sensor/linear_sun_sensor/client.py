@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.contract import DeviceClient, Progress
 from linear_sun_sensor.interface import Outcome
 
 
@@ -38,8 +38,12 @@ class SunSlit(DeviceClient):
         """Set what is taken for the Sun, 1 to 200 DN above the darkest pixel."""
         self._perform("SetThreshold", Threshold=level)
 
-    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+    def picture(
+        self, source: str | None = None, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
         """The latest readout, shape (1, 128)."""
         data = self.client.telemetry("Pixels")["Pixels"]
         assert isinstance(data, bytes)
+        if progress is not None:
+            progress(1, 1)
         return np.frombuffer(data, np.uint8).reshape(1, -1)

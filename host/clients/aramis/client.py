@@ -264,10 +264,12 @@ class Aramis(DeviceClient):
         )
         return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
-    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+    def picture(
+        self, source: str | None = None, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
         """The latest picture, as ``image`` gives it; TargetError on I2C."""
         try:
-            return self.image()
+            return self.image(progress)
         except TypeError:
             raise TargetError("AraMiS sends its picture over a serial line only") from None
 

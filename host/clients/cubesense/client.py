@@ -17,7 +17,7 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION_TERMS
 from cubestack.firmware_model.interface.cubesense.telemetry import RESULTS, SCHEDULES
-from cubestack.host.clients.contract import POLL_PERIOD_S, Columns, DeviceClient
+from cubestack.host.clients.contract import POLL_PERIOD_S, Columns, DeviceClient, Progress
 from cubestack.host.clients.cubesense.download import download_image, picture_of
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
@@ -130,10 +130,12 @@ class CubeSense(DeviceClient):
 
     picture_sources = tuple(sram.name.lower() for sram in Sram)
 
-    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+    def picture(
+        self, source: str | None = None, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
         """The picture (480, 640) in memory ``source``; default: the Sun camera's, sram1."""
         sram = Sram[(source or Sram.SRAM1.name).upper()]
-        return picture_of(download_image(self.client, sram, codes.ImageSize.SIDE_1024))
+        return picture_of(download_image(self.client, sram, codes.ImageSize.SIDE_1024, progress))
 
     def capture_and_detect(self, camera: Camera, sram: Sram | None = None) -> Measurement:
         """Take a picture into ``sram`` (default: the camera's own) and measure in it.

@@ -145,9 +145,15 @@ class CubeStar(DeviceClient):
         except ValueError:
             raise BadAnswerError(f"telemetry TaskStatus: unknown status {value}") from None
 
-    def picture(self, source: str | None = None) -> NDArray[np.uint8]:
+    def picture(
+        self, source: str | None = None, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
         """The picture in memory, as ``download_image`` gives it; there is one memory only."""
-        return self.download_image()
+        return self.download_image(progress)
+
+    def upload(self, picture: NDArray[np.uint8], progress: Progress | None = None) -> None:
+        """As ``upload_image``."""
+        self.upload_image(picture, progress)
 
     def download_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
         """The picture in memory, (512, 1024) with the first row on top.

@@ -10,6 +10,7 @@ import { Results } from "./results.js";
 import { ask, listen } from "./server.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
+import { Transfer } from "./transfer.js";
 
 const KEPT_LINES = 500;
 
@@ -17,6 +18,7 @@ const begun = Date.now();
 
 const parts = [
   "picture",
+  "wire",
   "attitude",
   "results",
   "loop",
@@ -77,6 +79,7 @@ function look(number, targets) {
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there
+  const transfer = new Transfer(place("wire"), path, about, tell);
   const attitude = new Attitude(place("attitude"), about);
   const timeline = new Timeline(place("loop"), about);
   const lamps = new Lamps(place("health"), about, (names) => show("lamps", names));
@@ -88,6 +91,7 @@ function look(number, targets) {
       link.className = message.link.failed ? "bad" : "";
       link.textContent = about.name;
       lamps.hearLink(message.link);
+      transfer.hear(message.carried);
       const { truth, time_s } = message.emulation ?? {};
       if (message.values) {
         telemetry.hear(message.values);

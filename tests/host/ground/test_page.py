@@ -8,9 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from cubestack.host.devices.registry import device_names
+from cubestack.host.pictures.images import save_picture
 
 SOON_MS = 30_000
 
@@ -124,6 +127,35 @@ def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
     assert page.evaluate(wide) == pytest.approx(2 * before, abs=2)
     page.press("#frame-of-picture", "-")
     assert page.evaluate(wide) == before
+
+
+def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> None:
+    picture = np.random.default_rng(1).integers(0, 2, (512, 1024), np.uint8) * 200
+    picture[40:] = 0  # black blocks are not sent
+    sent = tmp_path / "sent.png"
+    save_picture(picture, sent)
+    page.select_option("#speed", "fast")
+    page.set_input_files("#upload", sent)
+    page.wait_for_selector("#transfer-told >> text=/^upload: .* done$/")
+    page.click("#download")
+    page.wait_for_function("() => document.querySelector('#progress').value > 20")
+    page.click("#hold")
+    page.wait_for_selector("#transfer-told >> text=/ held$/")
+    page.click("#hold")
+    page.wait_for_selector("#transfer-told >> text=/^download: 4096 of 4096 blocks, done$/")
+    with page.expect_download() as saving:
+        page.click("#carried")
+    saving.value.save_as(tmp_path / "back.png")
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "back.png")), picture)
+    page.click("#download")
+    page.wait_for_selector("#transfer-told >> text=/^download: .* on its way/")
+    page.click("#give-up")
+    page.wait_for_selector("#transfer-told >> text=/given up after/")
+    page.select_option("#speed", "1")
+    look(page, "CubeSense")
+    assert page.locator("#upload").is_disabled()
+    assert "takes no picture" in page.inner_text("#transfer-told")
+    assert page.locator("#source option").all_inner_texts() == ["sram1", "sram2"]
 
 
 def test_a_command_has_its_effect(page: Any) -> None:
