@@ -14,7 +14,7 @@ SIMULATOR ?= icarus
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run test test-all test-hdl firmware mutants lint libraries bench bench-engines clean
+.PHONY: help venv run docs test test-all test-hdl firmware mutants lint libraries bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -23,6 +23,7 @@ help:
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
+	@echo "make docs      set up, then build the documents as a site in out/site"
 	@echo "make lint      ruff and mypy"
 	@echo "make libraries  build the compiled FPGAs that come along anew, for x86-64 and aarch64"
 	@echo "make bench     measure the cost of the hot paths"
@@ -72,6 +73,10 @@ bench: .venv/ready-run
 libraries: .venv/ready-dev
 	@$(BIN)/python -m pip install -q ziglang
 	@$(BIN)/python -m cubestack.host.devices.libraries
+
+docs: .venv/ready-dev
+	@$(BIN)/mkdocs build --strict --quiet
+	@echo "out/site/index.html"
 
 bench-engines: .venv/ready-dev
 	@$(BIN)/python -m tests.benchmarks.engines

@@ -51,6 +51,27 @@ class VirtualSerial(Closable):
         del self._ahead[:size]
         return data
 
+    def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
+        """Read to the end of ``expected``, to ``size`` bytes, or until ``timeout`` is over."""
+        late_ps = (
+            self._line.now_ps + (LONGEST_S if self.timeout is None else self.timeout) * PS_PER_S
+        )
+        data, whole = bytearray(), self.timeout
+        try:
+            while not data.endswith(expected) and (size is None or len(data) < size):
+                self.timeout = max((late_ps - self._line.now_ps) / PS_PER_S, 0.0)
+                byte = self.read()
+                if not byte:
+                    break
+                data += byte
+        finally:
+            self.timeout = whole
+        return bytes(data)
+
+    def readline(self, size: int = -1) -> bytes:
+        """As ``read_until`` the end of a line."""
+        return self.read_until(size=None if size < 0 else size)
+
     def write(self, data: bytes) -> int:
         """Start sending."""
         self._line.write(bytes(data))

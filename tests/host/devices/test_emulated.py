@@ -40,6 +40,20 @@ def test_a_read_waits_for_all_its_bytes_or_the_timeout(device: Any) -> None:
     assert not port.is_open
 
 
+def test_a_read_ends_with_what_is_expected_or_the_timeout(device: Any) -> None:
+    port = device.serial(timeout=0.5)
+    port.write(ASK + ASK)
+    first, second = port.read_until(b"\x1f\xff"), port.read_until(b"\x1f\xff")
+    assert first[-2:] == second[-2:] == b"\x1f\xff"
+    assert len(first) == len(second) == 12
+    port.write(ASK)
+    assert port.read_until(b"\x1f\xff", size=3) == first[:3]
+    began = device.time_s
+    assert len(port.readline()) == 9  # no line's end is in it
+    assert device.time_s - began == pytest.approx(0.5, abs=1e-9)
+    assert port.timeout == 0.5
+
+
 def test_what_arrived_can_be_counted_and_dropped(device: Any) -> None:
     port = device.serial(timeout=None)
     port.write(ASK)

@@ -1,0 +1,87 @@
+"""Pages of the site that are made when it is built: the start, all commands, all of `cubestack`.
+
+Hooks of mkdocs. Links that lead out of the documents lead to the repository.
+"""
+
+import inspect
+import re
+from argparse import _SubParsersAction
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+import cubestack
+from cubestack.host.cli.main import make_parser
+
+ROOT = Path(__file__).parent.parent
+REPOSITORY = "https://github.com/cubestack/cubestack/blob/main/"
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages."""
+    pages = {
+        "index.md": _from_root((ROOT / "README.md").read_text(encoding="utf-8")),
+        "reference-commands.md": commands(),
+        "reference-python.md": python(),
+    }
+    for name, text in pages.items():
+        files.append(File.generated(config, name, content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Links that lead out of the documents."""
+    return re.sub(r"\]\(\.\./([^)]+)\)", rf"]({REPOSITORY}\1)", markdown)
+
+
+def commands() -> str:
+    """What ``--help`` says of each command."""
+    parser = make_parser()
+    (groups,) = (one for one in parser._actions if isinstance(one, _SubParsersAction))
+    parts = ["# Commands\n", _help(parser)]
+    for name, command in groups.choices.items():
+        parts += [f"\n## cubestack {name}\n", _help(command)]
+    return "\n".join(parts)
+
+
+def python() -> str:
+    """What ``import cubestack`` gives, with its docstrings."""
+    parts = ["# Python\n", f"```text\n{inspect.getdoc(cubestack)}\n```\n"]
+    for name in sorted(name for name in cubestack.__all__ if not name.startswith("_")):
+        found = getattr(cubestack, name)
+        parts.append(f"\n## {name}\n\n{_described(name, found)}")
+        if inspect.isclass(found):
+            parts += _members(found)
+    return "\n".join(parts)
+
+
+def _members(owner: type) -> list[str]:
+    own = [(name, one) for name, one in vars(owner).items() if not name.startswith("_")]
+    documented = [(name, one) for name, one in own if callable(one) or isinstance(one, property)]
+    return [
+        f"\n### {owner.__name__}.{name}\n\n{_described(name, one)}"
+        for name, one in documented
+        if inspect.getdoc(one)
+    ]
+
+
+def _described(name: str, found: Any) -> str:
+    """How it is called, with types by their own names, and what it says of itself."""
+    try:
+        given = "" if isinstance(found, property) else str(inspect.signature(found))
+    except (TypeError, ValueError):
+        given = ""
+    text = inspect.getdoc(found) if callable(found) or given == "" else repr(found)
+    return f"```text\n{name}{re.sub(r'(?:[A-Za-z_]+[.])+(?=[A-Za-z])', '', given)}\n\n{text}\n```\n"
+
+
+def _help(parser: Any) -> str:
+    return f"```text\n{parser.format_help()}```\n"
+
+
+def _from_root(text: str) -> str:
+    """The README, as if it lay beside the documents."""
+    text = text.replace("](docs/", "](")
+    outside = r"\]\((?!https?:|images/)([\w./-]+\.(?!md\))\w+|[\w-]+/[\w./-]*|[A-Z]+\.md)\)"
+    return re.sub(outside, r"](../\1)", text)

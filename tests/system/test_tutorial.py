@@ -1,0 +1,97 @@
+"""The tutorial, done by its text alone: files as they are named in it, commands in their order."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from .conftest import Served
+
+TEXT = (Path(__file__).parents[2] / "docs" / "tutorial.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+SERVES = "cubestack emulate "
+SOON_S = 120
+
+pytestmark = pytest.mark.xdist_group("tutorial")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty folder with the files of the text."""
+    made = tmp_path_factory.mktemp("newcomer")
+    for kind, block in BLOCK.findall(TEXT):
+        if kind == "python":
+            first, _, rest = block.partition("\n")
+            (made / first.removeprefix("# ")).write_text(rest, encoding="utf-8")
+    return made
+
+
+def environment() -> dict[str, str]:
+    """Of a shell in which what the text installs is installed."""
+    own = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    return own | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+
+
+def commands() -> list[str]:
+    return [
+        line for kind, block in BLOCK.findall(TEXT) if kind == "sh" for line in block.split("\n")
+    ]
+
+
+@pytest.fixture
+def sensor(folder: Path) -> Iterator[None]:
+    """The second terminal."""
+    (line,) = (one for one in commands() if one.startswith(SERVES))
+    with Served(line.removeprefix(SERVES).split(), folder):
+        yield
+
+
+def done(line: str, folder: Path) -> str:
+    finished = subprocess.run(
+        *(line.split(),),
+        **{"cwd": folder, "env": environment(), "timeout": SOON_S},
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True},
+    )
+    assert finished.returncode == 0, finished.stdout
+    return str(finished.stdout)
+
+
+def test_every_command_is_one_of_those_tried_here() -> None:
+    assert commands() == [
+        *("python3 -m venv .venv", ". .venv/bin/activate", "pip install cubestack pytest", ""),
+        *("cubestack measure cubesense --frames 3 --profile extended", ""),
+        *("cubestack emulate cubesense --profile extended --pty ./ttyCUBESENSE", ""),
+        *("python sunsensor.py ./ttyCUBESENSE", "", "pytest test_sunsensor.py", ""),
+    ]
+
+
+def test_it_works_once_it_is_installed(folder: Path) -> None:
+    assert "nadir" in done("cubestack measure cubesense --frames 3 --profile extended", folder)
+
+
+def test_the_driver_measures_what_the_text_says(folder: Path, sensor: None) -> None:
+    told = done("python sunsensor.py ./ttyCUBESENSE", folder)
+    numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", told)]
+    assert numbers == pytest.approx([20, 10, -8, 12], abs=0.2)
+
+
+def test_its_tests_pass_and_one_fails_without_the_loop(folder: Path, tmp_path: Path) -> None:
+    assert "4 passed" in done("pytest test_sunsensor.py", folder)
+    worse = tmp_path / "worse"
+    shutil.copytree(folder, worse, ignore=shutil.ignore_patterns("__pycache__", "tty*"))
+    driver = worse / "sunsensor.py"
+    driver.write_text(driver.read_text().replace("range(attempts)", "range(1)"))
+    finished = subprocess.run(
+        ["pytest", "test_sunsensor.py"],
+        cwd=worse,
+        env=environment(),
+        capture_output=True,
+        text=True,
+    )
+    assert "1 failed, 3 passed" in finished.stdout
+    assert "emulated cubesense" in finished.stdout

@@ -1,0 +1,59 @@
+"""The documents as a site: whole, and of one machine."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+import cubestack
+from cubestack.host.cli.main import COMMANDS
+from cubestack.host.cli.reports import reports
+
+ROOT = Path(__file__).parent.parent
+
+LOADED = re.compile(
+    r"<(?:script|img|iframe|source|video)[^>]*\ssrc=\"(https?:)?//"
+    r"|<link[^>]*rel=\"?(?:stylesheet|preconnect|preload)[^>]*href=\"(https?:)?//"
+)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Built with every link checked."""
+    folder = tmp_path_factory.mktemp("site")
+    call = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", str(folder)]
+    quiet = os.environ | {"NO_MKDOCS_2_WARNING": "1", "COLUMNS": "90"}
+    done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True, env=quiet)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
+    pages = sorted(site.rglob("*.html"))
+    assert len(pages) > 40
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert not LOADED.search(text), page.name
+        assert 'data-md-component="source"' not in text  # which asks a host of repositories
+
+
+def test_every_document_is_in_the_navigation() -> None:
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    named = set(re.findall(r": ([\w-]+\.md)$", text, re.MULTILINE))
+    made = {"index.md", "reference-commands.md", "reference-python.md"}
+    assert named - made == {path.name for path in (ROOT / "docs").glob("*.md")}
+    assert yaml.safe_load(text)["theme"]["font"] is False
+
+
+def test_every_command_and_every_public_name_is_described(site: Path) -> None:
+    commands = (site / "reference-commands.html").read_text(encoding="utf-8")
+    for name in (*COMMANDS, *reports()):
+        assert f'id="cubestack-{name}"' in commands
+    names = (site / "reference-python.html").read_text(encoding="utf-8")
+    for name in (name for name in cubestack.__all__ if not name.startswith("_")):
+        assert f'id="{name.lower()}"' in names
+    assert "\nNone\n</code>" not in names  # a docstring that is missing
