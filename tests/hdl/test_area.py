@@ -109,6 +109,7 @@ def test_no_design_grows_unnoticed(name, design, file):
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@pytest.mark.slow
 @every_design
 def test_no_top_grows_unnoticed_on_ice40(name, design, file):
     if isinstance(design, Top):

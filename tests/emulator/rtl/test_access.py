@@ -89,7 +89,13 @@ def random_step(rng: np.random.Generator, wiring: Wiring) -> Step:
 
 
 @needs_compiler
-@pytest.mark.parametrize("design", WIRINGS)
+@pytest.mark.parametrize(
+    "design",
+    [
+        CubeStarShared,
+        *(pytest.param(top, marks=pytest.mark.slow) for top in WIRINGS if top != CubeStarShared),
+    ],
+)
 def test_every_engine_makes_the_same_transactions(design) -> None:
     """At any time: beside pixels that are stored, in standby, over the ends of segments."""
     rng = np.random.default_rng(7)

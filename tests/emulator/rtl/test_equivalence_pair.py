@@ -82,7 +82,9 @@ def random_steps(rng: np.random.Generator, cameras: dict[str, ListCamera]) -> It
 PARTS = [0.2, 0.2, 0.2, 0.25, 0.08, 0.04, 0.03]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 12))]
+)
 def test_random_life_of_a_board(seed):
     rng = np.random.default_rng(seed)
     number = seed % len(SIZES)

@@ -44,6 +44,7 @@ def test_addressing_changes_nothing_else(simulate: Any, initialised: bool) -> No
     simulate(addressable, SMALLEST, *NAMES, seed=1, **options)
 
 
+@pytest.mark.slow
 def test_full_size(simulate: Any) -> None:
     harness = Path(__file__).with_name("cubesense_full_frame.v")
     simulate(CubeSensePair, FULL_SIZE, "full_size", seed=1, harness=harness)

@@ -38,6 +38,7 @@ def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
     icarus.run(CubeStarTop, 5, 3, *shuffled, seed=seed, initialised=False)
 
 
+@pytest.mark.slow
 def test_full_frame(icarus: Any) -> None:
     harness = Path(__file__).with_name("full_frame.v")
     icarus.run(CubeStarTop, 1024, 512, *modules(STAR, "full_frame"), seed=1, harness=harness)
@@ -47,7 +48,10 @@ def test_published_borders(icarus: Any) -> None:
     icarus.run(CubeStarTop, 5, 3, *modules(STAR, "borders"), seed=1)
 
 
-@pytest.mark.parametrize(("columns", "rows", "seed"), [(8, 4, 1), (5, 3, 2), (32, 16, 3)])
+@pytest.mark.parametrize(
+    ("columns", "rows", "seed"),
+    [(8, 4, 1), (5, 3, 2), pytest.param(32, 16, 3, marks=pytest.mark.slow)],
+)
 @pytest.mark.parametrize("top", NEXT_VERSION)
 def test_bus(icarus: Any, top: str, columns: int, rows: int, seed: int) -> None:
     tier = TIERS[top]

@@ -33,8 +33,13 @@ def levels(engine: RtlEngine) -> dict[str, object]:
     return {**pins, **memories, "now": engine.now_ps, "broken": engine.violations}
 
 
+QUICK = ("cubestar", "cubesense-pair")
+
+
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-@pytest.mark.parametrize("name", BOARDS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in BOARDS]
+)
 def test_bursts_settle_as_single_edges_do(name: str) -> None:
     board = BOARDS[name]
     wiring = board.wiring(False)

@@ -53,12 +53,15 @@ def test_a_cluster_makes_the_same_file(alone: Folder, tmp_path: Path) -> None:
     assert content(folder.path) == content(alone.path)
 
 
-def test_kills_lose_only_blocks_in_flight(alone: Folder, small: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_kills_lose_only_blocks_in_flight(
+    alone: Folder, small: Path, tmp_path: Path, kills: int
+) -> None:
     out, generator = tmp_path / "killed", np.random.default_rng(8)
     call = [sys.executable, "-m", "cubestack.host.cli.main", "campaign", str(small)]
     call += ["--out", str(out), "--resume", "--workers", "2", "--json"]
     before = b""
-    for _ in range(3):
+    for _ in range(kills):
         with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
             try:
                 process.wait(float(generator.uniform(1.0, 4.0)))

@@ -90,7 +90,9 @@ def test_a_voted_counter_is_immune(voted: None) -> None:
     assert {result.answer for result in results} == {"right"}
 
 
-@pytest.mark.parametrize("layout", ["2", "3", "two-boards"])
+@pytest.mark.parametrize(
+    "layout", ["2", *(pytest.param(name, marks=pytest.mark.slow) for name in ("3", "two-boards"))]
+)
 def test_each_layout_has_its_registers(layout: str) -> None:
     results = measured(
         *("cubestar", cubestar.EXPERIMENT),
