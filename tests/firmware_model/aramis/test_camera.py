@@ -124,7 +124,9 @@ def test_a_frame_that_was_asked_for_before_is_waited_for(desk: Desk) -> None:
 def test_cutting_the_supply_ends_the_wait(desk: Desk) -> None:
     desk.start()
     desk.unit.on_sleep = desk.camera.cut
+    stopped = desk.unit.stopped
     assert desk.take() is Reason.CAMERA_OFF
+    assert desk.unit.stopped == stopped + 1  # the transfer is not left waiting for ever
     assert not desk.unit.camera_on
     assert desk.start() is Reason.CAMERA_OFF
     assert desk.state.flags == {"CameraOff"}

@@ -9,15 +9,32 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.field import Field
 from cubestack.firmware_model.aramis.matching.identification import Profile
-from cubestack.firmware_model.aramis.measurement import configuration
+from cubestack.firmware_model.aramis.measurement import Measuring, configuration
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, Detection
 from cubestack.firmware_model.aramis.settings import StoredSettings
+from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.aramis.telemetry import body_quaternion
-from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.firmware_model.interface.aramis import INTERFACE, MeasurementOutcome
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 EXTENDED = AramisSwitches.of("extended")
+
+
+def test_a_boresight_is_that_of_the_latest_measurement_if_it_gave_one() -> None:
+    """An older attitude is no hint for the next measurement."""
+    state = State(FlashStore())
+    measuring = Measuring(Meter(BLACKFIN_BF533), state, None, None)  # type: ignore[arg-type]
+    assert measuring.latest_boresight() is None
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.1])
+    state.quaternion = turn.as_quat().astype(np.float32)
+    state.measurement.outcome = MeasurementOutcome.CONCLUSIVE
+    assert measuring.latest_boresight() == pytest.approx(turn.as_matrix()[2], abs=1e-6)
+    for outcome in set(MeasurementOutcome) - {MeasurementOutcome.CONCLUSIVE}:
+        state.measurement.outcome = outcome
+        assert measuring.latest_boresight() is None
 
 
 def test_reset_values_are_the_verified_way() -> None:

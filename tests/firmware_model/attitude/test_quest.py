@@ -1,11 +1,14 @@
 """QUEST against the singular value decomposition, which solves Wahba's problem exactly."""
 
+from collections import Counter
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
+from cubestack.firmware_model.attitude.quest import AttitudeError, _determinant, dcm, quest
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -101,3 +104,47 @@ def test_twenty_stars_take_less_than_ten_milliseconds() -> None:
     body = in_field(np.random.default_rng(6), 20).astype(np.float32)
     quest(body, body, np.ones(20, np.float32), meter)
     assert 0.0001 < CORTEX_M3.seconds(meter.total) < 0.010
+
+
+class Counted(float):
+    """A number that counts what is done to it."""
+
+    done: ClassVar[Counter[str]] = Counter()
+
+    def __mul__(self, other: float) -> "Counted":
+        Counted.done["f32_mul"] += 1
+        return Counted(float(self) * float(other))
+
+    def __add__(self, other: float) -> "Counted":
+        Counted.done["f32_add"] += 1
+        return Counted(float(self) + float(other))
+
+    def __sub__(self, other: float) -> "Counted":
+        Counted.done["f32_add"] += 1
+        return Counted(float(self) - float(other))
+
+
+def test_a_determinant_is_charged_what_its_numbers_see() -> None:
+    values = np.array([[2, 7, 6], [9, 5, 1], [4, 3, 8]])
+    matrix = np.array([[Counted(value) for value in row] for row in values], dtype=object)
+    meter = Meter(CORTEX_M3)
+    Counted.done.clear()
+    assert _determinant(matrix, meter) == pytest.approx(np.linalg.det(values))
+    assert {name: meter.counts[name] for name in Counted.done} == Counted.done
+    assert meter.counts["ram_read"] == 9
+
+
+def test_each_star_costs_the_same() -> None:
+    """An outer product of the weighted vector: 3 + 9 multiplications, 9 sums, and the weight's."""
+    rng = np.random.default_rng(3)
+    counts = []
+    for stars in (4, 5, 20):
+        meter = Meter(CORTEX_M3)
+        body = in_field(rng, stars).astype(np.float32)
+        quest(body, body, np.ones(stars, np.float32), meter)
+        counts.append(meter.counts)
+    four, five, twenty = counts
+    assert five["f32_mul"] - four["f32_mul"] == 3 + 9
+    assert five["f32_add"] - four["f32_add"] == 9 + 1
+    for name in five:
+        assert twenty[name] - four[name] == 16 * (five[name] - four[name])

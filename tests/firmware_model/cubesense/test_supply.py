@@ -60,6 +60,18 @@ def test_it_is_off_for_a_while_at_least(unit: Harness, cleared_after_us: int) ->
     assert on_us - off_us >= OFF_TIME_US
 
 
+def test_two_memories_wait_for_the_one_that_was_cut_last(unit: Harness) -> None:
+    unit.log.clear()
+    for sram in codes.Sram:
+        unit.latched.add(sram)
+        unit.run(until_us=unit.now_us + OFF_TIME_US // 2)
+    unit.command("ClearOverCurrent", Selection=codes.SramSelection.BOTH)
+    for sram in codes.Sram:
+        pin = pins.SRAM_POWER[sram]
+        off_us, on_us = (us for us, r in unit.log if isinstance(r, SetPin) and r.pin == pin)
+        assert on_us - off_us >= OFF_TIME_US
+
+
 def test_a_lasting_latch_up_is_cut_again(unit: Harness) -> None:
     unit.latched.add(codes.Sram.SRAM1)
     unit.latch_on(SetPin(pins.SRAM_POWER[codes.Sram.SRAM1], 1), codes.Sram.SRAM1)

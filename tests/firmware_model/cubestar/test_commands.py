@@ -64,3 +64,13 @@ def test_an_interrupt_does_not_cut_a_wait_short(unit: Harness, name: str) -> Non
     unit.send("Exposure", exposure=1)  # wakes
     unit.run()
     assert not sleeps[0].wakeable
+
+
+def test_streaming_pays_for_each_pixel(unit: Harness) -> None:
+    """A turn of the loop and a bus cycle for each of 1024 x 512 pixels."""
+    unit.command("UploadImage")
+    before = unit.meter.counts.copy()
+    unit.command("StreamDownImage")
+    paid = unit.meter.counts - before
+    assert paid["ebi_read"] == 1024 * 512
+    assert 1024 * 512 <= paid["loop"] < 1.1 * 1024 * 512

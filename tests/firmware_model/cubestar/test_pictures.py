@@ -206,3 +206,16 @@ def test_control_pins_change_in_the_gateware_s_order(layout: Layout, log: str) -
 def test_rate_is_twice_as_high_with_two_memories() -> None:
     rates = {layout: ITERATION_US / Board(layout).pictures.iteration_us for layout in ON_BUS}
     assert rates == {Layout.SHARED: 1, Layout.TWO_MEMORIES: 2, Layout.TWO_BOARDS: 2}
+
+
+@pytest.mark.parametrize("layout", Layout)
+@pytest.mark.parametrize("count", [1, 97, 128])
+def test_an_interrupt_pays_for_each_byte_that_it_reads(layout: Layout, count: int) -> None:
+    """The memory has eight data lines: a bus cycle a byte."""
+    board = Board(layout)
+    board.external_ram = np.zeros(IMAGE_BYTES, np.uint8)
+    board.stored(np.zeros(IMAGE_BYTES, np.uint8))
+    accesses, cycles = board.meter.counts["ebi_read"], board.meter.total
+    assert len(board.pictures.read_now(5, count) or b"") == count
+    assert board.meter.counts["ebi_read"] - accesses == count
+    assert board.meter.total - cycles >= count * EBI.cycles

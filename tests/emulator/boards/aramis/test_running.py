@@ -8,6 +8,7 @@ import pytest
 from cubestack.emulator.boards.aramis.board import ARAMIS_POWER
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.sim.virtual_time import PS_PER_MS
+from cubestack.firmware_model.aramis.measurement import Measuring
 from cubestack.firmware_model.interface.aramis import INTERFACE, MeasurementMode, Reason
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.errors import CommandRefusedError
@@ -143,6 +144,19 @@ def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
         assert (active.client.telemetry("Exposure")["Rows"] == 1234) is save
     active.command("ClearConfig")
     assert active.client.telemetry("Exposure")["Rows"] == 6299
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("SetExposure", {"Rows": 99}), ("SetGain", {"Gain": 2.0}), ("ClearConfig", {})],
+)
+def test_other_pictures_than_before_begin_a_new_background(
+    active: Desk, monkeypatch: pytest.MonkeyPatch, name: str, values: dict[str, Any]
+) -> None:
+    begun: list[Measuring] = []
+    monkeypatch.setattr(Measuring, "restart", lambda measuring: begun.append(measuring))
+    active.command(name, **values)
+    assert len(begun) == 1
 
 
 def test_power_follows_what_runs(desk: Desk) -> None:

@@ -178,3 +178,17 @@ def test_random_upsets_at_one_in_a_million_never_leave_a_wrong_byte(desk: Desk) 
             assert desk.store.corrected == len(flips)
         desk.flip_flash(*flips)
     assert good == 20
+
+
+@pytest.mark.parametrize("size", [800, 80_000, 250_000])
+def test_programming_takes_the_flash_s_times(size: int) -> None:
+    """Of the data sheet: 0.8 s to erase 64 KiB, 10 us to write 16 bits; and the program's own."""
+    unit = Harness()
+    store = CatalogueStore(unit, unit.meter)
+    unit.perform(store.program(bytes(size)))
+    coded = len(flash_image(bytes(size)))
+    assert coded == pytest.approx(size * 9 / 8, abs=50)  # eight bits of code for 64, and a header
+    computing_us = unit.meter.total / unit.meter.table.clock_hz * 1e6
+    flash_us = -(-coded // 65_536) * 800_000 + coded / 2 * 10
+    assert unit.now_us == pytest.approx(flash_us + computing_us, abs=10)
+    assert computing_us < coded / 2 * 10

@@ -1,5 +1,6 @@
 """The search against a literal transcription of its rules, and its accuracy on drawn stars."""
 
+from collections import Counter
 from dataclasses import replace
 from itertools import product
 
@@ -227,3 +228,39 @@ def test_settings_out_of_range_are_named(settings: dict[str, int], message: str)
 def test_a_region_beyond_the_picture_is_refused() -> None:
     with pytest.raises(DetectionConfigError, match="y_end must be at most 256, not 512"):
         detect_stars(np.zeros((256, 1024), dtype=np.uint8), DetectionConfig(), meter())
+
+
+def growing(areas: int, pixels: int) -> Counter[str]:
+    """What the search of a dark picture with so many bars of so many pixels is charged."""
+    image = np.zeros((90, 90), np.uint8)
+    for number in range(areas):
+        image[9 + 9 * number, 10 : 10 + pixels] = 100
+        image[9 + 9 * number, 9] = 0
+    own = meter()
+    found = detect_stars(image, CHARGED, own)
+    assert len(found.centroids) == areas
+    return own.counts
+
+
+#: One sample in each bar, at its fourth pixel.
+CHARGED = DetectionConfig(x_start=13, x_end=14, y_start=0, y_end=90, step=9, min_pixels=4)
+
+
+@pytest.mark.parametrize("pixels", [5, 20])
+def test_equal_areas_are_charged_equally(pixels: int) -> None:
+    none, one, two, six = (growing(areas, pixels) for areas in (0, 1, 2, 6))
+    for name in one | six:
+        assert two[name] - none[name] == 2 * (one[name] - none[name])
+        assert six[name] - none[name] == 6 * (one[name] - none[name])
+
+
+def test_each_pixel_of_an_area_is_charged_the_same() -> None:
+    """Two calls; four neighbours looked at, a turn each; one into the list of pixels and one out
+    of it; two for the centroid: the brightest pixel, then the sums."""
+    short, longer, longest = (growing(1, pixels) for pixels in (8, 9, 48))
+    assert longer["call"] - short["call"] == 2
+    assert longest["call"] - short["call"] == 2 * 40
+    assert longer["loop"] - short["loop"] == 4 + 1 + 1 + 2
+    assert longest["loop"] - short["loop"] == 40 * (4 + 1 + 1 + 2)
+    assert longest["ebi_read"] - short["ebi_read"] == 40 * 4
+    assert longest["ebi_write"] - short["ebi_write"] == 40 * 2  # to zero, and back

@@ -1,5 +1,6 @@
 """Tracking and verification on random skies; each rate has room for chance."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +16,7 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     MatchOutcome,
     verify,
 )
-from cubestack.firmware_model.cubestar.matching.tracking import track
+from cubestack.firmware_model.cubestar.matching.tracking import _nearest, track
 
 from ..sky import meter, pinhole
 
@@ -115,3 +116,22 @@ def test_verification_keeps_a_set_that_agrees(catalogue: StarCatalogue, shoot: S
     assert kept[:2].tolist() == [-1, -1]
     assert kept[2:].tolist() == shot.stars[2:].tolist()
     assert set(votes[2:].tolist()) == {len(wrong) - 3}
+
+
+def test_the_nearest_star_costs_a_comparison_of_every_pair(catalogue: StarCatalogue) -> None:
+    """A star is turned: 9 products, 6 sums. A pair: 3 differences, 3 squares, 2 sums, and one
+    comparison."""
+
+    def charged(centroids: int, candidates: int) -> Counter[str]:
+        own = meter()
+        stars = np.arange(candidates, dtype=np.uint16)
+        _nearest(catalogue.vectors[:centroids], catalogue.vectors, stars, np.eye(3), own)
+        return own.counts
+
+    star = {"flash_read": 3, "f32_mul": 9, "f32_add": 6, "loop": 1}
+    pair = {"f32_mul": 3, "f32_add": 3 + 2, "f32_compare": 1, "loop": 1}
+    for centroids, candidates in ((1, 1), (2, 1), (1, 2), (7, 60)):
+        pairs = centroids * candidates
+        assert charged(centroids, candidates) == {
+            name: star.get(name, 0) * candidates + pair.get(name, 0) * pairs for name in star | pair
+        }

@@ -134,7 +134,12 @@ def test_measuring_sends_what_is_known(
 
 
 def test_julian_dates_are_split_exactly(node: FakeAramis, aramis: Aramis) -> None:
-    for more, days, millisecond in ((0.25, 0, 21_600_000), (0.0, 0, 0), (0.9999999999, 1, 0)):
+    for more, days, millisecond in (
+        (0.25, 0, 21_600_000),
+        (0.0, 0, 0),
+        (1 - 4e-9, 1, 0),  # 0.3 ms before the next day begins
+    ):
+        assert (2_461_366 + more) // 1 == 2_461_366
         aramis.set_time(2_461_366 + more)
         sent = {"JulianDay": 2_461_366 + days, "Millisecond": millisecond}
         assert node.log[-1] == ("SetSystemTime", sent)
