@@ -1,57 +1,9 @@
-"""What the protocol suite tries for a telecommand, and where telemetry shows what was set."""
+"""What the protocol suite tries for a telecommand."""
 
-import re
 from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
-from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.host.devices.device import ConformanceNotes
-
-
-def read_back(
-    interface: Interface, message: Message, notes: ConformanceNotes
-) -> dict[str, tuple[Message, Field]]:
-    """Where each of a telecommand's fields but keys is shown in telemetry; empty unless all are.
-
-    By name: the field's own, with the telecommand's number or the key behind it, or the
-    telecommand's.
-    """
-    if message.name in notes.not_shown:
-        return {}
-    keys = keys_of(message, notes)
-    number = re.sub(r".*?(\d*)$", r"\1", message.name)
-    found = {}
-    for field in message.fields:
-        if field.name in keys:
-            continue
-        behind = "".join(str(key) for key in keys.values()) or number
-        names = [field.name + behind]
-        if len(message.fields) == 1:
-            names.append(message.name)
-        ending = number if keys else ""
-        place = _place(interface, field, [name.lower() for name in names], ending)
-        if place is None:
-            return {}
-        found[field.name] = place
-    return found
-
-
-def keys_of(message: Message, notes: ConformanceNotes) -> dict[str, Value]:
-    """Key fields, at the values that are tried."""
-    reset = message.reset_values()
-    return {name: value for name, value in reset.items() if name in notes.keys}
-
-
-def _place(
-    interface: Interface, field: Field, names: list[str], ending: str
-) -> tuple[Message, Field] | None:
-    for telemetry in interface.telemetries:
-        if telemetry.supported and not telemetry.steps and telemetry.name.endswith(ending):
-            for shown in telemetry.fields:
-                as_set = (shown.type, shown.scale, shown.unit)
-                if shown.name.lower() in names and as_set == (field.type, field.scale, field.unit):
-                    return telemetry, shown
-    return None
+from cubestack.firmware_model.interface.codec.message import Message
 
 
 def values_to_try(message: Message) -> Iterator[dict[str, Value]]:

@@ -12,13 +12,8 @@ from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Mess
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.conformance.contract import CheckRun, FailedError, SkippedError
 from cubestack.host.conformance.effects import OF_SWITCHES
-from cubestack.host.conformance.values import (
-    keys_of,
-    limits_of,
-    read_back,
-    values_to_try,
-    violations,
-)
+from cubestack.host.conformance.values import limits_of, values_to_try, violations
+from cubestack.host.devices.shown_settings import keys_of, read_back
 from cubestack.host.errors import CommandRefusedError
 from cubestack.host.transport.streams import READ_BYTES, Transport, read_answer
 

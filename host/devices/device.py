@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 
+from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES, Switches
 from cubestack.host.clients.contract import Client, DeviceClient
@@ -173,6 +174,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         overlay: what its client found in the picture of a name, to be drawn over it; None where
             that is its stars, or nothing.
         processor: its processor as firmware of one's own sees it; None where that can not run.
+        image_sensor: registers of its image sensor, where its interface reads single ones.
     """
 
     name: str
@@ -200,6 +202,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     costs: "Callable[[], CostReport] | None" = None
     processor: "Callable[[], Processor] | None" = None
     overlay: "Callable[[Any, str], Overlay] | None" = None
+    image_sensor: CameraRegisterMap | None = None
 
     def __post_init__(self) -> None:
         """Refuse a name that can not be everywhere: ValueError."""

@@ -13,6 +13,12 @@ from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
+from cubestack.host.ground.tables import (
+    pointer_row,
+    read_sensor_register,
+    sensor_rows,
+    setting_rows,
+)
 from cubestack.host.ground.transfer import Transfer, grey_values
 from cubestack.host.pictures.overlay import Overlay, star_overlay
 from cubestack.host.shell.language import Shell
@@ -70,6 +76,11 @@ class Desk:
             missing["download"] = f"{interface.name} sends no picture"
         if not self._has("upload"):
             missing["upload"] = f"{interface.name} takes no picture by the wire"
+        if target.registers is None:
+            missing["registers"] = f"no registers of {interface.name} are within reach here"
+        if target.device is None or target.device.image_sensor is None:
+            none = f"{interface.name} reads no single register of its image sensor"
+            missing["sensor_registers"] = none
         if target.service_port is None:
             missing["bench"] = "no line with the bench protocol is open"
         return {
@@ -77,7 +88,9 @@ class Desk:
             "device": interface.name,
             "telemetries": [_message(one) for one in interface.telemetries],
             "telecommands": [_message(one) for one in interface.telecommands],
-            "registers": [one.name for one in Names(target).registers],
+            "registers": [pointer_row(one) for one in Names(target).registers],
+            "settings": setting_rows(target.device) if target.device else [],
+            "sensor_registers": sensor_rows(target.device) if target.device else [],
             "faults": list(controls.faults) if controls else [],
             "fault_parameters": dict(controls.fault_parameters) if controls else {},
             "channels": list(controls.channels) if controls else [],
@@ -107,6 +120,10 @@ class Desk:
         """What it found in the memory called ``picture``: ``marks`` with column, row and name,
         empty of unknown ones, and ``lines`` of columns and rows."""
         return self._thread.submit(self._asked, lambda: self._found(picture))
+
+    def sensor_register(self, name: str) -> "Future[JsonObject]":
+        """A register of its image sensor, as ``read_sensor_register`` gives it."""
+        return self._thread.submit(self._asked, lambda: self._sensor_register(name))
 
     def results(self) -> "Future[JsonObject]":
         """Its latest result as a line of a log, or the ``error`` in place of it."""
@@ -164,6 +181,11 @@ class Desk:
             "marks": [{"x": one.x_px, "y": one.y_px, "name": one.name} for one in found.marks],
             "lines": [line.tolist() for line in found.lines],
         }
+
+    def _sensor_register(self, name: str) -> JsonObject:
+        if self.target.device is None:
+            raise ValueError(self.about["missing"]["sensor_registers"])
+        return read_sensor_register(self.target.device, self.target.node, name)
 
     def _results(self) -> JsonObject:
         try:

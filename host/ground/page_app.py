@@ -75,6 +75,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets/{number:int}/pictures/{name}", of(_picture)),
             Route("/targets/{number:int}/recording", of(_recording)),
             Route("/targets/{number:int}/found/{name}", of(_found)),
+            Route("/targets/{number:int}/sensor-registers/{name}", of(_sensor_register)),
             Route("/targets/{number:int}/carried", of(_carried)),
             Route("/targets/{number:int}/download", of(_download), methods=["POST"]),
             Route("/targets/{number:int}/upload", of(_upload), methods=["POST"]),
@@ -135,6 +136,10 @@ async def _scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
 
 async def _found(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObject:
     return await asyncio.wrap_future(desk.found(path["name"]))
+
+
+async def _sensor_register(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObject:
+    return await asyncio.wrap_future(desk.sensor_register(path["name"]))
 
 
 async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:

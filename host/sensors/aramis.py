@@ -66,6 +66,7 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     campaigns=EXPERIMENTS,
     has_fpga=False,
     prepare=lambda shown: call(f"{BOARD}.catalogue:onboard_database", progress=shown)(),
+    image_sensor=REGISTERS,
     conformance=ConformanceNotes(
         effects={
             "StreamDownImage": partial(effects.check_stream, picture_bytes=IMAGE_BYTES),

@@ -177,6 +177,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     costs=call(f"{EXPERIMENTS}.costs:costs"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
+    image_sensor=REGISTERS,
     conformance=ConformanceNotes(
         effects={
             "StreamDownImage": partial(effects.check_stream, picture_bytes=IMAGE_BYTES),

@@ -8,6 +8,7 @@ import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
 import { Results } from "./results.js";
 import { ask, listen } from "./server.js";
+import { Settings } from "./settings.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
 import { Transfer } from "./transfer.js";
@@ -25,6 +26,7 @@ const parts = [
   "health",
   "emulation",
   "commands",
+  "settings",
   "telemetry",
 ];
 const lines = document.getElementById("lines");
@@ -76,6 +78,7 @@ function look(number, targets) {
     want({ show: [...new Set(Object.values(frames).flat())] });
   };
   new Commands(place("commands"), about, act);
+  new Settings(place("settings"), about, path, tell);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there

@@ -21,9 +21,10 @@ from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.effects import check_stream
 from cubestack.host.conformance.reads import check_reads
 from cubestack.host.conformance.suite import compare
-from cubestack.host.conformance.values import read_back, values_to_try
+from cubestack.host.conformance.values import values_to_try
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.registry import device
+from cubestack.host.devices.shown_settings import read_back
 from cubestack.host.devices.targets import Target
 
 BLOCKS = 4

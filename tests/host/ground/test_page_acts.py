@@ -1,0 +1,87 @@
+"""What a page commands, in a real browser: settings and registers, kept lines, waveforms."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from .test_page import SOON_MS, line, local
+
+pytestmark = pytest.mark.xdist_group("page acts")
+
+
+@contextmanager
+def station(*words: str) -> Iterator[str]:
+    """Address of a page."""
+    call = [sys.executable, "-m", "cubestack", "ground", *words, "--json"]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        assert process.stdout is not None
+        yield json.loads(process.stdout.readline())["page"]
+        process.send_signal(signal.SIGINT)
+
+
+@contextmanager
+def shown(chromium: Any, address: str) -> Iterator[Any]:
+    """The page at ``address``; nothing in it may go wrong or ask another machine."""
+    page = chromium.new_context().new_page()
+    page.set_default_timeout(SOON_MS)
+    wrong = list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda one: wrong.append(one.url) if not local(one.url) else None)
+    page.goto(address)
+    page.wait_for_selector("#line")
+    yield page
+    page.context.close()
+    assert not wrong
+
+
+@pytest.fixture(scope="module")
+def address(chromium: Any) -> Iterator[str]:
+    with station("emulated:cubestar", "emulated:cubesense", "--seed", "5") as opened:
+        yield opened
+
+
+@pytest.fixture
+def page(chromium: Any, address: str) -> Iterator[Any]:
+    with shown(chromium, address) as opened:
+        yield opened
+
+
+def look(page: Any, device: str) -> None:
+    page.click(f"nav >> text={device}")
+    page.wait_for_function(
+        "(device) => document.title.startsWith(device) && document.querySelector('#read-settings')",
+        arg=device,
+    )
+
+
+def test_a_setting_that_differs_is_marked(page: Any) -> None:
+    look(page, "CubeSense")
+    line(page, "write DetectionThreshold1 77")
+    page.click("#read-settings")
+    page.wait_for_selector("#settings-told >> text=/[0-9]+ of [0-9]+ differ/")
+    row = page.locator("#settings-rows tr", has_text="DetectionThreshold1.Threshold")
+    assert row.locator("td").nth(0).inner_text() == "77"
+    assert row.locator("td").nth(1).inner_text() == "225"
+    assert row.get_attribute("class") == "differs"
+    other = page.locator("#settings-rows tr", has_text="DetectionThreshold2.Threshold")
+    assert not other.get_attribute("class")
+    assert page.locator("#read-sensor").is_disabled()
+    assert "no single register" in page.inner_text("#sensor-told")
+
+
+def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
+    look(page, "CubeStar")
+    page.click("#read-sensor")
+    page.wait_for_selector("#sensor-told >> text=/ differ from their default$/")
+    assert page.locator("#sensor-rows tr").count() == 9
+    page.click("#settings summary >> text=image sensor register")
+    row = page.locator("#sensor-rows tr", has_text="CLOCKS_PER_SECOND")
+    assert len(row.locator("td").nth(0).inner_text()) == 8
+    assert page.locator("#read-registers").is_disabled()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
