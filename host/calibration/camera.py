@@ -50,6 +50,10 @@ class Camera:
         y_d = y * radial + 2 * self.p2 * x * y + self.p1 * (r2 + 2 * y * y)
         return np.stack([self.cx_px + self.f_px * x_d, self.cy_px + self.f_px * y_d], axis=-1)
 
+    def directions(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Pixels (n, 2) of directions (n, 3) in camera axes that point ahead."""
+        return self.project(vectors[:, :2] / vectors[:, 2:])
+
     def unproject(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points X/Z, Y/Z (..., 2) of pixels (..., 2), by fixed-point iteration.
 

@@ -16,7 +16,10 @@ from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.host.clients.cubesense.client import CubeSense, direction
+from cubestack.host.pictures.labels import Box
 from cubestack.host.pictures.overlay import Mark, Overlay
+from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Sheet
+from cubestack.host.pictures.stretch import stretched
 
 SCALE = 2
 INSET_SCALE = 16
@@ -24,7 +27,8 @@ INSET_MARGIN = 4
 LIMB_POINTS = 180
 EDGE = (255, 90, 90)
 FITTED = (120, 255, 120)
-AXIS = (120, 170, 255)
+WIDEST_DEG = 90.0
+"""Of the grid: half of what the lens images."""
 
 Pixels = NDArray[np.float64]
 
@@ -79,23 +83,39 @@ def overlay(cubesense: CubeSense, picture: str) -> Overlay:
 
 
 def annotate_nadir(
-    picture: NDArray[np.uint8], edges: Pixels, fitted: tuple[float, float, float] | None, path: Path
+    picture: NDArray[np.uint8],
+    edges: Pixels,
+    fitted: tuple[float, float, float] | None,
+    path: Path,
+    title: str = "nadir camera",
+    truth: tuple[float, float] | None = None,
 ) -> None:
     """Write the nadir ``picture`` (480, 640) with its ``edges`` (n, 2) and the ``fitted`` Earth.
 
-    ``fitted`` is alpha, beta and angular radius in degrees, None when there is no fit.
+    ``fitted`` is alpha, beta and angular radius in degrees, None when there is no fit; the radius
+    is 0 where the program tells none. ``truth`` is alpha and beta of the Earth's true centre, where
+    that is known. ``title`` is what it shows.
     """
-    image, draw = _canvas(picture)
-    _cross(draw, pixel(Camera.NADIR, np.array([[0.0, 0.0, 1.0]]))[0], 6, AXIS)
-    if fitted is not None:
-        rim = [tuple(SCALE * (point + 0.5)) for point in limb(*fitted)]
-        draw.line([*rim, rim[0]], fill=FITTED, width=1)
-        centre = pixel(Camera.NADIR, direction(*fitted[:2])[None])[0]
-        _cross(draw, centre, 10, FITTED)
+    sheet = _sheet(picture, Camera.NADIR)
+    legend = [Entry("circle", EDGE, "edge found on a scanned line")]
+    told = f"{len(edges)} edges found"
     for edge in edges:
-        x, y = SCALE * (edge + 0.5)
-        draw.ellipse((x - 4, y - 4, x + 4, y + 4), outline=EDGE, width=2)
-    image.save(path)
+        sheet.mark("circle", edge, EDGE, 0.35)
+    if fitted is None:
+        told += "; no Earth found"
+    else:
+        sheet.mark("cross", _seen(Camera.NADIR, fitted[:2]), FITTED, 0.7)
+        legend.append(Entry("cross", FITTED, "centre found"))
+        told += f"; centre at {_angles(fitted[:2])}"
+        if fitted[2] > 0:
+            sheet.outline(limb(*fitted), FITTED)
+            legend.append(Entry("line", FITTED, "limb fitted"))
+            told += f", radius {fitted[2]:.2f}°"
+        else:
+            told += " (this program tells no radius)"
+    told += _true(sheet, legend, Camera.NADIR, truth)
+    legend.append(Entry("cross", GRID, "boresight, angles from it"))
+    sheet.save(path, title, told, legend)
 
 
 def annotate_sun(
@@ -103,62 +123,84 @@ def annotate_sun(
     first: tuple[int, int],
     angles: tuple[float, float] | None,
     path: Path,
+    title: str = "sun camera",
+    truth: tuple[float, float] | None = None,
 ) -> None:
     """Write the sun ``picture`` (480, 640) with the window at its ``first`` Sun pixel.
 
-    ``angles`` are alpha and beta in degrees, None when the Sun was not found. The window is shown
-    once more, enlarged, in the corner of the picture that is farthest from it.
+    ``angles`` are alpha and beta in degrees, None when the Sun was not found; ``truth`` the true
+    ones, where they are known. The window is shown once more, enlarged, in the corner of the
+    picture that is farthest from it.
     """
-    image, draw = _canvas(picture)
-    _cross(draw, pixel(Camera.SUN, np.array([[0.0, 0.0, 1.0]]))[0], 6, AXIS)
+    sheet = _sheet(picture, Camera.SUN)
+    legend: list[Entry] = []
+    told = "no Sun found" if angles is None else f"Sun at {_angles(angles)}"
     if angles is not None:
-        centre = pixel(Camera.SUN, direction(*angles)[None])[0]
-        left, top = FULL_SIZE.window_origin(*first)
         side = FULL_SIZE.window
-        draw.rectangle(
-            (SCALE * left, SCALE * top, SCALE * (left + side), SCALE * (top + side)), outline=EDGE
-        )
-        _cross(draw, centre, 12, FITTED)
-        _inset(image, picture, (left, top), centre)
-    image.save(path)
+        origin = FULL_SIZE.window_origin(*first)
+        corners = np.array([[0, 0], [side, 0], [side, side], [0, side]]) + origin - 0.5
+        sheet.outline(corners, EDGE)
+        sheet.mark("cross", _seen(Camera.SUN, angles), FITTED, 0.7)
+        legend.append(Entry("square", EDGE, "window that is read, enlarged in the corner"))
+        legend.append(Entry("cross", FITTED, "centroid found"))
+    told += _true(sheet, legend, Camera.SUN, truth)
+    legend.append(Entry("cross", GRID, "boresight, angles from it"))
+    if angles is not None:
+        centre = _seen(Camera.SUN, angles)
+        true = None if truth is None else _seen(Camera.SUN, truth)
+        sheet.blocked.append(_inset(sheet.image, picture, origin, centre, true))
+    sheet.save(path, title, told, legend)
 
 
-def _canvas(picture: NDArray[np.uint8]) -> tuple[Image.Image, ImageDraw.ImageDraw]:
-    rows, columns = picture.shape
-    image = Image.fromarray(picture).resize((SCALE * columns, SCALE * rows), Image.Resampling.BOX)
-    image = image.convert("RGB")
-    return image, ImageDraw.Draw(image)
+def _sheet(picture: NDArray[np.uint8], camera: Camera) -> Sheet:
+    sheet = Sheet(stretched(picture, gamma=1.0), SCALE)
+    sheet.grid(lambda vectors: pixel(camera, vectors), WIDEST_DEG)
+    return sheet
 
 
-def _cross(draw: ImageDraw.ImageDraw, at: Pixels, arm: float, colour: tuple[int, int, int]) -> None:
-    x, y = SCALE * (at + 0.5)
-    draw.line((x - arm, y, x + arm, y), fill=colour)
-    draw.line((x, y - arm, x, y + arm), fill=colour)
+def _seen(camera: Camera, angles: tuple[float, float]) -> Pixels:
+    """Column and row at which a camera sees alpha and beta, deg."""
+    place: Pixels = pixel(camera, direction(*angles)[None])[0]
+    return place
+
+
+def _angles(angles: tuple[float, float]) -> str:
+    return f"alpha {angles[0]:+.2f}°, beta {angles[1]:+.2f}°"
+
+
+def _true(
+    sheet: Sheet, legend: list[Entry], camera: Camera, truth: tuple[float, float] | None
+) -> str:
+    """Mark the truth, if it is known; returns what is told of it."""
+    if truth is None:
+        return ""
+    sheet.mark("ticks", _seen(camera, truth), TRUTH, 1.4)
+    legend.append(Entry("ticks", TRUTH, "truth (not told to the device)"))
+    return f"; truth {_angles(truth)}"
 
 
 def _inset(
-    image: Image.Image, picture: NDArray[np.uint8], origin: tuple[int, int], centre: Pixels
-) -> None:
-    """Put the window, enlarged, where it hides nothing of interest."""
+    image: Image.Image,
+    picture: NDArray[np.uint8],
+    origin: tuple[int, int],
+    centre: Pixels,
+    truth: Pixels | None,
+) -> Box:
+    """Put the window, enlarged, where it hides nothing of interest; returns where."""
     rows, columns = picture.shape
     side = FULL_SIZE.window + 2 * INSET_MARGIN
     left = min(max(origin[0] - INSET_MARGIN, 0), columns - side)
     top = min(max(origin[1] - INSET_MARGIN, 0), rows - side)
-    size = side * INSET_SCALE
-    part = Image.fromarray(picture[top : top + side, left : left + side])
-    part = part.resize((size, size), Image.Resampling.BOX).convert("RGB")
-    draw = ImageDraw.Draw(part)
-    x, y = (INSET_SCALE * (origin[0] - left), INSET_SCALE * (origin[1] - top))
-    width = INSET_SCALE * FULL_SIZE.window
-    draw.rectangle((x, y, x + width, y + width), outline=EDGE)
-    x, y = INSET_SCALE * (centre + 0.5 - (left, top))
-    draw.line((x - 12, y, x + 12, y), fill=FITTED, width=2)
-    draw.line((x, y - 12, x, y + 12), fill=FITTED, width=2)
-    draw.rectangle((0, 0, size - 1, size - 1), outline=AXIS)
-    image.paste(
-        part,
-        (
-            0 if origin[0] > columns / 2 else image.width - size,
-            0 if origin[1] > rows / 2 else image.height - size,
-        ),
-    )
+    part = Sheet(picture[top : top + side, left : left + side], INSET_SCALE)
+    x, y = origin[0] - left - 0.5, origin[1] - top - 0.5
+    wide = FULL_SIZE.window
+    part.outline(np.array([[x, y], [x + wide, y], [x + wide, y + wide], [x, y + wide]]), EDGE)
+    part.mark("cross", centre - (left, top), FITTED, 1.2)
+    if truth is not None:
+        part.mark("ticks", truth - (left, top), TRUTH, 2.1)
+    size = part.image.width
+    ImageDraw.Draw(part.image).rectangle((0, 0, size - 1, size - 1), outline=GRID, width=2)
+    x = 0 if origin[0] > columns / 2 else image.width - size
+    y = 0 if origin[1] > rows / 2 else image.height - size
+    image.paste(part.image, (x, y))
+    return Box(x, y, x + size, y + size)

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.host.clients.aramis.client import Aramis, Attitude
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
 from cubestack.host.experiments.demo import Demo, download, tell_times
+from cubestack.host.experiments.star_truth import true_stars
 from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.terminal import console
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion
 ROUGHLY_OFF_DEG = 2.0
+MOST_STARS = int(INTERFACE.telecommand("SetDetection").reset_values()["MaxStars"])
+"""Stars that are kept of a picture, at most."""
 
 
 def show(
@@ -29,6 +33,7 @@ def show(
     board: Sequence[str],
 ) -> bool:
     """Measure twice and download; returns whether both measurements were conclusive."""
+    from cubestack.emulator.camera.mt9m001.lens import CONDITION
     from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
 
     demo = Demo(out, "aramis-sky", "star tracker without FPGA: Orion, 21.5 deg, 2026")
@@ -45,9 +50,13 @@ def show(
         _report(f"with a direction {ROUGHLY_OFF_DEG:g}° off", aided, truth)
         tell_times(aramis.phase_times(), "  ")
         stars = aramis.stars()
+        left_out = [f"all but the {MOST_STARS} brightest"] if len(stars) >= MOST_STARS else []
         picture = download("the picture over the serial line", aramis.image)
     save_picture(picture, out / "aramis-raw.png")
-    annotate(picture, stars, out / "aramis-stars.png")
+    lens = CONDITION.optics.project
+    told = true_stars(truth, lens, picture.shape)
+    title = "AraMiS, rendered sky: Orion, 2026"
+    annotate(picture, stars, out / "aramis-stars.png", title, left_out, lens, told)
     demo.finish("aramis-raw.png", "aramis-stars.png")
     return lost.valid and aided.valid
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 SUN_DEG = (20.0, 10.0)
 NADIR_DEG = (-8.0, 12.0)
+SUN_TITLE = "CubeSense, sun camera: the Sun through a fisheye lens"
+NADIR_TITLE = "CubeSense, nadir camera: the Earth from 750 km through a fisheye lens"
 PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}
 """CubeSense thesis, section 7.4: from imaging to centroid, mean of 100; shown beside ours."""
 
@@ -68,7 +70,7 @@ def _measure(
         f"the {name} picture over the bench port", lambda shown: bench.download(camera, shown)
     )
     save_picture(picture, out / f"{name}-raw.png")
-    _annotate(cubesense, measured, picture, out / f"{name}.png")
+    _annotate(cubesense, measured, picture, truth, out / f"{name}.png")
     return measured.detected
 
 
@@ -89,14 +91,18 @@ def _report(measured: Measurement, truth: tuple[float, float], phases_ms: dict[s
 
 
 def _annotate(
-    cubesense: CubeSense, measured: Measurement, picture: NDArray[np.uint8], path: Path
+    cubesense: CubeSense,
+    measured: Measurement,
+    picture: NDArray[np.uint8],
+    truth: tuple[float, float],
+    path: Path,
 ) -> None:
     details = cubesense.details(measured.camera)
     angles = (measured.alpha_deg, measured.beta_deg) if measured.detected else None
     if measured.camera is Camera.SUN:
         first = (int(details["FirstX"]), int(details["FirstY"]))
-        annotate_sun(picture, first, angles, path)
+        annotate_sun(picture, first, angles, path, SUN_TITLE, truth)
         return
     radius_deg = float(details["Radius"]) / PIXELS_PER_DEGREE
     fitted = None if angles is None else (*angles, radius_deg)
-    annotate_nadir(picture, cubesense.edges(), fitted, path)
+    annotate_nadir(picture, cubesense.edges(), fitted, path, NADIR_TITLE, truth)

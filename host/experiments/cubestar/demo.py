@@ -16,7 +16,9 @@ from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
 from cubestack.host.experiments.demo import Demo, download, tell_times
+from cubestack.host.experiments.star_truth import true_stars
 from cubestack.host.pictures.images import annotate, save_picture
+from cubestack.host.pictures.sheet import Lens
 from cubestack.host.terminal import console
 
 if TYPE_CHECKING:
@@ -53,6 +55,14 @@ class _Subject:
     scene: str
     truth: NDArray[np.float64]
     camera: Path | None = None
+
+    def lens(self) -> Lens:
+        """The lens that took the picture: the camera file's, or the emulated camera's own."""
+        if self.camera is not None:
+            return load_camera(self.camera).cropped(*CROP).directions
+        from cubestack.emulator.camera.mlx75412.lens import LENS
+
+        return LENS.project
 
 
 def show(
@@ -126,14 +136,30 @@ def _show(
         tell_times({name: phases[name] for name in PUBLISHED_PHASES})
         console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)
         stars = cubestar.stars()
+        left_out = left_out_by(cubestar)
         picture = download("the picture over the serial line", cubestar.stream_image)
         uptime = cubestar.client.telemetry("Identification")
     pictures = f"{subject.name}-raw.png", f"{subject.name}-stars.png"
     save_picture(picture, out / pictures[0])
-    annotate(picture, stars, out / pictures[1])
+    lens = subject.lens()
+    truth = true_stars(subject.truth, lens, picture.shape)
+    annotate(picture, stars, out / pictures[1], f"CubeStar, {subject.title}", left_out, lens, truth)
     virtual_s = int(uptime["RuntimeSeconds"]) + int(uptime["RuntimeMilliseconds"]) / 1000
     demo.finish(*pictures, virtual_s=virtual_s)
     return attitude.valid
+
+
+def left_out_by(cubestar: CubeStar) -> list[str]:
+    """What the latest detection saw and did not take, and why, for a picture's caption."""
+    summary = cubestar.client.telemetry("DetectionSummary")
+    most = int(cubestar.client.telemetry("MaxStars")["maxStars"])
+    told = [
+        f"{int(summary['AmountOfNoise'])} spots too small",
+        f"{int(summary['NumInvalidStars'])} too large",
+    ]
+    if int(summary["NumStarsDetected"]) >= most:
+        told.append(f"all after star {most}, where the search stops")
+    return told
 
 
 def _report(found: Attitude, truth: NDArray[np.float64]) -> None:

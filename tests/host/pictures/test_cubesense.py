@@ -10,7 +10,15 @@ from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.scene.earth_sun import Target
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import direction
-from cubestack.host.pictures.cubesense import annotate_nadir, annotate_sun, limb, pixel
+from cubestack.host.pictures.cubesense import (
+    EDGE,
+    FITTED,
+    annotate_nadir,
+    annotate_sun,
+    limb,
+    pixel,
+)
+from cubestack.host.pictures.sheet import TRUTH
 
 BACKGROUND = 34
 
@@ -37,9 +45,35 @@ def test_nadir_picture_marks_edges_and_works_without_a_fit(tmp_path: Path) -> No
     annotate_nadir(picture, edges, None, tmp_path / "edges.png")
     annotate_nadir(picture, edges, (0.0, 0.0, 63.5), tmp_path / "both.png")
     marked, fitted = (np.asarray(Image.open(tmp_path / f"{n}.png")) for n in ("edges", "both"))
-    assert marked.shape == (960, 1280, 3)
-    assert np.any(marked[92:112, 192:212, 0] > 200)
-    assert np.count_nonzero(fitted != marked) > 1000
+    assert marked.shape[0] > 960
+    assert marked.shape[1:] == (1280, 3)
+    assert np.all(marked[92:112, 192:212].max(axis=(0, 1)) == EDGE)
+    assert np.count_nonzero(fitted[:960] != marked[:960]) > 1000
+
+
+def test_a_program_without_a_radius_gets_no_limb_drawn(tmp_path: Path) -> None:
+    picture, edges = np.full((480, 640), BACKGROUND, np.uint8), np.zeros((0, 2))
+    green = []
+    for name, radius_deg in (("without", 0.0), ("with", 63.5)):
+        annotate_nadir(picture, edges, (0.0, 0.0, radius_deg), tmp_path / f"{name}.png", "nadir")
+        drawn = np.asarray(Image.open(tmp_path / f"{name}.png"))[:960]
+        green.append(int(np.all(drawn == FITTED, axis=2).sum()))
+    assert green[0] < 150 < 1000 < green[1]
+
+
+def test_truth_is_marked_where_it_is_and_only_when_known(tmp_path: Path) -> None:
+    picture = np.full((480, 640), BACKGROUND, np.uint8)
+    truth = (20.0, 10.0)
+    annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "not.png")
+    annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "true.png", "sun", truth)
+    unknown, known = (
+        np.all(np.asarray(Image.open(tmp_path / f"{name}.png"))[:960] == TRUTH, axis=2)
+        for name in ("not", "true")
+    )
+    assert not unknown.any()
+    rows, columns = np.nonzero(known)
+    middle = 2 * (pixel(Camera.SUN, direction(*truth)[None])[0] + 0.5)
+    np.testing.assert_allclose((columns.mean(), rows.mean()), middle, atol=1.5)
 
 
 @pytest.mark.parametrize("at", [(5, 5), (600, 20), (320, 470), (639, 479)])
@@ -56,4 +90,5 @@ def test_sun_that_was_not_found_has_no_window(tmp_path: Path) -> None:
     picture = np.full((480, 640), BACKGROUND, np.uint8)
     annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "s.png")
     drawn = np.asarray(Image.open(tmp_path / "s.png"))
-    assert np.count_nonzero(drawn != BACKGROUND) < 200  # the boresight's cross alone
+    assert not np.any(np.all(drawn == EDGE, axis=2))
+    assert not np.any(np.all(drawn == FITTED, axis=2))

@@ -1,0 +1,34 @@
+"""Where stars truly are in a picture: for marks that people see, never for a device."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.host.pictures.images import TrueStar
+from cubestack.host.pictures.sheet import Lens
+
+BRIGHT = 3.8
+"""Magnitude V below which stars are marked: CubeStar's published star list ends there."""
+
+
+def true_stars(
+    quaternion: NDArray[np.float64], lens: Lens, shape: tuple[int, ...]
+) -> list[TrueStar]:
+    """Stars brighter than V = 3.8 in a picture (rows, columns), at their places of 2026.
+
+    Args:
+        quaternion: the true attitude (4,), scalar last, inertial to camera.
+        lens: that took the picture.
+        shape: of the picture.
+    """
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion
+    from cubestack.emulator.scene.hipparcos import load_sky
+
+    sky = load_sky(mag_limit=BRIGHT)
+    seen = sky.vectors @ matrix_from_quaternion(quaternion).T
+    ahead = seen[:, 2] > 0
+    places = lens(seen[ahead])
+    inside = np.all((places >= 0) & (places <= np.array(shape[::-1]) - 1), axis=1)
+    return [
+        TrueStar(int(number), float(x), float(y))
+        for number, (x, y) in zip(sky.hip[ahead][inside], places[inside], strict=True)
+    ]

@@ -1,0 +1,69 @@
+"""Labels: never over one another, over a mark, or beyond the picture, whatever the star field."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from cubestack.host.pictures.labels import Box, Wanted, distance, place
+
+FRAME = Box(0, 0, 1024, 512)
+
+
+def field(seed: int) -> tuple[list[Wanted], list[Box]]:
+    """Random stars, some in clusters, some at the edge, and their marks."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 60))
+    at = rng.uniform((0, 0), (1024, 512), (count, 2))
+    if seed % 2:
+        at = np.clip(at[0] + rng.normal(0, 40, (count, 2)), 0, (1024, 512))
+    wanted = [
+        Wanted(float(x), float(y), 10.0, float(width), 18.0)
+        for (x, y), width in zip(at, rng.uniform(20, 130, count), strict=True)
+    ]
+    return wanted, [Box(w.x - 10, w.y - 10, w.x + 10, w.y + 10) for w in wanted]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_no_label_is_over_another_or_over_a_mark_or_outside(seed: int) -> None:
+    wanted, marks = field(seed)
+    boxes = place(wanted, FRAME, marks)
+    assert len(boxes) == len(wanted)
+    placed = [box for box in boxes if box is not None]
+    assert not any(one.overlaps(other) for one, other in combinations(placed, 2))
+    assert not any(box.overlaps(mark) for box in placed for mark in marks)
+    assert all(box.within(FRAME) for box in placed)
+    for box, label in zip(boxes, wanted, strict=True):
+        if box is not None:
+            assert box.right - box.left == pytest.approx(label.width)
+            near = max(box.left - label.x, label.x - box.right, box.top - label.y)
+            assert near < 60  # beside its own mark
+
+
+def test_stars_far_from_one_another_all_get_their_labels_at_the_right() -> None:
+    wanted = [Wanted(200.0 * i + 50, 100, 10, 80, 18) for i in range(4)]
+    boxes = place(wanted, FRAME)
+    assert all(
+        box is not None and box.left > label.x for box, label in zip(boxes, wanted, strict=True)
+    )
+
+
+def test_a_label_is_nearest_to_its_own_mark_where_it_can_be() -> None:
+    row = [Wanted(100.0 + 26 * i, 100, 10, 70, 18) for i in range(3)]
+    marks = [Box(w.x - 10, w.y - 10, w.x + 10, w.y + 10) for w in row]
+    for number, box in enumerate(place(row, FRAME, marks)):
+        assert box is not None
+        distances = [distance(box, label) for label in row]
+        assert distances[number] == min(distances)
+
+
+def test_a_label_without_room_is_left_out_and_the_first_ones_stay() -> None:
+    crowded = [Wanted(50, 50, 10, 80, 18)] * 40
+    boxes = place(crowded, FRAME)
+    assert boxes[0] is not None
+    assert None in boxes
+
+
+def test_boxes_that_touch_do_not_overlap() -> None:
+    assert not Box(0, 0, 10, 10).overlaps(Box(10, 0, 20, 10))
+    assert Box(0, 0, 10, 10).overlaps(Box(9, 9, 20, 20))
