@@ -10,7 +10,7 @@ import subprocess
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from vcd.reader import TokenKind, VCDParseError, tokenize
 
@@ -19,6 +19,8 @@ VIEWERS = ("gtkwave", "surfer")
 
 #: Seconds in a VCD file's units of time.
 _PS = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3, "ps": 1}
+
+CHANGES = (TokenKind.CHANGE_SCALAR, TokenKind.CHANGE_VECTOR, TokenKind.CHANGE_STRING)
 
 
 class Trace(NamedTuple):
@@ -101,12 +103,11 @@ def read(path: Path, count: int = 20, internal: bool = False) -> Trace:
                         names.setdefault(token.var.id_code, []).append(name)
                 elif token.kind is TokenKind.CHANGE_TIME:
                     time, changes = token.time_change * unit, {}
-                elif token.kind in (TokenKind.CHANGE_SCALAR, TokenKind.CHANGE_VECTOR):
-                    scalar = token.kind is TokenKind.CHANGE_SCALAR
-                    change = token.scalar_change if scalar else token.vector_change
+                elif token.kind in CHANGES:
+                    change: Any = token.data
                     if not changes and change.id_code in names:
                         moments.append((time, changes))
-                    value = change.value  # a number, or binary with unknown bits
+                    value = change.value  # a number, a text, or binary with unknown bits
                     for name in names.get(change.id_code, ()):
                         levels[name] = f"{value:x}" if isinstance(value, int) else value
                         changes[name] = levels[name]

@@ -1,0 +1,100 @@
+"""Block diagrams as SVG: boxes on a grid, and lines between neighbours."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import NamedTuple
+
+ACROSS, DOWN, BOX_WIDTH, BOX_HEIGHT, MARGIN = 280, 118, 140, 60, 16
+"""Pixels: from one column and row of the grid to the next, a box, and around all."""
+
+STYLE = (
+    "text{fill:#111;text-anchor:middle;font-size:13px}.title{font-weight:bold}"
+    ".label{font-size:10.5px;fill:#444}.box{fill:#eef3fb;stroke:#1a4f9c}"
+    ".line{stroke:#333;stroke-width:1.3;fill:none}"
+)
+HEAD = (
+    '<defs><marker id="head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" '
+    'markerHeight="7" orient="auto-start-reverse"><path d="M0 0L8 4L0 8z" fill="#333"/>'
+    "</marker></defs>"
+)
+
+
+class Block(NamedTuple):
+    """A box: column and row on the grid, its title, and a line below it."""
+
+    column: float
+    row: float
+    title: str
+    label: str = ""
+
+
+class Line(NamedTuple):
+    """A connection of two neighbours in a row or column.
+
+    Its label's lines stand above and below it; ``both`` puts an arrow's head on either end.
+    """
+
+    source: str
+    target: str
+    label: str
+    both: bool = False
+
+
+def blocks(boxes: Mapping[str, Block], lines: Sequence[Line]) -> str:
+    """The diagram; ValueError for a line between boxes of neither one row nor one column."""
+    columns = max(box.column for box in boxes.values())
+    rows = max(box.row for box in boxes.values())
+    width = 2 * MARGIN + columns * ACROSS + BOX_WIDTH
+    height = 2 * MARGIN + rows * DOWN + BOX_HEIGHT
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
+        f'font-family="sans-serif"><style>{STYLE}</style>{HEAD}',
+        f'<rect width="{width:g}" height="{height:g}" fill="white"/>',
+    ]
+    for line in lines:
+        parts += _line(boxes[line.source], boxes[line.target], line)
+    for box in boxes.values():
+        x, y = _corner(box)
+        middle = x + BOX_WIDTH / 2
+        parts += [
+            f'<rect class="box" x="{x:g}" y="{y:g}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" '
+            'rx="6"/>',
+            _text("title", middle, y + (26 if box.label else 35), box.title),
+            _text("label", middle, y + 45, box.label),
+        ]
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def _corner(box: Block) -> tuple[float, float]:
+    return MARGIN + box.column * ACROSS, MARGIN + box.row * DOWN
+
+
+def _line(source: Block, target: Block, line: Line) -> list[str]:
+    heads = 'marker-end="url(#head)"' + (' marker-start="url(#head)"' if line.both else "")
+    (x, y), (to_x, to_y) = _corner(source), _corner(target)
+    above, _, below = line.label.partition("\n")
+    if source.row == target.row:
+        right = to_x > x
+        start, end = (x + BOX_WIDTH, to_x) if right else (x, to_x + BOX_WIDTH)
+        level, middle = y + BOX_HEIGHT / 2, (start + end) / 2
+        return [
+            f'<path class="line" d="M{start:g} {level:g}H{end:g}" {heads}/>',
+            _text("label", middle, level - 7, above),
+            _text("label", middle, level + 16, below),
+        ]
+    if source.column == target.column:
+        down = to_y > y
+        start, end = (y + BOX_HEIGHT, to_y) if down else (y, to_y + BOX_HEIGHT)
+        middle, level = x + BOX_WIDTH / 2, (start + end) / 2
+        return [
+            f'<path class="line" d="M{middle:g} {start:g}V{end:g}" {heads}/>',
+            f'<text class="label" x="{middle + 8:g}" y="{level:g}" style="text-anchor:start">'
+            f"{escape(above)}</text>",
+            f'<text class="label" x="{middle + 8:g}" y="{level + 14:g}" '
+            f'style="text-anchor:start">{escape(below)}</text>',
+        ]
+    raise ValueError(f"{line.source} and {line.target} stand neither in one row nor one column")
+
+
+def _text(kind: str, x: float, y: float, text: str) -> str:
+    return f'<text class="{kind}" x="{x:g}" y="{y:g}">{escape(text)}</text>' if text else ""
