@@ -9,7 +9,7 @@ from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.table import UartCorrupt, UartDelay, UartDrop
 from cubestack.emulator.faults.wire import LineFaults
-from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 BAUD = 10_000
 BYTE_PS = 10**9
@@ -127,3 +127,21 @@ def test_a_tap_at_the_device_hears_what_the_device_does() -> None:
     line.uart.taps.append(Tap())
     line.both()
     assert tapped == [byte ^ 1 for byte in SENT]
+
+
+def test_a_byte_that_began_under_a_fault_is_hit_though_another_one_comes_meanwhile() -> None:
+    line = Line()
+    line.inject(UartDrop(direction="to-device"), 0, 0.5)
+    line.uart.host_writes(b"a")
+    line.kernel.advance_to(round(0.7 * BYTE_PS))
+    line.inject(UartDrop(direction="to-host"), 50, 60)
+    line.kernel.advance_to(2 * BYTE_PS)
+    assert line.heard == []
+
+
+def test_faults_that_ended_long_ago_are_forgotten() -> None:
+    line = Line()
+    for number in range(100):
+        line.inject(UartDrop(), 250 * number, 250 * number + 0.5)  # in ms
+        line.kernel.advance_to((number + 1) * PS_PER_S // 4)
+    assert 4 <= len(line.faults.injections) <= 6

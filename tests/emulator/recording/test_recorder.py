@@ -193,3 +193,15 @@ def test_what_was_done_meanwhile_is_done_again(tmp_path):
     assert done == [(PS_PER_MS, Control(PS_PER_MS, ("scene", "x.toml"), "text"))]
     with pytest.raises(ValueError, match=r"a\.rec: scene x\.toml can not be done here"):
         Device().replay(recording)
+
+
+def test_a_transfer_that_fails_in_another_way_is_named(tmp_path):
+    device, path = Device(), tmp_path / "a.rec"
+    transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
+    with recorded(path, device), pytest.raises(I2cError):
+        device.kernel.run(device.kernel.process(transfer))
+    recording = load_recording(path)
+    other = Device()
+    other.bus._targets.clear()  # nobody there: 6, ENXIO
+    (difference,) = other.replay(recording)
+    assert difference.endswith("errno 6, recorded 5")

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.image_sensor import SETTLE_US
 from cubestack.firmware_model.cubestar.pictures import ITERATION_US
 from cubestack.firmware_model.cubestar.program import RESET_LEAD_US
 from cubestack.firmware_model.interface.cubestar import ResetCause
@@ -276,3 +277,14 @@ def test_phases_of_the_last_picture_survive_a_reset(unit: Harness) -> None:
     assert before["Capture"] == pytest.approx(FRAME_US, abs=10)
     unit.command("MCUReset")
     assert unit.telemetry("PhaseTimes") == before
+
+
+def test_a_camera_that_was_never_set_up_is_waited_for_after_a_reset(unit: Harness) -> None:
+    """It may have got its supply only now; one that was set up has long settled."""
+    times_us = []
+    for commands in (("MCUReset",), ("CaptureImage", "MCUReset")):
+        unit.command(*commands[:-1])
+        start_us = unit.now_us
+        unit.command(commands[-1])
+        times_us.append(unit.now_us - start_us)
+    assert times_us[0] - times_us[1] == pytest.approx(SETTLE_US, abs=100)

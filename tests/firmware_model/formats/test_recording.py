@@ -73,3 +73,13 @@ def test_what_is_no_recording(tmp_path, text, reason):
         recording.load_recording(path)
     assert "\n" not in str(raised.value)
     assert "some.rec" in str(raised.value)
+
+
+def test_a_part_ends_with_what_begins_at_its_end():
+    begun = [recording.LineError(time_ps, "uart") for time_ps in (5, 10, 11)]
+    whole = recording.Recording("a", "cubestar", events=tuple(begun))
+    assert [whole.until(end_ps).events for end_ps in (4, 10, 11)] == [
+        (),
+        tuple(begun[:2]),
+        tuple(begun),
+    ]

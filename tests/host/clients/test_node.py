@@ -43,6 +43,15 @@ def test_answers_may_come_in_pieces_behind_noise(
     assert client.telemetry("powerstatus")["Current"] == 177
 
 
+def test_what_came_behind_an_answer_is_not_taken_for_the_next_one(
+    client: NodeClient, uart: Any
+) -> None:
+    uart.mangle = lambda data: data + encode_frame(b"\x07")
+    assert client.telemetry("TcmdProcessed") == {"Processed": 1}
+    uart.mangle = lambda data: data
+    assert client.telemetry("TcmdProcessed") == {"Processed": 1}
+
+
 def test_a_late_answer_is_not_taken_for_the_next_one(client: NodeClient, uart: Any) -> None:
     uart.pending += encode_frame(b"\x07")
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}

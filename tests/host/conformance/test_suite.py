@@ -304,3 +304,27 @@ def test_comparison_shows_the_first_difference():
     failed = CheckResult("a", Verdict.FAILED, "why", ("Gain=1",))
     assert compare(runs(one), runs(failed)) == "a: passed on x, failed on x (why)"
     assert compare(runs(one), runs()) == "a: only on x"
+
+
+@pytest.mark.parametrize(("here", "there"), [(2, 1), (1, 2)])
+def test_comparison_shows_that_one_observed_fewer_values(here, there):
+    one, other = (
+        CheckResult("a", Verdict.PASSED, "", ("Gain=1", "Gain=2")[:n]) for n in (here, there)
+    )
+    assert compare(runs(one), runs(other)) == f"a: {here} values on x, not on x"
+
+
+@pytest.mark.parametrize("name", ["Identification", "StarDetails"])
+def test_what_changes_something_is_asked_for_once_even_if_it_is_late(good, uart, monkeypatch, name):
+    run, now_s, asked = suite(good, uart), [0.0], []
+    message, answer = good.interface.telemetry(name), good.answer
+    monkeypatch.setattr(run, "now_s", lambda: now_s[0])
+
+    def slow(payload):
+        asked.append(payload)
+        now_s[0] += 0.1
+        return answer(payload)
+
+    monkeypatch.setattr(good, "answer", slow)
+    run.telemetry(message)
+    assert len(asked) == (1 if name == "StarDetails" else 3)

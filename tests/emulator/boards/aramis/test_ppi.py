@@ -146,3 +146,34 @@ def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> Non
     assert ends == [(pytest.approx(ends_s * PS_PER_S, abs=2), FrameEnd.STORED)]
     assert ppi.stored.readout_ps == pytest.approx(starts_s * PS_PER_S)
     assert target.min() > 0
+
+
+@pytest.mark.parametrize("wrong", range(ROWS))
+def test_one_wrong_line_anywhere_spoils_a_frame_and_not_the_next_one(wrong: int) -> None:
+    """A frame of pieces, one of which has lines of another length; then the frame begins anew."""
+    bench = Bench()
+    lines = Pieces(wrong)
+    bench.ppi = Ppi(bench.kernel, lines)
+    bench.ppi.on_end = lambda end: bench.ends.append((bench.kernel.now, end))
+    bench.ppi.start(bench.target)
+    assert [end for _, end in bench.run(FRAME)] == [FrameEnd.WRONG_LINES]
+    lines.wrong = None
+    bench.ppi.start(bench.target)
+    assert [end for _, end in bench.run(FRAME)][1:] == [FrameEnd.STORED]
+
+
+class Pieces(Lines):
+    """Each line comes by itself; line ``wrong`` is too short."""
+
+    def __init__(self, wrong: int | None) -> None:
+        super().__init__(ROWS * LINE)
+        self.wrong = wrong
+
+    def segment_at(self, time_ps: int) -> StreamSegment | None:
+        whole = super().segment_at(time_ps)
+        if whole is None or not whole.vsync:
+            return whole
+        row = (time_ps - int(whole.start_ps)) // (LINE * PERIOD)
+        start = whole.start_ps + row * LINE * PERIOD
+        pixels = np.ones((1, COLUMNS - (row == self.wrong)), np.uint8)
+        return StreamSegment(start, LINE, 1, 1, lambda: pixels)

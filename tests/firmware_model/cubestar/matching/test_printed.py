@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.identification import MatchOutcome
 from cubestack.firmware_model.cubestar.matching.tracking import REACH_DEG, track
-from cubestack.firmware_model.cubestar.matching.voting import DEFAULT_MARGIN_RAD, identify
+from cubestack.firmware_model.cubestar.matching.voting import (
+    CUT_RADIUS_DEG,
+    DEFAULT_MARGIN_RAD,
+    identify,
+)
 
 from ..sky import meter, pinhole
 
@@ -75,3 +79,21 @@ def test_tracks_what_is_nearest(catalogue: StarCatalogue, shoot: Shoot) -> None:
     field = pinhole()
     verified = track(directions, catalogue, attitude, meter(), field=field)
     assert 0 not in verified.matched
+
+
+def test_the_cut_holds_a_field_s_radius_and_the_error_of_a_rough_boresight() -> None:
+    assert CUT_RADIUS_DEG == 30 + 5  # sections 4.3.4, 5.3.4
+
+
+def test_four_of_the_fewest_stars_are_not_needed(catalogue: StarCatalogue) -> None:
+    """Three that agree are an identification (section 4.3.5), two are none."""
+    near = np.argsort(-catalogue.vectors @ catalogue.vectors[0])[:40]
+    for stars in combinations(near.tolist(), 3):
+        found = identify(catalogue.vectors[list(stars)], catalogue, meter())
+        if found.outcome is MatchOutcome.IDENTIFIED:
+            break
+    else:
+        pytest.fail("no three stars were identified")
+    assert len(found.matched) == 3
+    two = identify(catalogue.vectors[list(stars[:2])], catalogue, meter())
+    assert two.outcome is MatchOutcome.TOO_FEW_CENTROIDS
