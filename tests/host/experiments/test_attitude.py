@@ -14,11 +14,14 @@ from cubestack.firmware_model.interface.cubestar.codes import Reason
 from cubestack.host.clients.quality import AttitudeQuality, common
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.attitude import (
+    AttitudeExperiment,
+    AttitudeResult,
     axis_errors_deg,
     claims,
     compare,
     count_wrong,
     is_right,
+    percentile_95,
     rough_boresight,
 )
 from cubestack.host.experiments.measure import experiment_of
@@ -109,3 +112,31 @@ def test_a_report_shows_where_on_the_sky_it_was_right() -> None:
     (section,) = tested.sections(results)
     assert section.png.startswith(b"\x89PNG")
     assert list(tested.sections([{**results[0], "truth": None}])) == []
+
+
+def test_errors_of_either_sign_are_as_large() -> None:
+    assert percentile_95(iter([-100.0, None, 0.0, -100.0])) == pytest.approx(100.0)
+    assert percentile_95(iter([None])) is None
+
+
+def test_the_share_within_a_claim_takes_errors_of_either_sign() -> None:
+    errors = [0.5, -0.5, 2.0, -2.0, 5.0, -5.0]
+    results = [
+        AttitudeResult(
+            **compare(TRUTH, TRUTH),
+            centroids=9,
+            matched=9,
+            wrong=0,
+            mode="lis",
+            reason=None,
+            false_alarm=None,
+            sigma_deg=[1.0] * 3,
+            error_deg=[error] * 3,
+            phase_ms={},
+            wall_ms=1.0,
+            status="",
+        )
+        for error in errors
+    ]
+    lines = list(AttitudeExperiment.summarise(experiment_of(device("cubestar")), results, 1.0))
+    assert any("33 % are within the claimed sigma, 66.7 % within three" in line for line in lines)

@@ -92,6 +92,17 @@ def test_a_dead_camera_is_noticed_at_its_control_bus(star: Star, good: np.ndarra
 
 
 @pytest.mark.fault("camera-dead")
+def test_of_two_deaths_the_longer_one_counts(star: Star) -> None:
+    star.inject("camera-dead", for_s=1.0)
+    star.inject("camera-dead", for_s=0.1)
+    star.client.pause(0.5)
+    assert star.capture() == ("CAPTURE_FAILED", {"ISSetupError"})
+    star.client.pause(0.6)
+    star.client.command("ClearErrorFlags")
+    assert star.capture() == GOOD
+
+
+@pytest.mark.fault("camera-dead")
 def test_a_camera_that_dies_while_storing_is_set_up_again(star: Star) -> None:
     star.faults.inject("camera-dead", at_s=STORING_S)
     assert star.capture() == ("CAPTURE_FAILED", {"ImageCaptureError", "ISDisableError"})

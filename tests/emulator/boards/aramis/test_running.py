@@ -79,6 +79,17 @@ def test_the_loop_runs_at_1_hz(active: Desk) -> None:
     assert active.client.telemetry("LoopStatus")["Iterations"] == done
 
 
+def test_iterations_that_come_late_are_counted(active: Desk) -> None:
+    """A measurement takes longer than the period: no turn but the first is in time."""
+    active.command("SetExposure", Rows=16_383)  # 520 ms
+    active.client.command("StartLoop", Period=400, Mode=MeasurementMode.LOST_IN_SPACE)
+    active.client.pause(10.0)
+    status = active.client.telemetry("LoopStatus")
+    assert status["Iterations"] >= 5
+    assert status["LateIterations"] in (status["Iterations"], status["Iterations"] - 1)
+    assert "TimingError" in active.flags()
+
+
 def test_below_a_second_the_next_frame_comes_while_the_last_one_is_worked_on(active: Desk) -> None:
     active.client.command("StartLoop", Period=600, Mode=MeasurementMode.LOST_IN_SPACE)
     active.client.pause(6.05)

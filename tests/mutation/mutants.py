@@ -1,0 +1,94 @@
+"""Mutants of Python modules: one expression or statement changed, as a slip would change it."""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+PARTS = ("firmware_model", "emulator", "host")
+
+COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
+SIGNS: dict[type[ast.operator], type[ast.operator]] = {ast.Add: ast.Sub, ast.Sub: ast.Add}
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """``text`` is the whole module; ``path`` is relative to the project."""
+
+    path: Path
+    line: int
+    before: str
+    after: str
+    text: str
+
+    def __str__(self) -> str:
+        before, after = (" ".join(part.split())[:60] for part in (self.before, self.after))
+        return f"{self.path}:{self.line}: {before} -> {after}"
+
+
+def modules(root: Path) -> list[Path]:
+    """Those of the three parts, relative to ``root``, in order."""
+    found = (path for part in PARTS for path in (root / part).rglob("*.py"))
+    return sorted(path.relative_to(root) for path in found)
+
+
+def mutants(path: Path, text: str) -> list[Mutant]:
+    """All of one module, in the order of its lines; a module that does not parse raises."""
+    starts = [0]
+    for line in text.encode().splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+    code, found = text.encode(), []
+    for node, after in _changes(ast.parse(text)):
+        end_line, end_column = node.end_lineno or 0, node.end_col_offset or 0
+        first = starts[node.lineno - 1] + node.col_offset
+        last = starts[end_line - 1] + end_column
+        changed = (code[:first] + after.encode() + code[last:]).decode()
+        found.append(Mutant(path, node.lineno, code[first:last].decode(), after, changed))
+    return sorted(found, key=lambda mutant: mutant.line)
+
+
+def _changes(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
+    """Nodes, and what stands there instead."""
+    for node in _nodes(tree):
+        match node:
+            case ast.Compare(left, [operator], [right]) if type(operator) in COMPARISONS:
+                other = COMPARISONS[type(operator)]()
+                yield node, f"({ast.unparse(ast.Compare(left, [other], [right]))})"
+            case ast.BinOp(left, operator, right) if type(operator) in SIGNS:
+                other_sign = SIGNS[type(operator)]()
+                yield node, f"({ast.unparse(ast.BinOp(left, other_sign, right))})"
+            case ast.AugAssign(target, operator, value) if type(operator) in SIGNS:
+                yield node, ast.unparse(ast.AugAssign(target, SIGNS[type(operator)](), value))
+            case ast.Constant(value) if isinstance(value, int | float) and value is not True:
+                if value is not False:
+                    yield node, f"({value + 1!r})"
+            case ast.Expr(ast.Call() | ast.Yield() | ast.YieldFrom()) | ast.Raise():
+                yield node, "pass"
+            case ast.Return(value) if value is not None:
+                yield node, "pass"
+        if isinstance(node, ast.If | ast.While | ast.IfExp):
+            yield node.test, f"(not ({ast.unparse(node.test)}))"
+
+
+def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """All but annotations, f-strings, whose parts have no places, and what only types need."""
+    for name, value in ast.iter_fields(tree):
+        if name in ("annotation", "returns") or isinstance(tree, ast.JoinedStr):
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+                continue
+            if isinstance(child, ast.AST):
+                yield child
+                yield from _nodes(child)

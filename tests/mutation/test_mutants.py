@@ -1,0 +1,52 @@
+"""What the mutants are, and which tests they have to face."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.mutation.__main__ import ROOT, chosen, files_for
+from tests.mutation.mutants import modules, mutants
+
+HERE = Path("a.py")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a < b", ["(a <= b)"]),
+        ("a + b", ["(a - b)"]),
+        ("a -= b", ["a += b"]),
+        ("f(7)", ["pass", "f((8))"]),
+        ("if a:\n    f()", ["if (not (a)):\n    f()", "if a:\n    pass"]),
+        ("def f():\n    return a", ["def f():\n    pass"]),
+        ("raise a", ["pass"]),
+        ("a = 'é', b is None", ["a = 'é', (b is not None)"]),
+        ("a: Literal[3] = True", []),
+        ("a = f'{b + 1}'", []),
+        ("def f(a: Literal[1]) -> Literal[2]: ...", []),
+    ],
+)
+def test_mutants_of_a_text(text: str, expected: list[str]) -> None:
+    assert sorted(m.text for m in mutants(HERE, text)) == sorted(expected)
+
+
+def test_every_mutant_is_a_program_and_another_one() -> None:
+    for path in modules(ROOT)[::40]:
+        text = (ROOT / path).read_text("utf-8")
+        for mutant in mutants(path, text)[::20]:
+            assert ast.dump(ast.parse(mutant.text)) != ast.dump(ast.parse(text)), mutant
+
+
+def test_the_seed_decides() -> None:
+    folder = Path("firmware_model/attitude")
+    one, same, other = ([str(m) for m in chosen(folder, seed)] for seed in (1, 1, 2))
+    assert one == same != other
+    assert sorted(one) == sorted(other)
+
+
+def test_the_mirror_image_comes_first() -> None:
+    found = files_for(Path("firmware_model/attitude/quest.py"))
+    assert found[0] == Path("tests/firmware_model/attitude/test_quest.py")
+    assert Path("tests/firmware_model/attitude/test_field.py") in found
+    assert all((ROOT / file).is_file() for file in found)
