@@ -19,7 +19,8 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.host.experiments.cubestar.demo import left_out_by
 from cubestack.host.experiments.seen import picture_of
 from cubestack.host.experiments.star_truth import true_stars
-from cubestack.host.pictures.images import star_sheet
+from cubestack.host.pictures.images import IDENTIFIED, UNKNOWN, star_sheet
+from cubestack.host.pictures.sheet import GRID, PAPER, PLATE, TEXT, TRUTH
 
 FRAMES = 28
 EVERY_S = 4.0
@@ -29,7 +30,8 @@ RATE_DEG_S = (0.0, 0.25, 0.0)
 START_DEG = (98.0, -6.0, 20.0)
 WIDTH_PX = 640
 SHOWN_MS = 220
-COLOURS = 24
+GREYS, SHADES = 8, 3
+"""Of the palette: greys, and steps from black to each colour of a mark."""
 
 
 def main(path: Path, frames: int) -> None:
@@ -66,6 +68,17 @@ def main(path: Path, frames: int) -> None:
     print(f"{path}: {path.stat().st_size} bytes, in {time.monotonic() - started:.1f} s")
 
 
+def palette_colours() -> list[tuple[int, ...]]:
+    """What the sheets are drawn in, with steps in between for smooth edges."""
+    greys = [(255 * step // (GREYS - 1),) * 3 for step in range(GREYS)]
+    shades = [
+        tuple(part * step // SHADES for part in colour)
+        for colour in (IDENTIFIED, UNKNOWN, TRUTH, GRID, TEXT)
+        for step in range(1, SHADES + 1)
+    ]
+    return [*greys, PAPER, PLATE, *shades]
+
+
 def save(sheets: list[Image.Image], path: Path) -> None:
     """Write a GIF that repeats: frames of one size, few colours, without dither."""
     height = max(sheet.height for sheet in sheets)
@@ -75,7 +88,8 @@ def save(sheets: list[Image.Image], path: Path) -> None:
         whole.paste(sheet, (0, 0))
         size = (WIDTH_PX, round(WIDTH_PX * height / sheet.width))
         small.append(whole.resize(size, Image.Resampling.LANCZOS))
-    palette = small[0].quantize(COLOURS, Image.Quantize.MEDIANCUT)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for colour in palette_colours() for part in colour])
     drawn = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in small]
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=SHOWN_MS, loop=0)
 

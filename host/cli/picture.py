@@ -1,7 +1,8 @@
 """Make the picture that a star tracker takes of the sky at a known attitude.
 
 The emulated camera exposes it as its firmware asks for, with lens, noise and what else
-a scene file says; the file holds its grey values unchanged. Where the device takes
+a scene file says; the file holds its grey values unchanged, unless --stretched makes
+faint stars visible to the eye. Where the device takes
 uploaded pictures, its client's `upload_image` puts it into the memory of a real one.
 
 examples:
@@ -36,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, metavar="FILE", help="TOML scene; its pose counts")
     parser.add_argument("--mag-limit", type=float, metavar="V", help="only brighter stars")
     parser.add_argument("--seed", type=whole(0), default=0, help="of the noise (default 0)")
+    parser.add_argument(
+        "--stretched", action="store_true", help="lift faint stars for the eye; not for uploads"
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.png")
 
 
@@ -44,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.camera.common.star_sensor import StarSensor
     from cubestack.host.clients.quaternions import pointing_deg
     from cubestack.host.pictures.images import save_picture
+    from cubestack.host.pictures.stretch import SKY, stretched
 
     if args.out.suffix.lower() != ".png":
         raise ValueError(f"--out must end in .png, not be {args.out}")
@@ -54,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         picture, truth = camera.rendered, camera.scene.truth(emulated.board.kernel.now)
         assert picture is not None
     try:
-        save_picture(picture, args.out)
+        save_picture(stretched(picture, SKY) if args.stretched else picture, args.out)
     except OSError as error:
         raise ValueError(f"can not write {args.out}: {error.strerror}") from None
     rows, columns = picture.shape

@@ -11,7 +11,7 @@ BRIGHT = 3.8
 
 
 def true_stars(
-    quaternion: NDArray[np.float64], lens: Lens, shape: tuple[int, ...]
+    quaternion: NDArray[np.float64], lens: Lens, shape: tuple[int, ...], within_deg: float = 90.0
 ) -> list[TrueStar]:
     """Stars brighter than V = 3.8 in a picture (rows, columns), at their places of 2026.
 
@@ -19,13 +19,14 @@ def true_stars(
         quaternion: the true attitude (4,), scalar last, inertial to camera.
         lens: that took the picture.
         shape: of the picture.
+        within_deg: angle from the boresight beyond which a shade keeps light away, at most 90.
     """
     from cubestack.emulator.scene.attitude import matrix_from_quaternion
     from cubestack.emulator.scene.hipparcos import load_sky
 
     sky = load_sky(mag_limit=BRIGHT)
     seen = sky.vectors @ matrix_from_quaternion(quaternion).T
-    ahead = seen[:, 2] > 0
+    ahead = seen[:, 2] > max(0.0, float(np.cos(np.radians(within_deg))))
     places = lens(seen[ahead])
     inside = np.all((places >= 0) & (places <= np.array(shape[::-1]) - 1), axis=1)
     return [

@@ -99,7 +99,7 @@ def star_sheet(
         missed = sum(
             not np.any(np.hypot(*(at - (true.x_px, true.y_px)).T) < NEAR_PX) for true in truth
         )
-        told.append(f"{missed} of the {len(truth)} bright stars in the field were not found")
+        told.append(f"{len(truth) - missed} of the {len(truth)} bright stars in the field found")
         legend.append(Entry("ticks", TRUTH, "bright star's true place (not told to the device)"))
     if lens is not None:
         legend.append(Entry("cross", GRID, "boresight, angles from it"))

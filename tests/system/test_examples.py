@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.host.devices.emulated import open_device
@@ -135,3 +136,12 @@ def test_a_part_of_an_orbit_is_flown(tmp_path: Path) -> None:
     rows = (tmp_path / "results.csv").read_text().splitlines()
     assert len(rows) == 7
     assert (tmp_path / "errors.png").stat().st_size > 10_000
+
+
+def test_a_slew_is_animated(tmp_path: Path) -> None:
+    path = tmp_path / "slew.gif"
+    call = [sys.executable, HERE / "slew_animation.py", path, "3"]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    assert "3 frames, 3 of them with an attitude" in done.stdout
+    with Image.open(path) as drawn:
+        assert (drawn.n_frames, drawn.width) == (3, 640)

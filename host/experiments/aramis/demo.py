@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.aramis import INTERFACE
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.host.clients.aramis.client import Aramis, Attitude
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
@@ -50,12 +51,15 @@ def show(
         _report(f"with a direction {ROUGHLY_OFF_DEG:g}° off", aided, truth)
         tell_times(aramis.phase_times(), "  ")
         stars = aramis.stars()
+        switches = aramis.profile()
         left_out = [f"all but the {MOST_STARS} brightest"] if len(stars) >= MOST_STARS else []
+        if isinstance(switches, AramisSwitches) and switches.belief == "unique":
+            left_out.append("names of stars outside the triangle that was unique")
         picture = download("the picture over the serial line", aramis.image)
     save_picture(picture, out / "aramis-raw.png")
     lens = CONDITION.optics.project
-    told = true_stars(truth, lens, picture.shape)
-    title = "AraMiS, rendered sky: Orion, 2026"
+    told = true_stars(truth, lens, picture.shape, CONDITION.optics.field_stop_deg / 2)
+    title = "AraMiS (star tracker), rendered sky: Orion, 2026"
     annotate(picture, stars, out / "aramis-stars.png", title, left_out, lens, told)
     demo.finish("aramis-raw.png", "aramis-stars.png")
     return lost.valid and aided.valid

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.calibration.camera import load_camera
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import Attitude, CubeStar
@@ -143,7 +144,15 @@ def _show(
     save_picture(picture, out / pictures[0])
     lens = subject.lens()
     truth = true_stars(subject.truth, lens, picture.shape)
-    annotate(picture, stars, out / pictures[1], f"CubeStar, {subject.title}", left_out, lens, truth)
+    annotate(
+        picture,
+        stars,
+        out / pictures[1],
+        f"CubeStar (star tracker), {subject.title}",
+        left_out,
+        lens,
+        truth,
+    )
     virtual_s = int(uptime["RuntimeSeconds"]) + int(uptime["RuntimeMilliseconds"]) / 1000
     demo.finish(*pictures, virtual_s=virtual_s)
     return attitude.valid
@@ -151,14 +160,21 @@ def _show(
 
 def left_out_by(cubestar: CubeStar) -> list[str]:
     """What the latest detection saw and did not take, and why, for a picture's caption."""
+    from cubestack.firmware_model.cubestar.detection.background_search import MOST_STARS_FACTOR
+
     summary = cubestar.client.telemetry("DetectionSummary")
+    found = int(summary["NumStarsDetected"])
     most = int(cubestar.client.telemetry("MaxStars")["maxStars"])
     told = [
         f"{int(summary['AmountOfNoise'])} spots too small",
         f"{int(summary['NumInvalidStars'])} too large",
     ]
-    if int(summary["NumStarsDetected"]) >= most:
+    switches = cubestar.profile()
+    assert isinstance(switches, CubeStarSwitches)
+    if switches.detection == "sampled" and found >= most:
         told.append(f"all after star {most}, where the search stops")
+    elif switches.detection != "sampled" and found >= MOST_STARS_FACTOR * most:
+        told.append(f"all but the {found} brightest")
     return told
 
 

@@ -43,6 +43,21 @@ def test_the_other_star_tracker(run: Run, tmp_path: Path) -> None:
     assert "1280 x 1024 pixels" in err
 
 
+def test_stretched_lifts_faint_stars_and_without_it_values_stay(run: Run, tmp_path: Path) -> None:
+    pictures = []
+    for words in ((), ("--stretched",)):
+        path = tmp_path / "sky.png"
+        pose = ("--ra", "84", "--dec", "-1", "--seed", "3")
+        assert run("picture", "cubestar", *pose, *words, "--out", str(path))[0] == 0
+        with Image.open(path) as picture:
+            pictures.append(np.asarray(picture).astype(int))
+    raw, shown = pictures
+    faint = (raw > np.median(raw) + 8) & (raw < 60)
+    assert faint.any()
+    assert np.all(shown[faint] > raw[faint])
+    assert np.median(shown) == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [

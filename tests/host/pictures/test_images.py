@@ -65,7 +65,7 @@ def test_the_caption_counts_what_was_found_and_what_was_left_out(
     )
     assert "2 stars found, 1 of them identified" in told
     assert "left out: 7 spots too small" in told
-    assert "1 of the 2 bright stars in the field were not found" in told
+    assert "1 of the 2 bright stars in the field found" in told
     assert "found, not identified" in legend
     assert any("true place" in text for text in legend)
 
