@@ -29,6 +29,9 @@ TRUTH: Colour = (255, 225, 70)
 PLATE: Colour = (12, 13, 16)
 """Behind names and angles, as pictures may be bright there."""
 
+PAD_PX = 2.0
+"""Of a plate, at each side of the text."""
+
 EM = 1 / 62
 """Height of the text, in widths of the picture."""
 
@@ -166,7 +169,7 @@ class Sheet:
         text: str,
         colour: Colour,
     ) -> None:
-        width = self._font.getlength(text)
+        width = self._font.getlength(text) + 2 * PAD_PX
         labels.append((Wanted(at[0], at[1], radius, width, 1.2 * self.em), text, colour))
 
     def _write_labels(self) -> int:
@@ -176,8 +179,9 @@ class Sheet:
         boxes = place([wanted for wanted, _, _ in labels], frame, self.blocked)
         for box, (_, text, colour) in zip(boxes, labels, strict=True):
             if box is not None:
-                self._draw.rectangle((box.left - 1, box.top, box.right + 1, box.bottom), fill=PLATE)
-                self._draw.text((box.left, box.top), text, colour, self._font)
+                self._draw.rectangle((box.left, box.top, box.right, box.bottom), fill=PLATE)
+                at = box.left + PAD_PX, box.top
+                self._draw.text(at, text, colour, self._font)
         return boxes[: len(self._labels)].count(None)
 
     def _cross(self, at: Pixels, arm: float, colour: Colour) -> None:

@@ -49,11 +49,12 @@ def test_stars_far_from_one_another_all_get_their_labels_at_the_right() -> None:
 
 
 def test_a_label_is_nearest_to_its_own_mark_where_it_can_be() -> None:
-    row = [Wanted(100.0 + 26 * i, 100, 10, 70, 18) for i in range(3)]
-    marks = [Box(w.x - 10, w.y - 10, w.x + 10, w.y + 10) for w in row]
-    for number, box in enumerate(place(row, FRAME, marks)):
+    pair = [Wanted(100, 100, 10, 70, 18), Wanted(124, 104, 10, 70, 18)]
+    marks = [Box(w.x - 10, w.y - 10, w.x + 10, w.y + 10) for w in pair]
+    beside = Box(0, 85, 88, 115)  # so that the first free place is right above the other mark
+    for number, box in enumerate(place(pair, FRAME, [*marks, beside])):
         assert box is not None
-        distances = [distance(box, label) for label in row]
+        distances = [distance(box, label) for label in pair]
         assert distances[number] == min(distances)
 
 
