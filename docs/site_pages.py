@@ -6,6 +6,7 @@ Hooks of mkdocs. Links that lead out of the documents lead to the repository.
 import inspect
 import re
 from argparse import _SubParsersAction
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,11 +39,16 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 def commands() -> str:
     """What ``--help`` says of each command."""
     parser = make_parser()
-    (groups,) = (one for one in parser._actions if isinstance(one, _SubParsersAction))
-    parts = ["# Commands\n", _help(parser)]
-    for name, command in groups.choices.items():
-        parts += [f"\n## cubestack {name}\n", _help(command)]
-    return "\n".join(parts)
+    return "\n".join(["# Commands\n", _help(parser), *_commands_of(parser, "##", "cubestack")])
+
+
+def _commands_of(parser: Any, heading: str, words: str) -> Iterator[str]:
+    """Headings and help of a parser's commands, and of theirs."""
+    for groups in (one for one in parser._actions if isinstance(one, _SubParsersAction)):
+        for name, command in groups.choices.items():
+            yield f"\n{heading} {words} {name}\n"
+            yield _help(command)
+            yield from _commands_of(command, heading + "#", f"{words} {name}")
 
 
 def python() -> str:

@@ -53,6 +53,13 @@ def test_every_command_and_every_public_name_is_described(site: Path) -> None:
     commands = (site / "reference-commands.html").read_text(encoding="utf-8")
     for name in (*COMMANDS, *reports()):
         assert f'id="cubestack-{name}"' in commands
+    for words in (
+        "hdl-area",
+        "hdl-wave",
+        "measure-aramis",
+        "calibrate-cubestar",
+    ):  # commands of commands
+        assert f'id="cubestack-{words}"' in commands
     names = (site / "reference-python.html").read_text(encoding="utf-8")
     for name in (name for name in cubestack.__all__ if not name.startswith("_")):
         assert f'id="{name.lower()}"' in names

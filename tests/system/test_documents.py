@@ -148,9 +148,36 @@ def test_examples_of_scenes_load(tmp_path: Path) -> None:
         load(tmp_path, picture)
 
 
+#: Every document for people; of examples their own pages.
+DOCUMENTS = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "examples").glob("*/README.md")),
+]
+
+
+def anchors(path: Path) -> set[str]:
+    """Of a document's headings, as a repository's page and the site both make them."""
+    text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    plain = (re.sub(r"[^\w\s-]", "", heading.lower()).strip() for heading in headings)
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+def test_anchors_of_links_are_headings() -> None:
+    checked = 0
+    for document in DOCUMENTS:
+        text = document.read_text(encoding="utf-8")
+        for target, anchor in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", text):
+            page = document.parent / target if target else document
+            assert page.is_file(), f"{document.name}: {target}"
+            assert anchor in anchors(page), f"{document.name}: {target}#{anchor}"
+            checked += 1
+    assert checked > 5
+
+
 def test_links_lead_somewhere() -> None:
-    documents = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    for document in documents:
+    for document in DOCUMENTS:
         text = document.read_text(encoding="utf-8")
         for target in re.findall(r"\]\(([^)#:]+)\)", text):
             assert (document.parent / target).exists(), f"{document.name}: {target}"

@@ -1,0 +1,245 @@
+"""Every block of code in README.md and docs/: it is parsed, and what can be run alone is run.
+
+What is not run is named here, with the reason. `SLOW` are those that take more than some seconds.
+"""
+
+import ast
+import re
+import shlex
+import shutil
+import subprocess
+import textwrap
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+import yaml
+
+import cubestack
+from cubestack.host.cli.main import make_parser
+from cubestack.host.devices.emulated import open_device
+from tests.conftest import Run
+
+from .conftest import ROOT, Served
+
+BLOCK = re.compile(r"^( *)```([^\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+LANGUAGES = {"sh", "python", "toml", "yaml", "text", "csv"}
+#: Dialogues and register accesses of the protocol pages, whose own tests run them.
+LANGUAGES |= {"wire", "wire-sky", "registers", "py"}
+ENVIRONMENT = re.compile(r"[A-Z_]+=\S*")
+
+
+class Code(NamedTuple):
+    """A block, or a line of one."""
+
+    document: str
+    language: str
+    text: str
+
+
+def blocks() -> Iterator[Code]:
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        for indent, language, text in BLOCK.findall(path.read_text(encoding="utf-8")):
+            shown = textwrap.dedent(text) if indent else text
+            yield Code(path.name, language, shown)
+
+
+BLOCKS = list(blocks())
+
+
+def of(language: str) -> list[Any]:
+    found = [one for one in BLOCKS if one.language == language]
+    return [pytest.param(one, id=f"{one.document}-{n}") for n, one in enumerate(found)]
+
+
+def commands() -> Iterator[tuple[str, list[str]]]:
+    """Document and words of each command of a shell; without environment, `&` and redirections."""
+    for block in BLOCKS:
+        if block.language == "sh":
+            for line in block.text.replace("\\\n", " ").splitlines():
+                for part in re.split(r";(?=\s*printf|\s*head)", line):
+                    words = shlex.split(part, comments=True)
+                    while words and ENVIRONMENT.fullmatch(words[0]):
+                        del words[0]
+                    if words:
+                        yield block.document, words
+
+
+def own() -> Iterator[tuple[str, str]]:
+    """Document and line of each command of this project."""
+    for document, words in commands():
+        if Path(words[0]).name == "cubestack":
+            last = words.index(">") if ">" in words else len(words)
+            yield document, shlex.join(word for word in words[1:last] if word != "&")
+
+
+OWN = sorted(set(own()))
+
+#: Programs that are not this project's, and what the documents do with them.
+OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", "printf", "head"}
+OTHERS |= {"", "gdb-multiarch"}  # the first one is `.`
+
+#: Commands that are parsed and not run here, and why.
+LEFT = {
+    r"\bglow\b": "a device of the text: tests/examples/test_adding_a_sensor.py",
+    r"^emulate\b|^ground\b": "serves until Ctrl-C",
+    r"/dev/ttyUSB0|\./tty": "a port that somebody has to serve",
+    r"program\.elf|picture\.elf": "needs the firmware of tests/system/test_own_firmware.py",
+    r"sky\.jpg|night/|bench/": "needs photographs",
+    r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",
+    r"^campaign (?!--list)|^upsets|^fidelity|^costs|^hdl|^bench|^layouts": "minutes to hours",
+}
+
+#: Commands that take a moment; all others that are run are slow.
+QUICK = r"^registers|^export|^catalogue|^picture|--list$|^shell|^decode|^replay|^log .*--each"
+
+RECORDED = "run.rec"
+
+
+def test_every_block_has_a_language() -> None:
+    assert len(BLOCKS) > 100
+    assert {one.language for one in BLOCKS} <= LANGUAGES
+
+
+@pytest.mark.parametrize("block", of("python"))
+def test_python_is_python(block: Code) -> None:
+    text = block.text.replace("test_...(cubestar)", "test_any(cubestar)")
+    compile(text, block.document, "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT)
+
+
+@pytest.mark.parametrize("block", of("toml"))
+def test_toml_is_toml(block: Code) -> None:
+    assert tomllib.loads(block.text)
+
+
+@pytest.mark.parametrize("block", of("yaml"))
+def test_yaml_is_yaml(block: Code) -> None:
+    assert yaml.safe_load(block.text)
+
+
+@pytest.mark.parametrize("block", of("sh"))
+def test_shell_is_shell(block: Code) -> None:
+    done = subprocess.run(["bash", "-n"], input=block.text, text=True, capture_output=True)
+    assert done.stderr == ""
+
+
+def test_other_programs_are_known_and_their_files_are_there() -> None:
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    for document, words in commands():
+        program = Path(words[0]).name
+        if program == "make":
+            named = {word for word in words[1:] if "=" not in word}
+            assert named <= targets, f"{document}: {words}"
+        elif program != "cubestack":
+            assert program in OTHERS, f"{document}: {words}"
+            for word in words[1:]:
+                if word.startswith(("examples/", "tests/")):
+                    assert (ROOT / word).exists(), f"{document}: {word}"
+
+
+@pytest.mark.parametrize(("document", "line"), OWN)
+def test_the_command_takes_it(document: str, line: str, folder: Path) -> None:
+    if re.search(r"\bglow\b", line):
+        pytest.skip("a device of the text: tests/examples/test_adding_a_sensor.py")
+    make_parser().parse_args(shlex.split(line))
+    assert document
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a reader: files that the documents name are there, with what they say."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    texts = {
+        name: next(one.text for one in BLOCKS if one.document == page and one.language == "toml")
+        for name, page in {
+            "unit.toml": "calibration.md",
+            "plan.toml": "faults.md",
+            "false-stars.toml": "campaigns.md",
+        }.items()
+    }
+    sky = 'kind = "sky"\nra_deg = 83.8\ndec_deg = -5.4\n'
+    texts |= {"sky.toml": sky, "drift.toml": sky, "sun.toml": 'kind = "earth-sun"\n'}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def runnable() -> list[Any]:
+    found = [one for one in OWN if not any(re.search(left, one[1]) for left in LEFT)]
+    return [
+        pytest.param(*one, marks=() if re.search(QUICK, one[1]) else pytest.mark.slow)
+        for one in found
+    ]
+
+
+def test_nothing_is_left_out_that_is_not_there() -> None:
+    for left in LEFT:
+        assert any(re.search(left, line) for _, line in OWN), left
+    assert len(runnable()) > 30
+
+
+@pytest.mark.parametrize(("document", "line"), runnable())
+def test_it_runs(document: str, line: str, folder: Path, run: Run) -> None:
+    words = shlex.split(line)
+    if words[:2] == ["run", "--"] and shutil.which(words[2]) is None:
+        pytest.skip(f"no {words[2]}")
+    if "--record" in words:
+        words += ["-c", "read Power"]  # in place of the reader's typing
+    elif RECORDED in words:
+        (made,) = (shlex.split(one) for _, one in OWN if f"--record {RECORDED}" in one)
+        assert run(*made, "-c", "read Power").code == 0
+    outcome = run(*words)
+    assert outcome.code == 0, f"{document}: {outcome.err}"
+
+
+def python_of(document: str, first: str) -> str:
+    """The block of Python that begins so."""
+    (text,) = (
+        one.text
+        for one in BLOCKS
+        if (one.document, one.language) == (document, "python") and one.text.startswith(first)
+    )
+    return text
+
+
+def test_the_first_script_of_the_readme(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Against what the command above it serves."""
+    (line,) = (one for _, one in OWN if one == "emulate cubestar --pty ./ttyCUBESTAR")
+    with Served(shlex.split(line)[1:], folder):
+        exec(python_of("README.md", "import cubestack"), {})
+    stars = capsys.readouterr().out.splitlines()[1:]
+    assert len(stars) >= 5
+
+
+def test_scenes_are_changed_as_their_page_says(folder: Path) -> None:
+    names: dict[str, Any] = {}
+    exec(python_of("scenes.md", "import cubestack"), names)
+    assert names["camera"].condition.temperature_c != -10  # the file's, which does not say it
+
+
+def test_profiles_are_chosen_as_their_page_says() -> None:
+    chosen = "cubestack.open_device("
+    opened = eval(python_of("profiles.md", chosen), {"cubestack": cubestack})
+    with opened:
+        assert opened.client.profile().profile == "mixed"
+        exec(python_of("profiles.md", "opened.client"), {"opened": opened})
+        assert opened.client.profile().profile == "mixed"
+
+
+def test_faults_are_made_as_their_page_says() -> None:
+    with open_device("cubesense") as device:
+        exec(python_of("faults.md", "fault = "), {"board": device.board})
+        device.wait(6)
+        device.client.client.command("CaptureOnly", Camera=1, Sram=1, Location=0)
+        device.wait(1)
+        assert any("pixel-hot" in str(event) for event in device.faults.log)
+
+
+@pytest.mark.slow
+def test_hazards_are_measured_as_their_page_says() -> None:
+    names: dict[str, Any] = {"cubestack": cubestack}
+    exec(python_of("hazards.md", "frames = "), names)
+    assert len(names["frames"]) == 20
