@@ -75,7 +75,7 @@ libraries: .venv/ready-dev
 	@$(BIN)/python -m cubestack.host.devices.libraries
 
 docs: .venv/ready-dev
-	@$(BIN)/mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 COLUMNS=90 $(BIN)/mkdocs build --strict --quiet
 	@echo "out/site/index.html"
 
 bench-engines: .venv/ready-dev

@@ -53,7 +53,8 @@ def _commands_of(parser: Any, heading: str, words: str) -> Iterator[str]:
 
 def python() -> str:
     """What ``import cubestack`` gives, with its docstrings."""
-    parts = ["# Python\n", f"```text\n{inspect.getdoc(cubestack)}\n```\n"]
+    about = str(inspect.getdoc(cubestack)).replace("::\n\n", "")
+    parts = ["# Python\n", f"```text\n{about}\n```\n"]
     for name in sorted(name for name in cubestack.__all__ if not name.startswith("_")):
         found = getattr(cubestack, name)
         parts.append(f"\n## {name}\n\n{_described(name, found)}")

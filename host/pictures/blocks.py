@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NamedTuple
 
-ACROSS, DOWN, BOX_WIDTH, BOX_HEIGHT, MARGIN = 280, 118, 140, 60, 16
+ACROSS, DOWN, BOX_WIDTH, BOX_HEIGHT, MARGIN = 296, 128, 156, 68, 16
 """Pixels: from one column and row of the grid to the next, a box, and around all."""
 
 STYLE = (
-    "text{fill:#111;text-anchor:middle;font-size:13px}.title{font-weight:bold}"
-    ".label{font-size:10.5px;fill:#444}.box{fill:#eef3fb;stroke:#1a4f9c}"
+    "text{fill:#111;text-anchor:middle;font-size:16px}.title{font-weight:bold}"
+    ".label{font-size:13px;fill:#444}.box{fill:#eef3fb;stroke:#1a4f9c}"
     ".line{stroke:#333;stroke-width:1.3;fill:none}"
 )
 HEAD = (
@@ -59,8 +59,8 @@ def blocks(boxes: Mapping[str, Block], lines: Sequence[Line]) -> str:
         parts += [
             f'<rect class="box" x="{x:g}" y="{y:g}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" '
             'rx="6"/>',
-            _text("title", middle, y + (26 if box.label else 35), box.title),
-            _text("label", middle, y + 45, box.label),
+            _text("title", middle, y + (30 if box.label else 40), box.title),
+            _text("label", middle, y + 52, box.label),
         ]
     return "\n".join([*parts, "</svg>", ""])
 
@@ -80,7 +80,7 @@ def _line(source: Block, target: Block, line: Line) -> list[str]:
         return [
             f'<path class="line" d="M{start:g} {level:g}H{end:g}" {heads}/>',
             _text("label", middle, level - 7, above),
-            _text("label", middle, level + 16, below),
+            _text("label", middle, level + 18, below),
         ]
     if source.column == target.column:
         down = to_y > y
@@ -90,7 +90,7 @@ def _line(source: Block, target: Block, line: Line) -> list[str]:
             f'<path class="line" d="M{middle:g} {start:g}V{end:g}" {heads}/>',
             f'<text class="label" x="{middle + 8:g}" y="{level:g}" style="text-anchor:start">'
             f"{escape(above)}</text>",
-            f'<text class="label" x="{middle + 8:g}" y="{level + 14:g}" '
+            f'<text class="label" x="{middle + 8:g}" y="{level + 16:g}" '
             f'style="text-anchor:start">{escape(below)}</text>',
         ]
     raise ValueError(f"{line.source} and {line.target} stand neither in one row nor one column")

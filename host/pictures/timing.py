@@ -8,14 +8,14 @@ from typing import NamedTuple
 LANE, HIGH, LEFT, WIDTH, TOP = 34, 18, 150, 840, 34
 """Pixels: height of a lane and of a level in it, names, time axis, and above the lanes."""
 
-CHARACTER = 7
+CHARACTER = 8
 """Pixels of a character of a value, at least."""
 
 PS_PER = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3}
 
 STYLE = (
-    "text{fill:#111;font-size:12px}.name{text-anchor:end;font-family:monospace}"
-    ".value{text-anchor:middle;font-size:11px}.axis{text-anchor:middle;fill:#555;font-size:11px}"
+    "text{fill:#111;font-size:14px}.name{text-anchor:end;font-family:monospace}"
+    ".value{text-anchor:middle;font-size:13px}.axis{text-anchor:middle;fill:#555;font-size:13px}"
     ".wave{fill:none;stroke:#1a4f9c;stroke-width:1.4}.bus{fill:#eef3fb;stroke:#1a4f9c}"
     ".grid{stroke:#ddd}"
 )
