@@ -10,9 +10,10 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.devices.targets import Target
-from cubestack.host.errors import CommandRefusedError, HostError
+from cubestack.host.errors import CommandRefusedError, HostError, NoAnswerError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
+from cubestack.host.ground.magnitudes import magnitude
 from cubestack.host.ground.tables import (
     pointer_row,
     read_sensor_register,
@@ -36,11 +37,13 @@ LONGEST_LINE = 10_000
 @dataclass
 class Link:
     """How the link to a target is: requests, those that the device refused, those without a right
-    answer, telemetry that had to be asked for again; the last failure."""
+    answer, those of them without any in time, telemetry that had to be asked for again; the last
+    failure."""
 
     requests: int = 0
     refused: int = 0
     failed: int = 0
+    late: int = 0
     repeated: int = 0
     error: str = ""
 
@@ -117,8 +120,8 @@ class Desk:
         return self._thread.submit(lambda: {name: self._read(name) for name in names})
 
     def found(self, picture: str) -> "Future[JsonObject]":
-        """What it found in the memory called ``picture``: ``marks`` with column, row and name,
-        empty of unknown ones, and ``lines`` of columns and rows."""
+        """What it found in the memory called ``picture``: ``marks`` with column, row, name, empty
+        of unknown ones, and V magnitude, None where it has none; ``lines`` of columns and rows."""
         return self._thread.submit(self._asked, lambda: self._found(picture))
 
     def sensor_register(self, name: str) -> "Future[JsonObject]":
@@ -178,7 +181,15 @@ class Desk:
             raise ValueError(self.about["missing"]["found"])
         found = self._overlay(self._client, picture)
         return {
-            "marks": [{"x": one.x_px, "y": one.y_px, "name": one.name} for one in found.marks],
+            "marks": [
+                {
+                    "x": one.x_px,
+                    "y": one.y_px,
+                    "name": one.name,
+                    "v_mag": None if one.hipparcos is None else magnitude(one.hipparcos),
+                }
+                for one in found.marks
+            ],
             "lines": [line.tolist() for line in found.lines],
         }
 
@@ -217,6 +228,7 @@ class Desk:
             raise
         except HostError as error:
             self.link.failed += 1
+            self.link.late += isinstance(error, NoAnswerError)
             self.link.error = str(error)
             raise
         finally:

@@ -12,11 +12,12 @@ from cubestack.host.pictures.star_names import star_name
 
 @dataclass(frozen=True)
 class Mark:
-    """A place: what it is, empty where the device does not know."""
+    """A place: what it is, empty where the device does not know; a star's Hipparcos number."""
 
     x_px: float
     y_px: float
     name: str = ""
+    hipparcos: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,8 @@ def star_overlay(client: DeviceClient, _picture: str) -> Overlay:
     """Stars of the latest picture, wherever that lies; raises the client's errors."""
     return Overlay(
         [
-            Mark(star.x_px, star.y_px, "" if star.hipparcos is None else star_name(star.hipparcos))
+            Mark(star.x_px, star.y_px, name, star.hipparcos)
             for star in client.stars()
+            for name in ["" if star.hipparcos is None else star_name(star.hipparcos)]
         ]
     )

@@ -46,22 +46,23 @@ export class Lamps {
 
   hear(values) {
     for (const name of this.on)
-      for (const [flag, value] of Object.entries(values[name] ?? {})) {
+      for (const { name: flag } of this.frames.find((one) => one.name === name).flags) {
         const lamp = this.lamps.get(`${name}.${flag}`);
-        if (!lamp) continue;
-        const lit = Boolean(value);
-        lamp.className = lit ? "lit" : "";
-        lamp.setAttribute("aria-label", `${flag} ${lit ? "on" : "off"}`);
+        const value = values[name]?.[flag]; // none where the frame did not come
+        const [kind, state] =
+          value === undefined ? ["unknown", "not known"] : value ? ["lit", "on"] : ["", "off"];
+        lamp.className = kind;
+        lamp.setAttribute("aria-label", `${flag} ${state}`);
       }
   }
 
-  hearLink({ requests, failed, refused, repeated, error }) {
+  hearLink({ requests, failed, late, refused, repeated, error }) {
     const well = requests - failed - refused;
     this.link.className = failed ? "bad" : "quiet";
     const last = error ? `; the last: ${error}` : "";
     this.link.textContent =
       `link: ${requests} requests, ${well} answered, ${refused} refused, ${repeated} repeated, ` +
-      `${failed} failed${last}`;
+      `${failed} failed, ${late} of them without an answer in time${last}`;
   }
 
   hearEmulation({ currents_ma }) {

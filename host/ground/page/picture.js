@@ -1,11 +1,9 @@
 // The pictures in an emulation's memories: the newest by itself, brightened as one likes.
 
 import { choose, labelled, make } from "./dom.js";
+import { Enlarged } from "./enlarged.js";
+import { drawFound } from "./overlay.js";
 import { ask } from "./server.js";
-
-const RADIUS = 9;
-const EDGE = 4; // of a mark whose name all others have too
-const LARGEST = 8;
 
 export class Pictures {
   // `path` leads to the target.
@@ -13,7 +11,6 @@ export class Pictures {
     this.path = path;
     this.known = {};
     this.found = { marks: [], lines: [] };
-    this.zoom = 1;
     this.late = false;
     this.name = choose([], { id: "picture-name", onchange: () => this.fetch() });
     this.newest = make("input", { type: "checkbox", checked: true, id: "newest" });
@@ -25,17 +22,27 @@ export class Pictures {
       title: none ?? "read over the wire after each picture; they are those of its latest one",
       onchange: () => this.find(),
     });
+    this.magnitudes = make("input", {
+      type: "checkbox",
+      id: "magnitudes",
+      disabled: Boolean(none),
+      title: none ?? "V of the stars that have a name",
+      onchange: () => this.drawFound(),
+    });
     const stretch = { type: "range", min: 0, max: 1, step: 0.02, value: 0.6, id: "stretch" };
     this.stretch = make("input", { ...stretch, oninput: () => this.draw() });
     this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
     this.canvas.onmousemove = (event) => this.point(event);
-    this.frame = make("div", { className: "frame", id: "frame-of-picture", tabIndex: 0 });
-    this.frame.setAttribute("aria-label", "picture; + and - enlarge it, arrow keys move it");
-    this.frame.append(this.canvas);
-    this.frame.onkeydown = ({ key }) => {
-      if (key === "+" || key === "-") this.enlarge(key === "+" ? 2 : 0.5, 0.5, 0.5);
-    };
-    this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    this.enlarged = new Enlarged(this.canvas, () => this.drawFound());
+    this.untold = make("p", { className: "quiet", id: "untold" });
+    const key = (kind, text) => make("li", { className: kind, textContent: text });
+    this.legend = make(
+      "ul",
+      { id: "found-legend", hidden: true },
+      key("known", "known"),
+      key("unknown", "found, not known"),
+      key("fitted", "fitted, or a window"),
+    );
     this.value = make("p", { className: "quiet", textContent: "no picture yet" });
     place.append(
       make(
@@ -44,10 +51,14 @@ export class Pictures {
         labelled("memory", this.name),
         labelled("the newest", this.newest, { className: "beside" }),
         labelled("what it found", this.marks, { className: "beside" }),
+        labelled("magnitudes", this.magnitudes, { className: "beside" }),
         labelled("brightness", this.stretch),
       ),
-      this.frame,
+      this.enlarged.place,
+      this.enlarged.buttons,
+      this.legend,
       this.value,
+      this.untold,
     );
     if (about.missing.controls) this.value.textContent = about.missing.controls;
   }
@@ -64,6 +75,7 @@ export class Pictures {
     if (changed.length) {
       this.late = true; // what it finds in a new picture comes when it is done with that
       this.found = { marks: [], lines: [] };
+      this.legend.hidden = true;
     }
     if (changed.includes(this.name.value)) this.fetch();
     else if (this.late && !busy) this.find();
@@ -72,16 +84,18 @@ export class Pictures {
   async find() {
     this.late = false;
     this.found = { marks: [], lines: [] };
+    this.legend.hidden = true;
     if (this.marks.checked)
       try {
         this.found = await ask(`${this.path}/found/${encodeURIComponent(this.name.value)}`);
         const { marks } = this.found;
         const known = marks.filter((mark) => mark.name).length;
         this.value.textContent = `${marks.length} found, ${known} of them known`;
+        this.legend.hidden = false;
       } catch (error) {
         this.value.textContent = error.message;
       }
-    this.draw();
+    this.drawFound();
   }
 
   async fetch() {
@@ -110,47 +124,14 @@ export class Pictures {
     }
     const pen = this.canvas.getContext("2d");
     pen.putImageData(shown, 0, 0);
-    pen.font = "13px system-ui, sans-serif";
-    pen.strokeStyle = "#78aaff";
-    pen.setLineDash([]);
-    for (const line of this.found.lines) {
-      pen.beginPath();
-      for (const [x, y] of line) pen.lineTo(x, y);
-      pen.closePath();
-      pen.stroke();
-    }
-    const often = new Set(this.found.marks.map((mark) => mark.name)).size < 2;
-    for (const { x, y, name } of this.found.marks) {
-      pen.strokeStyle = pen.fillStyle = name ? "#78ff78" : "#ff8c5a";
-      pen.setLineDash(name ? [] : [3, 3]);
-      pen.beginPath();
-      pen.arc(x, y, often && name ? EDGE : RADIUS, 0, 2 * Math.PI);
-      pen.stroke();
-      if (often && this.found.marks.length > 1) continue;
-      const width = pen.measureText(name).width;
-      const left = x + RADIUS + 3 + width > shown.width ? x - RADIUS - 3 - width : x + RADIUS + 3;
-      pen.fillText(name, left, Math.min(Math.max(y + 4, 12), shown.height - 3));
-    }
+    this.drawFound();
   }
 
-  wheel(event) {
-    if (!event.ctrlKey && !event.altKey) return; // the page scrolls
-    event.preventDefault();
-    const box = this.canvas.getBoundingClientRect();
-    const across = (event.clientX - box.left) / box.width;
-    const down = (event.clientY - box.top) / box.height;
-    this.enlarge(event.deltaY < 0 ? 1.25 : 0.8, across, down);
-  }
-
-  // By a factor, and the place at these shares of width and height stays where it is.
-  enlarge(factor, across, down) {
-    const { frame, canvas } = this;
-    const before = canvas.getBoundingClientRect();
-    this.zoom = Math.min(Math.max(this.zoom * factor, 1), LARGEST);
-    canvas.style.width = `${100 * this.zoom}%`;
-    const after = canvas.getBoundingClientRect();
-    frame.scrollLeft += across * (after.width - before.width);
-    frame.scrollTop += down * (after.height - before.height);
+  drawFound() {
+    const left = this.enlarged.drawOver((pen, place, size) =>
+      drawFound(pen, this.found, place, size, this.magnitudes.checked),
+    );
+    this.untold.textContent = left ? `${left} names have no room; enlarge it to read them` : "";
   }
 
   point(event) {

@@ -17,6 +17,14 @@ from cubestack.host.pictures.images import save_picture
 
 SOON_MS = 30_000
 
+GREEN = (
+    "() => { const c = document.querySelector('#over');"
+    "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+    "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 1] > d[i] + 60) n++;"
+    "return n }"
+)
+"""Pixels of what is drawn over the picture that are green."""
+
 pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are started once
 
 
@@ -114,19 +122,49 @@ def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
     page.check("#marks")
     line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
     page.wait_for_selector("#picture >> text=/^[1-9][0-9]* found/")
-    green = (
-        "() => { const c = document.querySelector('#canvas');"
-        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
-        "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 1] > d[i] + 60) n++;"
-        "return n }"
-    )
-    assert page.evaluate(green) > 50
+    assert page.evaluate(GREEN) > 50
+    assert page.locator("#found-legend").is_visible()
+
+
+def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
+    """By keys alone, by the wheel once it is chosen, and by the pointer."""
+    picture = page.locator("#frame-of-picture")
     wide = "document.querySelector('#canvas').clientWidth"
+    shifted = "document.querySelector('#frame-of-picture').scrollLeft"
+    page.wait_for_function("() => document.querySelector('#canvas').width === 1024")
     before = page.evaluate(wide)
-    page.press("#frame-of-picture", "+")
+    picture.press("+")
     assert page.evaluate(wide) == pytest.approx(2 * before, abs=2)
-    page.press("#frame-of-picture", "-")
+    assert page.evaluate(shifted) == pytest.approx(before / 2, abs=3)  # its middle stays
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_function(f"() => {shifted} < {before / 2 - 10}")
+    page.keyboard.press("0")
     assert page.evaluate(wide) == before
+    picture.hover()
+    page.mouse.wheel(0, -100)
+    assert page.evaluate(wide) > before
+    page.keyboard.press("0")
+    page.keyboard.press("+")
+    at = page.evaluate(shifted)
+    picture.hover()
+    box = picture.bounding_box()
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 40, box["y"] + box["height"] / 2)
+    page.mouse.up()
+    assert page.evaluate(shifted) == at - 40
+    page.click("#sizes >> text=whole")
+    assert page.evaluate(wide) == before
+
+
+def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
+    page.check("#marks")
+    line(page, "write CaptureAndProcess")
+    page.wait_for_selector("#picture >> text=/found, .* of them known/")
+    page.wait_for_function(f"() => ({GREEN})() > 50")
+    before = page.evaluate(GREEN)
+    page.check("#magnitudes")
+    # A picture that comes meanwhile has nothing to be seen until it is read.
+    page.wait_for_function(f"() => ({GREEN})() > {before}")
 
 
 def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> None:

@@ -88,7 +88,9 @@ def test_stars_are_those_that_the_device_found(served: Serving) -> None:
     summary = do(served, "read DetectionSummary")[1]["data"]["values"]
     assert len(stars) == summary["NumStarsDetected"] > 3
     assert all(0 <= star["x"] < 1024 and 0 <= star["y"] < 512 for star in stars)
-    assert any(star["name"] for star in stars)
+    (rigel,) = (star for star in stars if star["name"] == "Rigel")
+    assert rigel["v_mag"] == pytest.approx(0.18, abs=0.1)  # V of the Hipparcos catalogue
+    assert all((star["v_mag"] is None) == (star["name"] == "") for star in stars)
 
 
 @pytest.mark.parametrize(
