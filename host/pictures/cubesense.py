@@ -70,6 +70,9 @@ def overlay(cubesense: CubeSense, picture: str) -> Overlay:
         if camera is Camera.NADIR and measured.capture.stored:
             marks += [Mark(x, y, "edge") for x, y in cubesense.edges().tolist()]
             if measured.detected:
+                x, y = pixel(camera, direction(*angles)[None])[0].tolist()
+                marks.append(Mark(x, y, "nadir"))
+            if measured.detected and details["Radius"]:  # not every profile calculates it
                 lines.append(limb(*angles, float(details["Radius"]) / PIXELS_PER_DEGREE))
         elif measured.detected:
             x, y = pixel(camera, direction(*angles)[None])[0].tolist()

@@ -97,11 +97,16 @@ export class Attitude {
     for (let ra = 0; ra < 360; ra += 90) this.word(pen, `${ra / 15} h`, sky(ra, 0));
     this.word(pen, "N", sky(0, 90));
     this.word(pen, "S", sky(0, -90));
+    pen.strokeStyle = "#888";
+    pen.beginPath();
+    pen.arc(SIZE / 2, SIZE / 2, RADIUS, 0, 2 * Math.PI);
+    pen.stroke();
     if (this.truth) this.arrow(pen, this.truth, TRUE, [6, 4]);
     if (this.measured) this.arrow(pen, this.measured, MEASURED, []);
     pen.textAlign = "left";
     pen.fillStyle = MEASURED;
     pen.fillText("– answer", 8, SIZE - 34);
+    if (this.measured) this.name(pen, this.measured);
     pen.fillStyle = TRUE;
     pen.fillText("- - truth", 8, SIZE - 14);
   }
@@ -124,6 +129,15 @@ export class Attitude {
     pen.globalAlpha = near > 0 ? 1 : 0.35;
     pen.fillText(text, column, row);
     pen.globalAlpha = 1;
+  }
+
+  // What the thinner two of the lines are.
+  name(pen, { boresight, right, up }) {
+    for (const [text, side] of [["up", up], ["right", right]]) {
+      const at = boresight.map((part, i) => LENGTH * part + 1.25 * AXIS * side[i]);
+      const [column, row] = this.seen(at);
+      pen.fillText(text, column - pen.measureText(text).width / 2, row);
+    }
   }
 
   // Boresight, and up and right of the picture at its end.

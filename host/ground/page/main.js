@@ -84,7 +84,7 @@ function look(number, targets) {
   live = null; // what the parts want is told when it is there
   const transfer = new Transfer(place("wire"), path, about, tell);
   const attitude = new Attitude(place("attitude"), about);
-  const timeline = new Timeline(place("loop"), about);
+  const timeline = new Timeline(place("loop"), about, (names) => show("loop", names));
   const lamps = new Lamps(place("health"), about, (names) => show("lamps", names));
   const results = new Results(place("results"), about, (on) => want({ results: on }));
   const telemetry = new Telemetry(place("telemetry"), about, (names) => show("telemetry", names));
@@ -104,8 +104,8 @@ function look(number, targets) {
         results.hear(message.results, truth);
         attitude.hear(message.results, truth);
       }
-      const words = { ...worded(message.results), ...telemetry.words() };
-      timeline.hear(words, time_s ?? (Date.now() - begun) / 1000);
+      const time = time_s ?? (Date.now() - begun) / 1000;
+      timeline.hear(worded(message.results), message.values ?? {}, time);
       if (message.pictures) pictures.hear(message.pictures, message.emulation.busy);
       if (message.emulation) {
         emulation.hear(message.emulation);

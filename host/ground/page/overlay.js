@@ -1,7 +1,8 @@
 // What was found in a picture, drawn over it: places with their names, and lines.
 
 const RADIUS = 9; // all lengths in pixels of the screen
-const EDGE = 4; // of a mark whose name all others have too
+const EDGE = 4; // of a mark whose name many others have too
+const MANY = 3;
 const TEXT = 12;
 const GAP = 3;
 
@@ -24,34 +25,40 @@ export function drawFound(pen, { marks, lines }, place, size, magnitudes) {
     pen.closePath();
     pen.stroke();
   }
-  const often = marks.length > 1 && new Set(marks.map((mark) => mark.name)).size < 2;
-  for (const { x, y, name } of marks) {
+  const times = new Map();
+  for (const { name } of marks) times.set(name, (times.get(name) ?? 0) + 1);
+  const often = ({ name }) => name && times.get(name) >= MANY;
+  for (const mark of marks) {
+    const { x, y, name } = mark;
     pen.strokeStyle = name ? KNOWN : UNKNOWN;
     pen.setLineDash(name ? [] : [3, 3]);
     pen.beginPath();
-    pen.arc(...place(x, y), often && name ? EDGE : RADIUS, 0, 2 * Math.PI);
+    pen.arc(...place(x, y), often(mark) ? EDGE : RADIUS, 0, 2 * Math.PI);
     pen.stroke();
   }
-  return often ? 0 : write(pen, marks, place, size, magnitudes);
+  const named = marks.filter((mark) => mark.name && !often(mark));
+  const circles = marks.map((mark) => place(mark.x, mark.y));
+  return write(pen, named, circles, place, size, magnitudes);
 }
 
-function write(pen, marks, place, size, magnitudes) {
+function write(pen, marks, circles, place, size, magnitudes) {
   const faint = (mark) => mark.v_mag ?? Infinity;
   const taken = [];
   let left = 0;
   pen.fillStyle = KNOWN;
-  for (const mark of marks.filter((one) => one.name).sort((a, b) => faint(a) - faint(b))) {
+  for (const mark of marks.sort((a, b) => faint(a) - faint(b))) {
     const [x, y] = place(mark.x, mark.y);
     if (x < 0 || y < 0 || x > size.width || y > size.height) continue;
     const text = words(mark, magnitudes);
     const wide = pen.measureText(text).width;
     const aside = RADIUS + GAP;
-    const box = {
-      left: x + aside + wide <= size.width ? x + aside : x - aside - wide,
-      top: Math.min(Math.max(y - TEXT / 2, 0), size.height - TEXT),
-      wide,
-    };
-    if (taken.some((other) => meet(box, other))) {
+    const top = Math.min(Math.max(y - TEXT / 2, 0), size.height - TEXT);
+    const free = [x + aside, x - aside - wide]
+      .map((from) => ({ left: from, top, wide }))
+      .filter((box) => box.left >= 0 && box.left + wide <= size.width)
+      .filter((box) => !taken.some((other) => meet(box, other)));
+    const box = free.find((one) => !circles.some((circle) => under(one, circle))) ?? free[0];
+    if (!box) {
       left += 1;
       continue;
     }
@@ -63,6 +70,11 @@ function write(pen, marks, place, size, magnitudes) {
 
 function words({ name, v_mag }, magnitudes) {
   return magnitudes && v_mag !== null ? `${name} ${v_mag.toFixed(1)}` : name;
+}
+
+function under({ left, top, wide }, [x, y]) {
+  const across = x > left - RADIUS && x < left + wide + RADIUS;
+  return across && y > top - RADIUS && y < top + TEXT + RADIUS;
 }
 
 function meet(a, b) {

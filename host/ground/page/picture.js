@@ -131,7 +131,7 @@ export class Pictures {
     const left = this.enlarged.drawOver((pen, place, size) =>
       drawFound(pen, this.found, place, size, this.magnitudes.checked),
     );
-    this.untold.textContent = left ? `${left} names have no room; enlarge it to read them` : "";
+    this.untold.textContent = left ? `names without room: ${left}; enlarge it to read them` : "";
   }
 
   point(event) {

@@ -1,6 +1,7 @@
 // Telemetry frames as they come in, and any number in them over time.
 
 import { choose, labelled, make } from "./dom.js";
+import { named } from "./fields.js";
 import uPlot from "./vendor/uPlot.esm.js";
 
 const KEPT = 3600; // points of a plot: an hour at one a second
@@ -74,19 +75,13 @@ export class Telemetry {
     this.draw();
   }
 
-  // Of the frame that is shown, what has a name.
-  words() {
-    const named = [...this.cells].filter(([, cell]) => / \(\d+\)$/.test(cell.textContent));
-    return Object.fromEntries(named.map(([name, cell]) => [name, cell.textContent]));
-  }
-
   hear(values) {
     const shown = values[this.name.value];
     const one = this.byName.get(this.name.value);
     if (shown && one) {
       for (const field of one.fields) {
         const cell = this.cells.get(field.name);
-        cell.textContent = "error" in shown ? "–" : worded(field, shown[field.name]);
+        cell.textContent = "error" in shown ? "–" : worded(field, shown);
       }
       this.meaning.classList.toggle("bad", "error" in shown);
       this.meaning.textContent = shown.error ?? `${one.id}: ${one.meaning}`;
@@ -139,11 +134,10 @@ export class Telemetry {
   }
 }
 
-function worded(field, value) {
-  if (field.choices) {
-    const name = Object.keys(field.choices).find((one) => field.choices[one] === Number(value));
-    if (name) return `${name} (${value})`;
-  }
+function worded(field, values) {
+  const value = values[field.name];
+  const name = named(field, values);
+  if (name) return `${name} (${value})`;
   if (typeof value === "number" && !Number.isInteger(value)) return value.toPrecision(7);
   return String(value);
 }

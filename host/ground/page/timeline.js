@@ -1,83 +1,182 @@
-// Words that a device answers, task, mode or state, as bands over time.
+// Words that a device answers, task, mode or state, as bands over time: those of its results, and
+// any field of telemetry whose values have names.
 
-import { make } from "./dom.js";
+import { choose, labelled, make } from "./dom.js";
+import { hasNames, named } from "./fields.js";
 
-const SPAN_S = 60;
+const SPANS_S = [60, 300, 1800];
 const KEPT = 20_000; // changes of a word
-const ROW = 30;
-const NAMES = 110; // columns of the bands' names
+const ROW = 42;
+const TEXT = 20; // above the band
 const FOOT = 22;
 const PADDING = 32; // of what it stands in, left and right
-const COLOURS = ["#2f81f7", "#d29922", "#3fb950", "#db61a2", "#a371f7", "#f0883e", "#8b949e"];
+const COLOURS = ["#58a6ff", "#d29922", "#3fb950", "#db61a2", "#a98bf7", "#f0883e", "#9aa3af"];
+const STRIPES = 6; // a colour that comes once more is striped
 
 export class Timeline {
-  constructor(place, about) {
+  // `want(names)` says which frames are to be read again and again.
+  constructor(place, about, want) {
+    this.want = want;
     this.bands = new Map();
-    this.colours = new Map();
+    this.looks = new Map();
+    this.chosen = new Map(); // frame and field by the name of the band
+    this.fields = new Map(
+      about.telemetries
+        .filter((one) => one.supported && !one.changes)
+        .flatMap((one) => one.fields.filter(hasNames).map((field) => ({ frame: one.name, field })))
+        .map((one) => [`${one.frame}.${one.field.name}`, one]),
+    );
+    const none = !this.fields.size;
+    this.field = choose([...this.fields.keys()], { id: "band", disabled: none });
+    this.span = choose(
+      SPANS_S.map((span) => ({ value: String(span), textContent: `${span} s` })),
+      { id: "span", onchange: () => this.draw() },
+    );
+    const add = make("button", {
+      id: "add-band",
+      type: "button",
+      textContent: "Add band",
+      disabled: none,
+      onclick: () => this.choose(this.field.value),
+    });
+    this.buttons = make("div", { className: "row", id: "bands" });
     this.told = make("p", { className: "quiet", id: "timeline-told" });
-    this.canvas = make("canvas", { id: "timeline", width: 300, height: ROW, role: "img" });
+    this.canvas = make("canvas", { id: "timeline", width: 300, height: 1, role: "img" });
     this.canvas.setAttribute("aria-label", "words that the device answered over time");
-    place.append(this.told, this.canvas);
-    this.told.textContent = about.missing.results
-      ? "shows what is shown in telemetry"
-      : `last ${SPAN_S} s`;
+    this.legend = make("ul", { id: "timeline-legend" });
+    place.append(
+      make("div", { className: "row" }, labelled("field", this.field), add, labelled("last", this.span)),
+      this.buttons,
+      this.told,
+      this.canvas,
+      this.legend,
+    );
+    this.none = none ? `${about.device} has no words in telemetry` : null;
+    this.want([]);
+    if (about.missing.results && !none) this.choose(this.field.value);
+    new ResizeObserver(() => this.draw()).observe(this.told);
   }
 
-  // Words by name, at a time in seconds.
-  hear(words, time) {
+  choose(name) {
+    if (this.chosen.has(name)) return;
+    this.chosen.set(name, this.fields.get(name));
+    const remove = make("button", {
+      type: "button",
+      textContent: `${name} ×`,
+      ariaLabel: `remove the band ${name}`,
+      onclick: () => {
+        this.chosen.delete(name);
+        this.bands.delete(name);
+        remove.remove();
+        this.field.focus();
+        this.wanted();
+        this.draw();
+      },
+    });
+    this.buttons.append(remove);
+    this.wanted();
+  }
+
+  wanted() {
+    this.want([...new Set([...this.chosen.values()].map((one) => one.frame))]);
+  }
+
+  // Words by name, and telemetry by frame, at a time in seconds.
+  hear(words, frames, time) {
     if (this.time > time) this.bands.clear(); // it went back
     this.time = time;
-    for (const [name, word] of Object.entries(words)) {
+    const found = { ...words };
+    for (const [name, { frame, field }] of this.chosen) {
+      const values = frames[frame];
+      if (values?.[field.name] === undefined) continue;
+      found[name] = named(field, values) ?? String(values[field.name]);
+    }
+    for (const [name, word] of Object.entries(found)) {
       const changes = this.bands.get(name) ?? [];
       this.bands.set(name, changes);
       const last = changes.at(-1);
-      if (last?.word === word) last.until = time;
-      else changes.push({ from: last?.until ?? time, until: time, word });
+      if (last) last.until = time;
+      if (last?.word !== word) changes.push({ from: time, until: time, word });
       if (changes.length > KEPT) changes.shift();
     }
-    if (this.bands.size) this.draw();
+    this.draw();
   }
 
-  colour(word) {
-    if (!this.colours.has(word))
-      this.colours.set(word, COLOURS[this.colours.size % COLOURS.length]);
-    return this.colours.get(word);
+  // Colour, and whether it is striped.
+  look(word) {
+    const number = this.looks.size;
+    if (!this.looks.has(word))
+      this.looks.set(word, [COLOURS[number % COLOURS.length], number >= COLOURS.length]);
+    return this.looks.get(word);
   }
 
   draw() {
-    const height = ROW * this.bands.size + FOOT;
-    const width = this.canvas.parentElement.clientWidth - PADDING;
+    if (!this.canvas.isConnected) return; // another target is looked at
+    const height = this.bands.size ? ROW * this.bands.size + FOOT : 1;
+    const width = Math.max(this.canvas.parentElement.clientWidth - PADDING, 1);
     if (this.canvas.height !== height) this.canvas.height = height;
     if (this.canvas.width !== width) this.canvas.width = width;
     const pen = this.canvas.getContext("2d");
-    const text = getComputedStyle(document.body).color;
-    const begin = Math.max(this.time - SPAN_S, 0);
-    const x = (time) => NAMES + ((time - begin) / SPAN_S) * (width - NAMES);
     pen.clearRect(0, 0, width, height);
+    if (!this.bands.size) {
+      this.told.textContent = this.none ?? "no word yet";
+      this.explain([]);
+      return;
+    }
+    const text = getComputedStyle(document.body).color;
+    const span = Number(this.span.value);
+    const begin = Math.max(this.time - span, 0);
+    const x = (time) => ((time - begin) / span) * width;
+    const seen = new Set();
     pen.font = "13px system-ui, sans-serif";
     pen.textBaseline = "middle";
+    pen.textAlign = "left";
     [...this.bands].forEach(([name, changes], row) => {
       const top = ROW * row;
       pen.fillStyle = text;
-      pen.fillText(name, 0, top + ROW / 2, NAMES - 8);
+      pen.fillText(name, 0, top + TEXT / 2, width);
+      pen.fillStyle = "#8883";
+      pen.fillRect(0, top + TEXT, width, ROW - TEXT - 4);
       for (const { from, until, word } of changes) {
         if (until < begin) continue;
         const left = x(Math.max(from, begin));
-        const wide = Math.max(x(until) - left, 1);
-        pen.fillStyle = this.colour(word);
-        pen.fillRect(left, top + 4, wide, ROW - 8);
-        if (pen.measureText(word).width + 8 > wide) continue;
-        pen.fillStyle = "#000";
-        pen.fillText(word, left + 4, top + ROW / 2);
+        seen.add(word);
+        this.band(pen, word, left, top + TEXT, Math.max(x(until) - left, 1), ROW - TEXT - 4);
       }
     });
+    pen.fillStyle = text;
+    pen.fillText(`${begin.toFixed(0)} s`, 0, height - FOOT / 2);
+    pen.textAlign = "right";
+    pen.fillText(`${(begin + span).toFixed(0)} s`, width, height - FOOT / 2);
     const words = [...this.bands].map(([name, changes]) => `${name} ${changes.at(-1).word}`);
     this.told.textContent = words.join(", ");
-    pen.fillStyle = text;
-    pen.textAlign = "left";
-    pen.fillText(`${begin.toFixed(0)} s`, NAMES, height - FOOT / 2);
-    pen.textAlign = "right";
-    pen.fillText(`${(begin + SPAN_S).toFixed(0)} s`, width, height - FOOT / 2);
-    pen.textAlign = "left";
+    this.explain([...seen].sort());
+  }
+
+  band(pen, word, left, top, wide, high) {
+    const [colour, striped] = this.look(word);
+    pen.fillStyle = colour;
+    pen.fillRect(left, top, wide, high);
+    pen.fillStyle = "#0006";
+    if (striped)
+      for (let at = 0; at < wide; at += 2 * STRIPES)
+        pen.fillRect(left + at, top, Math.min(STRIPES, wide - at), high);
+    if (pen.measureText(word).width + 8 > wide) return;
+    pen.fillStyle = striped ? "#fff" : "#000";
+    pen.fillText(word, left + 4, top + high / 2);
+  }
+
+  // What has no room in a band is told below.
+  explain(words) {
+    const shown = [...this.legend.children].map((one) => one.textContent);
+    if (shown.join() === words.join()) return;
+    this.legend.replaceChildren(
+      ...words.map((word) => {
+        const [colour, striped] = this.look(word);
+        const swatch = make("span", { className: striped ? "swatch striped" : "swatch" });
+        swatch.style.backgroundColor = colour;
+        return make("li", {}, swatch, word);
+      }),
+    );
   }
 }

@@ -116,6 +116,26 @@ def test_attitude_words_and_flags_are_shown(page: Any) -> None:
     assert "imager" in page.inner_text("#supplies")
 
 
+def test_any_word_of_telemetry_is_a_band(page: Any) -> None:
+    """Chosen and removed by keys; what it is now, and what its colours mean, are in words."""
+    fields = page.locator("#band option").all_inner_texts()
+    assert len(fields) > 3
+    page.select_option("#band", "AttitudeQuaternion.Mode")
+    page.press("#add-band", "Enter")
+    page.wait_for_selector("#timeline-told >> text=AttitudeQuaternion.Mode")
+    word = page.inner_text("#timeline-told").split("AttitudeQuaternion.Mode ")[1].split(",")[0]
+    assert not word.isdigit()
+    assert word in page.locator("#timeline-legend li").all_inner_texts()
+    tall = "document.querySelector('#timeline').height"
+    before = page.evaluate(tall)
+    page.press("#bands button", "Enter")
+    page.wait_for_function(f"() => {tall} < {before}")
+    assert "AttitudeQuaternion" not in page.inner_text("#timeline-told")
+    assert page.evaluate("document.activeElement.id") == "band"
+    look(page, "AraMiS")
+    assert page.locator("#band option").all_inner_texts() != fields
+
+
 def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
     look(page, "CubeSense")
     page.wait_for_selector("#attitude-told >> text=CubeSense answers no attitude")
