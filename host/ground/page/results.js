@@ -56,9 +56,9 @@ export class Results {
         "tr",
         {},
         make("th", { scope: "row", textContent: name }),
-        cell(worded(name, value)),
-        cell(known ? worded(name, true_) : ""),
-        cell(known ? turned(value - true_).toFixed(4) : ""),
+        ...(known
+          ? [worded(name, value), worded(name, true_), turned(value - true_).toFixed(4)].map(cell)
+          : [make("td", { className: "value", colSpan: 3, textContent: worded(name, value) })]),
       );
     });
     this.table.replaceChildren(...rows);
