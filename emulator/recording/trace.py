@@ -105,12 +105,12 @@ class VcdTrace:
             variable = self._writer.register_var(scope, last, "wire", size=bits, init=init)
         self._variables[name] = variable
 
-    def close(self) -> None:
-        """Write what is pending and detach."""
+    def close(self, until_ps: int | None = None) -> None:
+        """Write what is pending and detach; what begins at ``until_ps`` or later is left out."""
         vars(self._kernel).pop("step", None)
         for tap in self._taps:
             tap.close()
-        self._flush(None)
+        self._flush(until_ps)
         self._writer.close(max(self._written_ns, self._kernel.now // PS_PER_NS))
 
     def _observed_step(self) -> None:

@@ -4,12 +4,14 @@ The device is powered up like the recorded one, as the recording says: its scene
 seed and faults, and what was done to it meanwhile. --scene, --seed and --faults
 take their place, and what is not as it was is told. Exit code 0 when every byte
 came at the same time, 1 when one differs: the first one of each port is named
-with its field.
+with its field. With --trace-from or --trace-to it plays to the end of that span
+and compares nothing.
 
 examples:
   cubestack emulate {second} --record run.rec
   cubestack replay run.rec
   cubestack replay run.rec --trace run.vcd
+  cubestack replay run.rec --trace run.vcd --trace-from 2.5 --trace-to 3
 """
 
 import argparse
@@ -18,11 +20,16 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.host.cli.arguments import typed
 from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
 from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.past import Recipe
+from cubestack.host.devices.records import create_file, start_trace
+from cubestack.host.options import between
 from cubestack.host.recording.setups import setup_for
 from cubestack.host.terminal import say
+
+LATEST_S = 1e8
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,24 +38,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="another one than recorded")
     add_start_arguments(parser, seed=None, seed_help="another one than recorded")
     add_record_arguments(parser)
+    time = typed(between(0.0, LATEST_S, "a time in s"))
+    parser.add_argument("--trace-from", type=time, metavar="S", help="where --trace begins")
+    parser.add_argument("--trace-to", type=time, metavar="S", help="where --trace ends")
     parser.add_argument("--json", action="store_true", help="one object with all differences")
 
 
 def run(args: argparse.Namespace) -> int:
     """Replay and report."""
-    from cubestack.emulator.recording.replay import Replay
+    from cubestack.emulator.recording.replay import SETTLE_PS, Replay
 
+    span = _span(args)
     recording = load_recording(args.recording)
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)
     with ExitStack() as stack:
         opened = Recipe.of(recording, setup).make(args.engine)
         stack.callback(opened.close)
-        recorder = record(args, opened, stack, setup)
+        whole = argparse.Namespace(record=args.record, trace=None if span else args.trace)
+        recorder = record(whole, opened, stack, setup)
         board = opened.board
         controls = EmulatedControls(opened)
         if recorder is not None:
             controls.on_act = lambda words, text: recorder.control(board.kernel.now, words, text)
         replay = Replay(recording, board.kernel, board.uarts, board.i2c_bus, controls.act)
+        if span is not None:
+            stream = create_file(args.trace, stack)
+            board.kernel.advance_to(span[0])
+            trace = start_trace(opened, stream)
+            end_ps = span[1] or recording.end_ps + SETTLE_PS
+            board.kernel.advance_to(end_ps)
+            trace.close(end_ps)
+            return 0
         differences = replay.run(opened.device.interface)
     if args.json:
         print(json.dumps({"recording": str(args.recording), "differences": differences}))
@@ -56,3 +76,15 @@ def run(args: argparse.Namespace) -> int:
         duration_s = recording.end_ps / 1e12
         print("\n".join(differences) or f"{duration_s:.3f} s replayed: no difference")
     return int(bool(differences))
+
+
+def _span(args: argparse.Namespace) -> tuple[int, int] | None:
+    """Beginning and end of a trace in ps, 0 for the recording's; None where all is played."""
+    if args.trace_from is None and args.trace_to is None:
+        return None
+    if args.trace is None:
+        raise ValueError("--trace-from and --trace-to: of --trace, which is not there")
+    begin, end = (round((one or 0.0) * 1e12) for one in (args.trace_from, args.trace_to))
+    if args.trace_to is not None and end <= begin:
+        raise ValueError("--trace-to: behind --trace-from")
+    return begin, end

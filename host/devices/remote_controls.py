@@ -21,7 +21,7 @@ HTTP_ERRORS = 400
 TIMEOUT_S = 60.0
 """Wall time for an answer."""
 
-PATIENT = ("/run", "/back")
+PATIENT = ("/run", "/back", "/trace")
 """What takes as long as it does."""
 
 
@@ -50,7 +50,8 @@ class ControlClient:
 
     def fetch(self, method: str, path: str, body: object = None) -> bytes:
         """The answer as it is; raises as ``ask`` does."""
-        timeout_s = None if path in PATIENT else TIMEOUT_S
+        patient = path.partition("?")[0].endswith(PATIENT)
+        timeout_s = None if patient else TIMEOUT_S
         connection = http.client.HTTPConnection(*self._address, timeout=timeout_s)
         try:
             connection.request(

@@ -24,6 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cubestack.host.ground.emulation import Emulation, JsonObject
 from cubestack.host.ground.guard import TooLargeError, refused
+from cubestack.host.ground.traces import Trace
 from cubestack.host.pictures.images import png
 
 T = TypeVar("T")
@@ -43,7 +44,8 @@ class Call:
         meaning: one phrase.
         act: (emulation, values of path and body) -> the answer, in the emulation's thread; a
             future is waited for.
-        takes: types of the body's members by name; each with its default, or `REQUIRED`.
+        takes: types of the body's members by name, or of the numbers behind a GET's path; each
+            with its default, or `REQUIRED`.
     """
 
     method: str
@@ -141,6 +143,11 @@ CALLS = (
     Call("GET", "/devices/{device}/pictures/{name}", "one, as PNG", Emulation.picture),
     Call("GET", "/devices/{device}/recording", "what passed its ports", Emulation.recording),
     Call(
+        *("GET", "/devices/{device}/trace", "a VCD file of a span, done again beside"),
+        lambda emulation, device, from_s, to_s: emulation.trace(device, from_s, to_s),
+        {"from_s": (NUMBER, REQUIRED), "to_s": (NUMBER, REQUIRED)},
+    ),
+    Call(
         *("POST", "/devices/{device}/act", "what the shell's fault, scene and power do"),
         _act,
         {"words": (list, REQUIRED), "text": (str, "")},
@@ -171,13 +178,16 @@ def control_app(emulation: Emulation) -> Starlette:
 async def _answer(emulation: Emulation, call: Call, request: Request) -> Response:
     try:
         body = await request.body()
-        values = call.values(json.loads(body) if body else {}) | request.path_params
+        given = json.loads(body) if body else _query(request, call)
+        values = call.values(given) | request.path_params
         found = await _asked(emulation, partial(call.act, emulation, **values))
         if isinstance(found, Future):
             await asyncio.wrap_future(found)
             found = await _asked(emulation, emulation.state)
         if isinstance(found, np.ndarray):
             return Response(await asyncio.to_thread(png, found), media_type="image/png")
+        if isinstance(found, Trace):
+            return Response(await asyncio.to_thread(found.make), media_type="text/plain")
         if isinstance(found, tuple):
             return Response(await asyncio.to_thread(_start_of, *found), media_type="text/plain")
         return JSONResponse(found)
@@ -189,6 +199,12 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
         return refused(str(error), HTTPStatus.BAD_REQUEST)
     except RuntimeError as error:
         return refused(str(error), HTTPStatus.CONFLICT)
+
+
+def _query(request: Request, call: Call) -> JsonObject:
+    """What a GET has behind its path: numbers; ValueError for what is none."""
+    given = request.query_params if call.method == "GET" else {}
+    return {name: float(value) for name, value in given.items() if name in call.takes}
 
 
 def _start_of(path: Path, count: int) -> bytes:

@@ -15,6 +15,8 @@ from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.virtual_serial import PS_PER_S
 from cubestack.host.errors import TargetError
+from cubestack.host.ground.traces import LONGEST_S as TRACE_S
+from cubestack.host.ground.traces import Trace
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -191,6 +193,14 @@ class Emulation:
         one, past = self._of(device), self._recorded()
         path = past.file(self.emulated.index(one))
         return path, path.stat().st_size
+
+    def trace(self, device: str, from_s: float, to_s: float) -> Trace:
+        """A waveform of a span of time up to now; ValueError for another span."""
+        now_s = self.port.kernel.now / PS_PER_S
+        if not 0 <= from_s < to_s <= now_s or to_s - from_s > TRACE_S:
+            span = f"at most {TRACE_S:g} s of the time up to now, {now_s:.6f} s"
+            raise ValueError(f"a waveform has {span}, not {from_s:g} to {to_s:g} s")
+        return Trace(*self.recording(device), from_s, to_s)
 
     def _recorded(self) -> "Past":
         if isinstance(self.past, str):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -74,6 +74,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets", targets),
             Route("/targets/{number:int}/pictures/{name}", of(_picture)),
             Route("/targets/{number:int}/recording", of(_recording)),
+            Route("/targets/{number:int}/trace", of(_trace)),
             Route("/targets/{number:int}/found/{name}", of(_found)),
             Route("/targets/{number:int}/sensor-registers/{name}", of(_sensor_register)),
             Route("/targets/{number:int}/carried", of(_carried)),
@@ -97,7 +98,7 @@ async def _opened(desk: "Future[Desk]") -> Desk:
 async def _told(handler: Any, desk: Desk, request: Request) -> Response:
     """The answer of a handler, or what is wrong in words."""
     try:
-        body = json.loads(await request.body() or b"{}")
+        body = json.loads(await request.body() or b"{}") or dict(request.query_params)
         if not isinstance(body, dict):
             raise ValueError("the body is a JSON object")
         found = await handler(desk, body, request.path_params)
@@ -151,6 +152,11 @@ async def _recording(desk: Desk, _body: JsonObject, _path: JsonObject) -> Respon
     name = f'attachment; filename="{desk.target.interface.name.lower()}.rec"'
     content = await _fetched(desk, "recording")
     return Response(content, media_type="text/plain", headers={"content-disposition": name})
+
+
+async def _trace(desk: Desk, body: JsonObject, _path: JsonObject) -> Response:
+    span = urlencode([(name, body[name]) for name in ("from_s", "to_s") if name in body])
+    return Response(await _fetched(desk, f"trace?{span}"), media_type="text/plain")
 
 
 async def _download(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:

@@ -12,6 +12,7 @@ import { Settings } from "./settings.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
 import { Transfer } from "./transfer.js";
+import { Waveform } from "./waveform.js";
 
 const KEPT_LINES = 500;
 
@@ -27,6 +28,7 @@ const parts = [
   "emulation",
   "commands",
   "settings",
+  "waveform",
   "telemetry",
 ];
 const lines = document.getElementById("lines");
@@ -79,6 +81,7 @@ function look(number, targets) {
   };
   new Commands(place("commands"), about, act);
   new Settings(place("settings"), about, path, tell);
+  const waveform = new Waveform(place("waveform"), about, path, tell);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there
@@ -109,6 +112,7 @@ function look(number, targets) {
       if (message.pictures) pictures.hear(message.pictures, message.emulation.busy);
       if (message.emulation) {
         emulation.hear(message.emulation);
+        waveform.hear(message.emulation);
         lamps.hearEmulation(message.emulation);
       }
       for (const line of message.log ?? []) tell(line);

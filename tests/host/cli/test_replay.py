@@ -195,3 +195,14 @@ def test_files_that_can_not_be_opened(recording, run):
     assert (outcome.code, "no.rec" in outcome.line) == (1, True)
     outcome = run("replay", recording, "--trace", "no/folder/x.vcd")
     assert (outcome.code, "can not write no/folder/x.vcd" in outcome.line) == (2, True)
+
+
+def test_a_span_as_waveform(recording, run, tmp_path):
+    made = tmp_path / "span.vcd"
+    assert run("replay", recording, "--trace", made, "--trace-to", "0.001").code == 0
+    times = [int(line[1:]) for line in made.read_text().splitlines() if line.startswith("#")]
+    assert max(times) == 1_000_000
+    outcome = run("replay", recording, "--trace-from", "1")
+    assert (outcome.code, "of --trace" in outcome.err) == (2, True)
+    outcome = run("replay", recording, "--trace", made, "--trace-from", "1", "--trace-to", "1")
+    assert "behind --trace-from" in outcome.err

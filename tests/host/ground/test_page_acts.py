@@ -6,9 +6,12 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.emulator.recording import vcd
 
 from .test_page import SOON_MS, line, local
 
@@ -85,3 +88,34 @@ def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
     assert len(row.locator("td").nth(0).inner_text()) == 8
     assert page.locator("#read-registers").is_disabled()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
+    look(page, "CubeStar")
+    line(page, "write CaptureAndProcess")
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    page.click("#show-waves")
+    page.wait_for_selector("#waveform-told >> text=/ [1-9][0-9]* changes, the last at /")
+    blue = (
+        "() => { const c = document.querySelector('#waves');"
+        "const d = c.getContext('2d').getImageData(190, 0, 810, c.height).data;"
+        "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 2] > d[i] + 60) n++;"
+        "return n }"
+    )
+    drawn = page.evaluate(blue)
+    assert drawn > 1000
+    page.click("#wider")
+    assert page.evaluate(blue) != drawn
+    with page.expect_download() as saving:
+        page.click("#save-waves")
+    saving.value.save_as(tmp_path / "a.vcd")
+    with (tmp_path / "a.vcd").open("rb") as stream:
+        found = vcd.read(stream)
+    assert max(time for all_of in found.values() for time, _ in all_of) > 0
+    assert any(len(found[name]) > 2 for name in found if name.startswith("fpga."))
+    page.fill("#trace-to", "1e6")
+    page.click("#show-waves")
+    page.wait_for_selector("#waveform-told >> text=/at most 60 s of the time up to now/")
+    page.click("#pause")
+    page.wait_for_selector("#pause[aria-pressed=false]")

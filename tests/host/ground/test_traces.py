@@ -1,0 +1,60 @@
+"""Waveforms of a running emulation's past."""
+
+from io import BytesIO
+
+import pytest
+
+from cubestack.host.ground import traces
+from tests.emulator.recording import vcd
+
+from .conftest import Controlled
+
+TRACE = "/devices/cubestar/trace"
+
+
+def changes(text: str) -> vcd.Changes:
+    return vcd.read(BytesIO(text.encode()))
+
+
+def test_a_span_of_the_past_as_waveform(controlled: Controlled) -> None:
+    """A reset is in it, and what the emulation has now is not touched."""
+    controlled.ask("POST", "/run", {"to_s": 1.0})
+    act = {"words": ["fault", "processor-reset"]}
+    controlled.ask("POST", "/devices/cubestar/act", act)
+    controlled.ask("POST", "/run", {"to_s": 3.0})
+    status, text = controlled.ask("GET", f"{TRACE}?from_s=0.9&to_s=2.5", as_text=True)
+    assert (status, text.splitlines()[0]) == (200, "$timescale 1 ns $end")
+    found = changes(text)
+    assert any(name.startswith("fpga.") for name in found)
+    times = [time for all_of in found.values() for time, _ in all_of[1:]]
+    assert min(times) >= 0.9e9
+    assert max(times) <= 2.5e9
+    assert controlled.ask("GET", "/state")[1]["time_s"] == 3.0
+    awake = found["firmware.awake"]
+    assert len(awake) > 2  # it was reset in this span, and slept before and after
+    before = controlled.ask("GET", f"{TRACE}?from_s=0.5&to_s=0.99", as_text=True)[1]
+    assert len(changes(before)["firmware.awake"]) < len(awake)
+
+
+@pytest.mark.parametrize(
+    ("span", "error"),
+    [
+        ("from_s=0.5", "needs 'to_s'"),
+        ("from_s=0&to_s=much", "could not convert"),
+        ("from_s=nan&to_s=0.5", "up to now"),
+        ("from_s=0.4&to_s=0.4", "up to now"),
+        ("from_s=0&to_s=99", "up to now"),
+    ],
+)
+def test_spans_that_are_none(controlled: Controlled, span: str, error: str) -> None:
+    controlled.ask("POST", "/run", {"to_s": 0.6})
+    status, told = controlled.ask("GET", f"{TRACE}?{span}")
+    assert status == 400
+    assert error in told["error"]
+
+
+def test_one_at_a_time(controlled: Controlled) -> None:
+    controlled.ask("POST", "/run", {"to_s": 0.6})
+    with traces._one_at_a_time:
+        status, told = controlled.ask("GET", f"{TRACE}?from_s=0&to_s=0.5")
+    assert (status, told["error"]) == (409, "another waveform is being made")
