@@ -4,6 +4,7 @@ import { Attitude } from "./attitude.js";
 import { Commands } from "./commands.js";
 import { make } from "./dom.js";
 import { Emulation } from "./emulation.js";
+import { Favourites } from "./favourites.js";
 import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
 import { Results } from "./results.js";
@@ -79,7 +80,8 @@ function look(number, targets) {
     frames[part] = names;
     want({ show: [...new Set(Object.values(frames).flat())] });
   };
-  new Commands(place("commands"), about, act);
+  const commands = new Commands(place("commands"), about, act);
+  new Favourites(place("commands"), about, commands);
   new Settings(place("settings"), about, path, tell);
   const waveform = new Waveform(place("waveform"), about, path, tell);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);

@@ -36,12 +36,11 @@ export class Settings {
       const value = make("td", { className: "value", textContent: "–" });
       const row = make(
         "tr",
-        { title: one.details ?? one.meaning },
+        { title: `${shown(one)}: ${one.details ?? one.meaning}` },
         make("th", { scope: "row", textContent: name(one) }),
         value,
         make("td", { className: "value quiet", textContent: text(one.default) }),
         make("td", { className: "quiet", textContent: one.unit ?? "" }),
-        make("td", { className: "quiet", textContent: shown(one) }),
       );
       return { one, row, value };
     });
@@ -68,7 +67,7 @@ export class Settings {
     if (missing) told.textContent = missing;
     place.append(make("div", { className: "row" }, act, told));
     if (!list.length) return;
-    const titles = [what, "value", "default", "", "where"];
+    const titles = [what, "value", "default", ""];
     const head = titles.map((title) => make("th", { textContent: title, scope: "col" }));
     const body = make("tbody", { id: `${id}-rows` }, ...rows.map(({ row }) => row));
     const summary = make("summary", { textContent: `${list.length} ${what}s` });
@@ -101,7 +100,7 @@ export class Settings {
       const { value, bits } = await ask(`${this.path}/sensor-registers/${name}`);
       mark(each, value);
       const named = Object.entries(bits).map(([bit, held]) => `${bit} ${held}`);
-      if (named.length) each.row.title = `${each.one.meaning}: ${named.join(", ")}`;
+      if (named.length) each.row.title = `${address(each.one)}: ${named.join(", ")}`;
     }
   }
 }
