@@ -7,6 +7,7 @@ examples:
   cubestack ground emulated:{first} emulated:{second}
   cubestack ground emulated:{first} --profile extended --scene sky.toml
   cubestack ground /dev/ttyUSB0 --device {second}
+  cubestack ground run.rec
   cubestack ground ./tty --device {first} --control http://127.0.0.1:8700
 """
 
@@ -101,10 +102,13 @@ def _options(args: argparse.Namespace) -> list[str]:
 def _open(text: str, options: Sequence[str], args: argparse.Namespace) -> "Desk":
     from cubestack.host.ground.desk import Desk
     from cubestack.host.ground.emulators import emulated
+    from cubestack.host.ground.played import is_recording, open_recording
 
     with ExitStack() as stack:
         if text.startswith(EMULATED):
             target = stack.enter_context(emulated(text.removeprefix(EMULATED), options))
+        elif is_recording(text):
+            target = open_recording(text)
         else:
             target = open_target(
                 *(text, args.device),

@@ -14,6 +14,7 @@ from cubestack.host.errors import CommandRefusedError, HostError, NoAnswerError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.magnitudes import magnitude
+from cubestack.host.ground.played import PlayedClient
 from cubestack.host.ground.tables import (
     pointer_row,
     read_sensor_register,
@@ -79,6 +80,9 @@ class Desk:
             missing["download"] = f"{interface.name} sends no picture"
         if not self._has("upload"):
             missing["upload"] = f"{interface.name} takes no picture by the wire"
+        if self.played is not None:
+            for what in ("send", "download", "upload", "found", "sensor_registers"):
+                missing[what] = f"{target.name} is a recording, which takes no telecommand"
         if target.registers is None:
             missing["registers"] = f"no registers of {interface.name} are within reach here"
         if target.device is None or target.device.image_sensor is None:
@@ -99,6 +103,7 @@ class Desk:
             "channels": list(controls.channels) if controls else [],
             "chosen": controls.chosen if controls else {},
             "sources": list(self._client.picture_sources) if self._client else [],
+            "played": self.played.state if self.played else None,
             "missing": missing,
         }
 
@@ -107,6 +112,11 @@ class Desk:
         """Those of its emulation in another process."""
         controls = self.target.controls
         return controls if isinstance(controls, RemoteControls) else None
+
+    @property
+    def played(self) -> PlayedClient | None:
+        """The recording that it is."""
+        return self.target.node if isinstance(self.target.node, PlayedClient) else None
 
     def do(self, line: str) -> "Future[JsonObject]":
         """What a line of the shell gives: ``rows`` for a reader, and ``data``.

@@ -81,6 +81,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets/{number:int}/download", of(_download), methods=["POST"]),
             Route("/targets/{number:int}/upload", of(_upload), methods=["POST"]),
             Route("/targets/{number:int}/transfer/{act}", of(_transfer), methods=["POST"]),
+            Route("/targets/{number:int}/play", of(_play), methods=["POST"]),
             Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
             Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
             Route("/targets/{number:int}/{call:str}", of(_steer), methods=["POST"]),
@@ -118,6 +119,16 @@ async def _do(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     if not isinstance(line, str):
         raise ValueError("'line' is a line of the shell")
     return await asyncio.wrap_future(desk.do(line))
+
+
+async def _play(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
+    to_s, runs = body.get("to_s"), body.get("runs")
+    if desk.played is None:
+        raise ValueError(f"{desk.target.name} is no recording")
+    if not isinstance(to_s, int | float | None) or not isinstance(runs, bool):
+        raise ValueError("'to_s' is a time in s, 'runs' true or false")
+    desk.played.play(to_s, runs)
+    return desk.played.state
 
 
 async def _steer(desk: Desk, body: JsonObject, path: JsonObject) -> JsonObject:
@@ -219,6 +230,7 @@ async def _live(desk: Desk, socket: WebSocket) -> None:
             told: JsonObject = {"link": vars(desk.link)}
             carried = desk.carried
             told["carried"] = carried.state if carried else None
+            told["played"] = desk.played.state if desk.played else None
             free = carried is None or not carried.runs
             if wanted.show and free:
                 told["values"] = await asyncio.wrap_future(desk.read(wanted.show))

@@ -32,7 +32,7 @@ export class Commands {
     );
     const row = make("div", { className: "row" }, labelled("telecommand", this.name));
     place.append(row, this.meaning, this.fields, shell);
-    const missing = Object.entries(about.missing).filter(([what]) => ["bench", "raw"].includes(what));
+    const missing = Object.entries(about.missing).filter(([what]) => ["bench", "raw", "send"].includes(what));
     for (const [what, why] of missing)
       place.append(make("p", { className: "quiet", textContent: `no ${what}: ${why}` }));
     this.show();
@@ -43,7 +43,9 @@ export class Commands {
     if (!one) return;
     this.meaning.textContent = `${one.id}: ${one.meaning}`;
     const inputs = one.fields.map((field) => labelled(field.name, input(field)));
-    const send = make("button", { className: "main", id: "send", textContent: "Send" });
+    const why = this.about.missing.send;
+    const state = { disabled: Boolean(why), title: why ?? "" };
+    const send = make("button", { className: "main", id: "send", textContent: "Send", ...state });
     this.fields.replaceChildren(...inputs, send);
   }
 

@@ -7,6 +7,7 @@ import { Emulation } from "./emulation.js";
 import { Favourites } from "./favourites.js";
 import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
+import { Played } from "./played.js";
 import { Results } from "./results.js";
 import { ask, listen } from "./server.js";
 import { Settings } from "./settings.js";
@@ -20,6 +21,7 @@ const KEPT_LINES = 500;
 const begun = Date.now();
 
 const parts = [
+  "played",
   "picture",
   "wire",
   "attitude",
@@ -83,6 +85,7 @@ function look(number, targets) {
   const commands = new Commands(place("commands"), about, act);
   new Favourites(place("commands"), about, commands);
   new Settings(place("settings"), about, path, tell);
+  const played = new Played(place("played"), about, path, tell);
   const waveform = new Waveform(place("waveform"), about, path, tell);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
   const pictures = new Pictures(place("picture"), about, path);
@@ -100,6 +103,7 @@ function look(number, targets) {
       link.textContent = about.name;
       lamps.hearLink(message.link);
       transfer.hear(message.carried);
+      played.hear(message.played);
       const { truth, time_s } = message.emulation ?? {};
       if (message.values) {
         telemetry.hear(message.values);

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from cubestack.host.devices.targets import open_target
 from tests.emulator.recording import vcd
 
 from .test_page import SOON_MS, line, local
@@ -24,8 +25,10 @@ def station(*words: str) -> Iterator[str]:
     call = [sys.executable, "-m", "cubestack", "ground", *words, "--json"]
     with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdout is not None
-        yield json.loads(process.stdout.readline())["page"]
-        process.send_signal(signal.SIGINT)
+        try:
+            yield json.loads(process.stdout.readline())["page"]
+        finally:
+            process.send_signal(signal.SIGINT)
 
 
 @contextmanager
@@ -182,3 +185,27 @@ def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: boo
                     page.select_option(chooser, option)
         assert page.locator("img, script:not([type=module])").count() == 0
         assert page.evaluate("document.hacked") is None
+
+
+def test_a_recording_is_played(chromium: Any, tmp_path: Path) -> None:
+    path = tmp_path / "run.rec"
+    target = open_target("emulated:cubesense", record=path)
+    target.node.telemetry("Configuration")
+    target.node.pause(60.0)
+    target.node.command("DetectionThreshold1", Threshold=9)
+    target.node.telemetry("Configuration")
+    target.close()
+    with station(str(path)) as address, shown(chromium, address) as page:
+        page.wait_for_selector("#played-time >> text=/ of 6[0-9][.][0-9]+ s$/")
+        page.select_option("#frame", "Configuration")
+        cell = "#telemetry table tr >> nth=0"
+        page.wait_for_selector(f"{cell} >> text=225")
+        page.focus("#played-to")
+        page.press("#played-to", "End")
+        page.wait_for_selector(f"{cell} >> text=/9/")
+        assert page.locator("#send").is_disabled()
+        assert page.locator("#pause").is_disabled()
+        assert page.locator("#download").is_disabled()
+        assert "a recording" in page.inner_text("#commands")
+        page.click("#play")
+        page.wait_for_selector("#play >> text=Play")

@@ -1,0 +1,64 @@
+"""A recording as a target of a page."""
+
+from pathlib import Path
+
+import pytest
+
+from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.host.devices.targets import open_target
+from cubestack.host.errors import NoAnswerError, TargetError
+from cubestack.host.ground.desk import Desk
+from cubestack.host.ground.played import PlayedClient, is_recording, open_recording
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A threshold is read, set to 9 at 2 s or later, and read again."""
+    path = tmp_path_factory.mktemp("played") / "a.rec"
+    target = open_target("emulated:cubesense", record=path)
+    target.node.telemetry("Configuration")
+    target.node.pause(2.0)
+    target.node.command("DetectionThreshold1", Threshold=9)
+    target.node.telemetry("Configuration")
+    target.close()
+    return path
+
+
+def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
+    clock = [100.0]
+    client = PlayedClient(load_recording(made), INTERFACE, lambda: clock[0])
+    with pytest.raises(NoAnswerError, match=r"by 0\.000 s"):
+        client.telemetry("Configuration")
+    clock[0] += 1.0
+    assert client.telemetry("Configuration")["Threshold1"] == 225
+    clock[0] += 100.0
+    assert client.time_s == client.end_s < 10.0
+    assert client.telemetry("Configuration")["Threshold1"] == 9
+    client.play(1.5, runs=False)
+    clock[0] += 100.0
+    assert client.time_s == 1.5
+    assert client.telemetry("Configuration")["Threshold1"] == 225
+    client.play(None, runs=True)
+    clock[0] += 0.25
+    assert client.time_s == 1.75
+    for nonsense in (-1.0, 1e9, float("nan")):
+        with pytest.raises(ValueError, match="the recording has 0 to"):
+            client.play(nonsense, runs=True)
+
+
+def test_a_page_has_it_as_a_target(made: Path) -> None:
+    assert is_recording(str(made))
+    assert not is_recording("/dev/ttyUSB0")
+    desk = Desk(open_recording(str(made)))
+    assert {"send", "controls", "raw", "download"} <= desk.about["missing"].keys()
+    assert desk.played is not None
+    desk.played.play(desk.played.end_s, runs=False)
+    values = desk.read(["Configuration", "Result1"]).result()
+    assert values["Configuration"]["Threshold1"] == 9
+    assert "nobody had read Result1" in values["Result1"]["error"]
+    with pytest.raises(TargetError, match="takes no telecommand"):
+        desk.do("write DetectionThreshold1 7").result()
+    with pytest.raises(ValueError, match="is a recording"):
+        desk.transfer("download")
+    desk.close()
