@@ -2,11 +2,8 @@
 
 import math
 import re
-import shlex
 import tomllib
-from collections.abc import Iterator
 from dataclasses import fields
-from itertools import dropwhile, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -189,31 +186,6 @@ def test_make_has_the_targets_that_are_promised() -> None:
     targets = set(re.findall(r"^(\w+):", text_of("Makefile"), re.MULTILINE))
     assert {"venv", "run", "test", "lint", "bench", "clean"} <= targets
     assert set(re.findall(r"^make (\w+)", text_of("README.md"), re.MULTILINE)) <= targets
-
-
-def commands_of(document: Path) -> Iterator[list[str]]:
-    """Words of each call of the command in a document's shell blocks, up to what is behind it."""
-    text = document.read_text(encoding="utf-8").replace("\\\n", " ")
-    for block in re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
-        for line in block.splitlines():
-            words = shlex.split(line, comments=True)
-            words = list(dropwhile(lambda word: re.match("[A-Z_]+=", word), words))
-            words = list(takewhile(lambda word: word not in ("|", ">", "&", "&&", ";"), words))
-            if words and words[0].removeprefix(".venv/bin/") == "cubestack":
-                yield words[1:]
-
-
-def test_every_call_of_the_command_in_the_documents_can_be_made() -> None:
-    parser, count = make_parser(), 0
-    for document in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
-        for words in commands_of(document):
-            try:
-                parser.parse_args(words)
-            except SystemExit as end:
-                if end.code:
-                    pytest.fail(f"{document.name}: cubestack {shlex.join(words)}")
-            count += 1
-    assert count > 60
 
 
 def test_commands_of_the_readme_exist() -> None:
