@@ -112,7 +112,7 @@ def _shipped() -> _Subject:
     truth = json.loads(RENDERED.with_suffix(".json").read_text(encoding="utf-8"))
     return _Subject(
         "photograph",
-        "no photographs here: a picture file that this project rendered itself",
+        "a picture file that this project rendered itself, as there are no photographs",
         f'kind = "picture"\nfile = "{RENDERED.resolve()}"\n',
         np.array(truth["quaternion_xyzw_inertial_to_camera"]),
     )
