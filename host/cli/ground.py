@@ -103,6 +103,7 @@ def _open(text: str, options: Sequence[str], args: argparse.Namespace) -> "Desk"
     from cubestack.host.ground.desk import Desk
     from cubestack.host.ground.emulators import emulated
     from cubestack.host.ground.played import is_recording, open_recording
+    from cubestack.host.transport.streams import SerialTransport
 
     with ExitStack() as stack:
         if text.startswith(EMULATED):
@@ -114,6 +115,8 @@ def _open(text: str, options: Sequence[str], args: argparse.Namespace) -> "Desk"
                 *(text, args.device),
                 **{"service_port": args.bench, "baud": args.baud, "control": args.control},
             )
+        if isinstance(target.line, SerialTransport):
+            target.line.reopens = True
         return Desk(target, stack.pop_all().close)
 
 

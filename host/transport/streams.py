@@ -43,7 +43,15 @@ def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
 
 
 class SerialTransport:
-    """A serial port, or any URL that pyserial knows."""
+    """A serial port, or any URL that pyserial knows.
+
+    Attributes:
+        reopens: whether a port that has gone is opened again when it is used next: a cable that
+            was pulled and put back.
+    """
+
+    reopens = False
+    _gone = False
 
     def __init__(self, port: str, baud: int) -> None:
         """Open ``port`` at ``baud``, 8N1; raises PortOpenError."""
@@ -71,25 +79,35 @@ class SerialTransport:
     def write(self, data: bytes) -> None:
         """Send all of ``data``; raises PortClosedError."""
         try:
+            self._come_back()
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
+            self._gone = True
             raise PortClosedError(f"{self.name}: {_reason(error)}") from error
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """What is there, once a byte has come; raises PortClosedError."""
         try:
+            self._come_back()
             self._set_timeout(timeout_s)
             first: bytes = self._port.read(1)
             if not first:
                 return b""
             rest: bytes = self._port.read(min(max_bytes - 1, self._port.in_waiting))
         except (serial.SerialException, OSError) as error:
+            self._gone = True
             raise PortClosedError(f"{self.name}: {_reason(error)}") from error
         return first + rest
 
     def close(self) -> None:
         """Close the port."""
         self._port.close()
+
+    def _come_back(self) -> None:
+        if self._gone and self.reopens:
+            self._port.close()
+            self._port.open()
+            self._gone = False
 
     def _set_timeout(self, timeout_s: float) -> None:
         if self._port.timeout != timeout_s:  # setting it touches the port
