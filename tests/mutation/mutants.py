@@ -24,13 +24,19 @@ SIGNS: dict[type[ast.operator], type[ast.operator]] = {ast.Add: ast.Sub, ast.Sub
 
 @dataclass(frozen=True)
 class Mutant:
-    """``text`` is the whole module; ``path`` is relative to the project."""
+    """``path`` is relative to the project; bytes ``first`` to ``last`` of it are changed."""
 
     path: Path
     line: int
+    first: int
+    last: int
     before: str
     after: str
-    text: str
+
+    def put_into(self, text: str) -> str:
+        """The module with the mutant, from its ``text``."""
+        code = text.encode()
+        return (code[: self.first] + self.after.encode() + code[self.last :]).decode()
 
     def __str__(self) -> str:
         before, after = (" ".join(part.split())[:60] for part in (self.before, self.after))
@@ -53,8 +59,7 @@ def mutants(path: Path, text: str) -> list[Mutant]:
         end_line, end_column = node.end_lineno or 0, node.end_col_offset or 0
         first = starts[node.lineno - 1] + node.col_offset
         last = starts[end_line - 1] + end_column
-        changed = (code[:first] + after.encode() + code[last:]).decode()
-        found.append(Mutant(path, node.lineno, code[first:last].decode(), after, changed))
+        found.append(Mutant(path, node.lineno, first, last, code[first:last].decode(), after))
     return sorted(found, key=lambda mutant: mutant.line)
 
 

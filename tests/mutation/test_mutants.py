@@ -28,14 +28,14 @@ HERE = Path("a.py")
     ],
 )
 def test_mutants_of_a_text(text: str, expected: list[str]) -> None:
-    assert sorted(m.text for m in mutants(HERE, text)) == sorted(expected)
+    assert sorted(m.put_into(text) for m in mutants(HERE, text)) == sorted(expected)
 
 
 def test_every_mutant_is_a_program_and_another_one() -> None:
     for path in modules(ROOT)[::40]:
         text = (ROOT / path).read_text("utf-8")
         for mutant in mutants(path, text)[::20]:
-            assert ast.dump(ast.parse(mutant.text)) != ast.dump(ast.parse(text)), mutant
+            assert ast.dump(ast.parse(mutant.put_into(text))) != ast.dump(ast.parse(text)), mutant
 
 
 def test_the_seed_decides() -> None:
