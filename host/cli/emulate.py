@@ -252,6 +252,7 @@ def _control(
     guard = Guard(control_app(emulation), token, any_host=args.allow_remote)
     serving = Serving(guard, args.listen, args.control, allow_remote=args.allow_remote)
     stack.enter_context(serving.running())
+    stack.callback(emulation.bench.close)
     stack.callback(port.close)  # first, so that nobody waits for an answer any more
     say(f"control on {serving.url}, token {token}")
     return port

@@ -16,7 +16,7 @@ from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.virtual_serial import PS_PER_S
 from cubestack.host.errors import TargetError
 from cubestack.host.ground.traces import LONGEST_S as TRACE_S
-from cubestack.host.ground.traces import Trace
+from cubestack.host.ground.traces import Bench, Trace
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -36,12 +36,14 @@ class Emulation:
         emulated: the devices.
         ports: of each device, where its serial lines are served.
         past: what was done to them, by which one can go back; or why there is none.
+        bench: where waveforms of that are made.
     """
 
     port: "ControlPort"
     emulated: Sequence[AnyEmulated]
     ports: Mapping[str, Sequence[str]] = field(default_factory=dict)
     past: "Past | str" = "nothing is on record"
+    bench: Bench = field(default_factory=Bench)
 
     def __post_init__(self) -> None:
         """Nothing has been looked at."""
@@ -200,7 +202,7 @@ class Emulation:
         if not 0 <= from_s < to_s <= now_s or to_s - from_s > TRACE_S:
             span = f"at most {TRACE_S:g} s of the time up to now, {now_s:.6f} s"
             raise ValueError(f"a waveform has {span}, not {from_s:g} to {to_s:g} s")
-        return Trace(*self.recording(device), from_s, to_s)
+        return Trace(self.bench, *self.recording(device), from_s, to_s)
 
     def _recorded(self) -> "Past":
         if isinstance(self.past, str):

@@ -1,13 +1,16 @@
 """Waveforms of a running emulation's past."""
 
+import sys
+import threading
 from io import BytesIO
 
 import pytest
 
-from cubestack.host.ground import traces
+from cubestack.host.errors import TargetError
+from cubestack.host.ground.traces import Bench
 from tests.emulator.recording import vcd
 
-from .conftest import Controlled
+from .conftest import SOON_S, Controlled
 
 TRACE = "/devices/cubestar/trace"
 
@@ -55,6 +58,26 @@ def test_spans_that_are_none(controlled: Controlled, span: str, error: str) -> N
 
 def test_one_at_a_time(controlled: Controlled) -> None:
     controlled.ask("POST", "/run", {"to_s": 0.6})
-    with traces._one_at_a_time:
+    with controlled.emulation.bench._free:
         status, told = controlled.ask("GET", f"{TRACE}?from_s=0&to_s=0.5")
     assert (status, told["error"]) == (409, "another waveform is being made")
+
+
+def test_what_is_being_made_ends_with_the_emulation() -> None:
+    """And nothing more is made."""
+    bench, said = Bench(), list[str]()
+    for_ever = [sys.executable, "-c", "import threading; threading.Event().wait()"]
+    making = threading.Thread(target=lambda: said.append(failed(bench, for_ever)))
+    making.start()
+    while bench._process is None:
+        assert making.is_alive()
+    bench.close()
+    making.join(SOON_S)
+    assert said == ["no waveform: -9"]
+    assert failed(bench, for_ever) == "no waveform: the emulation ends"
+
+
+def failed(bench: Bench, call: list[str]) -> str:
+    with pytest.raises(TargetError) as refusal:
+        bench.run(call)
+    return str(refusal.value)
