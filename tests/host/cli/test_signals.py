@@ -48,10 +48,14 @@ def test_no_link_is_left(number: signal.Signals, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_no_emulation_is_left(number: signal.Signals) -> None:
-    with begun("ground", "emulated:cubestar") as process:
+@pytest.mark.parametrize("words", [("ground", "emulated:cubestar"), ("demo", "--out", "{folder}")])
+def test_no_emulation_is_left(
+    words: tuple[str, ...], number: signal.Signals, tmp_path: Path
+) -> None:
+    with begun(*(word.format(folder=tmp_path) for word in words)) as process:
         assert process.stderr is not None
-        assert "Ctrl-C" in process.stderr.readline()
+        while "Ctrl-C" not in (line := process.stderr.readline()):
+            assert line
         (child,) = children(process.pid)
         process.send_signal(number)
         process.wait(SOON_S)
