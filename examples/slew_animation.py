@@ -95,4 +95,6 @@ def save(sheets: list[Image.Image], path: Path) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) not in (2, 3):
+        sys.exit("usage: python slew_animation.py FILE.gif [FRAMES]")
     main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else FRAMES)

@@ -110,7 +110,13 @@ def test_suite_of_a_driver(tmp_path: Path) -> None:
     assert 'name="cubestack.cubestar.fault_events"' in report.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["bringup.py", "plain_pyserial.py", "smbus2_attitude.py"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("bringup.py", "plain_pyserial.py", "smbus2_attitude.py"),
+        *("slew_animation.py", "one_orbit.py"),
+    ],
+)
 def test_without_a_target_each_says_how_it_is_called(name: str) -> None:
     done = subprocess.run([sys.executable, HERE / name], capture_output=True, text=True)
     assert done.returncode == 1
