@@ -72,8 +72,24 @@ def read_scene_file(
 
     The keys of ``DEVICE_KEYS`` are left out, as a scene knows no device.
 
-    Raises SceneError for a file that can not be read or is no TOML, and for what its reader
-    refuses by a ValueError.
+    Raises as ``read_file``.
+    """
+
+    def scene(table: dict[str, Any]) -> V:
+        kind = table.pop("kind", None)
+        table = {key: value for key, value in table.items() if key not in DEVICE_KEYS}
+        if not isinstance(kind, str) or kind not in kinds:
+            raise SceneError(f"kind must be {right}, not {kind!r}")
+        return kinds[kind](table)
+
+    return read_file(path, scene)
+
+
+def read_file(path: Path, reader: Callable[[dict[str, Any]], V]) -> V:
+    """What ``reader`` makes of a TOML file.
+
+    Raises SceneError, with the file's name, for one that can not be read or is no TOML, and for
+    what ``reader`` refuses by a ValueError.
     """
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
@@ -82,11 +98,7 @@ def read_scene_file(
     except ValueError as error:
         raise SceneError(f"{path} is no TOML file: {error}") from None
     try:
-        kind = table.pop("kind", None)
-        table = {key: value for key, value in table.items() if key not in DEVICE_KEYS}
-        if not isinstance(kind, str) or kind not in kinds:
-            raise SceneError(f"kind must be {right}, not {kind!r}")
-        return kinds[kind](table)
+        return reader(table)
     except ValueError as error:
         raise SceneError(f"{path}: {error}") from None
 

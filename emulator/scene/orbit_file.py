@@ -16,7 +16,6 @@ boresight = [0.0, -1.0, 0.0]
 right = [1.0, 0.0, 0.0]
 """
 
-import tomllib
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -49,16 +48,7 @@ _QUATERNION = file.several(4, file.number)
 
 def load_orbit(path: Path) -> Orbit:
     """What the file says; SceneError names it, and the key that is wrong."""
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"{path} can not be read: {error.strerror or error}") from None
-    except ValueError as error:
-        raise SceneError(f"{path} is no TOML file: {error}") from None
-    try:
-        return _orbit(table)
-    except ValueError as error:
-        raise SceneError(f"{path}: {error}") from None
+    return file.read_file(path, _orbit)
 
 
 def _orbit(table: dict[str, Any]) -> Orbit:
