@@ -86,7 +86,7 @@ def test_commands_of_all_options_run_until_the_first_failure(shell, commands):
 def test_a_picture_whose_memory_is_cut_off(shell, tmp_path, monkeypatch):
     # Whole pictures have 2176 chunks of margin before the first that is read from the memory.
     small = partial(download_image, size=ImageSize.SIDE_64)
-    monkeypatch.setattr(client, "download_image", lambda node, sram, _size: small(node, sram))
+    monkeypatch.setattr(client, "download_image", lambda node, sram, *_: small(node, sram))
     commands = (
         "write CaptureOnly SUN SRAM1 TOP; time 1; fault latch-up SRAM1;"
         f"image '{tmp_path / 'x.png'}'"
