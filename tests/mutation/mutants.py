@@ -24,10 +24,15 @@ SIGNS: dict[type[ast.operator], type[ast.operator]] = {ast.Add: ast.Sub, ast.Sub
 
 @dataclass(frozen=True)
 class Mutant:
-    """``path`` is relative to the project; bytes ``first`` to ``last`` of it are changed."""
+    """``path`` is relative to the project; bytes ``first`` to ``last`` of it are changed.
+
+    They stand in the lines ``line`` to ``end``, of a statement that begins in line ``statement``.
+    """
 
     path: Path
+    statement: int
     line: int
+    end: int
     first: int
     last: int
     before: str
@@ -55,38 +60,43 @@ def mutants(path: Path, text: str) -> list[Mutant]:
     for line in text.encode().splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
     code, found = text.encode(), []
-    for node, after in _changes(ast.parse(text)):
-        end_line, end_column = node.end_lineno or 0, node.end_col_offset or 0
-        first = starts[node.lineno - 1] + node.col_offset
-        last = starts[end_line - 1] + end_column
-        found.append(Mutant(path, node.lineno, first, last, code[first:last].decode(), after))
+    for statement, node, after in _changes(ast.parse(text)):
+        line, end = node.lineno, node.end_lineno or 0
+        first = starts[line - 1] + node.col_offset
+        last = starts[end - 1] + (node.end_col_offset or 0)
+        before = code[first:last].decode()
+        found.append(Mutant(path, statement, line, end, first, last, before, after))
     return sorted(found, key=lambda mutant: mutant.line)
 
 
-def _changes(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
-    """Nodes, and what stands there instead."""
-    for node in _nodes(tree):
+def _changes(tree: ast.AST) -> Iterator[tuple[int, ast.expr | ast.stmt, str]]:
+    """Nodes, after the first lines of their statements, and what stands there instead."""
+    for statement, node in _nodes(tree):
         match node:
             case ast.Compare(left, [operator], [right]) if type(operator) in COMPARISONS:
                 other = COMPARISONS[type(operator)]()
-                yield node, f"({ast.unparse(ast.Compare(left, [other], [right]))})"
+                yield statement, node, f"({ast.unparse(ast.Compare(left, [other], [right]))})"
             case ast.BinOp(left, operator, right) if type(operator) in SIGNS:
                 other_sign = SIGNS[type(operator)]()
-                yield node, f"({ast.unparse(ast.BinOp(left, other_sign, right))})"
+                yield statement, node, f"({ast.unparse(ast.BinOp(left, other_sign, right))})"
             case ast.AugAssign(target, operator, value) if type(operator) in SIGNS:
-                yield node, ast.unparse(ast.AugAssign(target, SIGNS[type(operator)](), value))
+                yield (
+                    statement,
+                    node,
+                    ast.unparse(ast.AugAssign(target, SIGNS[type(operator)](), value)),
+                )
             case ast.Constant(value) if isinstance(value, int | float) and value is not True:
                 if value is not False:
-                    yield node, f"({value + 1!r})"
+                    yield statement, node, f"({value + 1!r})"
             case ast.Expr(ast.Call() | ast.Yield() | ast.YieldFrom()) | ast.Raise():
-                yield node, "pass"
+                yield statement, node, "pass"
             case ast.Return(value) if value is not None:
-                yield node, "pass"
+                yield statement, node, "pass"
         if isinstance(node, ast.If | ast.While | ast.IfExp):
-            yield node.test, f"(not ({ast.unparse(node.test)}))"
+            yield statement, node.test, f"(not ({ast.unparse(node.test)}))"
 
 
-def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
+def _nodes(tree: ast.AST, statement: int = 0) -> Iterator[tuple[int, ast.AST]]:
     """All but annotations, f-strings, whose parts have no places, and what only types need."""
     for name, value in ast.iter_fields(tree):
         if name in ("annotation", "returns") or isinstance(tree, ast.JoinedStr):
@@ -95,5 +105,6 @@ def _nodes(tree: ast.AST) -> Iterator[ast.AST]:
             if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
                 continue
             if isinstance(child, ast.AST):
-                yield child
-                yield from _nodes(child)
+                begins = child.lineno if isinstance(child, ast.stmt) else statement
+                yield begins, child
+                yield from _nodes(child, begins)

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutation.__main__ import ROOT, chosen, files_for
+from tests.mutation.__main__ import chosen
 from tests.mutation.mutants import modules, mutants
+from tests.mutation.suite import ROOT, files_for
 
 HERE = Path("a.py")
 

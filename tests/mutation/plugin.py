@@ -1,0 +1,36 @@
+"""Of pytest, for the runs that are made here: how long each test takes, and which failed first."""
+
+import json
+import os
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+PLUGIN = __name__
+DURATIONS, FAILED = "MUTATION_DURATIONS", "MUTATION_FAILED"
+"""Environment variables: the files to write, if any."""
+
+_GROUP = re.compile(r"@[\w-]+$")
+_durations: dict[str, float] = defaultdict(float)
+
+
+def without_group(test: str) -> str:
+    """Its name without what pytest-xdist appends where tests stay together."""
+    return _GROUP.sub("", test)
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """A phase of a test has ended."""
+    test = without_group(report.nodeid)
+    _durations[test] += report.duration
+    if report.failed and (path := os.environ.get(FAILED)):
+        Path(path).write_text(test, "utf-8")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Written by the process that has heard of all tests, not by its workers."""
+    path = os.environ.get(DURATIONS)
+    if path and not hasattr(session.config, "workerinput"):
+        Path(path).write_text(json.dumps(_durations), "utf-8")

@@ -1,0 +1,93 @@
+"""Which tests run a line, by one recorded run of all of them, and how long each takes."""
+
+import json
+import os
+import subprocess
+import sys
+from collections import defaultdict
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+
+from coverage import CoverageData
+
+from tests.mutation.mutants import PARTS, Mutant
+from tests.mutation.plugin import DURATIONS, PLUGIN, without_group
+
+FOLDER = Path("out/mutation")
+DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
+BUDGET_S, MOST_TESTS = 25.0, 150
+"""What a mutant has to face: so many seconds of tests at most, and so many tests."""
+
+
+def record(root: Path) -> int:
+    """Run all tests of the project in ``root`` under coverage.py; pytest's exit code."""
+    folder = root / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / SETTINGS).write_text(
+        f"[run]\nrelative_files = true\ndata_file = {folder / DATA}\n"
+        "disable_warnings = no-data-collected, module-not-imported\n",
+        "utf-8",
+    )
+    call = [sys.executable, "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup"]
+    call += ["-p", PLUGIN, f"--cov-config={folder / SETTINGS}"]
+    call += [*(f"--cov={part}" for part in PARTS), "--cov-context=test", "--cov-report="]
+    environment = os.environ | {DURATIONS: str(folder / TIMES)}
+    return subprocess.call(call, cwd=root, env=environment)
+
+
+class Reached:
+    """A recorded run. Raises FileNotFoundError where there is none."""
+
+    def __init__(self, root: Path) -> None:
+        self._folder = root / FOLDER
+        self.durations: dict[str, float] = json.loads((self._folder / TIMES).read_text("utf-8"))
+        self._lines: dict[Path, dict[int, list[str]]] = {}
+
+    @cached_property
+    def _data(self) -> CoverageData:
+        data = CoverageData(str(self._folder / DATA))
+        data.read()
+        return data
+
+    def tests(self, mutant: Mutant) -> list[str]:
+        """Those that run its line, or else its module: of each file the quickest, the nearest
+        file first, then the next of each."""
+        if mutant.path not in self._lines:
+            self._lines[mutant.path] = self._data.contexts_by_lineno(str(mutant.path))
+        by_line = self._lines[mutant.path]
+        # Of a statement over several lines, Python reports some only.
+        lines = range(mutant.statement, mutant.end + 1)
+        found = _names(context for line in lines for context in by_line.get(line, ()))
+        found = found or _names(context for each in by_line.values() for context in each)
+        ranked = self._in_turn(mutant.path, found & self.durations.keys())
+        spent, taken = 0.0, []
+        for test in ranked:
+            spent += self.durations[test]
+            if taken and (spent > BUDGET_S or len(taken) == MOST_TESTS):
+                break
+            taken.append(test)
+        return taken
+
+    def _in_turn(self, path: Path, tests: set[str]) -> list[str]:
+        by_file: dict[str, list[str]] = defaultdict(list)
+        for test in sorted(tests, key=lambda test: (self.durations[test], test)):
+            by_file[test.partition("::")[0]].append(test)
+
+        def distance(file: str) -> tuple[bool, int, float, str]:
+            mirror = Path("tests") / path.parent / f"test_{path.stem}.py"
+            shared = len(os.path.commonpath([Path(file).parent, mirror.parent]).split(os.sep))
+            return Path(file) != mirror, -shared, self.durations[by_file[file][0]], file
+
+        order = {file: place for place, file in enumerate(sorted(by_file, key=distance))}
+        turns = [
+            (turn, order[file], test)
+            for file, found in by_file.items()
+            for turn, test in enumerate(found)
+        ]
+        return [test for *_, test in sorted(turns)]
+
+
+def _names(contexts: Iterable[str]) -> set[str]:
+    """Of tests: a context is a test's name and the phase of it; that of imports has no name."""
+    return {without_group(context.rpartition("|")[0]) for context in contexts} - {""}

@@ -1,0 +1,82 @@
+"""One mutant and the tests that it has to face, in a copy of the project."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.mutation.mutants import Mutant
+from tests.mutation.plugin import FAILED, PLUGIN
+
+UNKNOWN_S = 600.0
+"""The time that tests may take of which it is not known how long they take."""
+
+SITE = """
+import sys
+from pathlib import Path
+for name, module in list(sys.modules.items()):
+    if name.startswith("__editable___cubestack"):
+        for package in module.MAPPING:
+            parts = package.split(".")[1:] or ["host", "api"]
+            module.MAPPING[package] = str(Path({tree!r}, *parts))
+"""
+"""Makes the interpreter import the copy instead of the project that is installed."""
+
+
+class Copy:
+    """A copy of the project in ``root``, that mutants are put into, one at a time."""
+
+    def __init__(self, root: Path, folder: Path) -> None:
+        self._tree, self._failed = folder / "tree", folder / "failed"
+        left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "out")
+        shutil.copytree(root, self._tree, ignore=left_out, symlinks=True)
+        site = folder / "site"
+        site.mkdir()
+        text = SITE.format(tree=str(self._tree))
+        (site / "sitecustomize.py").write_text(text, "utf-8")
+        environment = {"PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"}
+        self._environment = os.environ | environment | {FAILED: str(self._failed)}
+        self._sound: dict[str, bool] = {}
+
+    def killed(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
+        """Whether one of the tests, that passes without it, fails with the mutant."""
+        target = self._tree / mutant.path
+        original = target.read_text("utf-8")
+        while tests:
+            target.write_text(mutant.put_into(original), "utf-8")
+            try:
+                passed = self._pass(tests, limit_s)
+            finally:
+                target.write_text(original, "utf-8")
+            if passed or not self._failed.exists():
+                return not passed  # not in time, or not even imported
+            failed = self._failed.read_text("utf-8")
+            if failed not in self._sound:
+                self._sound[failed] = self._pass([failed], UNKNOWN_S)
+            if self._sound[failed]:
+                return True
+            tests = [test for test in tests if self._sound.get(test, True)] + [
+                f"--deselect={failed}"
+            ]
+        return False
+
+    def _pass(self, tests: list[str], timeout_s: float) -> bool:
+        self._failed.unlink(missing_ok=True)
+        call = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", PLUGIN]
+        nothing = subprocess.DEVNULL
+        with subprocess.Popen(
+            [*call, *tests],
+            cwd=self._tree,
+            env=self._environment,
+            stdout=nothing,
+            stderr=nothing,
+            start_new_session=True,  # so that it ends with all that it has started
+        ) as process:
+            try:
+                return process.wait(timeout_s) == 0
+            except subprocess.TimeoutExpired:
+                return False
+            finally:
+                if process.poll() is None:
+                    os.killpg(process.pid, 9)
