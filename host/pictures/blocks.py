@@ -20,16 +20,28 @@ HEAD = (
 
 
 class Block(NamedTuple):
-    """A box: column and row on the grid, its title, and a line below it."""
+    """A box: column and first row on the grid, its title, a line below it, and rows it takes."""
 
     column: float
     row: float
     title: str
     label: str = ""
+    rows: int = 1
+
+    @property
+    def last(self) -> float:
+        """Its last row."""
+        return self.row + self.rows - 1
+
+    @property
+    def height(self) -> float:
+        """Pixels."""
+        return (self.rows - 1) * DOWN + BOX_HEIGHT
 
 
 class Line(NamedTuple):
-    """A connection of two neighbours in a row or column.
+    """A connection of two neighbours in a row or column; of a tall box and one beside it in the
+    other's row.
 
     Its label's lines stand above and below it; ``both`` puts an arrow's head on either end.
     """
@@ -43,7 +55,7 @@ class Line(NamedTuple):
 def blocks(boxes: Mapping[str, Block], lines: Sequence[Line]) -> str:
     """The diagram; ValueError for a line between boxes of neither one row nor one column."""
     columns = max(box.column for box in boxes.values())
-    rows = max(box.row for box in boxes.values())
+    rows = max(box.last for box in boxes.values())
     width = 2 * MARGIN + columns * ACROSS + BOX_WIDTH
     height = 2 * MARGIN + rows * DOWN + BOX_HEIGHT
     parts = [
@@ -55,12 +67,12 @@ def blocks(boxes: Mapping[str, Block], lines: Sequence[Line]) -> str:
         parts += _line(boxes[line.source], boxes[line.target], line)
     for box in boxes.values():
         x, y = _corner(box)
-        middle = x + BOX_WIDTH / 2
+        middle, level = x + BOX_WIDTH / 2, y + box.height / 2
         parts += [
-            f'<rect class="box" x="{x:g}" y="{y:g}" width="{BOX_WIDTH}" height="{BOX_HEIGHT}" '
+            f'<rect class="box" x="{x:g}" y="{y:g}" width="{BOX_WIDTH}" height="{box.height:g}" '
             'rx="6"/>',
-            _text("title", middle, y + (30 if box.label else 40), box.title),
-            _text("label", middle, y + 52, box.label),
+            _text("title", middle, level + (-4 if box.label else 6), box.title),
+            _text("label", middle, level + 18, box.label),
         ]
     return "\n".join([*parts, "</svg>", ""])
 
@@ -73,8 +85,9 @@ def _line(source: Block, target: Block, line: Line) -> list[str]:
     heads = 'marker-end="url(#head)"' + (' marker-start="url(#head)"' if line.both else "")
     (x, y), (to_x, to_y) = _corner(source), _corner(target)
     above, _, below = line.label.partition("\n")
-    if source.row == target.row:
-        right = to_x > x
+    top, bottom = max(source.row, target.row), min(source.last, target.last)
+    if source.column != target.column and top <= bottom:
+        right, y = to_x > x, MARGIN + (top + bottom) / 2 * DOWN
         start, end = (x + BOX_WIDTH, to_x) if right else (x, to_x + BOX_WIDTH)
         level, middle = y + BOX_HEIGHT / 2, (start + end) / 2
         return [
@@ -84,7 +97,7 @@ def _line(source: Block, target: Block, line: Line) -> list[str]:
         ]
     if source.column == target.column:
         down = to_y > y
-        start, end = (y + BOX_HEIGHT, to_y) if down else (y, to_y + BOX_HEIGHT)
+        start, end = (y + source.height, to_y) if down else (y, to_y + target.height)
         middle, level = x + BOX_WIDTH / 2, (start + end) / 2
         return [
             f'<path class="line" d="M{middle:g} {start:g}V{end:g}" {heads}/>',

@@ -45,3 +45,17 @@ def test_lines_end_at_their_boxes() -> None:
     assert drawing.count("marker-start=") == 1
     with pytest.raises(ValueError, match="neither in one row"):
         blocks(boxes, [Line("a", "c", "")])
+
+
+def test_a_tall_box_has_its_lines_in_the_rows_of_the_others() -> None:
+    boxes = {"a": Block(0, 0, "A"), "b": Block(0, 1, "B"), "tall": Block(1, 0, "T", rows=2)}
+    drawing = blocks(boxes, [Line("a", "tall", ""), Line("tall", "b", "")])
+    tops = [
+        (float(y), float(height))
+        for y, height in re.findall(
+            r'class="box" x="[\d.]+" y="([\d.]+)"[^>]*height="([\d.]+)"', drawing
+        )
+    ]
+    levels = [float(y) for y in re.findall(r'class="line" d="M[\d.]+ ([\d.]+)H', drawing)]
+    assert levels == [y + height / 2 for y, height in tops[:2]]
+    assert tops[2] == (tops[0][0], tops[1][0] + tops[1][1] - tops[0][0])
