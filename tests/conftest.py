@@ -30,6 +30,17 @@ class Outcome(NamedTuple):
 Run = Callable[..., Outcome]
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that share a fixture of their module stay in one process, so that it is made once."""
+    for item in items:
+        shared = getattr(item, "_fixtureinfo", None)
+        found = shared.name2fixturedefs.values() if shared else ()
+        of_module = any(fixtures[-1].scope == "module" for fixtures in found)
+        if of_module and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
 @pytest.fixture
 def profile() -> str:
     """Profile of what is tested; a test about one of them is parametrized with its name."""

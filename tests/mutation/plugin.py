@@ -12,7 +12,7 @@ PLUGIN = __name__
 DURATIONS, FAILED = "MUTATION_DURATIONS", "MUTATION_FAILED"
 """Environment variables: the files to write, if any."""
 
-_GROUP = re.compile(r"@[\w-]+$")
+_GROUP = re.compile(r"@[\w ./-]+$")
 _durations: dict[str, float] = defaultdict(float)
 
 

@@ -18,6 +18,7 @@ SMALL = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", SMALL)
 def test_pair(simulate: Any, module: str) -> None:
     simulate(SMALL[module], module, seed=1)

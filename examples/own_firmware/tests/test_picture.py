@@ -26,6 +26,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "picture.elf"
 
 
+@pytest.mark.slow
 def test_a_picture_comes_through_the_fpga(image: Path) -> None:
     """Sum and brightest pixel are those of the bytes in the FPGA's memory."""
     with cubestack.open_device("cubestar", firmware=str(image)) as cubestar:

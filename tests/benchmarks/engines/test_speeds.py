@@ -43,6 +43,7 @@ def test_the_simulator_stores_the_sample(name):
         changed[5] ^= 0x10
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(missing_for_cocotb() is not None, reason="no cocotb or no Icarus Verilog")
 def test_cocotb_stores_the_sample_and_says_when_it_does_not():
     load = WORKLOADS["cubestar-double"]

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
         lambda: star.rtl_clocks_per_s(1),
         lambda: star.strides_per_s(1),
         lambda: star.strobes_per_s(1),
-        lambda: cold_build_s(cubestar_wiring()),
+        pytest.param(lambda: cold_build_s(cubestar_wiring()), marks=pytest.mark.slow),
         lambda: pair.pair_scan_ms(pair.pair_with_cameras(), 1),
     ],
 )

@@ -76,7 +76,9 @@ def random_life(
     return cameras, script.commands
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(n, marks=pytest.mark.slow) for n in range(6, 25))]
+)
 def test_random_lives(board, seed):
     size, icarus = board
     rng = np.random.default_rng([seed, size.columns])

@@ -17,7 +17,10 @@ SMALL = (
 )
 
 
-@pytest.fixture(params=SMALL, ids=lambda size: f"{size.columns}x{size.rows}")
+@pytest.fixture(
+    params=[pytest.param(SMALL[0], marks=pytest.mark.slow), *SMALL[1:]],
+    ids=lambda size: f"{size.columns}x{size.rows}",
+)
 def read_out(request: pytest.FixtureRequest) -> ReadOut:
     return request.param
 

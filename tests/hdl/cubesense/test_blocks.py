@@ -44,7 +44,7 @@ BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
 }
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("block", BLOCKS)
 def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
     simulate(BLOCKS[block], read_out, block, name=block, seed=seed)

@@ -38,7 +38,7 @@ def test_addressing_at_full_size(simulate: Any) -> None:
     simulate(addressable, FULL_SIZE, "addressing", mcu_addressing=True, seed=1)
 
 
-@pytest.mark.parametrize("initialised", [True, False])
+@pytest.mark.parametrize("initialised", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_addressing_changes_nothing_else(simulate: Any, initialised: bool) -> None:
     options = {"mcu_addressing": True, "initialised": initialised}
     simulate(addressable, SMALLEST, *NAMES, seed=1, **options)

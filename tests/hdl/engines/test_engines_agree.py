@@ -72,7 +72,7 @@ def difference(wiring: Wiring, events: list[PinEvent], found: Played, expected: 
     return ", ".join(name for name, m in found.memories.items() if m != expected.memories[name])
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in SEEDS[1:])])
 def test_settled_pin_by_settled_pin(case, seed):
     events = case.events(seed)
     expected = case.icarus.play(events)

@@ -88,6 +88,7 @@ def score(*options: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_block_is_scored(tmp_path: Path) -> None:
     """Three wrong gates that the bench notices and one that makes no difference."""
     options = ("matrix-counter", "--count", "4", "--seed", "23", "--out", str(tmp_path), "--json")

@@ -35,7 +35,7 @@ def test_every_trial_serves_a_row_and_every_row_has_one(name: str) -> None:
 @pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.slow if name == "cubestar" else ()) for name in BUILT_IN],
+    [pytest.param(name, marks=() if name == "aramis" else pytest.mark.slow) for name in BUILT_IN],
 )
 def test_a_quick_run_gives_every_row_a_value_in_both_profiles(run: Run, name: str) -> None:
     lines = run("fidelity", name, "--quick", "--json", "--workers", "1").out.splitlines()

@@ -46,6 +46,7 @@ def test_two_workers_make_the_same_file(alone: Folder, tmp_path: Path) -> None:
     assert content(folder.path) == content(alone.path)
 
 
+@pytest.mark.slow
 def test_a_cluster_makes_the_same_file(alone: Folder, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "cluster", alone.plan, resume=False)
     with dask_cluster() as cluster:

@@ -61,6 +61,7 @@ def test_a_counter_matters_only_where_it_counts(counters: list[UpsetResult]) -> 
     assert healed > len(counters) / 2
 
 
+@pytest.mark.slow
 def test_a_seed_repeats_it() -> None:
     options = {"registers": "writer.data", "memory_bits": 0, "seed": 5}
     first, again = (measured("cubestar", cubestar.EXPERIMENT, **options) for _ in range(2))
@@ -81,6 +82,7 @@ def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         cached.cache_clear()
 
 
+@pytest.mark.slow
 def test_a_voted_counter_is_immune(voted: None) -> None:
     rig = replace(cubestar.EXPERIMENT.rig(cubestar.CubeStarUpsetOptions()), phases=STORES)
     tested = replace(cubestar.EXPERIMENT, rig=lambda _options: rig)
