@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from tests.hdl.regression import ANY_TOP, FULL, PAIR, RATES, STAR, TIERS, modules
+from tests.tiers import quick
 
 CUBESTAR = ["cubestar", "cubestar-shared", "cubestar-double", "cubestar-boards"]
 CASES = [
@@ -15,7 +16,7 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("top", "module"), CASES)
+@pytest.mark.parametrize(("top", "module"), quick(CASES, 4))
 def test_top(icarus: Any, top: str, module: str) -> None:
     tier = TIERS[top]
     settings = {"seed": 1, "environment": tier.further}

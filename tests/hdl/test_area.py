@@ -18,15 +18,14 @@ from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import have_nextpnr, have_yosys
 from cubestack.hdl.flow.top import Top, counted
 from tests.hdl import flow_checks
+from tests.tiers import quick
 
 #: Each sensor's designs, and the file with their areas.
 SENSORS = [(counted(sensor.TOPS), sensor.AREA_FILE) for sensor in (cubestar, cubesense)]
 DESIGNS = {name: design for table, _ in SENSORS for name, design in table.items()}
 
-every_design = pytest.mark.parametrize(
-    ("name", "design", "file"),
-    [(name, design, file) for table, file in SENSORS for name, design in table.items()],
-)
+DESIGNS = [(name, design, file) for table, file in SENSORS for name, design in table.items()]
+every_design = pytest.mark.parametrize(("name", "design", "file"), DESIGNS)
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -103,7 +102,7 @@ def tiles(name):
     return count_tiles(DESIGNS[name].make())
 
 
-@every_design
+@pytest.mark.parametrize(("name", "design", "file"), quick(DESIGNS, 6))
 def test_no_design_grows_unnoticed(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 

@@ -17,6 +17,7 @@ from cubestack.hdl.proofs import cubesense, cubestar
 from cubestack.hdl.proofs.properties import idle_is_reset
 from cubestack.hdl.proofs.prover import Fault, Proof, ProofResult, UnknownWireError, prove
 from cubestack.hdl.proofs.verdicts import Verdict, verdict_text
+from tests.tiers import quick
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 
@@ -36,7 +37,7 @@ def test_property_is_proved(name: str) -> None:
     assert prove(PROOFS[name])[:2] == (True, False)
 
 
-@pytest.mark.parametrize("name", SHALLOW)
+@pytest.mark.parametrize("name", quick(SHALLOW, 12))
 def test_planted_bug_is_found(name: str) -> None:
     assert prove(PROOFS[name], planted=True)[:2] == (False, True)
 

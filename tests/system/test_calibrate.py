@@ -44,6 +44,7 @@ def test_an_emulated_unit_s_lens_is_found(
         assert picture.width > 900
 
 
+@pytest.mark.slow
 def test_photographs_give_their_camera(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, photographs: Path
 ) -> None:

@@ -13,6 +13,7 @@ from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.flow.top import Top, counted, tops_in
 from cubestack.hdl.proofs.prover import prove
 from tests.hdl import flow_checks
+from tests.tiers import quick
 
 need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 
@@ -20,7 +21,7 @@ EXAMPLES = Path(__file__).parents[2]
 
 
 @need_yosys
-@pytest.mark.parametrize("name", tops_in(TOPS))
+@pytest.mark.parametrize("name", quick(tops_in(TOPS), 1))
 def test_verilog_file(name: str, tmp_path: Path) -> None:
     top = tops_in(TOPS)[name]
     file = flow_checks.written(name, top, tmp_path)
@@ -34,7 +35,7 @@ def test_verilog_file(name: str, tmp_path: Path) -> None:
 
 
 @need_yosys
-@pytest.mark.parametrize("name", counted(TOPS))
+@pytest.mark.parametrize("name", quick(counted(TOPS), 1))
 def test_area(name: str) -> None:
     assert list(recorded_areas(AREA_FILE)) == list(counted(TOPS))
     design = counted(TOPS)[name]
@@ -42,7 +43,9 @@ def test_area(name: str) -> None:
 
 
 @need_yosys
-@pytest.mark.parametrize("name", [name for name in PROOFS if not name.startswith("nadir")])
+@pytest.mark.parametrize(
+    "name", quick([name for name in PROOFS if not name.startswith("nadir")], 1)
+)
 def test_proof(name: str) -> None:
     """One of the two equal FPGAs."""
     assert prove(PROOFS[name]).proved

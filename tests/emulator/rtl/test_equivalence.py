@@ -12,6 +12,7 @@ from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import rtlil_text
+from tests.tiers import quick
 
 from .cameras import plain_camera, random_camera
 from .comparison import Step, assert_same, assert_same_outputs, engines, read
@@ -57,7 +58,7 @@ def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize("seed", quick(range(15), 8))
 def test_random_life_of_a_board(size, seed):
     rng = np.random.default_rng([seed, *size])
     camera = random_camera(rng, *size)

@@ -15,6 +15,7 @@ from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.firmware_model.interface.cubesense.fpga import COMMANDS
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop
+from tests.tiers import quick
 
 from .cameras import ListCamera, plain_camera
 from .comparison import Step, assert_same, assert_same_outputs, engines, read
@@ -82,9 +83,7 @@ def random_steps(rng: np.random.Generator, cameras: dict[str, ListCamera]) -> It
 PARTS = [0.2, 0.2, 0.2, 0.25, 0.08, 0.04, 0.03]
 
 
-@pytest.mark.parametrize(
-    "seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 12))]
-)
+@pytest.mark.parametrize("seed", quick(range(12), 1))
 def test_random_life_of_a_board(seed):
     rng = np.random.default_rng(seed)
     number = seed % len(SIZES)
@@ -112,7 +111,7 @@ def random_events(rng: np.random.Generator, count: int) -> list[PinEvent]:
     return [PinEvent(*command) for command in script.commands]
 
 
-@pytest.mark.parametrize("seed", [0, 1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", quick(range(3), 2))
 def test_pin_by_pin(seed):
     """With limits so wide that many writes and reads break them."""
     wiring = WIRINGS[seed % len(WIRINGS)]

@@ -13,6 +13,7 @@ from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.pair import CubeSensePair
+from tests.tiers import quick
 
 from .cameras import ListCamera
 from .commanded import Command, CommandedIcarus, Outcome, run_engine
@@ -76,9 +77,7 @@ def random_life(
     return cameras, script.commands
 
 
-@pytest.mark.parametrize(
-    "seed", [*range(6), *(pytest.param(n, marks=pytest.mark.slow) for n in range(6, 25))]
-)
+@pytest.mark.parametrize("seed", quick(range(25), 6))
 def test_random_lives(board, seed):
     size, icarus = board
     rng = np.random.default_rng([seed, size.columns])

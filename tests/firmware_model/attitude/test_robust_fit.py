@@ -12,6 +12,7 @@ from cubestack.firmware_model.attitude.quest import dcm, quest
 from cubestack.firmware_model.attitude.robust_fit import Fit, robust_fit
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
+from tests.tiers import quick
 
 Floats = NDArray[np.float32]
 SIGMA = 2e-5
@@ -79,7 +80,7 @@ def test_sigmas_hold_with_displaced_stars() -> None:
     assert three > 0.985
 
 
-@pytest.mark.parametrize("factor", [0.99, 0.999, 1.0, 1.003, 1.02])
+@pytest.mark.parametrize("factor", quick([0.99, 0.999, 1.003, 1.0, 1.02], 2))
 @pytest.mark.parametrize("side", [0.0, 0.3])
 def test_another_focal_length_is_found_where_there_is_one(factor: float, side: float) -> None:
     def draw(rng: np.random.Generator) -> tuple[Floats, Floats, Rotation]:

@@ -17,6 +17,7 @@ from cubestack.hdl.cubesense.nadir_scan import NadirScan
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.sun_window import SunWindow
 from cubestack.hdl.cubesense.top import CubeSenseFpga
+from tests.tiers import quick
 
 
 class AsynchronousReset(Component):
@@ -44,7 +45,7 @@ BLOCKS: dict[str, Callable[[ReadOut], Component]] = {
 }
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", quick([1, 2], 1))
 @pytest.mark.parametrize("block", BLOCKS)
 def test_block(simulate: Any, read_out: ReadOut, block: str, seed: int) -> None:
     simulate(BLOCKS[block], read_out, block, name=block, seed=seed)

@@ -9,9 +9,10 @@ import pytest
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from tests.hdl.regression import SMALLEST, addressable
+from tests.tiers import quick
 
 NAMES = ["modes", "read", "store", "failures"]
-SEEDS = [1, pytest.param(2, marks=pytest.mark.slow)]
+SEEDS = quick([1, 2], 1)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -38,7 +39,7 @@ def test_addressing_at_full_size(simulate: Any) -> None:
     simulate(addressable, FULL_SIZE, "addressing", mcu_addressing=True, seed=1)
 
 
-@pytest.mark.parametrize("initialised", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.parametrize("initialised", quick([False, True], 1))
 def test_addressing_changes_nothing_else(simulate: Any, initialised: bool) -> None:
     options = {"mcu_addressing": True, "initialised": initialised}
     simulate(addressable, SMALLEST, *NAMES, seed=1, **options)

@@ -12,6 +12,7 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, SharedAsPublished
 from tests.hdl.regression import STAR, TIERS, modules
+from tests.tiers import quick
 
 SIZES = [(8, 4), (5, 3), (16, 8)]
 #: One seed for each small size, and the others.
@@ -30,7 +31,7 @@ def test_published(icarus: Any, name: str, columns: int, rows: int, seed: int) -
     icarus.run(CubeStarTop, columns, rows, *modules(STAR, name), seed=seed)
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
+@pytest.mark.parametrize("seed", quick([1, 2, 3], 1))
 def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
     """Standby alone makes the state: the part's flip-flops come up as they like."""
     shuffled = [*modules(STAR, "store", "read", "modes")]
@@ -48,10 +49,7 @@ def test_published_borders(icarus: Any) -> None:
     icarus.run(CubeStarTop, 5, 3, *modules(STAR, "borders"), seed=1)
 
 
-@pytest.mark.parametrize(
-    ("columns", "rows", "seed"),
-    [(8, 4, 1), (5, 3, 2), pytest.param(32, 16, 3, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("columns", "rows", "seed"), quick([(5, 3, 2), (8, 4, 1), (32, 16, 3)], 1))
 @pytest.mark.parametrize("top", NEXT_VERSION)
 def test_bus(icarus: Any, top: str, columns: int, rows: int, seed: int) -> None:
     tier = TIERS[top]
@@ -72,7 +70,7 @@ def with_board(wrapper: AsPublished, name: str) -> str:
     return verilog_text(wrapper, name) + verilog_text(board, "board")
 
 
-@pytest.mark.parametrize(("columns", "rows", "seed"), [(5, 3, 1), (8, 4, 2)])
+@pytest.mark.parametrize(("columns", "rows", "seed"), quick([(5, 3, 1), (8, 4, 2)], 1))
 @pytest.mark.parametrize("wrapper", [SharedAsPublished, DoubleAsPublished])
 def test_next_version_stores_as_the_published_board(
     icarus: Any, wrapper: type[AsPublished], columns: int, rows: int, seed: int

@@ -21,6 +21,7 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import verilog_text
 from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
 from tests.hdl.regression import FULL
+from tests.tiers import quick
 
 from .board_events import BOARDS, random_events
 from .icarus_board import IcarusBoard, Played
@@ -72,7 +73,7 @@ def difference(wiring: Wiring, events: list[PinEvent], found: Played, expected: 
     return ", ".join(name for name, m in found.memories.items() if m != expected.memories[name])
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in SEEDS[1:])])
+@pytest.mark.parametrize("seed", quick(SEEDS, 1))
 def test_settled_pin_by_settled_pin(case, seed):
     events = case.events(seed)
     expected = case.icarus.play(events)

@@ -7,6 +7,7 @@ import pytest
 from cubestack.hdl.flow.generate import verilog_text
 from tests.hdl.planted.bugs import BUGS, STAR, Bug, planted
 from tests.hdl.regression import FULL, TIERS, run_tier
+from tests.tiers import quick
 
 pytestmark = [
     pytest.mark.cocotb,
@@ -31,7 +32,7 @@ def wrong_verilog(bug: Bug, top: str) -> str:
         return verilog_text(design(tier.columns, tier.rows), "dut")
 
 
-@pytest.mark.parametrize(("bug", "top"), CASES)
+@pytest.mark.parametrize(("bug", "top"), quick(CASES, 4))
 def test_is_caught(bug: Bug, top: str, tmp_path: Path) -> None:
     (tmp_path / "dut.v").write_text(wrong_verilog(bug, top), encoding="utf-8")
     outcome = run_tier(top, tmp_path / "dut.v", tmp_path / "tier")

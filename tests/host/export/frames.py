@@ -10,12 +10,13 @@ import pytest
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.host.devices.registry import devices
+from tests.tiers import quick
 
 INTERFACES = [device.interface for device in devices()]
 
 EACH = pytest.mark.parametrize("interface", INTERFACES, ids=lambda interface: interface.name)
 
-COUNTS = pytest.mark.parametrize("count", [10, pytest.param(1000, marks=pytest.mark.slow)])
+COUNTS = pytest.mark.parametrize("count", quick([10, 1000], 1))
 
 
 def messages(interface: Interface, kind: Kind) -> list[Message]:

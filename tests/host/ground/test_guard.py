@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 from cubestack.host.errors import PortOpenError
 from cubestack.host.ground.guard import LARGEST_BODY
 from cubestack.host.ground.serving import MOST_CONNECTIONS, Serving, loopback_name
+from tests.tiers import quick
 
 from .conftest import SOON_S, TOKEN, Controlled
 
@@ -90,7 +91,7 @@ def test_noise_is_no_request(controlled: Controlled) -> None:
     assert controlled.ask("GET", "/state")[0] == 200
 
 
-@pytest.mark.parametrize("count", [1_000, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", quick([1_000, 10_000], 1))
 def test_many_connections_do_not_stop_the_emulation(controlled: Controlled, count: int) -> None:
     kept = []
     with connect(

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from cubestack.emulator.i2cdev.scheduler import MAX_DEBT_NS
+from tests.tiers import quick
 
 from .conftest import Run
 
@@ -27,12 +28,15 @@ BYTES = f"for _ in range({BYTE_READS}): bus.read_byte_data(0x1A, 0x83)"
 BYTES_BITS = BYTE_READS * (2 * (1 + 9 + 9) + 1)
 LONG = "bus.i2c_rdwr(i2c_msg.read(0x1A, 600))"
 LONG_BITS = 1 + 9 + 9 * 600 + 1
+CASES = [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYTES, BYTES_BITS)]
 
 
 @pytest.mark.parametrize(
     ("hz", "calls", "bits"),
-    [(100_000, BYTES, BYTES_BITS), (400_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS)],
-    ids=["bytes-100k", "bytes-400k", "long-400k"],
+    quick(
+        [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYTES, BYTES_BITS)], 2
+    ),
+    ids=["bytes-100k", "long-400k", "bytes-400k"],
 )
 def test_transfers_take_the_time_of_the_wire(run: Run, hz: int, calls: str, bits: int) -> None:
     """All together take no less, but for what was late before them."""

@@ -70,6 +70,7 @@ def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypa
     assert len(set(libraries)) == 5
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_two_processes_may_build_at_once(cache):
     program = (

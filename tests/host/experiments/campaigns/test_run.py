@@ -54,7 +54,8 @@ def test_a_cluster_makes_the_same_file(alone: Folder, tmp_path: Path) -> None:
     assert content(folder.path) == content(alone.path)
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [1, 3])
 def test_kills_lose_only_blocks_in_flight(
     alone: Folder, small: Path, tmp_path: Path, kills: int
 ) -> None:

@@ -15,6 +15,7 @@ from cubestack.host.experiments.cubestar import upsets as cubestar
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.upsets import experiment
 from cubestack.host.experiments.upsets.sample import UpsetResult
+from tests.tiers import quick
 
 from .voted import VotedCounter
 
@@ -92,9 +93,7 @@ def test_a_voted_counter_is_immune(voted: None) -> None:
     assert {result.answer for result in results} == {"right"}
 
 
-@pytest.mark.parametrize(
-    "layout", ["2", *(pytest.param(name, marks=pytest.mark.slow) for name in ("3", "two-boards"))]
-)
+@pytest.mark.parametrize("layout", quick(["2", "3", "two-boards"], 1))
 def test_each_layout_has_its_registers(layout: str) -> None:
     results = measured(
         *("cubestar", cubestar.EXPERIMENT),

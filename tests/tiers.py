@@ -1,0 +1,23 @@
+"""Which cases of a parametrized test run each time, and which only with all tests."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+from _pytest.mark import ParameterSet
+
+
+def quick(cases: Iterable[Any], count: int) -> list[Any]:
+    """All cases; ``count`` of them, evenly spread, run each time, and the others are slow.
+
+    A tuple is a case of several values, as pytest has it.
+    """
+    found = list(cases)
+    kept = {place * len(found) // count for place in range(count)}
+    return [case if place in kept else _slow(case) for place, case in enumerate(found)]
+
+
+def _slow(case: Any) -> ParameterSet:
+    if isinstance(case, ParameterSet):
+        return pytest.param(*case.values, id=case.id, marks=[*case.marks, pytest.mark.slow])
+    return pytest.param(*(case if isinstance(case, tuple) else [case]), marks=pytest.mark.slow)
