@@ -18,6 +18,7 @@ of the stars; the sidereal time's equinox has moved by 0.4 deg from theirs, whic
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,9 +61,18 @@ class Atmosphere:
     extinction_mag: float = 0.25
     sky_mag: float | None = None
 
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
+        "latitude_deg": (-90, 90),
+        "sidereal_deg": (0, 360),
+        "height_m": (-500, 9000),
+        "seeing_arcsec": (0, 20),
+        "extinction_mag": (0, 5),
+        "sky_mag": (10, 30),
+    }
+
     def __post_init__(self) -> None:
         """Refuse a place or an air that can not be: SceneError."""
-        for name, (low, high) in LIMITS.items():
+        for name, (low, high) in self.LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise SceneError(f"{name} must be in {low:g}..{high:g}, not {value}")
@@ -129,16 +139,6 @@ class Atmosphere:
         diameter_cm = max(aperture_mm / 10, POINT_CM)
         height = np.exp(-self.height_m / SCALE_HEIGHT_M)
         return float(0.09 * diameter_cm ** (-2 / 3) * height / np.sqrt(2 * exposure_s))
-
-
-LIMITS = {
-    "latitude_deg": (-90, 90),
-    "sidereal_deg": (0, 360),
-    "height_m": (-500, 9000),
-    "seeing_arcsec": (0, 20),
-    "extinction_mag": (0, 5),
-    "sky_mag": (10, 30),
-}
 
 
 def air_mass(height_deg: NDArray[np.float64]) -> NDArray[np.float64]:

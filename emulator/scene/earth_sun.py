@@ -7,7 +7,7 @@ of its picture's right side in body axes. Alpha and beta are as in ``emulator.sc
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,6 +141,12 @@ class EarthSunScene:
     hazards: tuple[SkyHazard, ...] = ()
     seed: int = 0
 
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
+        "altitude_km": (0, HIGHEST_KM),
+        "unevenness": (0, 10),
+        "glow_km": (0, 1000),
+    }
+
     def __post_init__(self) -> None:
         """Refuse surroundings that can not be; directions become unit vectors."""
         for name in ("nadir", "sun", "moon"):
@@ -154,7 +160,7 @@ class EarthSunScene:
             )
         refuse_zero(self, "altitude_km")
         refuse_negative(self, "seed")
-        refuse_outside(self, altitude_km=(0, HIGHEST_KM), unevenness=(0, 10), glow_km=(0, 1000))
+        refuse_outside(self, **self.LIMITS)
         refuse_strangers(self.hazards)
         radius = np.radians(angular_radius_deg(self.altitude_km))
         for hazard in self.hazards:

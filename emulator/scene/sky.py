@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,14 +93,20 @@ class SkyScene:
     still: bool = False
     seed: int = 0
 
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
+        "epoch": EPOCHS,
+        "mag_limit": MAGNITUDES,
+        "false_star_mag": MAGNITUDES,
+        "false_stars": (0, MOST_FALSE_STARS),
+    }
+
     def __post_init__(self) -> None:
         """Refuse a sky that can not be."""
         starts = [pose.start_s for pose in self._all_poses]
         if sorted(starts) != starts:
             raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
         refuse_negative(self, "seed")
-        refuse_outside(self, epoch=EPOCHS, mag_limit=MAGNITUDES, false_star_mag=MAGNITUDES)
-        refuse_outside(self, false_stars=(0, MOST_FALSE_STARS))
+        refuse_outside(self, **self.LIMITS)
         refuse_strangers(self.hazards)
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
@@ -25,10 +25,15 @@ class View(Generic[S, C]):
     condition: C
 
 
+TEMPERATURES_C = (-60.0, 125.0)
+"""That sensors work at."""
+
+
 def check_temperature(temperature_c: float) -> None:
     """Raise SceneError for a temperature that no sensor works at."""
-    if not -60 <= temperature_c <= 125:
-        raise SceneError(f"temperature_c must be in -60..125, not {temperature_c}")
+    low, high = TEMPERATURES_C
+    if not low <= temperature_c <= high:
+        raise SceneError(f"temperature_c must be in {low:g}..{high:g}, not {temperature_c}")
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,8 @@ class SkyCondition:
     temperature_c: float = 20.0
     hot_pixels: int = 20
     hazards: tuple[SensorHazard, ...] = ()
+
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {"temperature_c": TEMPERATURES_C}
 
     def __post_init__(self) -> None:
         """Refuse what can not be."""

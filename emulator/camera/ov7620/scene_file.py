@@ -31,13 +31,19 @@ The ball of the nadir sensor's bench is another kind, "ball", with the arguments
 from pathlib import Path
 from typing import Any
 
-from cubestack.emulator.camera.common.scene_file import read_hazards
+from cubestack.emulator.camera.common.scene_file import hazard_tables, read_hazards
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene import file
-from cubestack.emulator.scene.ball import ball_scene
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
+from cubestack.emulator.scene import file, keys
+from cubestack.emulator.scene.ball import DISTANCE_MM, RADIUS_MM, ball_scene
+from cubestack.emulator.scene.earth_sun import (
+    FASTEST_DEG_S,
+    EarthSunScene,
+    Mounting,
+    Reflection,
+    Target,
+)
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS
 
 
@@ -66,81 +72,119 @@ def _view(table: dict[str, Any]) -> EarthSunView:
     return EarthSunView(EarthSunScene.facing(**angles, **values, hazards=light), condition)
 
 
+_VECTOR = file.several(3, file.number)
+_MOUNTING = file.subtable(
+    {
+        "boresight": _VECTOR.told("direction, body axes"),
+        "right": _VECTOR.told("direction that the picture's rows follow, body axes"),
+    },
+    Mounting,
+)
+
+
 def _mounting(value: Any) -> Mounting:
-    values = file.subtable(
-        {"boresight": file.several(3, file.number), "right": file.several(3, file.number)}
-    )(value)
+    values = _MOUNTING(value)
     if "boresight" not in values:
         raise file.SceneError("needs the key boresight")
     return Mounting(**values)
 
 
-def _lens(value: Any) -> LensError:
-    return LensError(**file.subtable(_LENS)(value))
+_PAIRS = file.list_of(file.several(2, file.number))
 
 
 def _radial(value: Any) -> tuple[tuple[float, float], ...]:
     if not isinstance(value, list):
         raise file.SceneError(f"must be pairs of field angle and error, not {value!r}")
-    return tuple(file.several(2, file.number)(pair) for pair in value)
+    return _PAIRS(value)
+
+
+_LENS = file.subtable(
+    {
+        "centre_px": file.several(2, file.number).told("optical axis less the boresight"),
+        "radial_deg": file.Reader(_radial, _PAIRS.about).told(
+            "pairs of field angle, and error outwards there"
+        ),
+        "decentring_deg": file.several(2, file.number).told("Brown's p1 and p2"),
+    },
+    LensError,
+)
+
+
+def _lens(value: Any) -> LensError:
+    return LensError(**_LENS(value))
+
+
+_REFLECTION = file.subtable(
+    {
+        "camera": file.one_of({camera.name.lower(): camera for camera in Target}).told("that sees"),
+        "at_deg": file.several(2, file.number).told("its angles alpha and beta"),
+        "radius_px": file.number.told("its size", low=0),
+        "level": file.number.told("grey values above black", low=0),
+    }
+)
 
 
 def _reflections(value: Any) -> tuple[Reflection, ...]:
     if not isinstance(value, list):
         raise file.SceneError("must be tables, each under [[reflections]]")
-    return tuple(_reflection(file.subtable(_REFLECTION)(item)) for item in value)
+    return tuple(_reflection(_REFLECTION(item)) for item in value)
 
 
 def _reflection(values: dict[str, Any]) -> Reflection:
-    if missing := _REFLECTION.keys() - values.keys():
+    if missing := _REFLECTION.about["readers"].keys() - values.keys():
         raise file.SceneError(f"needs the keys {', '.join(sorted(missing))}")
     alpha, beta = values.pop("at_deg")
     check_field(alpha, beta)
     return Reflection(alpha_deg=alpha, beta_deg=beta, **values)
 
 
-_REFLECTION: file.Readers = {
-    "camera": file.one_of({camera.name.lower(): camera for camera in Target}),
-    "at_deg": file.several(2, file.number),
-    "radius_px": file.number,
-    "level": file.number,
-}
-_LENS: file.Readers = {
-    "centre_px": file.several(2, file.number),
-    "radial_deg": _radial,
-    "decentring_deg": file.several(2, file.number),
-}
+def _mounted(boresight: str) -> file.Reader[Mounting]:
+    return file.Reader(_mounting, _MOUNTING.about).told(f"how it is mounted; else {boresight}")
+
+
+_OWN_LENS = file.Reader(_lens, _LENS.about).told("how it differs from the firmware's polynomial")
+_PAIR = file.several(2, file.number)
+_RATE = file.number.told(low=-FASTEST_DEG_S, high=FASTEST_DEG_S)
 _SCENE: file.Readers = {
-    "nadir": file.several(3, file.number),
-    "nadir_deg": file.several(2, file.number),
-    "sun": file.several(3, file.number),
-    "sun_deg": file.several(2, file.number),
-    "moon": file.several(3, file.number),
-    "altitude_km": file.number,
-    "rate_deg_s": file.several(3, file.number),
-    "nadir_camera": _mounting,
-    "sun_camera": _mounting,
-    "nadir_lens": _lens,
-    "sun_lens": _lens,
-    "bloom_px": file.number,
-    "unevenness": file.number,
-    "glow_km": file.number,
-    "reflections": _reflections,
-    "temperature_c": file.number,
-    "hot_pixels": file.whole,
-    "hot_pairs": file.whole,
-    "noise": file.flag,
-    "seed": file.whole,
-    "hazards": lambda value: value,
+    "nadir": _VECTOR.told("direction of the Earth's centre", role="direction"),
+    "nadir_deg": _PAIR.told("its angles in the nadir camera", instead=["nadir"]),
+    "sun": _VECTOR.told("direction of the Sun", role="direction"),
+    "sun_deg": _PAIR.told("its angles in the Sun camera", instead=["sun"]),
+    "moon": _VECTOR.told("direction of the Moon; without it there is none", role="direction"),
+    "altitude_km": file.number.told("of the satellite"),
+    "rate_deg_s": file.several(3, _RATE).told("body rate in body axes"),
+    "nadir_camera": _mounted("+z"),
+    "sun_camera": _mounted("-z"),
+    "nadir_lens": _OWN_LENS,
+    "sun_lens": _OWN_LENS,
+    "bloom_px": file.number.told("radius of the Sun's image on the boresight", low=0),
+    "unevenness": file.number.told("standard deviation of the Earth's brightness, relative"),
+    "glow_km": file.number.told("scale height of the glow above the limb; 0 for none"),
+    "reflections": file.Reader(_reflections, {**_REFLECTION.about, "type": "tables"}).told(
+        "false lights"
+    ),
+    "temperature_c": file.number.told("of lenses and sensors; only hazards depend on it"),
+    "hot_pixels": file.whole.told("pixels of each camera that are stuck at full scale", low=0),
+    "hot_pairs": file.whole.told("pairs of such pixels, side by side", low=0),
+    "noise": file.flag.told("false: no noise, but for hot pixels"),
+    "seed": file.whole.told("of noise, surface and hot pixels", low=0),
+    "hazards": hazard_tables(EARTH_HAZARDS),
 }
 _BALL_SCENE: file.Readers = {
-    "angle_deg": file.several(2, file.number),
-    "radius_mm": file.number,
-    "distance_mm": file.number,
-    "offset_mm": file.several(3, file.number),
-    "unevenness": file.number,
-    "seed": file.whole,
+    "angle_deg": _PAIR.told("alpha and beta that the stage is turned to", default=[0.0, 0.0]),
+    "radius_mm": file.number.told("of the ball", default=RADIUS_MM, low=0),
+    "distance_mm": file.number.told("of its surface from the axis", default=DISTANCE_MM, low=0),
+    "offset_mm": _VECTOR.told("of the optic point from the axis", default=[0.0, 0.0, 0.0]),
+    "unevenness": file.number.told("of the ball's brightness, relative", default=0.0),
+    "seed": _SCENE["seed"],
 }
-_BALL = _BALL_SCENE | {
-    key: _SCENE[key] for key in ("nadir_lens", "hot_pixels", "hot_pairs", "noise")
+_BALL: file.Readers = {
+    **_BALL_SCENE,
+    **{key: _SCENE[key] for key in ("nadir_lens", "hot_pixels", "hot_pairs", "noise")},
 }
+
+
+def earth_sun_keys() -> dict[str, Any]:
+    """What the keys of each kind are (`keys.declared`)."""
+    owners = EarthSunScene, FisheyeCondition
+    return {"earth-sun": keys.declared(_SCENE, *owners), "ball": keys.declared(_BALL, *owners)}

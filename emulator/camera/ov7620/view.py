@@ -1,10 +1,11 @@
 """What a sun or nadir camera is like, and what it sees."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.hazards.contract import Lens, SensorHazard
-from cubestack.emulator.camera.common.view import View, check_temperature
+from cubestack.emulator.camera.common.view import TEMPERATURES_C, View, check_temperature
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.luminance import F_NUMBER, PITCH_UM, SPOT_PX
 from cubestack.emulator.scene.earth_sun import EarthSunScene
@@ -43,6 +44,8 @@ class FisheyeCondition:
     sun_lens: LensError | None = None
     temperature_c: float = 20.0
     hazards: tuple[SensorHazard, ...] = ()
+
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {"temperature_c": TEMPERATURES_C}
 
     def __post_init__(self) -> None:
         """Refuse what can not be."""

@@ -30,7 +30,9 @@ class Aberration(SkyHazard):
     )
     orbit_km_s: float = key(7.6, "speed around the Earth, km/s", 0, 12)
     orbit_towards: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0), "where that goes: three numbers, or right ascension and declination in deg"
+        (0.0, 0.0, 1.0),
+        "where that goes: three numbers, or right ascension and declination in deg",
+        role="direction",
     )
 
     name: ClassVar[str] = "aberration"

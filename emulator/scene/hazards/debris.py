@@ -29,10 +29,14 @@ class Debris(SkyHazard):
     """One object that moves against the stars."""
 
     direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0), "where it is at `time_s`: three numbers, or ra and dec in deg"
+        (0.0, 0.0, 1.0),
+        "where it is at `time_s`: three numbers, or ra and dec in deg",
+        role="direction",
     )
     towards: tuple[float, ...] = key(
-        (1.0, 0.0, 0.0), "a direction on its way, less than half a turn on, likewise"
+        (1.0, 0.0, 0.0),
+        "a direction on its way, less than half a turn on, likewise",
+        role="direction",
     )
     rate_deg_s: float = key(0.5, "how fast it moves, deg/s", 0, 20)
     v_mag: float = key(2.0, "its magnitude", -10, 10)

@@ -58,10 +58,14 @@ class EarthLimb(SkyHazard):
     """The Earth below a satellite, in some direction."""
 
     nadir: tuple[float, ...] = key(
-        (0.0, 0.0, -1.0), "of its centre: three numbers, or right ascension and declination in deg"
+        (0.0, 0.0, -1.0),
+        "of its centre: three numbers, or right ascension and declination in deg",
+        role="direction",
     )
     sun: tuple[float, ...] | None = key(
-        None, "direction of the Sun, likewise; without it, in the satellite's zenith"
+        None,
+        "direction of the Sun, likewise; without it, in the satellite's zenith",
+        role="direction",
     )
     altitude_km: float = key(600.0, "of the satellite", 150, 40_000)
     unevenness: float = key(0.1, "standard deviation of the surface's brightness, relative", 0, 1)

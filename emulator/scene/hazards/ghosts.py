@@ -40,7 +40,9 @@ class Ghosts(SkyHazard):
     """What the lens makes of the Sun beside its image."""
 
     sun: tuple[float, ...] | None = key(
-        None, "direction of the Sun; without it, the scene's, or none where a scene has none"
+        None,
+        "direction of the Sun; without it, the scene's, or none where a scene has none",
+        role="direction",
     )
     share: float = key(1e-4, "of the Sun's light that the brightest ghost has", 0, 1)
     count: int = key(5, "ghosts, each with half of the light of the one before", 0, 50)

@@ -35,9 +35,15 @@ class Strength:
         return self.values[-1] if self.default is None else self.default
 
 
-def key(default: Any, meaning: str, low: float = -math.inf, high: float = math.inf) -> Any:
-    """A field of a hazard: what it is, with its unit, and its least and greatest value."""
-    return field(default=default, metadata={"meaning": meaning, "range": (low, high)})
+def key(
+    default: Any, meaning: str, low: float = -math.inf, high: float = math.inf, role: str = ""
+) -> Any:
+    """A field of a hazard: what it is, with its unit, and its least and greatest value.
+
+    ``role`` is "direction" for that of something, as ``emulator.scene.file.Reader`` tells it.
+    """
+    told = {"meaning": meaning, "range": (low, high)} | ({"role": role} if role else {})
+    return field(default=default, metadata=told)
 
 
 @dataclass(frozen=True, kw_only=True)

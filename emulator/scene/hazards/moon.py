@@ -42,10 +42,14 @@ class Moon(SkyHazard):
     """The Moon in some direction."""
 
     direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0), "of its centre: three numbers, or right ascension and declination in deg"
+        (0.0, 0.0, 1.0),
+        "of its centre: three numbers, or right ascension and declination in deg",
+        role="direction",
     )
     sun: tuple[float, ...] | None = key(
-        None, "direction of the Sun, likewise, which gives the phase; without it, full"
+        None,
+        "direction of the Sun, likewise, which gives the phase; without it, full",
+        role="direction",
     )
     scatter: float = key(SHARE, "share of its light that the lens scatters", 0, 0.2)
 

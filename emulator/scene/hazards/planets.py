@@ -44,7 +44,9 @@ class Planets(SkyHazard):
         ephemeris.NEW_YEAR_2026, "Julian date at time 0", ephemeris.FIRST_DATE, ephemeris.LAST_DATE
     )
     direction: tuple[float, ...] | None = key(
-        None, "of one planet, instead of all of the date: three numbers, or ra and dec in deg"
+        None,
+        "of one planet, instead of all of the date: three numbers, or ra and dec in deg",
+        role="direction",
     )
     v_mag: float = key(-2.5, "magnitude of that one", -5.0, 10.0)
 

@@ -37,7 +37,9 @@ class SunGlare(SkyHazard):
     """A source beside the field."""
 
     direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0), "of the source: three numbers, or right ascension and declination in deg"
+        (0.0, 0.0, 1.0),
+        "of the source: three numbers, or right ascension and declination in deg",
+        role="direction",
     )
     v_mag: float = key(
         SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73", -30, 30

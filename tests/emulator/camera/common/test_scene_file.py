@@ -190,7 +190,7 @@ def test_a_night_on_the_ground(tmp_path: Path) -> None:
         ("latitude_deg = -33.9", "", "atmosphere: needs the key latitude_deg"),
         ("seeing_arcsec = 3", "seeing_arcsec = 30", "atmosphere: seeing_arcsec must be in 0..20"),
         ('"earth"', '"earth"\nrate_deg_s = [0, 1, 0]', 'mount = "earth" needs one pose'),
-        ('"earth"', '"moon"', 'mount must be "sky" or "earth", not \'moon\''),
+        ('"earth"', '"moon"', "mount must be one of ['sky', 'earth'], not 'moon'"),
         ("sidereal_deg = 200", 'utc = "now"\nlongitude_deg = 0', "utc must be a date and time"),
     ],
 )
