@@ -102,7 +102,7 @@ class SkyScene:
 
     def __post_init__(self) -> None:
         """Refuse a sky that can not be."""
-        starts = [pose.start_s for pose in self._all_poses]
+        starts = [pose.start_s for pose in self.all_poses]
         if sorted(starts) != starts:
             raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
         refuse_negative(self, "seed")
@@ -120,7 +120,8 @@ class SkyScene:
         return cls(quaternion_from_pointing(ra_deg, dec_deg, roll_deg))
 
     @cached_property
-    def _all_poses(self) -> tuple[Pose, ...]:
+    def all_poses(self) -> tuple[Pose, ...]:
+        """That at time 0, and the later ones."""
         return (Pose(self.quaternion, self.rate_deg_s), *self.poses)
 
     @cached_property
@@ -129,13 +130,13 @@ class SkyScene:
         return (
             0.0
             if self.still
-            else max(float(np.linalg.norm(np.asarray(p.rate_deg_s))) for p in self._all_poses)
+            else max(float(np.linalg.norm(np.asarray(p.rate_deg_s))) for p in self.all_poses)
         )
 
     def pose_at(self, time_ps: int) -> Pose:
         """The pose that holds at a time."""
         begun = [pose for pose in self.poses if pose.start_s * PS_PER_S <= time_ps]
-        return begun[-1] if begun else self._all_poses[0]
+        return begun[-1] if begun else self.all_poses[0]
 
     def truth(self, time_ps: int) -> NDArray[np.float64]:
         """The attitude (4,) at a time: scalar last, inertial to camera."""
@@ -154,7 +155,7 @@ class SkyScene:
         """The same sky, all poses turned by a rotation vector (3,) in camera axes, in degrees."""
         first, *later = (
             replace(pose, quaternion=propagate(pose.quaternion, rotation_deg, 1.0))
-            for pose in self._all_poses
+            for pose in self.all_poses
         )
         return replace(self, quaternion=first.quaternion, poses=tuple(later))
 

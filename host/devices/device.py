@@ -17,6 +17,7 @@ from cubestack.host.clients.contract import Client, DeviceClient
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
+    from cubestack.emulator.scene.form import SceneForm
     from cubestack.firmware_model.interface.efm32gg.table import Processor
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
@@ -175,6 +176,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
             that is its stars, or nothing.
         processor: its processor as firmware of one's own sees it; None where that can not run.
         image_sensor: registers of its image sensor, where its interface reads single ones.
+        scene_form: what tools can do with its scenes beside reading files; None for nothing.
     """
 
     name: str
@@ -203,6 +205,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
     processor: "Callable[[], Processor] | None" = None
     overlay: "Callable[[Any, str], Overlay] | None" = None
     image_sensor: CameraRegisterMap | None = None
+    scene_form: "Callable[[], SceneForm[Any]] | None" = None
 
     def __post_init__(self) -> None:
         """Refuse a name that can not be everywhere: ValueError."""

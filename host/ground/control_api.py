@@ -24,6 +24,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cubestack.host.ground.emulation import Emulation, JsonObject
 from cubestack.host.ground.guard import TooLargeError, refused
+from cubestack.host.ground.scenes import stars
 from cubestack.host.ground.traces import Trace
 from cubestack.host.pictures.images import png
 
@@ -146,6 +147,18 @@ CALLS = (
         *("GET", "/devices/{device}/trace", "a VCD file of a span, done again beside"),
         lambda emulation, device, from_s, to_s: emulation.trace(device, from_s, to_s),
         {"from_s": (NUMBER, REQUIRED), "to_s": (NUMBER, REQUIRED)},
+    ),
+    Call("GET", "/devices/{device}/scene", "what its cameras see, as a file's", Emulation.scene),
+    Call("GET", "/devices/{device}/scene/keys", "keys of scene files", Emulation.scene_keys),
+    Call(
+        *("POST", "/devices/{device}/scene/look", "where on the sky another scene would be"),
+        lambda emulation, device, table: emulation.look(device, table),
+        {"table": (dict, REQUIRED)},
+    ),
+    Call(
+        *("GET", "/stars", "stars of the catalogue, the brightest first"),
+        lambda _emulation, mag_limit, epoch: stars(mag_limit, epoch),
+        {"mag_limit": (NUMBER, 4.0), "epoch": (NUMBER, 2026.0)},
     ),
     Call(
         *("POST", "/devices/{device}/act", "what the shell's fault, scene and power do"),

@@ -15,6 +15,7 @@ from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.virtual_serial import PS_PER_S
 from cubestack.host.errors import TargetError
+from cubestack.host.ground import scenes
 from cubestack.host.ground.traces import LONGEST_S as TRACE_S
 from cubestack.host.ground.traces import Bench, Trace
 
@@ -129,6 +130,18 @@ class Emulation:
         if name not in pictures:
             raise TargetError(f"no picture {name!r}; there is {', '.join(pictures) or 'none'}")
         return pictures[name].copy()
+
+    def scene_keys(self, device: str) -> JsonObject:
+        """See ``scenes.keys``."""
+        return scenes.keys(self._of(device).device)
+
+    def scene(self, device: str) -> JsonObject:
+        """See ``scenes.present``."""
+        return scenes.present(self._of(device))
+
+    def look(self, device: str, table: Mapping[str, Any]) -> JsonObject:
+        """See ``scenes.look``."""
+        return scenes.look(self._of(device), table)
 
     def act(self, device: str, words: Sequence[str], text: str = "") -> None:
         """Do what the shell does with such words; ``text`` of a file that they name.

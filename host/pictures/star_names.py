@@ -65,6 +65,11 @@ _NAMES = {
 }
 
 
+def is_named(hipparcos: int) -> bool:
+    """Whether a star has a proper name here."""
+    return hipparcos in _NAMES
+
+
 def star_name(hipparcos: int) -> str:
     """Proper name of a star, or its Hipparcos number."""
     return _NAMES.get(hipparcos, f"HIP {hipparcos}")

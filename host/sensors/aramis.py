@@ -13,6 +13,7 @@ from cubestack.host.devices.lazily import call, get
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
     from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.scene.form import SceneForm
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.aramis.client import Aramis
 
@@ -41,6 +42,13 @@ def _load_scene(path: Path) -> "SkyView":
     return load_scene(path, CONDITION)
 
 
+def _scene_form() -> "SceneForm[SkyView]":
+    from cubestack.emulator.camera.common.scene_form import sky_form
+    from cubestack.emulator.camera.mt9m001.lens import CONDITION
+
+    return sky_form(CONDITION)
+
+
 DEVICE: "Device[AramisBoard, Aramis]" = Device(
     name="aramis",
     title="AraMiS",
@@ -49,6 +57,7 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     client=call("cubestack.host.clients.aramis.client:Aramis"),
     open_board=_open_board,
     load_scene=_load_scene,
+    scene_form=_scene_form,
     default_scene=call("cubestack.emulator.scene.sky:SkyScene.pointing", *POINTING_DEG),
     default_scene_title="Orion",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),

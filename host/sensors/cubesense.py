@@ -29,6 +29,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     client=call("cubestack.host.clients.cubesense.client:CubeSense"),
     open_board=_open_board,
     load_scene=call("cubestack.emulator.camera.ov7620.scene_file:load_earth_sun_scene"),
+    scene_form=call("cubestack.emulator.camera.ov7620.scene_form:earth_sun_form"),
     default_scene=call(
         "cubestack.emulator.scene.earth_sun:EarthSunScene.facing",
         sun_deg=(20.0, 10.0),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
     from cubestack.emulator.boards.cubestar.stack import CubeStarStack
     from cubestack.emulator.camera.common.view import SkyView
+    from cubestack.emulator.scene.form import SceneForm
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.cubestar.client import CubeStar
 
@@ -93,6 +94,13 @@ def _load_scene(path: Path) -> "SkyView":
     return load_scene(path, CONDITION, UNCERTAIN)
 
 
+def _scene_form() -> "SceneForm[SkyView]":
+    from cubestack.emulator.camera.common.scene_form import sky_form
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION, UNCERTAIN
+
+    return sky_form(CONDITION, UNCERTAIN)
+
+
 def _default_scene() -> "Scene":
     from cubestack.emulator.scene.attitude import quaternion_from_pointing
     from cubestack.emulator.scene.sky import SkyScene
@@ -123,6 +131,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     client=call("cubestack.host.clients.cubestar.client:CubeStar"),
     open_board=_open_board,
     load_scene=_load_scene,
+    scene_form=_scene_form,
     default_scene=_default_scene,
     default_scene_title="Orion",
     experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),

@@ -27,6 +27,9 @@ ARCSEC2_PER_SR = (648_000 / math.pi) ** 2
 SUN_V = -26.74
 """Apparent magnitude of the Sun from the Earth (Allen's Astrophysical Quantities, section 14.2)."""
 
+SUN_RADIUS_DEG = 0.2666
+"""Of its disc, at 1 au (likewise)."""
+
 EARTH_RADIANCE = 0.3 / math.pi * 10 ** (-0.4 * SUN_V)
 """Radiance 1 of ``emulator.scene.earth`` in V = 0 stars a steradian: its albedo is 0.3."""
 
@@ -51,6 +54,15 @@ class Lights:
 
     vectors: Vectors
     v_mag: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Something in the sky, for a map: its name, unit vector (3,) to its centre, its radius."""
+
+    name: str
+    direction: Vectors
+    radius_deg: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +133,11 @@ class SkyHazard(Hazard):
     def speed_deg_s(self) -> float:
         """How fast its lights move against the stars."""
         return 0.0
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """What it says of where something stands at time 0."""
+        return ()
 
     def lights(self, looking: Looking) -> Lights | None:
         """Its points of light at an instant."""

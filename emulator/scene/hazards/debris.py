@@ -12,6 +12,7 @@ import numpy as np
 
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import (
+    Body,
     Depth,
     Lights,
     Looking,
@@ -73,6 +74,11 @@ class Debris(SkyHazard):
     def speed_deg_s(self) -> float:
         """Its rate."""
         return self.rate_deg_s
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The object, where it is said to be at its time."""
+        return (Body("debris", direction("direction", self.direction)),)
 
     def lights(self, looking: Looking) -> Lights:
         """Where it is at the instant."""

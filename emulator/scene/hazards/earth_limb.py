@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, Earth, angular_radius_deg
 from cubestack.emulator.scene.hazards.contract import (
     EARTH_RADIANCE,
+    SUN_RADIUS_DEG,
+    Body,
     Brightness,
     Depth,
     Looking,
@@ -95,6 +97,12 @@ class EarthLimb(SkyHazard):
         sun = aside(looking.boresight, sun_deg, generator)
         seed = int(generator.integers(2**31))
         return cls(nadir=tuple(nadir.tolist()), sun=tuple(sun.tolist()), seed=seed)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Earth and Sun."""
+        radius_deg = angular_radius_deg(self.altitude_km)
+        return Body("Earth", self._nadir, radius_deg), Body("Sun", self._sun, SUN_RADIUS_DEG)
 
     @property
     def _nadir(self) -> Vectors:

@@ -13,7 +13,9 @@ import numpy as np
 
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.hazards.contract import (
+    SUN_RADIUS_DEG,
     SUN_V,
+    Body,
     Brightness,
     Depth,
     Looking,
@@ -66,6 +68,13 @@ class Ghosts(SkyHazard):
         """Of a Sun anywhere in the picture, with this share of its light in the brightest one."""
         sun = tuple(looking.anywhere(generator).tolist())
         return cls(share=strength, sun=sun, seed=int(generator.integers(2**31)))
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The Sun, where it is said."""
+        if self.sun is None:
+            return ()
+        return (Body("Sun", direction("sun", self.sun), SUN_RADIUS_DEG),)
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
         """All ghosts, and the light scattered around the Sun."""

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hazards.contract import (
+    SUN_RADIUS_DEG,
+    Body,
     Brightness,
     Depth,
     Looking,
@@ -78,6 +80,12 @@ class Moon(SkyHazard):
     @property
     def _sun(self) -> Vectors:
         return -self._centre if self.sun is None else direction("sun", self.sun)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The Moon, and the Sun where it is said."""
+        moon = Body("Moon", self._centre, math.degrees(RADIUS_RAD))
+        return (moon,) if self.sun is None else (moon, Body("Sun", self._sun, SUN_RADIUS_DEG))
 
     @property
     def phase_deg(self) -> float:

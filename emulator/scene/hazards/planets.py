@@ -12,6 +12,7 @@ import numpy as np
 
 from cubestack.emulator.scene.hazards import ephemeris
 from cubestack.emulator.scene.hazards.contract import (
+    Body,
     Depth,
     Lights,
     Looking,
@@ -65,6 +66,14 @@ class Planets(SkyHazard):
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
         """One planet of this magnitude anywhere in the picture."""
         return cls(direction=tuple(looking.anywhere(generator).tolist()), v_mag=strength)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The one, or all of the date."""
+        if self.direction is not None:
+            return (Body("planet", direction("direction", self.direction)),)
+        there = {one: ephemeris.geocentric(one, self.julian_date) for one in MAGNITUDES}
+        return tuple(Body(one.title(), at / np.linalg.norm(at)) for one, at in there.items())
 
     def lights(self, looking: Looking) -> Lights:
         """One light a planet."""

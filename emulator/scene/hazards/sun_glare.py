@@ -16,7 +16,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from cubestack.emulator.scene.hazards.contract import (
+    SUN_RADIUS_DEG,
     SUN_V,
+    Body,
     Brightness,
     Depth,
     Looking,
@@ -64,6 +66,12 @@ class SunGlare(SkyHazard):
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
         """The Sun at this angle from the boresight, to any side."""
         return cls(direction=tuple(looking.beside(strength, generator).tolist()))
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The source; the Sun where it is as bright."""
+        name = "Sun" if self.v_mag == SUN_V else "stray light"
+        return (Body(name, direction("direction", self.direction), SUN_RADIUS_DEG),)
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
         """Light that gets to each part of the picture."""

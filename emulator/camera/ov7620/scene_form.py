@@ -1,0 +1,107 @@
+"""Scenes of sun and nadir cameras, for tools: see ``emulator.scene.form``."""
+
+from typing import Any
+
+import numpy as np
+
+from cubestack.emulator.camera.common.view import View
+from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
+from cubestack.emulator.camera.ov7620.scene_file import earth_sun_keys
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.earth import angular_radius_deg
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
+from cubestack.emulator.scene.form import (
+    Field,
+    Matrix,
+    SceneForm,
+    Sight,
+    Table,
+    bodies_of,
+    differing,
+    hazard_table,
+    rounded,
+)
+from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG, Body
+from cubestack.emulator.scene.hazards.moon import RADIUS_RAD as MOON_RADIUS_RAD
+from cubestack.emulator.scene.keys import plain
+
+TITLE = "the satellite's body axes at time 0; y is down"
+
+TURN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""The map has +z, where the nadir camera usually looks, in its middle, and -y on top."""
+
+_AROUND = np.radians(np.arange(0, 360, 5))
+RIM = vector_from_angles(FIELD_DEG * np.cos(_AROUND), FIELD_DEG * np.sin(_AROUND))
+"""Directions (n, 3) in camera axes along the rim of the field."""
+
+MARKS = {
+    f"{sign}{axis}": float(f"{sign}1") * np.eye(3)[number]
+    for number, axis in enumerate("xyz")
+    for sign in "+-"
+}
+
+
+def earth_sun_form() -> SceneForm[EarthSunView]:
+    """Of a device with a sun and a nadir camera."""
+    return SceneForm(earth_sun_keys(), _view, _table, _sight)
+
+
+def _view(board: Any) -> EarthSunView:
+    return View(board.scene, next(iter(board.cameras.values())).condition)
+
+
+def _table(view: EarthSunView) -> Table:
+    scene, condition = view.scene, view.condition
+    table: Table = {"kind": "earth-sun", "nadir": rounded(scene.nadir), "sun": rounded(scene.sun)}
+    if scene.moon is not None:
+        table["moon"] = rounded(scene.moon)
+    rate = np.asarray(scene.rate_deg_s, np.float64)
+    if np.any(rate):
+        table["rate_deg_s"] = rate.tolist()
+    usual = EarthSunScene()
+    table |= differing(scene, usual, "nadir", "sun", "moon", "rate_deg_s")
+    seed = table.get("seed", 0)
+    table |= differing(condition, FisheyeCondition(), "seed")
+    for camera in Target:
+        name = camera.name.lower()
+        mounting: Mounting = getattr(scene, f"{name}_camera")
+        if not np.allclose(mounting.matrix, getattr(usual, f"{name}_camera").matrix):
+            table[f"{name}_camera"] = {key: plain(one) for key, one in vars(mounting).items()}
+        lens: LensError | None = getattr(condition, f"{name}_lens")
+        if lens is not None:
+            table[f"{name}_lens"] = differing(lens, NOMINAL, "scale", "residuals")
+    if scene.reflections:
+        table["reflections"] = [_reflection(one) for one in scene.reflections]
+    return table | hazard_table((*scene.hazards, *condition.hazards), seed)
+
+
+def _reflection(one: Reflection) -> Table:
+    at = {"camera": one.camera.name.lower(), "at_deg": [one.alpha_deg, one.beta_deg]}
+    return {**at, "radius_px": one.radius_px, "level": one.level}
+
+
+def _sight(view: EarthSunView, now_ps: int) -> Sight:
+    scene = view.scene
+    moved = bool(np.any(np.asarray(scene.rate_deg_s))) and now_ps > 0
+    bodies = [
+        Body("Earth", np.asarray(scene.nadir), angular_radius_deg(scene.altitude_km)),
+        Body("Sun", np.asarray(scene.sun), SUN_RADIUS_DEG),
+    ]
+    if scene.moon is not None:
+        moon_deg = float(np.degrees(MOON_RADIUS_RAD))
+        bodies.append(Body("Moon", np.asarray(scene.moon), moon_deg))
+    known = {one.name for one in bodies}
+    return Sight(
+        TITLE,
+        tuple(_camera(scene, camera, 0) for camera in Target),
+        tuple(_camera(scene, camera, now_ps) for camera in Target) if moved else (),
+        (*bodies, *(one for one in bodies_of(scene.hazards) if one.name not in known)),
+        MARKS,
+        turn=TURN,
+    )
+
+
+def _camera(scene: EarthSunScene, camera: Target, time_ps: int) -> Field:
+    axes: Matrix = scene.axes(camera, time_ps)
+    return Field(f"{camera.name.lower()} camera", axes, RIM @ axes)

@@ -1,0 +1,135 @@
+"""What tools can do with scenes beside reading their files: tell their keys, write one down as the
+table of a file, and say where on a map of the sky it puts cameras and bodies.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.scene.hazards import Hazard
+from cubestack.emulator.scene.hazards.contract import Body, SkyHazard
+from cubestack.emulator.scene.keys import Told, plain
+
+Matrix = NDArray[np.float64]
+Table = dict[str, Any]
+V = TypeVar("V")
+
+DIGITS = 9
+"""Of angles in degrees and of unit vectors: what is beyond them, conversions make."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """What a camera sees of the sky.
+
+    Attributes:
+        name: of the camera, and when, if it is not at time 0.
+        axes: (3, 3), its x (right), y (down) and boresight as rows, in the scene's axes.
+        outline: (n, 3), directions along the border of its picture, in order, in the scene's axes.
+    """
+
+    name: str
+    axes: Matrix
+    outline: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A scene on a map of the sky. Directions are in the scene's axes.
+
+    Attributes:
+        title: what these axes are.
+        fields: of its cameras, which ``now`` are elsewhere where they turn.
+        now: whether each of ``fields`` is one at the time now, and not at time 0.
+        bodies: what stands where at time 0.
+        marks: points by which one finds one's way.
+        stars: whether the axes are those of the stars.
+        turn: (3, 3), from the scene's axes to those of the map, whose z is up.
+    """
+
+    title: str
+    fields: tuple[Field, ...]
+    now: tuple[Field, ...] = ()
+    bodies: tuple[Body, ...] = ()
+    marks: Mapping[str, Matrix] = field(default_factory=dict)
+    stars: bool = False
+    turn: Matrix = field(default_factory=lambda: np.eye(3))
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {
+            "title": self.title,
+            "fields": [_field(one) for one in self.fields],
+            "now": [_field(one) for one in self.now],
+            "bodies": [
+                {
+                    "name": one.name,
+                    "direction": rounded(one.direction),
+                    "radius_deg": one.radius_deg,
+                }
+                for one in self.bodies
+            ],
+            "marks": {name: rounded(mark) for name, mark in self.marks.items()},
+            "stars": self.stars,
+            "turn": self.turn.tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class SceneForm(Generic[V]):
+    """Scenes of one kind of device.
+
+    Attributes:
+        keys: of scene files, by kind, as ``keys.declared`` tells them.
+        view: what the cameras of a board see, and are like, as the reader of scene files gives it.
+        table: of a scene file that gives such a view again.
+        sight: such a view on the map, and where it is at a time in ps.
+    """
+
+    keys: Mapping[str, Mapping[str, Told]]
+    view: Callable[[Any], V]
+    table: Callable[[V], Table]
+    sight: Callable[[V, int], Sight]
+
+
+def _field(one: Field) -> dict[str, Any]:
+    return {"name": one.name, "axes": rounded(one.axes), "outline": rounded(one.outline)}
+
+
+def rounded(values: Any) -> Any:
+    """Numbers, of any shape, to `DIGITS` digits, as lists; never -0."""
+    return (np.round(np.asarray(values, np.float64), DIGITS) + 0.0).tolist()
+
+
+def differing(thing: Any, usual: Any, *without: str) -> Table:
+    """Fields of a dataclass that are not as in ``usual``, and can be written down; by name."""
+    found = {}
+    for one in fields(thing):
+        if one.init and one.name not in without:
+            value = plain(getattr(thing, one.name))
+            if value is not None and value != plain(getattr(usual, one.name)):
+                found[one.name] = value
+    return found
+
+
+def hazard_table(hazards: tuple[Hazard, ...], seed: int) -> Table:
+    """The key ``hazards`` of a file with this ``seed``, if there are any."""
+    found: dict[str, list[Table]] = {}
+    for one in hazards:
+        own = differing(one, type(one)(), "seed")
+        found.setdefault(one.name, []).append(
+            own | ({} if one.seed == seed else {"seed": one.seed})
+        )
+    return {"hazards": found} if found else {}
+
+
+def bodies_of(hazards: tuple[SkyHazard, ...]) -> tuple[Body, ...]:
+    """What hazards of light say of where something stands, each once."""
+    found: dict[tuple[str, tuple[float, ...]], Body] = {}
+    for hazard in hazards:
+        for body in hazard.bodies:
+            found.setdefault((body.name, tuple(rounded(body.direction))), body)
+    return tuple(found.values())

@@ -1,0 +1,97 @@
+"""Scenes of a running emulation, as JSON has them: their keys, and where they are on the sky."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cubestack.firmware_model.formats.setup import Document
+from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.emulated import AnyEmulated
+from cubestack.host.errors import TargetError
+from cubestack.host.pictures.star_names import is_named, star_name
+from cubestack.host.recording.setups import written
+
+if TYPE_CHECKING:
+    from cubestack.emulator.scene.form import SceneForm
+
+JsonObject = dict[str, Any]
+
+FILE = "scene"
+"""What a scene that has no file is called in messages."""
+
+FAINTEST = 7.0
+"""V of stars that are told at most: there are 15 000 then."""
+
+
+def keys(device: AnyDevice) -> JsonObject:
+    """What the keys of its scene files are, by their kind; TargetError where it does not tell."""
+    return {"kinds": _form(device).keys}
+
+
+def present(emulated: AnyEmulated) -> JsonObject:
+    """What its cameras see, as the table of a scene file, and where that is on the sky."""
+    form = _form(emulated.device)
+    view = form.view(emulated.board)
+    sight = form.sight(view, emulated.board.kernel.now).as_dict()
+    return {"table": form.table(view), "sight": sight}
+
+
+def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:
+    """Where on the sky a scene would be whose file has ``table``; ValueError for one that is none.
+
+    Nothing of the emulation changes.
+    """
+    form = _form(emulated.device)
+    with written(Document(FILE, text_of(table))) as path:
+        try:
+            view = emulated.device.load_scene(path)
+        except ValueError as error:
+            raise ValueError(str(error).replace(str(path), FILE)) from None
+    return {"sight": form.sight(view, emulated.board.kernel.now).as_dict()}
+
+
+def text_of(table: Mapping[str, Any]) -> str:
+    """The text of a scene file that has ``table``; ValueError for what no file has."""
+    from cubestack.emulator.scene.toml_text import toml_text
+
+    return toml_text(table)
+
+
+@lru_cache(maxsize=8)
+def stars(mag_limit: float, epoch: float) -> JsonObject:
+    """Stars with V below ``mag_limit`` at a Julian year, the brightest first: ``ra_deg``,
+    ``dec_deg``, ``v_mag``, and ``name``, empty where there is none.
+
+    ValueError for a limit above `FAINTEST`, or an epoch that scenes can not have.
+    """
+    from cubestack.emulator.scene.hipparcos import load_sky
+    from cubestack.emulator.scene.sky import EPOCHS
+
+    if not mag_limit <= FAINTEST:
+        raise ValueError(f"mag_limit is {FAINTEST:g} at most, not {mag_limit:g}")
+    if not EPOCHS[0] <= epoch <= EPOCHS[1]:
+        raise ValueError(f"an epoch is {EPOCHS[0]:g} to {EPOCHS[1]:g}, not {epoch:g}")
+    sky = load_sky(epoch, mag_limit)
+    order = np.argsort(sky.v_mag, kind="stable")
+    x, y, z = sky.vectors[order].T
+    ra, dec = np.degrees(np.arctan2(y, x)) % 360, np.degrees(np.arcsin(z))
+    rows = zip(sky.hip[order].tolist(), ra, dec, sky.v_mag[order], strict=True)
+    return {
+        "stars": [
+            {
+                "name": star_name(hip) if is_named(hip) else "",
+                "ra_deg": round(float(ra_deg), 4),
+                "dec_deg": round(float(dec_deg), 4),
+                "v_mag": round(float(v_mag), 2),
+            }
+            for hip, ra_deg, dec_deg, v_mag in rows
+        ]
+    }
+
+
+def _form(device: AnyDevice) -> "SceneForm[Any]":
+    if device.scene_form is None:
+        raise TargetError(f"{device.title} does not tell the keys of its scenes")
+    return device.scene_form()

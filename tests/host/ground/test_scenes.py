@@ -1,0 +1,117 @@
+"""What the control port tells of scenes: keys, the present one, and where it is on the sky."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.scene.attitude import matrix_from_pointing
+from cubestack.host.devices.emulated import open_device
+from cubestack.host.devices.registry import device, device_names
+from cubestack.host.errors import TargetError
+from cubestack.host.ground import scenes
+
+from .conftest import Controlled
+
+SCENE = "/devices/cubestar/scene"
+
+
+def show(controlled: Controlled, table: dict[str, Any]) -> tuple[int, Any]:
+    body = {"words": ["scene", "scene"], "text": scenes.text_of(table)}
+    return controlled.ask("POST", "/devices/cubestar/act", body)
+
+
+def test_the_keys_of_scene_files_are_told(controlled: Controlled) -> None:
+    status, told = controlled.ask("GET", f"{SCENE}/keys")
+    assert status == 200
+    assert list(told["kinds"]) == ["sky", "picture"]
+    epoch = told["kinds"]["sky"]["epoch"]
+    assert (epoch["type"], epoch["low"], epoch["high"]) == ("number", 1800, 2200)
+
+
+def test_the_present_scene_is_one_that_can_be_shown_again(controlled: Controlled) -> None:
+    table = controlled.ask("GET", SCENE)[1]["table"]
+    assert (table["kind"], table["ra_deg"], table["mag_limit"]) == ("sky", 84.0, 3.8)
+    other = table | {"ra_deg": 120.0, "hazards": {"moon": [{"direction": [120.0, 10.0]}]}}
+    assert show(controlled, other)[0] == 200
+    status, told = controlled.ask("GET", SCENE)
+    assert (status, told["table"]["ra_deg"]) == (200, 120.0)
+    assert [one["name"] for one in told["sight"]["bodies"]] == ["Moon"]
+    assert show(controlled, told["table"])[0] == 200
+    assert controlled.ask("GET", SCENE)[1]["table"] == told["table"]
+
+
+def test_another_scene_is_looked_at_and_not_shown(controlled: Controlled) -> None:
+    before = controlled.emulated.scene
+    table = {"kind": "sky", "ra_deg": 10.0, "dec_deg": 20.0, "roll_deg": 30.0}
+    status, told = controlled.ask("POST", f"{SCENE}/look", {"table": table})
+    assert status == 200
+    (field,) = told["sight"]["fields"]
+    np.testing.assert_allclose(field["axes"], matrix_from_pointing(10, 20, 30), atol=1e-8)
+    assert controlled.emulated.scene is before
+
+
+@pytest.mark.parametrize(
+    ("table", "error"),
+    [
+        ({}, 'scene: kind must be "sky" or "picture", not None'),
+        ({"kind": "sky", "ra_deg": 400, "dec_deg": 0}, "scene: ra_deg must be -360 to 360"),
+        ({"kind": "sky", "ra_deg": 1, "dec_deg": 0, "<b>": 1}, "scene: unknown key '<b>'"),
+        ({"kind": "sky", "ra_deg": None}, "no value of a scene file: None"),
+        ({"kind": "sky", "a\nb": {"c": 1}}, "scene: unknown key 'a\\nb'"),
+        ({"kind": "sky", "ra_deg": "\ud800", "dec_deg": 1}, "surrogates not allowed"),
+        ({"kind": "picture", "file": "/none.png"}, "scene: none.png can not be read"),
+        (
+            {"kind": "sky", "ra_deg": 1, "dec_deg": 0, "hazards": {"moon": [{"scatter": 1}]}},
+            "scatter of the hazard moon must be in 0..0.2",
+        ),
+    ],
+)
+def test_what_is_no_scene_is_told_in_one_line(
+    controlled: Controlled, table: dict[str, Any], error: str
+) -> None:
+    status, told = controlled.ask("POST", f"{SCENE}/look", {"table": table})
+    assert status == 400
+    assert error in told["error"]
+    assert "\n" not in told["error"]
+
+
+def test_only_who_may_is_told_of_scenes(controlled: Controlled) -> None:
+    for method, path in (("GET", SCENE), ("GET", f"{SCENE}/keys"), ("GET", "/stars")):
+        assert controlled.ask(method, path, headers={})[0] == 401
+    assert controlled.ask("POST", f"{SCENE}/look", {"table": {}}, headers={})[0] == 401
+
+
+def test_stars_are_those_of_the_catalogue(controlled: Controlled) -> None:
+    status, told = controlled.ask("GET", "/stars?mag_limit=2")
+    stars = told["stars"]
+    assert status == 200
+    assert (stars[0]["name"], stars[0]["v_mag"]) == ("Sirius", -1.44)
+    assert stars[0]["ra_deg"] == pytest.approx(101.28, abs=0.02)
+    assert stars[0]["dec_deg"] == pytest.approx(-16.72, abs=0.01)
+    magnitudes = [star["v_mag"] for star in stars]
+    assert magnitudes == sorted(magnitudes)
+    assert max(magnitudes) < 2
+    polaris = next(star for star in told["stars"] if star["name"] == "Polaris")
+    assert polaris["dec_deg"] > 89
+    for wrong in ("mag_limit=12", "mag_limit=nan", "epoch=1000", "epoch=x"):
+        assert controlled.ask("GET", f"/stars?{wrong}")[0] == 400
+
+
+@pytest.mark.parametrize("name", device_names())
+def test_the_default_scene_of_every_device_is_told(name: str) -> None:
+    with open_device(name) as emulated:
+        told = scenes.present(emulated)
+        json.dumps(told | scenes.keys(emulated.device), allow_nan=False)
+        again = scenes.look(emulated, told["table"])
+    for one, other in zip(told["sight"]["fields"], again["sight"]["fields"], strict=True):
+        assert one["name"] == other["name"]
+        np.testing.assert_allclose(one["axes"], other["axes"], atol=1e-7)
+
+
+def test_a_device_without_a_form_says_so() -> None:
+    none = replace(device("cubestar"), scene_form=None)
+    with pytest.raises(TargetError, match="CubeStar does not tell the keys of its scenes"):
+        scenes.keys(none)
