@@ -18,7 +18,10 @@ Table = dict[str, Any]
 V = TypeVar("V")
 
 DIGITS = 9
-"""Of angles in degrees and of unit vectors: what is beyond them, conversions make."""
+"""Of angles in degrees, and of directions on the map: what is beyond them, conversions make."""
+
+WRITTEN_DIGITS = 6
+"""Of unit vectors in scene files: 0.2 arcsec, and still read by people."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +102,9 @@ def _field(one: Field) -> dict[str, Any]:
     return {"name": one.name, "axes": rounded(one.axes), "outline": rounded(one.outline)}
 
 
-def rounded(values: Any) -> Any:
-    """Numbers, of any shape, to `DIGITS` digits, as lists; never -0."""
-    return (np.round(np.asarray(values, np.float64), DIGITS) + 0.0).tolist()
+def rounded(values: Any, digits: int = DIGITS) -> Any:
+    """Numbers, of any shape, to so many digits behind the point, as lists; never -0."""
+    return (np.round(np.asarray(values, np.float64), digits) + 0.0).tolist()
 
 
 def differing(thing: Any, usual: Any, *without: str) -> Table:

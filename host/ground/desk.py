@@ -70,6 +70,8 @@ class Desk:
         missing = {} if controls else {"controls": f"{target.name} has no control port"}
         if controls and controls.no_past:
             missing["past"] = f"there is no way back: {controls.no_past}"
+        if target.device is None or target.device.scene_form is None:
+            missing["scene_form"] = f"{interface.name} does not tell the keys of its scenes"
         if target.line is None:
             missing["raw"] = f"{target.name} is no serial line"
         if self._overlay is None:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlencode
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -19,8 +18,8 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.errors import HostError
+from cubestack.host.ground import relays
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.guard import TooLargeError, refused
@@ -38,9 +37,6 @@ NONSENSE = 1003
 
 SHARED = ("time_s", "held", "pace", "speed", "snapshots", "goes_back")
 """Of the state of an emulation, what all its devices have in common."""
-
-STEERING = ("pause", "resume", "step", "run", "pace", "snapshot", "back")
-"""Calls of the control port that pages pass on."""
 
 
 def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
@@ -72,9 +68,9 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
         routes=[
             Route("/", page),
             Route("/targets", targets),
-            Route("/targets/{number:int}/pictures/{name}", of(_picture)),
-            Route("/targets/{number:int}/recording", of(_recording)),
-            Route("/targets/{number:int}/trace", of(_trace)),
+            Route("/targets/{number:int}/pictures/{name}", of(relays.picture)),
+            Route("/targets/{number:int}/recording", of(relays.recording)),
+            Route("/targets/{number:int}/trace", of(relays.trace)),
             Route("/targets/{number:int}/found/{name}", of(_found)),
             Route("/targets/{number:int}/sensor-registers/{name}", of(_sensor_register)),
             Route("/targets/{number:int}/carried", of(_carried)),
@@ -83,8 +79,12 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets/{number:int}/transfer/{act}", of(_transfer), methods=["POST"]),
             Route("/targets/{number:int}/play", of(_play), methods=["POST"]),
             Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
-            Route("/targets/{number:int}/scene", of(_scene), methods=["POST"]),
-            Route("/targets/{number:int}/{call:str}", of(_steer), methods=["POST"]),
+            Route("/targets/{number:int}/scene", of(relays.scene)),
+            Route("/targets/{number:int}/scene", of(relays.show_scene), methods=["POST"]),
+            Route("/targets/{number:int}/scene/keys", of(relays.scene_keys)),
+            Route("/targets/{number:int}/scene/look", of(relays.look), methods=["POST"]),
+            Route("/targets/{number:int}/stars", of(relays.stars)),
+            Route("/targets/{number:int}/{call:str}", of(relays.steer), methods=["POST"]),
             WebSocketRoute("/targets/{number:int}/live", live),
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
@@ -131,43 +131,12 @@ async def _play(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     return desk.played.state
 
 
-async def _steer(desk: Desk, body: JsonObject, path: JsonObject) -> JsonObject:
-    call = path["call"]
-    if call not in STEERING:
-        raise ValueError(f"no call {call!r}; there are {', '.join(STEERING)}")
-    return await _control(desk, "POST", f"/{call}", body)
-
-
-async def _scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
-    text = body.get("text")
-    if not isinstance(text, str):
-        raise ValueError("'text' is that of a scene file")
-    act = {"words": ["scene", "scene.toml"], "text": text}
-    return await _control(desk, "POST", f"/devices/{_controls(desk).device}/act", act)
-
-
 async def _found(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObject:
     return await asyncio.wrap_future(desk.found(path["name"]))
 
 
 async def _sensor_register(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObject:
     return await asyncio.wrap_future(desk.sensor_register(path["name"]))
-
-
-async def _picture(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:
-    content = await _fetched(desk, f"pictures/{quote(path['name'])}")
-    return Response(content, media_type="image/png")
-
-
-async def _recording(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response:
-    name = f'attachment; filename="{desk.target.interface.name.lower()}.rec"'
-    content = await _fetched(desk, "recording")
-    return Response(content, media_type="text/plain", headers={"content-disposition": name})
-
-
-async def _trace(desk: Desk, body: JsonObject, _path: JsonObject) -> Response:
-    span = urlencode([(name, body[name]) for name in ("from_s", "to_s") if name in body])
-    return Response(await _fetched(desk, f"trace?{span}"), media_type="text/plain")
 
 
 async def _download(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
@@ -198,23 +167,6 @@ async def _carried(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response
     name = f'attachment; filename="{desk.target.interface.name.lower()}.png"'
     headers = {"content-disposition": name}
     return Response(desk.carried.picture, media_type="image/png", headers=headers)
-
-
-async def _fetched(desk: Desk, what: str) -> bytes:
-    """What the control port has of the device."""
-    controls = _controls(desk)
-    path = f"/devices/{controls.device}/{what}"
-    return await asyncio.to_thread(controls.client.fetch, "GET", path)
-
-
-async def _control(desk: Desk, method: str, path: str, body: object = None) -> JsonObject:
-    return await asyncio.to_thread(_controls(desk).client.ask, method, path, body)
-
-
-def _controls(desk: Desk) -> RemoteControls:
-    if desk.controls is None:
-        raise ValueError(desk.about["missing"]["controls"])
-    return desk.controls
 
 
 async def _live(desk: Desk, socket: WebSocket) -> None:

@@ -12,6 +12,7 @@ from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
 from cubestack.emulator.scene.form import (
+    WRITTEN_DIGITS,
     Field,
     Matrix,
     SceneForm,
@@ -28,7 +29,7 @@ from cubestack.emulator.scene.keys import plain
 
 TITLE = "the satellite's body axes at time 0; y is down"
 
-TURN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+TURN = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """The map has +z, where the nadir camera usually looks, in its middle, and -y on top."""
 
 _AROUND = np.radians(np.arange(0, 360, 5))
@@ -53,9 +54,10 @@ def _view(board: Any) -> EarthSunView:
 
 def _table(view: EarthSunView) -> Table:
     scene, condition = view.scene, view.condition
-    table: Table = {"kind": "earth-sun", "nadir": rounded(scene.nadir), "sun": rounded(scene.sun)}
-    if scene.moon is not None:
-        table["moon"] = rounded(scene.moon)
+    table: Table = {"kind": "earth-sun"}
+    for name in ("nadir", "sun", "moon"):
+        if getattr(scene, name) is not None:
+            table[name] = rounded(getattr(scene, name), WRITTEN_DIGITS)
     rate = np.asarray(scene.rate_deg_s, np.float64)
     if np.any(rate):
         table["rate_deg_s"] = rate.tolist()

@@ -1,4 +1,4 @@
-// What only an emulation lets one do: hold its time, disturb it, show it another scene.
+// What only an emulation lets one do: hold its time, and disturb it.
 
 import { choose, labelled, make } from "./dom.js";
 
@@ -73,19 +73,6 @@ export class Emulation {
         this.channels.append(
           button(`${channel} ${to}`, `${channel}-${to}`, () => act(`power ${channel} ${to}`)),
         );
-    this.scene = make("textarea", {
-      rows: 7,
-      id: "scene",
-      spellcheck: false,
-      placeholder: 'kind = "sky"\nra_deg = 10.0\ndec_deg = -30.0\nroll_deg = 0.0',
-    });
-    const scene = make(
-      "details",
-      {},
-      make("summary", { textContent: "another scene" }),
-      labelled("its file's text", this.scene),
-      button("Show", "show-scene", () => steer("scene", { text: this.scene.value })),
-    );
     const chosen = Object.entries(about.chosen).map(([name, value]) => `${name} ${value}`);
     place.append(
       make("p", {}, "virtual time ", this.time),
@@ -95,7 +82,6 @@ export class Emulation {
       past,
       faults,
       this.channels,
-      scene,
     );
     if (why) this.state.textContent = why;
     if (why) grey(place, why);

@@ -9,6 +9,7 @@ import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
 import { Played } from "./played.js";
 import { Results } from "./results.js";
+import { Scene } from "./scene.js";
 import { ask, listen } from "./server.js";
 import { Settings } from "./settings.js";
 import { Telemetry } from "./telemetry.js";
@@ -29,6 +30,7 @@ const parts = [
   "loop",
   "health",
   "emulation",
+  "scene",
   "commands",
   "settings",
   "waveform",
@@ -88,6 +90,7 @@ function look(number, targets) {
   const played = new Played(place("played"), about, path, tell);
   const waveform = new Waveform(place("waveform"), about, path, tell);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
+  new Scene(place("scene"), about, path, told);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there
   const transfer = new Transfer(place("wire"), path, about, tell);

@@ -65,7 +65,7 @@ def same(one: Any, other: Any) -> bool:
     if isinstance(one, tuple) and one and is_dataclass(one[0]):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, np.ndarray | tuple | float):
-        return bool(np.allclose(np.asarray(one), np.asarray(other), rtol=0, atol=2e-8))
+        return bool(np.allclose(np.asarray(one), np.asarray(other), rtol=0, atol=1e-6))
     return bool(one == other)
 
 
@@ -153,4 +153,5 @@ def test_earth_and_sun_stand_in_the_satellite_s_axes(tmp_path: Path) -> None:
     np.testing.assert_allclose(nadir.outline @ nadir.axes[2], np.cos(np.radians(95)))
     assert len(sight.now) == 2
     assert sight.turn @ np.array([0, 0, 1]) == pytest.approx([1, 0, 0])
+    assert np.linalg.det(sight.turn) == pytest.approx(1)  # seen from inside, as the sky is
     assert not sight.stars

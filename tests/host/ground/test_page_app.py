@@ -53,7 +53,13 @@ def test_the_page_and_its_parts_are_there(served: Serving) -> None:
     status, page = ask(served, "GET", "/")
     assert status == 200
     assert b"/page/main.js" in page
-    for part in ("main.js", "style.css", "vendor/uPlot.esm.js", "vendor/uPlot.LICENSE"):
+    for part in (
+        "main.js",
+        "style.css",
+        "scene.css",
+        "vendor/uPlot.esm.js",
+        "vendor/uPlot.LICENSE",
+    ):
         assert ask(served, "GET", f"/page/{part}")[0] == 200
 
 
@@ -121,12 +127,23 @@ def test_what_can_not_be_is_told(served: Serving, line: str, status: int, error:
         ("/targets/0/pause", {}, 400),
         ("/targets/0/dance", {}, 400),
         ("/targets/0/scene", {"text": ""}, 400),
+        ("/targets/0/scene", {"table": {"kind": "sky"}}, 400),
+        ("/targets/0/scene", {"table": {"a": None}}, 400),
+        ("/targets/0/scene", {"table": "text"}, 400),
+        ("/targets/0/scene/look", {"table": {}}, 400),
     ],
 )
 def test_nonsense_is_refused(served: Serving, path: str, body: Any, status: int) -> None:
     found, told = ask(served, "POST", path, body)
     assert found == status
     assert json.loads(told)["error"]
+
+
+@pytest.mark.parametrize("what", ["scene", "scene/keys", "stars"])
+def test_without_a_control_port_there_is_no_scene(served: Serving, what: str) -> None:
+    status, told = ask(served, "GET", f"/targets/0/{what}")
+    assert status == 400
+    assert json.loads(told)["error"] == "emulated:cubestar has no control port"
 
 
 def test_commands_from_a_page_touch_no_file() -> None:

@@ -1,0 +1,231 @@
+"""The page's scene in a real browser: map, form, and what comes of them."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from cubestack.host.devices.targets import open_target
+
+from .test_page import COVERED, PALE, SOON_MS, local
+from .test_page_acts import HOSTILE, hostile, look, shown, station
+
+pytestmark = pytest.mark.xdist_group("page")
+
+VALUE = "label:has-text('{}') input.scene-value"
+
+
+@pytest.fixture(scope="module")
+def address(chromium: Any) -> Iterator[str]:
+    with station("emulated:cubestar", "emulated:cubesense", "--seed", "5") as opened:
+        yield opened
+
+
+@pytest.fixture
+def page(chromium: Any, address: str) -> Iterator[Any]:
+    with shown(chromium, address) as opened:
+        stage(opened, "CubeStar")
+        yield opened
+
+
+def stage(page: Any, device: str) -> None:
+    """Look at a device, and wait for its scene; that of its power-up."""
+    look(page, device)
+    page.wait_for_selector("#scene-told >> text=/camera/")
+
+
+def value(page: Any, key: str) -> float:
+    return float(page.input_value(f"#scene-keys {VALUE.format(key)} >> nth=0"))
+
+
+def fill(page: Any, key: str, text: str) -> None:
+    page.fill(f"#scene-keys {VALUE.format(key)} >> nth=0", text)
+
+
+def told(page: Any, text: str) -> None:
+    page.wait_for_selector(f"#scene-told >> text={text}")
+
+
+def place(page: Any, right: float, down: float) -> tuple[float, float]:
+    """Of the screen, by shares of half of the map's width and height."""
+    page.locator("#sky-map").scroll_into_view_if_needed()
+    box = page.locator("#sky-map").bounding_box()
+    half = (box["width"] - 16) / 2
+    return (
+        box["x"] + box["width"] / 2 + right * half,
+        box["y"] + box["height"] / 2 + down * half / 2,
+    )
+
+
+def test_a_click_and_a_drag_put_the_pointing(page: Any) -> None:
+    page.mouse.click(*place(page, 0, 0))
+    told(page, "/camera (0.0|360.0)° -?0.0°/")
+    assert min(value(page, "ra_deg"), 360 - value(page, "ra_deg")) < 0.5
+    page.mouse.move(*place(page, -0.5, 0))
+    page.mouse.down()  # east is left; on the equator a place is at 2 sqrt(2) sin(ra / 4)
+    assert value(page, "ra_deg") == pytest.approx(4 * math.degrees(math.asin(8**-0.5)), abs=0.6)
+    page.mouse.move(*place(page, -0.4, -0.5))
+    page.mouse.move(*place(page, 0, -0.5))
+    page.mouse.up()
+    # Hammer's projection: half way up the middle is where sqrt(2) sin(dec / 2) is a half of 1.
+    expected = 2 * math.degrees(math.asin(0.5 / math.sqrt(2)))
+    told(page, "/camera .* 4[012][.]/")
+    assert value(page, "dec_deg") == pytest.approx(expected, abs=0.6)
+    before = value(page, "ra_deg")
+    page.mouse.click(*place(page, -0.95, -0.95))  # beside the map
+    assert value(page, "ra_deg") == before
+
+
+def test_keys_alone_put_the_pointing_and_the_emulation_sees_it(page: Any) -> None:
+    fill(page, "ra_deg", "100")
+    fill(page, "dec_deg", "10")
+    told(page, "/camera 100.0° 10.0°/")
+    page.focus("#sky-map")
+    page.keyboard.press("ArrowLeft")  # east
+    page.keyboard.press("Shift+ArrowDown")
+    told(page, "/camera 101.0° 0.0°/")
+    fill(page, "roll_deg", "45")
+    page.press("#scene-apply", "Enter")
+    page.wait_for_selector("#lines li.good >> text=scene")
+    page.select_option("#command", "CaptureAndProcess")
+    page.click("#send")
+    page.wait_for_selector("#attitude-told >> text=/truth 101.0000° .*0.0000° 45.0000°/")
+
+
+def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
+    fill(page, "ra_deg", "400")
+    told(page, "scene: ra_deg must be -360 to 360, not 400")
+    field = page.locator(f"#scene-keys {VALUE.format('ra_deg')}").first
+    assert field.get_attribute("aria-invalid") == "true"
+    page.click("#scene-apply")
+    page.wait_for_selector("#lines li.bad >> text=scene: ra_deg must be -360 to 360, not 400")
+    page.click("#scene-present")
+    told(page, "/^right ascension/")
+    assert field.get_attribute("aria-invalid") is None
+
+
+def test_fields_are_those_of_the_readers(page: Any) -> None:
+    """Limits, defaults and meanings; none of them is in the page's scripts."""
+    epoch = page.locator(f"#scene-keys {VALUE.format('epoch')}")
+    assert (epoch.get_attribute("min"), epoch.get_attribute("max")) == ("1800", "2200")
+    assert epoch.get_attribute("placeholder") == "2026"
+    epoch.focus()
+    assert "Julian year" in page.inner_text("#scene-help")
+    kinds = page.locator("[aria-label='kind of hazards'] option").all_text_contents()
+    assert {"moon", "earth-limb", "hot-pixels"} <= set(kinds)
+    page.select_option("#scene-kind", "picture")
+    told(page, "a picture needs the key file")
+    assert page.locator("#scene-keys label:has-text('exposure_ms')").count() == 1
+
+
+def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
+    page.click("#scene-keys summary >> text=hazards")
+    page.select_option("[aria-label='kind of hazards']", "moon")
+    page.click("[aria-label='add to hazards']")
+    told(page, "/Moon /")
+    things = page.locator("#scene-what option").all_inner_texts()
+    assert things == ["pointing", "moon.direction", "moon.sun"]
+    page.select_option("#scene-what", "moon.direction")
+    page.mouse.click(*place(page, 0, 0))
+    told(page, "/Moon (0.0|360.0)°/")
+    page.click("#scene-apply")
+    page.wait_for_selector("#lines li.good >> text=scene")
+    page.click("#scene-present")
+    told(page, "/Moon (0.0|360.0)°/")
+    page.click("[aria-label='remove moon']")
+    told(page, "/camera [^;]*$/")
+    page.click("#scene-apply")
+    page.wait_for_function("() => document.querySelectorAll('#lines li.good').length >= 2")
+
+
+def test_a_whole_file_is_shown(page: Any) -> None:
+    page.click("#scene summary >> text=a whole scene file")
+    page.fill("#scene-text", 'kind = "sky"\nra_deg = 200.0\ndec_deg = -40.0\n')
+    page.click("#show-scene")
+    told(page, "/camera 200.0° -40.0°/")
+    assert value(page, "ra_deg") == 200
+    page.fill("#scene-text", "[pointin]\n")
+    page.click("#show-scene")
+    page.wait_for_selector("#lines li.bad >> text=scene: ")
+
+
+def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
+    stage(page, "CubeSense")
+    assert page.locator("#scene-what option").all_inner_texts() == ["nadir", "sun", "moon"]
+    page.mouse.click(*place(page, 0, 0))  # +z, where the nadir camera looks
+    told(page, "/Earth -?0.00 -?0.00 1.00/")
+    page.select_option("#scene-what", "moon")
+    page.mouse.click(*place(page, 0.2, 0))
+    told(page, "/Moon/")
+    page.click("#scene-apply")
+    page.wait_for_selector("#lines li.good >> text=scene")
+    page.click("#scene-present")
+    told(page, "/Earth -?0.00 -?0.00 1.00.*Moon/")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_is_seen_whole(chromium: Any, address: str, width: int, scheme: str) -> None:
+    size = {"width": width, "height": 850}
+    page = chromium.new_context(viewport=size, color_scheme=scheme).new_page()
+    page.set_default_timeout(SOON_MS)
+    page.goto(address)
+    for device in ("CubeStar", "CubeSense"):
+        stage(page, device)
+        for summary in page.locator("#scene-keys > div > details > summary").all():
+            summary.click()
+        page.click("[aria-label='add to hazards']")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(COVERED) == []
+        assert page.evaluate(PALE) == []
+        ink = (
+            "() => { const c = document.querySelector('#sky-map'); const n = new Set();"
+            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            "for (let i = 0; i < d.length; i += 4) n.add(d[i] << 16 | d[i + 1] << 8 | d[i + 2]);"
+            "return n.size }"
+        )
+        assert page.evaluate(ink) > 50  # grid, stars or discs, names, outlines
+    page.context.close()
+
+
+def test_no_key_is_markup(chromium: Any, address: str) -> None:
+    with shown(chromium, address) as page:
+
+        def evil(route: Any) -> None:
+            kinds = route.fetch().json()["kinds"]
+            for key in kinds["sky"].values():
+                key["meaning"], key["unit"] = HOSTILE, HOSTILE
+            kinds["sky"][HOSTILE] = {
+                "type": "number",
+                "default": HOSTILE,
+                "meaning": "",
+                "unit": "",
+            }
+            route.fulfill(json={"kinds": kinds})
+
+        page.route("**/scene/keys", evil)
+        page.route("**/stars", lambda route: route.fulfill(json=hostile(route.fetch().json())))
+        page.reload()
+        page.wait_for_selector("#line")
+        stage(page, "CubeStar")
+        page.fill(f"[aria-label='{HOSTILE}']", "3")
+        told(page, "/unknown key/")
+        page.locator(f"#scene-keys {VALUE.format('epoch')}").focus()
+        assert HOSTILE in page.inner_text("#scene-help")
+        assert page.locator("img").count() == 0
+        assert page.evaluate("document.hacked") is None
+
+
+def test_what_is_not_emulated_has_no_scene(chromium: Any, tmp_path: Any) -> None:
+    path = tmp_path / "run.rec"
+    target = open_target("emulated:cubesense", record=path)
+    target.node.telemetry("Configuration")
+    target.close()
+    with station(str(path)) as address, shown(chromium, address) as page:
+        page.wait_for_selector("#scene-told >> text=/has no control port/")
+        for control in ("#scene-apply", "#scene-present", "#scene-kind", "#scene-text"):
+            assert page.locator(control).is_disabled()
+            assert "no control port" in page.locator(control).get_attribute("title")
+        assert not page.locator("#sky-map").is_visible()
+        assert local(address)
