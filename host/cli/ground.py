@@ -14,10 +14,10 @@ examples:
 import argparse
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.device_options import add_board_arguments, given_options
@@ -26,7 +26,6 @@ from cubestack.host.devices.registry import device_names
 from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.devices.targets import EMULATED, FORMS, open_target
 from cubestack.host.errors import TargetError
-from cubestack.host.options import flag
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check(targets: Sequence[str], options: Sequence[str]) -> None:
+def _check(targets: Sequence[str], options: Mapping[str, Any]) -> None:
     """TargetError for a device that can not be emulated, or options where none is."""
     emulated = [one.removeprefix(EMULATED) for one in targets if one.startswith(EMULATED)]
     for name in emulated:
@@ -86,38 +85,40 @@ def _check(targets: Sequence[str], options: Sequence[str]) -> None:
             known = ", ".join(EMULATED + one for one in device_names())
             raise TargetError(f"no device {name!r} can be emulated; known: {known}")
     if options and not emulated:
-        raise TargetError(f"{' '.join(options)} is for emulated:DEVICE")
+        from cubestack.host.ground.emulators import words
+
+        raise TargetError(f"{' '.join(words(options))} is for emulated:DEVICE")
 
 
-def _options(args: argparse.Namespace) -> list[str]:
-    """Those of emulated devices that were given, as `cubestack emulate` takes them."""
+def _options(args: argparse.Namespace) -> dict[str, Any]:
+    """Those of emulated devices that were given, by name."""
     given = {"scene": args.scene, "seed": args.seed, **given_options(args)}
-    words: list[str] = []
-    for name, value in given.items():
-        if value is not None:
-            words += [flag(name)] if value is True else [flag(name), str(value)]
-    return words
+    return {name: value for name, value in given.items() if value is not None}
 
 
-def _open(text: str, options: Sequence[str], args: argparse.Namespace) -> "Desk":
+def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "Desk":
     from cubestack.host.ground.desk import Desk
-    from cubestack.host.ground.emulators import emulated
+    from cubestack.host.ground.emulators import Emulator
     from cubestack.host.ground.played import is_recording, open_recording
     from cubestack.host.transport.streams import SerialTransport
 
-    with ExitStack() as stack:
-        if text.startswith(EMULATED):
-            target = stack.enter_context(emulated(text.removeprefix(EMULATED), options))
-        elif is_recording(text):
-            target = open_recording(text)
-        else:
-            target = open_target(
-                *(text, args.device),
-                **{"service_port": args.bench, "baud": args.baud, "control": args.control},
-            )
-        if isinstance(target.line, SerialTransport):
-            target.line.reopens = True
-        return Desk(target, stack.pop_all().close)
+    if text.startswith(EMULATED):
+        emulator = Emulator(text.removeprefix(EMULATED), options)
+        with ExitStack() as stack:
+            stack.callback(emulator.close)
+            desk = Desk(emulator.start(), emulator)
+            stack.pop_all()
+            return desk
+    if is_recording(text):
+        target = open_recording(text)
+    else:
+        target = open_target(
+            *(text, args.device),
+            **{"service_port": args.bench, "baud": args.baud, "control": args.control},
+        )
+    if isinstance(target.line, SerialTransport):
+        target.line.reopens = True
+    return Desk(target)
 
 
 def _close(desks: "Sequence[Future[Desk]]") -> None:

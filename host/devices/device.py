@@ -37,6 +37,10 @@ BoardT_co = TypeVar("BoardT_co", bound="Board", covariant=True)
 ClientT_co = TypeVar("ClientT_co", bound=DeviceClient, covariant=True)
 
 
+FILE = "FILE"
+"""``metavar`` of an option that names a file."""
+
+
 @dataclass(frozen=True)
 class BoardOption:
     """An option that one device's board has, beside those of all.
@@ -49,6 +53,8 @@ class BoardOption:
         default: what it is when it is not given: one of ``choices``, a text, or False.
         notice: what a user must know of a value, or None.
         metavar: what stands for any text in the help; empty where it is none.
+        known: texts that have a meaning of their own.
+        unset: what it means when it is empty, a word or two for lists.
     """
 
     name: str
@@ -57,6 +63,13 @@ class BoardOption:
     default: str | bool = False
     notice: Callable[[str], str | None] = lambda _value: None
     metavar: str = ""
+    known: tuple[str, ...] = ()
+    unset: str = ""
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it names a file, or one of ``known``."""
+        return self.metavar == FILE
 
     @property
     def flag(self) -> str:
@@ -77,6 +90,7 @@ PROFILE_OPTIONS = (
         "switches that differ from the profile: see `cubestack registers DEVICE --switches`",
         default="",
         metavar="SWITCH=VALUE,...",
+        unset="as the profile",
     ),
 )
 

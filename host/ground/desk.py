@@ -1,6 +1,6 @@
 """A target that pages look at: opened once, asked by one thread, in the shell's words."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +13,7 @@ from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, HostError, NoAnswerError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
+from cubestack.host.ground.emulators import Emulator, SentFile
 from cubestack.host.ground.magnitudes import magnitude
 from cubestack.host.ground.played import PlayedClient
 from cubestack.host.ground.tables import (
@@ -54,12 +55,14 @@ class Desk:
     target: that is looked at.
     link: how its link is.
     carried: the latest picture that went over the wire; None for none.
+    begun: how often its emulation was started again.
     """
 
-    def __init__(self, target: Target, on_close: Callable[[], None] = lambda: None) -> None:
-        """Look at ``target``, which is closed with this; ``on_close`` is called after that."""
-        self.target, self.link, self._on_close = target, Link(), on_close
+    def __init__(self, target: Target, emulator: Emulator | None = None) -> None:
+        """Look at ``target``, which is closed with this, as is the ``emulator`` that it is of."""
+        self.target, self.link, self._emulator = target, Link(), emulator
         self.carried: Transfer | None = None
+        self.begun = 0
         self._shell = Shell(target)
         self._thread = ThreadPoolExecutor(1, "target")
 
@@ -90,6 +93,8 @@ class Desk:
         if target.device is None or target.device.image_sensor is None:
             none = f"{interface.name} reads no single register of its image sensor"
             missing["sensor_registers"] = none
+        if self._emulator is None:
+            missing["restart"] = f"no emulation of {target.name} was started by this page"
         if target.service_port is None:
             missing["bench"] = "no line with the bench protocol is open"
         return {
@@ -104,6 +109,8 @@ class Desk:
             "fault_parameters": dict(controls.fault_parameters) if controls else {},
             "channels": list(controls.channels) if controls else [],
             "chosen": controls.chosen if controls else {},
+            "options": self._emulator.rows(controls.chosen) if self._emulator and controls else [],
+            "begun": self.begun,
             "sources": list(self._client.picture_sources) if self._client else [],
             "played": self.played.state if self.played else None,
             "missing": missing,
@@ -165,13 +172,40 @@ class Desk:
         self._thread.submit(self._asked, self.carried.run)
         return self.carried
 
+    def restart(
+        self, options: Mapping[str, Any], files: Mapping[str, SentFile]
+    ) -> "Future[JsonObject]":
+        """Emulate it anew, as ``Emulator.restart`` does: ``rows`` for a reader.
+
+        ValueError where it can not be, or a picture is on its way.
+        """
+        if self._emulator is None:
+            raise ValueError(self.about["missing"]["restart"])
+        if self.carried is not None and self.carried.runs:
+            raise ValueError("a picture is on its way")
+        return self._thread.submit(self._restart, self._emulator, options, files)
+
     def close(self) -> None:
         """Release the target."""
         if self.carried is not None:
             self.carried.give_up()
         self._thread.shutdown(cancel_futures=True)
         self.target.close()
-        self._on_close()
+        if self._emulator is not None:
+            self._emulator.close()
+
+    def _restart(
+        self, emulator: Emulator, options: Mapping[str, Any], files: Mapping[str, SentFile]
+    ) -> JsonObject:
+        before = self.target
+        self.target, end = emulator.restart(before, options, files)
+        self._shell, self.link, self.carried = Shell(self.target), Link(), None
+        for name in ("about", "_client"):
+            vars(self).pop(name, None)
+        self.begun += 1
+        before.close()
+        end()
+        return {"rows": list(self.about["chosen"].items())}
 
     @cached_property
     def _client(self) -> DeviceClient | None:

@@ -22,6 +22,7 @@ from cubestack.host.errors import HostError
 from cubestack.host.ground import relays
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.emulation import JsonObject
+from cubestack.host.ground.emulators import SentFile
 from cubestack.host.ground.guard import TooLargeError, refused
 
 PAGE = Path(__file__).parent / "page"
@@ -84,6 +85,7 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/targets/{number:int}/scene/keys", of(relays.scene_keys)),
             Route("/targets/{number:int}/scene/look", of(relays.look), methods=["POST"]),
             Route("/targets/{number:int}/stars", of(relays.stars)),
+            Route("/targets/{number:int}/restart", of(_restart), methods=["POST"]),
             Route("/targets/{number:int}/{call:str}", of(relays.steer), methods=["POST"]),
             WebSocketRoute("/targets/{number:int}/live", live),
             Mount("/page", StaticFiles(directory=PAGE)),
@@ -119,6 +121,24 @@ async def _do(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     if not isinstance(line, str):
         raise ValueError("'line' is a line of the shell")
     return await asyncio.wrap_future(desk.do(line))
+
+
+async def _restart(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
+    options, files = body.get("options", {}), body.get("files", {})
+    if not isinstance(options, dict) or not isinstance(files, dict):
+        raise ValueError("'options' and 'files' are objects by the options' names")
+    sent = {name: _sent(one) for name, one in files.items()}
+    return await asyncio.wrap_future(desk.restart(options, sent))
+
+
+def _sent(one: object) -> SentFile:
+    parts = (
+        [one.get(key, "") for key in ("name", "content", "suffix")] if isinstance(one, dict) else []
+    )
+    if not parts or not all(isinstance(part, str) for part in parts):
+        raise ValueError("a file has 'name', 'content' in base 64, and 'suffix'")
+    name, content, suffix = parts
+    return SentFile(name, base64.b64decode(content, validate=True), suffix)
 
 
 async def _play(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
@@ -172,14 +192,16 @@ async def _carried(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response
 async def _live(desk: Desk, socket: WebSocket) -> None:
     """Tell a tab again and again what it shows, until it is gone."""
     await socket.accept()
-    wanted, logged = Wanted(), 0
+    wanted, logged, begun = Wanted(), 0, desk.begun
     hears = asyncio.create_task(socket.receive_json())
     try:
         while True:
             if hears.done():
                 wanted = _wanted(hears.result(), desk)
                 hears = asyncio.create_task(socket.receive_json())
-            told: JsonObject = {"link": vars(desk.link)}
+            if desk.begun != begun:
+                logged, begun = 0, desk.begun
+            told: JsonObject = {"link": vars(desk.link), "begun": begun}
             carried = desk.carried
             told["carried"] = carried.state if carried else None
             told["played"] = desk.played.state if desk.played else None

@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHES, CubeStarSwitches
 from cubestack.host.conformance import effects
-from cubestack.host.devices.device import BoardOption, ConformanceNotes, Device, Report
+from cubestack.host.devices.device import FILE, BoardOption, ConformanceNotes, Device, Report
 from cubestack.host.devices.lazily import call, get
 
 if TYPE_CHECKING:
@@ -176,7 +176,9 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             "program for the processor: an ELF, Intel HEX or binary file (FILE@0xADDRESS), "
             f"or {REFERENCE}, the same in C, instead of this project's own (docs/own-firmware.md)",
             default="",
-            metavar="FILE",
+            metavar=FILE,
+            known=(REFERENCE,),
+            unset="this project's model",
         ),
         BoardOption(
             "semihosting", "own firmware prints, and ends, by BKPT 0xAB, which is a fault otherwise"

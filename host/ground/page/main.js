@@ -12,6 +12,7 @@ import { Results } from "./results.js";
 import { Scene } from "./scene.js";
 import { ask, listen } from "./server.js";
 import { Settings } from "./settings.js";
+import { Start } from "./start.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
 import { Transfer } from "./transfer.js";
@@ -30,6 +31,7 @@ const parts = [
   "loop",
   "health",
   "emulation",
+  "start",
   "scene",
   "commands",
   "settings",
@@ -39,6 +41,9 @@ const parts = [
 const lines = document.getElementById("lines");
 const link = document.getElementById("link");
 let live = null;
+let targets = [];
+let looked = 0;
+let renews = false;
 
 function tell(text, kind = "") {
   const time = new Date().toLocaleTimeString();
@@ -62,8 +67,9 @@ function worded(results = {}) {
   return Object.fromEntries(Object.entries(results).filter(([, v]) => typeof v === "string"));
 }
 
-function look(number, targets) {
+function look(number) {
   live?.close();
+  looked = number;
   const about = targets[number];
   document.title = `${about.device} – cubestack`;
   for (const part of parts) {
@@ -90,6 +96,7 @@ function look(number, targets) {
   const played = new Played(place("played"), about, path, tell);
   const waveform = new Waveform(place("waveform"), about, path, tell);
   const emulation = new Emulation(place("emulation"), about, steer, act, path);
+  new Start(place("start"), about, path, told);
   new Scene(place("scene"), about, path, told);
   const pictures = new Pictures(place("picture"), about, path);
   live = null; // what the parts want is told when it is there
@@ -102,6 +109,10 @@ function look(number, targets) {
   live = listen(
     `${path}/live`,
     (message) => {
+      if (message.begun !== about.begun) {
+        renew();
+        return;
+      }
       link.className = message.link.failed ? "bad" : "";
       link.textContent = about.name;
       lamps.hearLink(message.link);
@@ -136,14 +147,27 @@ function look(number, targets) {
     button.setAttribute("aria-current", String(index === number));
 }
 
+// What is looked at was started again: what there is of it may be other things.
+async function renew() {
+  if (renews) return;
+  renews = true;
+  try {
+    targets = await ask("/targets");
+    look(looked);
+  } catch (error) {
+    tell(error.message, "bad");
+  }
+  renews = false;
+}
+
 async function start() {
   link.textContent = "waiting for the devices to start";
-  const targets = await ask("/targets");
+  targets = await ask("/targets");
   const buttons = targets.map((about, number) =>
-    make("button", { textContent: about.device, onclick: () => look(number, targets) }),
+    make("button", { textContent: about.device, onclick: () => look(number) }),
   );
   document.getElementById("targets").replaceChildren(...buttons);
-  look(0, targets);
+  look(0);
 }
 
 start().catch((error) => tell(error.message, "bad"));

@@ -1,0 +1,147 @@
+"""An emulation that a page started is started again otherwise, with the same scene and seed."""
+
+import base64
+import http.client
+import json
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.reference.image import reference_image
+from cubestack.host.errors import PortOpenError, TargetError
+from cubestack.host.ground.desk import Desk
+from cubestack.host.ground.emulators import Emulator, SentFile, words
+from cubestack.host.ground.guard import Guard
+from cubestack.host.ground.page_app import page_app
+from cubestack.host.ground.scenes import text_of
+from cubestack.host.ground.serving import Serving
+
+from .conftest import SOON_S, TOKEN
+
+
+@pytest.fixture(scope="module")
+def desk() -> Iterator[Desk]:
+    emulator = Emulator("cubestar", {"seed": 7})
+    opened = Desk(emulator.start(), emulator)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def served(desk: Desk) -> Iterator[Serving]:
+    opened = Future[Desk]()
+    opened.set_result(desk)
+    serving = Serving(Guard(page_app([opened]), TOKEN), "127.0.0.1", 0)
+    with serving.running():
+        yield serving
+
+
+def scene(desk: Desk) -> Any:
+    assert desk.controls is not None
+    return desk.controls.client.ask("GET", "/devices/cubestar/scene")["table"]
+
+
+def restart(served: Serving, body: object, token: str = TOKEN) -> tuple[int, Any]:
+    connection = http.client.HTTPConnection(*served.address, timeout=SOON_S)
+    try:
+        headers = {"Authorization": f"Bearer {token}"}
+        connection.request("POST", "/targets/0/restart", json.dumps(body), headers)
+        answer = connection.getresponse()
+        return answer.status, json.loads(answer.read())
+    finally:
+        connection.close()
+
+
+def test_a_profile_is_chosen_and_scene_and_seed_stay(desk: Desk, served: Serving) -> None:
+    assert desk.controls is not None
+    shown = scene(desk) | {"ra_deg": 10.0, "hazards": {"moon": [{"direction": [12.0, 0.0]}]}}
+    act = {"words": ["scene", "scene"], "text": text_of(shown)}
+    desk.controls.client.ask("POST", "/devices/cubestar/act", act)
+    before, begun = desk.controls.client.url, desk.begun
+    status, told = restart(served, {"options": {"profile": "extended"}})
+    assert (status, told["rows"]) == (200, [["seed", "7"], ["profile", "extended"]])
+    assert desk.controls.client.url != before
+    assert desk.begun == begun + 1
+    assert scene(desk) == shown
+    now = {row["name"]: row["now"] for row in desk.about["options"]}
+    assert (now["profile"], now["firmware"]) == ("extended", "")
+    values = desk.do("read Identification").result()["data"]["values"]
+    assert values["NodeType"] > 0
+
+
+def test_firmware_is_sent_and_runs(desk: Desk, served: Serving) -> None:
+    content = base64.b64encode(reference_image().read_bytes()).decode()
+    own = {"name": "../../my <own>.elf", "content": content}
+    status, told = restart(served, {"files": {"firmware": own}})
+    assert status == 200, told
+    assert "/my_own_.elf#" in dict(told["rows"])["firmware"]
+    assert desk.do("read Identification").result()["data"]["values"]["NodeType"] > 0
+    # What runs can be kept, and has no profile.
+    kept = next(row["now"] for row in desk.about["options"] if row["name"] == "firmware")
+    status, told = restart(served, {"options": {"firmware": kept, "profile": "extended"}})
+    assert status == 502
+    assert told["error"].endswith("own firmware has no profile and no switches: leave them out")
+    status, told = restart(served, {"options": {"firmware": kept}})
+    assert (status, dict(told["rows"])["profile"]) == (200, "published")
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "error"),
+    [
+        ({"options": {"profile": "best"}}, 400, "profile of cubestar must be one of"),
+        ({"options": {"profile": 3}}, 400, "profile of cubestar must be one of"),
+        ({"options": {"set": "no=1"}}, 400, "no"),
+        ({"options": {"set": 3}}, 400, "set can not be 3"),
+        ({"options": {"uart": "node"}}, 400, "uart is an option of cubesense, not of cubestar"),
+        ({"options": {"scene": "/etc/passwd"}}, 400, "scene is no option of cubestar"),
+        ({"options": {"firmware": "/etc/passwd"}}, 400, "firmware: send the file itself"),
+        ({"options": []}, 400, "'options' and 'files' are objects"),
+        ({"files": {"firmware": 3}}, 400, "a file has 'name', 'content' in base 64"),
+        ({"files": {"firmware": {"name": "a", "content": "%"}}}, 400, "base64"),
+        (
+            {"files": {"firmware": {"name": "a", "content": "", "suffix": "/../x"}}},
+            400,
+            "an address of plain bytes is like @0x0",
+        ),
+        ({"files": {"firmware": {"name": "a.elf", "content": "AAAA"}}}, 502, "is no ELF file"),
+    ],
+)
+def test_what_can_not_be_started_is_one_line_and_the_old_one_runs(
+    desk: Desk, served: Serving, body: object, status: int, error: str
+) -> None:
+    begun = desk.begun
+    found, told = restart(served, body)
+    assert (found, desk.begun) == (status, begun)
+    assert error in told["error"]
+    assert "\n" not in told["error"]
+    assert desk.do("read Identification").result()["data"]["values"]["NodeType"] > 0
+
+
+def test_only_who_may_starts_it_again(desk: Desk, served: Serving) -> None:
+    begun = desk.begun
+    assert restart(served, {}, "guess")[0] == 401
+    assert desk.begun == begun
+
+
+def test_one_that_does_not_start_is_told() -> None:
+    emulator = Emulator("cubestar", {"scene": "/none.toml"})
+    with pytest.raises(PortOpenError, match=r"/none\.toml"):
+        emulator.start()
+    emulator.close()
+
+
+def test_options_are_words_of_the_command_line() -> None:
+    given = {"seed": 0, "set": "", "mcu_addressing": True, "semihosting": False, "scene": None}
+    assert words(given) == ["--seed", "0", "--mcu-addressing"]
+
+
+def test_a_sent_file_stays_in_its_folder(tmp_path: Path) -> None:
+    for name in ("..", "/etc/passwd", "a/../../b", "", "\0", "é.bin"):
+        path = Path(SentFile(name, b"x", "@0x10").written(tmp_path).removesuffix("@0x10"))
+        assert path.parent == tmp_path
+        assert path.read_bytes() == b"x"
+    with pytest.raises(TargetError):
+        Emulator("nothing", {})
