@@ -1,10 +1,12 @@
 // What the device answered last, beside the truth where it is emulated, on the sky, and in a log.
 
 import { labelled, make } from "./dom.js";
+import { apart, fromParts } from "./sphere.js";
 
 const KEPT = 100_000; // lines of the log: more than a day at one a second
 const TRAIL = 600;
 const GRID_DEG = 30;
+const [ALPHA, BETA] = ["_alpha_deg", "_beta_deg"]; // ends of the names of a direction's angles
 
 export class Results {
   // `want(on)` says whether results are to be read again and again.
@@ -49,18 +51,20 @@ export class Results {
     const errors = {};
     const rows = Object.entries(results).map(([name, value]) => {
       const true_ = name.endsWith("_deg") ? truth[name] : undefined;
-      const known = true_ !== undefined && true_ !== null && value !== null;
-      if (known) errors[`${name.slice(0, -4)}_error_deg`] = turned(value - true_);
-      const cell = (text) => make("td", { className: "value", textContent: text });
-      return make(
-        "tr",
-        {},
-        make("th", { scope: "row", textContent: name }),
-        ...(known
-          ? [worded(name, value), worded(name, true_), turned(value - true_).toFixed(4)].map(cell)
-          : [make("td", { className: "value", colSpan: 3, textContent: worded(name, value) })]),
-      );
+      const known = true_ !== undefined && true_ !== null;
+      const error = known && value !== null ? turned(value - true_) : null;
+      if (error !== null) errors[`${name.slice(0, -4)}_error_deg`] = error;
+      if (known) return row(name, worded(name, value), worded(name, true_), error);
+      const all = make("td", { className: "value", colSpan: 3, textContent: worded(name, value) });
+      return make("tr", {}, make("th", { scope: "row", textContent: name }), all);
     });
+    for (const { name, answer, true_ } of directions(results, truth)) {
+      const error = answer && apart(answer, true_);
+      if (answer) errors[`${name}_error_deg`] = error;
+      const shown = row(`${name} direction`, answer ? pointed(answer) : "–", pointed(true_), error);
+      shown.className = "direction";
+      rows.push(shown);
+    }
     this.table.replaceChildren(...rows);
     this.lines.push({ utc: new Date().toISOString(), ...results, ...errors });
     if (this.lines.length > KEPT) this.lines.shift();
@@ -115,6 +119,29 @@ export class Results {
     make("a", { href: address, download: `${device.toLowerCase()}.csv` }).click();
     URL.revokeObjectURL(address);
   }
+}
+
+// Unit vectors of what is answered as two angles, and is known; none where nothing was detected.
+function directions(results, truth) {
+  const names = Object.keys(results).filter((name) => name.endsWith(ALPHA));
+  return names.flatMap((alpha) => {
+    const name = alpha.slice(0, -ALPHA.length);
+    const beta = name + BETA;
+    const numbers = (from) => [from[alpha], from[beta]].every((part) => typeof part === "number");
+    if (!numbers(truth)) return [];
+    const answer = numbers(results) ? fromParts(results[alpha], results[beta]) : null;
+    return [{ name, answer, true_: fromParts(truth[alpha], truth[beta]) }];
+  });
+}
+
+function pointed(vector) {
+  return vector.map((part) => part.toFixed(4)).join(" ");
+}
+
+function row(name, answer, true_, error) {
+  const texts = [answer, true_, error === null ? "–" : error.toFixed(4)];
+  const cells = texts.map((text) => make("td", { className: "value", textContent: text }));
+  return make("tr", {}, make("th", { scope: "row", textContent: name }), ...cells);
 }
 
 function turned(deg) {

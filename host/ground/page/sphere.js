@@ -28,6 +28,20 @@ export function angles([x, y, z]) {
   return [(along + 360) % 360, Math.atan2(z, Math.hypot(x, y)) / RAD];
 }
 
+// Unit vector in camera axes of the two angles that sun and nadir sensors give: parts of the angle
+// from the boresight, towards x and y.
+export function fromParts(alpha, beta) {
+  const away = Math.hypot(alpha, beta) * RAD;
+  const around = Math.atan2(beta, alpha);
+  return [Math.sin(away) * Math.cos(around), Math.sin(away) * Math.sin(around), Math.cos(away)];
+}
+
+// Angle between two unit vectors in degrees, exact for small ones too.
+export function apart(a, b) {
+  const chord = Math.hypot(...a.map((part, i) => part - b[i]));
+  return (2 * Math.asin(Math.min(chord / 2, 1))) / RAD;
+}
+
 // Place in a map of half width 2 and half height 1 around 0, to the right and down.
 export function flat([x, y, z]) {
   const along = Math.atan2(y, x);

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cubestack.host.devices.targets import open_target
@@ -162,6 +163,28 @@ def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
     page.wait_for_selector("#lines li.good >> text=scene")
     page.click("#scene-present")
     told(page, "/Earth -?0.00 -?0.00 1.00.*Moon/")
+
+
+def test_directions_are_answered_beside_the_truth(page: Any) -> None:
+    """Of the limb's and the Sun's measurement; the error is the angle between the vectors."""
+    stage(page, "CubeSense")
+    row = page.locator("#results tr.direction", has_text="nadir direction")
+    for camera, memory in (("NADIR", "SRAM2"), ("SUN", "SRAM1")):
+        page.fill("#line", f"write CaptureAndDetect Camera={camera} Sram={memory}")
+        page.press("#line", "Enter")
+        page.wait_for_selector(f"#results tr:has-text('{camera.lower()}_detect') >> text=SUCCESS")
+        page.wait_for_selector(
+            f"#results tr.direction:has-text('{camera.lower()}') >> text=/^0[.]/"
+        )
+    cells = row.locator("td").all_inner_texts()
+    answer, truth = (np.array([float(part) for part in cell.split()]) for cell in cells[:2])
+    angle = math.degrees(float(np.linalg.norm(answer - truth)))
+    assert float(cells[2]) == pytest.approx(angle, abs=0.02)
+    assert float(cells[2]) < 1.0
+    with page.expect_download() as saving:
+        page.click("#save")
+    header = saving.value.path().read_text("utf-8").splitlines()[0].split(",")
+    assert {"nadir_error_deg", "sun_error_deg", "sun_alpha_error_deg"} <= set(header)
 
 
 @pytest.mark.parametrize("width", [390, 1280])
