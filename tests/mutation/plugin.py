@@ -1,4 +1,4 @@
-"""Of pytest, for the runs that are made here: how long each test takes, and which failed first."""
+"""Of pytest, for the runs that are made here: tests, how long each takes, which failed first."""
 
 import json
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 PLUGIN = __name__
-DURATIONS, FAILED = "MUTATION_DURATIONS", "MUTATION_FAILED"
+COLLECTED, DURATIONS, FAILED = "MUTATION_COLLECTED", "MUTATION_DURATIONS", "MUTATION_FAILED"
 """Environment variables: the files to write, if any."""
 
 _GROUP = re.compile(r"@[\w ./-]+$")
@@ -19,6 +19,12 @@ _durations: dict[str, float] = defaultdict(float)
 def without_group(test: str) -> str:
     """Its name without what pytest-xdist appends where tests stay together."""
     return _GROUP.sub("", test)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """All tests are known."""
+    if path := os.environ.get(COLLECTED):
+        Path(path).write_text(json.dumps([item.nodeid for item in session.items]), "utf-8")
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -4,15 +4,16 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from functools import cached_property
 from pathlib import Path
 
 from coverage import CoverageData
 
 from tests.mutation.mutants import PARTS, Mutant
-from tests.mutation.plugin import DURATIONS, PLUGIN, without_group
+from tests.mutation.plugin import COLLECTED, DURATIONS, PLUGIN, without_group
 
 FOLDER = Path("out/mutation")
 DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
@@ -36,6 +37,21 @@ def record(root: Path) -> int:
     return subprocess.call(call, cwd=root, env=environment)
 
 
+def collected(root: Path) -> set[str]:
+    """The tests that are there now; none of a file that can not be imported."""
+    with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
+        names = Path(folder, "names.json")
+        call = [sys.executable, "-m", "pytest", "-q", "--collect-only", "-p", "no:cacheprovider"]
+        subprocess.run(
+            [*call, "-p", PLUGIN],
+            cwd=root,
+            env=os.environ | {COLLECTED: str(names)},
+            stdout=subprocess.DEVNULL,
+            check=False,
+        )
+        return set(json.loads(names.read_text("utf-8")))
+
+
 class Reached:
     """A recorded run. Raises FileNotFoundError where there is none."""
 
@@ -43,6 +59,12 @@ class Reached:
         self._folder = root / FOLDER
         self.durations: dict[str, float] = json.loads((self._folder / TIMES).read_text("utf-8"))
         self._lines: dict[Path, dict[int, list[str]]] = {}
+
+    def update(self, present: Set[str]) -> list[str]:
+        """Forget the tests that are not ``present`` any more; return those that were not yet."""
+        new = sorted(present - self.durations.keys())
+        self.durations = {test: self.durations[test] for test in self.durations.keys() & present}
+        return new
 
     @cached_property
     def _data(self) -> CoverageData:

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from tests.mutation.mutants import Mutant
-from tests.mutation.reached import Reached
+from tests.mutation.reached import BUDGET_S, Reached, collected
 from tests.mutation.trial import UNKNOWN_S
 
 ROOT = Path(__file__).parents[2]
@@ -20,16 +20,28 @@ class Suite:
     """Chooses the tests that a mutant has to face."""
 
     def __init__(self) -> None:
+        self._reached: Reached | None = None
+        self._new: list[str] = []
         try:
-            self._reached: Reached | None = Reached(ROOT)
+            self._reached = Reached(ROOT)
         except FileNotFoundError:
-            self._reached = None
+            return
+        self._new = self._reached.update(collected(ROOT))
 
     def tests(self, mutant: Mutant) -> tuple[list[str], float]:
         """Arguments for pytest, and the seconds that it may take."""
-        if self._reached and (found := self._reached.tests(mutant)):
-            return found, LEAST_S + SLOWER * sum(map(self._reached.durations.get, found))
+        if self._reached:
+            recorded, new = self._reached.tests(mutant), near(mutant.path, self._new)
+            known_s = sum(map(self._reached.durations.__getitem__, recorded))
+            if recorded or new:
+                return new + recorded, LEAST_S + SLOWER * (known_s + BUDGET_S * bool(new))
         return [str(file) for file in files_for(mutant.path)], UNKNOWN_S
+
+
+def near(path: Path, tests: list[str]) -> list[str]:
+    """Those that stand in the test files for a module."""
+    files = {str(file) for file in files_for(path)}
+    return [test for test in tests if test.partition("::")[0] in files]
 
 
 def files_for(path: Path) -> list[Path]:

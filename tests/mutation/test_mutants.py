@@ -1,13 +1,15 @@
 """What the mutants are, and which tests they have to face."""
 
 import ast
+import json
 from pathlib import Path
 
 import pytest
 
 from tests.mutation.__main__ import chosen
 from tests.mutation.mutants import modules, mutants
-from tests.mutation.suite import ROOT, files_for
+from tests.mutation.reached import FOLDER, TIMES, Reached
+from tests.mutation.suite import ROOT, files_for, near
 
 HERE = Path("a.py")
 
@@ -52,3 +54,19 @@ def test_the_mirror_image_comes_first() -> None:
     others = [(ROOT / file).read_text("utf-8") for file in found[1:]]
     assert others
     assert all("attitude.quest import" in text for text in others)
+
+
+def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_beside(
+    tmp_path: Path,
+) -> None:
+    own = "tests/firmware_model/attitude/test_quest.py::"
+    other = "tests/emulator/bus/test_uart.py::"
+    (tmp_path / FOLDER).mkdir(parents=True)
+    recorded = {own + "test_old": 1.0, own + "test_gone": 1.0, other + "test_old[1]": 1.0}
+    (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
+    reached = Reached(tmp_path)
+    new = [other + "test_old[2]", own + "test_new"]
+    assert reached.update({own + "test_old", other + "test_old[1]", *new}) == new
+    assert reached.durations.keys() == {own + "test_old", other + "test_old[1]"}
+    assert near(Path("firmware_model/attitude/quest.py"), new) == [own + "test_new"]
+    assert near(Path("emulator/bus/uart.py"), new) == [other + "test_old[2]"]
