@@ -20,6 +20,9 @@ DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
 BUDGET_S, MOST_TESTS = 25.0, 150
 """What a mutant has to face: so many seconds of tests at most, and so many tests."""
 
+DOCUMENTS = ("tests/system/test_documents.py", "tests/system/test_protocol_pages.py")
+"""They compare tables with the documents, and need not run a line for it."""
+
 
 def record(root: Path) -> int:
     """Run all tests of the project in ``root`` under coverage.py; pytest's exit code."""
@@ -73,18 +76,19 @@ class Reached:
         return data
 
     def tests(self, mutant: Mutant) -> list[str]:
-        """Those that run its line, or else its module: of each file the quickest, the nearest
-        file first, then the next of each."""
+        """Those that run its line: of each file the quickest, the nearest file first, then the
+        next of each. Where it runs when it is imported, those of `DOCUMENTS` and of its module."""
         if mutant.path not in self._lines:
             self._lines[mutant.path] = self._data.contexts_by_lineno(str(mutant.path))
         by_line = self._lines[mutant.path]
         # Of a statement over several lines, Python reports some only.
         lines = range(mutant.statement, mutant.end + 1)
         found = _names(context for line in lines for context in by_line.get(line, ()))
-        found = found or _names(context for each in by_line.values() for context in each)
-        ranked = self._in_turn(mutant.path, found & self.durations.keys())
         spent, taken = 0.0, []
-        for test in ranked:
+        if not found:
+            found = _names(context for each in by_line.values() for context in each)
+            taken = [test for test in self.durations if test.partition("::")[0] in DOCUMENTS]
+        for test in self._in_turn(mutant.path, (found & self.durations.keys()) - {*taken}):
             spent += self.durations[test]
             if taken and (spent > BUDGET_S or len(taken) == MOST_TESTS):
                 break

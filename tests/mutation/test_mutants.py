@@ -5,10 +5,11 @@ import json
 from pathlib import Path
 
 import pytest
+from coverage import CoverageData
 
 from tests.mutation.__main__ import chosen
-from tests.mutation.mutants import modules, mutants
-from tests.mutation.reached import FOLDER, TIMES, Reached
+from tests.mutation.mutants import Mutant, modules, mutants
+from tests.mutation.reached import DATA, DOCUMENTS, FOLDER, TIMES, Reached
 from tests.mutation.suite import ROOT, files_for, near
 
 HERE = Path("a.py")
@@ -70,3 +71,24 @@ def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_besid
     assert reached.durations.keys() == {own + "test_old", other + "test_old[1]"}
     assert near(Path("firmware_model/attitude/quest.py"), new) == [own + "test_new"]
     assert near(Path("emulator/bus/uart.py"), new) == [other + "test_old[2]"]
+
+
+def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) -> None:
+    (tmp_path / FOLDER).mkdir(parents=True)
+    of_documents = f"{DOCUMENTS[0]}::test_defaults"
+    recorded = dict.fromkeys(("tests/test_a.py::test_f", "test_b.py::test_g", of_documents), 1.0)
+    (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
+    data = CoverageData(str(tmp_path / FOLDER / DATA))
+    for context, line in (
+        ("", 1),
+        ("tests/test_a.py::test_f|run", 3),
+        ("test_b.py::test_g|run", 4),
+    ):
+        data.set_context(context)
+        data.add_lines({str(HERE): [line]})
+    data.write()
+    reached = Reached(tmp_path)
+    for line, expected in ((3, ["tests/test_a.py::test_f"]), (4, ["test_b.py::test_g"])):
+        assert reached.tests(Mutant(HERE, line, line, line, 0, 1, "a", "b")) == expected
+    at_import = reached.tests(Mutant(HERE, 1, 1, 1, 0, 1, "a", "b"))
+    assert at_import == [of_documents, "tests/test_a.py::test_f", "test_b.py::test_g"]
