@@ -60,6 +60,63 @@ def test_precession_turns_the_pole_as_published() -> None:
     assert precession(2451545.0) == pytest.approx(np.eye(3))
 
 
+def test_precession_is_that_of_another_library() -> None:
+    """1900-01-01 by ERFA's pmat76."""
+    expected = [
+        [0.9997029109769726, 0.0223527366106469, 0.0097182792781790],
+        [-0.022352736792131, 0.9997501404657165, -0.000108612530292],
+        [-0.009718278760616, -0.000108649873838, 0.9999527705112556],
+    ]
+    np.testing.assert_allclose(precession(2415020.0), expected, atol=2e-9)
+
+
+def test_the_moons_terms_are_the_greatest_of_the_long_series() -> None:
+    """Meeus, Astronomical Algorithms, chapter 47: the same series with more terms and digits."""
+    long = {
+        "longitude": {
+            (0, 0, 1, 0): 6.288774, (2, 0, -1, 0): 1.274027, (2, 0, 0, 0): 0.658314,
+            (0, 0, 2, 0): 0.213618, (0, 1, 0, 0): -0.185116, (0, 0, 0, 2): -0.114332,
+        },
+        "latitude": {
+            (0, 0, 0, 1): 5.128122, (0, 0, 1, 1): 0.280602, (0, 0, 1, -1): 0.277693,
+            (2, 0, 0, -1): 0.173237,
+        },
+    }  # fmt: skip
+
+    def theirs(julian_date: float) -> tuple[float, float, float]:
+        t = (julian_date - 2451545.0) / 36525
+        arguments = (
+            297.8501921 + 445267.1114034 * t,
+            357.5291092 + 35999.0502909 * t,
+            134.9633964 + 477198.8675055 * t,
+            93.2720950 + 483202.0175233 * t,
+        )
+
+        def total(name: str) -> float:
+            return sum(
+                size * np.sin(np.radians(np.dot(factors, arguments)))
+                for factors, size in long[name].items()
+            )
+
+        d, _, m, _ = np.radians(arguments)
+        distance_km = 385000.56 - 20905.355 * np.cos(m) - 3699.111 * np.cos(2 * d - m)
+        distance_km -= 2955.968 * np.cos(2 * d) + 569.925 * np.cos(2 * m)
+        longitude = 218.3164477 + 481267.88123421 * t + total("longitude")
+        return longitude, total("latitude"), distance_km
+
+    dates = 2451545.0 + np.linspace(-18_000, 18_000, 400)
+    longitude, latitude, distance_km = np.transpose([theirs(date) for date in dates])
+    tilt = np.radians(23.4392911 - 0.0130042 * (dates - 2451545.0) / 36525)
+    x, y, z = np.transpose([moon(date) for date in dates])
+    y, z = y * np.cos(tilt) + z * np.sin(tilt), z * np.cos(tilt) - y * np.sin(tilt)
+    along = np.degrees(np.arctan2(y, x)) - longitude
+    above = np.degrees(np.arctan2(z, np.hypot(x, y))) - latitude
+    farther = np.sqrt(x**2 + y**2 + z**2) / distance_km - 1
+    # What the digits and terms that are left out make.
+    for off, rms in (((along + 180) % 360 - 180, 0.0078), (above, 0.00365), (farther, 0.00054)):
+        assert np.sqrt(np.mean(off**2)) < rms
+
+
 def test_the_moon_is_where_the_text_book_has_it() -> None:
     """Meeus, Astronomical Algorithms, example 47.a: 1992 April 12, 0 h TD."""
     tilt = np.radians(23.440636)
