@@ -125,6 +125,20 @@ def test_every_key_of_every_hazard_is_documented() -> None:
     assert [row for row in part.splitlines() if row.startswith("| `")] == expected
 
 
+def test_the_curves_of_hazards_are_of_their_scales() -> None:
+    page = text_of("docs/hazards.md")
+    for hazard in (*SKY_HAZARDS.values(), *EARTH_HAZARDS.values(), *SENSOR_HAZARDS.values()):
+        part = section(page, hazard.name)
+        assert f"`--hazard {hazard.name}`, which is `{hazard.name}=" in part
+        (usual,) = re.findall(rf"which is `{hazard.name}=(.*?)`", part)
+        assert float(usual) == hazard.strength.usual
+        shown: dict[str, list[float]] = {}
+        for device, strength in re.findall(r"^\| (\w+) \| (\S+) \| \d", part, re.MULTILINE):
+            shown.setdefault(device, []).append(float(strength))
+        assert shown
+        assert all(scale == [*hazard.strength.values] for scale in shown.values()), hazard.name
+
+
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
     examples = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
     device, sky, night, hard, picture, earth, ball = examples

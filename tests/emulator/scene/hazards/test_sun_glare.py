@@ -41,3 +41,5 @@ def test_slope_across_the_picture() -> None:
 def test_sun_in_the_field_is_finite() -> None:
     light = star_light(SkyScene(ORION.quaternion, hazards=(at(0, transmittance=1),)), LENS, SHUTTER)
     assert np.isfinite(light).all()
+    # No baffle gives more than there is.
+    assert on_boresight(at(0, transmittance=1)) == pytest.approx(10 ** (-0.4 * SUN_V), rel=1e-5)
