@@ -61,6 +61,42 @@ def test_stat_is_laid_out_as_the_kernel_does():
     assert struct.unpack_from("=II", extended, 128) == (89, 7)
 
 
+class _Statx(ctypes.Structure):
+    """By statx(2)."""
+
+    _fields_ = (
+        *((name, ctypes.c_uint32) for name in ("mask", "blksize")),
+        ("attributes", ctypes.c_uint64),
+        *((name, ctypes.c_uint32) for name in ("nlink", "uid", "gid")),
+        ("mode", ctypes.c_uint16),
+        *((name, ctypes.c_uint64) for name in ("ino", "size", "blocks", "attributes_mask")),
+        ("times", ctypes.c_uint64 * 8),
+        *((name, ctypes.c_uint32) for name in ("rdev_major", "rdev_minor", "major", "minor")),
+        ("spare", ctypes.c_uint64 * 14),
+    )
+
+
+def test_statx_tells_of_a_device_what_the_kernel_tells_of_one() -> None:
+    real, made = _Statx(), _Statx.from_buffer_copy(NODE.statx())
+    basic = 0x7FF
+    assert ctypes.CDLL(None).statx(-100, b"/dev/null", 0, basic, ctypes.byref(real)) == 0
+    same = ("blksize", "nlink", "size", "blocks")
+    assert [getattr(made, name) for name in same] == [getattr(real, name) for name in same]
+    assert stat.S_IFMT(made.mode) == stat.S_IFMT(real.mode)
+    assert (made.mask, made.attributes, made.attributes_mask) == (basic, 0, 0)
+    assert (made.uid, made.gid) == (os.getuid(), os.getgid())
+    folder = os.stat("/dev").st_dev
+    assert (made.major, made.minor) == (os.major(folder), os.minor(folder))
+    assert (made.rdev_major, made.rdev_minor) == (89, 7)
+    for compact in (False, True):
+        text = NODE.stat(compact=compact)
+        size, blocks = struct.unpack_from("=q", text, 48)[0], struct.unpack_from("=q", text, 64)[0]
+        block = struct.unpack_from("=i" if compact else "=q", text, 56)[0]
+        assert (size, block, blocks) == (0, real.blksize, 0)
+        assert struct.unpack_from("=Q", text, 8)[0] == made.ino
+    assert DeviceNode(8).statx() != NODE.statx()
+
+
 def test_listing_is_what_i2c_tools_read():
     number, kind, name, _ = NODE.listing.split("\t")
     assert (number, kind.strip()) == ("i2c-7", "i2c")
