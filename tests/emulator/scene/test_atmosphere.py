@@ -125,3 +125,23 @@ def test_sidereal_time_and_a_camera_on_the_earth() -> None:
 def test_what_can_not_be(name: str, value: float) -> None:
     with pytest.raises(SceneError, match=rf"{name} must be in "):
         Atmosphere(**({"latitude_deg": 0, "sidereal_deg": 0} | {name: value}))
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("latitude_deg", -90, 90),
+        ("sidereal_deg", 0, 360),
+        ("height_m", -500, 9000),
+        ("seeing_arcsec", 0, 20),
+        ("extinction_mag", 0, 5),
+        ("sky_mag", 10, 30),
+    ],
+)
+def test_what_just_can_be(name: str, low: float, high: float) -> None:
+    place = {"latitude_deg": 0.0, "sidereal_deg": 0.0}
+    for value in (low, high):
+        assert getattr(Atmosphere(**(place | {name: value})), name) == value
+    for value in (low - 0.01, high + 0.01):
+        with pytest.raises(SceneError, match=rf"{name} must be in "):
+            Atmosphere(**(place | {name: value}))

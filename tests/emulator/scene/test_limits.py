@@ -88,25 +88,47 @@ def test_as_many_false_stars_as_there_may_be() -> None:
     ("kind", "key", "inside", "outside"),
     [
         ("sky", "dec_deg", 90, 90.001),
+        ("sky", "dec_deg", -90, -90.001),
         ("sky", "ra_deg", -360, -360.1),
+        ("sky", "ra_deg", 360, 360.1),
+        ("sky", "rate_deg_s", [100, -100, 100], [100.1, 0, 0]),
         ("sky", "epoch", 2200.0, 2200.1),
+        ("sky", "epoch", 1800.0, 1799.9),
         ("sky", "false_stars", MOST_FALSE_STARS, MOST_FALSE_STARS + 1),
+        ("sky", "false_stars", 0, -1),
+        ("sky", "false_star_mag", [3.0, 3.0], [3.1, 3.0]),
         ("sky", "mag_limit", -30, -30.1),
+        ("sky", "mag_limit", 30, 30.1),
+        ("sky", "temperature_c", -60, -60.1),
+        ("sky", "temperature_c", 125, 125.1),
+        ("sky", "hot_pixels", 0, -1),
+        ("sky", "seed", 0, -1),
         ("earth-sun", "altitude_km", 1e6, 1.1e6),
+        ("earth-sun", "altitude_km", 1e-3, 0),
         ("earth-sun", "glow_km", 0, -0.1),
+        ("earth-sun", "unevenness", 0, -0.1),
+        ("earth-sun", "rate_deg_s", [0, -1000, 1000], [0, 0, -1000.1]),
+        ("earth-sun", "temperature_c", -60, -60.1),
+        ("earth-sun", "temperature_c", 125, 125.1),
+        ("earth-sun", "hot_pixels", 0, -1),
+        ("earth-sun", "hot_pairs", 0, -1),
+        ("earth-sun", "bloom_px", 0.1, 0),
+        ("earth-sun", "seed", 0, -1),
     ],
 )
 def test_the_limits_themselves_are_inside(
-    kind: str, key: str, inside: float, outside: float, tmp_path: Path
+    kind: str, key: str, inside: Any, outside: Any, tmp_path: Path
 ) -> None:
     path = tmp_path / "scene.toml"
 
-    def load(value: float) -> Any:
+    def load(value: Any) -> Any:
         path.write_text(toml(kind, (SKY if kind == "sky" else {}) | {key: value}))
         return (
             load_scene(path, CONDITION, UNCERTAIN) if kind == "sky" else load_earth_sun_scene(path)
         )
 
     load(inside)
-    with pytest.raises(SceneError, match=f"^{os.fspath(path)}: {key} must be .*, not "):
+    with pytest.raises(
+        SceneError, match=f"^{os.fspath(path)}: {key} must (not )?(be|fall).*, not "
+    ):
         load(outside)
