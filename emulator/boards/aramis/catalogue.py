@@ -204,11 +204,10 @@ def _triples(
 ) -> NDArray[np.intp]:
     """Index triples (m, 3), rising, of stars that are pairwise closer than the limit."""
     near = vectors @ vectors.T > np.cos(limit_rad)
-    np.fill_diagonal(near, False)
     parts, count = [np.zeros((0, 3), dtype=np.intp)], 0
     for first in progress(range(len(vectors)), len(vectors), "listing triangles"):
         others = first + 1 + np.flatnonzero(near[first, first + 1 :])
-        second, third = np.nonzero(np.triu(near[np.ix_(others, others)]))
+        second, third = np.nonzero(np.triu(near[np.ix_(others, others)], 1))
         triples = np.stack([np.full(len(second), first), others[second], others[third]], axis=1)
         parts.append(triples.astype(np.intp))
         count += len(triples)

@@ -15,6 +15,7 @@ from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
 from cubestack.emulator.camera.mt9m001.lens import CONDITION, double_gauss
 from cubestack.emulator.camera.mt9m001.registers import GAINS, SensorSettings, read_settings
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
+from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from cubestack.firmware_model.interface.cameras import mt9m001 as chip
@@ -118,6 +119,22 @@ def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(
     assert segments[0][2] == read_out
     first = starts(segments)[0] / PS_PER_S
     assert first == pytest.approx(counts_from_s + 3001 * ROW_S, abs=1e-7)
+
+
+@pytest.mark.parametrize(("clocks", "counts"), [(-1, True), (0, True), (1, False), (300, False)])
+def test_a_gain_counts_for_frames_that_have_not_begun(
+    camera: Mt9m001, clocks: int, counts: bool
+) -> None:
+    begins = starts(stream(camera, 0, 200 * PS_PER_MS))[1]
+    bright = Atmosphere(-1.0, 84.0, sky_mag=12.0)
+    camera = Mt9m001(SkyView(scene(mag_limit=-5.0, atmosphere=bright), QUIET))
+    write_ps = begins + clocks * PS_PER_S // chip.PIXEL_CLOCK_HZ
+    stream(camera, 0, write_ps)
+    put(camera, "GLOBAL_GAIN", 0x67, now_ps=write_ps)
+    lines = camera.segment_at(begins + 10 * PS_PER_MS)
+    assert lines.start_ps == pytest.approx(begins + 242 * PS_PER_S / chip.PIXEL_CLOCK_HZ, abs=1)
+    assert lines.pixels is not None
+    assert bool(lines.pixels().max() > 200) is counts
 
 
 def test_changes_wait_while_they_are_held(camera: Mt9m001) -> None:

@@ -103,6 +103,27 @@ def test_too_fast_a_clock_is_logged_once_and_decoded(
     assert caplog.messages == [message]
 
 
+@pytest.mark.parametrize(
+    ("low_ps", "high_ps", "told"),
+    [
+        (1_300_000, 600_000, []),
+        (1_299_999, 600_000, ["low was 1.30, right 1.3"]),
+        (1_300_000, 599_999, ["high was 0.60, right 0.6"]),
+    ],
+)
+def test_the_shortest_times_are_those_of_the_data_sheet(
+    device: Device, caplog: pytest.LogCaptureFixture, low_ps: int, high_ps: int, told: list[str]
+) -> None:
+    """I2C's fast mode: SCL low for 1.3 us, high for 0.6 us."""
+    pin, now = device.slave.on_pin, 10**9
+    pin("SDA", 0, now)
+    for _ in range(2):
+        pin("SCL", 0, now := now + high_ps)
+        pin("SCL", 1, now := now + low_ps)
+    heard = [record.args for record in caplog.records]
+    assert [f"{a} was {b:.2f}, right {c:.1f}" for a, b, c in heard] == told
+
+
 def test_there_are_only_two_pins(device: Device) -> None:
     with pytest.raises(ValueError, match="has the pins SCL and SDA, not 'CLK'"):
         device.slave.on_pin("CLK", 1, 0)

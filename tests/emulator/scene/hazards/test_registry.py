@@ -73,6 +73,20 @@ def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
     assert made_of(SKY_HAZARDS)({kind.name: table}) == (hazard,)
 
 
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_lights_move_as_fast_as_is_said(kind: type[SkyHazard]) -> None:
+    """By that the renderer knows how often to look at them."""
+    now = looking(ORION, LENS, SHUTTER)
+    hazard = kind.placed(kind.strength.usual, now, np.random.default_rng(3))
+    here, soon = (hazard.lights(replace(now, time_s=now.time_s + dt)) for dt in (0.0, 1.0))
+    if here is None or soon is None:
+        assert hazard.speed_deg_s == 0
+        return
+    chords = np.linalg.norm(soon.vectors - here.vectors, axis=1)
+    fastest_deg_s = np.degrees(2 * np.arcsin(chords / 2)).max()
+    assert hazard.speed_deg_s == pytest.approx(fastest_deg_s, abs=1e-3)
+
+
 def test_a_scene_takes_hazards_only() -> None:
     with pytest.raises(SceneError, match="hazards must be hazards of light, not 'moon'"):
         SkyScene([0, 0, 0, 1], hazards=("moon",))  # type: ignore[arg-type]
