@@ -6,6 +6,7 @@ import pytest
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.hazards import Ghosts, Glint, Looking
 from cubestack.emulator.scene.hazards.contract import SUN_V
+from cubestack.emulator.scene.hazards.glare import aureole
 from cubestack.emulator.scene.hazards.glint import SUN_SURFACE
 
 FISHEYE = Looking(np.eye(3), 190, 190, 95, np.radians(0.345))
@@ -52,3 +53,74 @@ def test_glint_is_at_the_border_and_turns_with_the_camera(seed: int) -> None:
     np.testing.assert_allclose(
         Glint(seed=seed, surface=0.04).glow(turned, vectors @ axes), glow, rtol=1e-3, atol=1e9
     )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ghosts_halve_from_one_to_the_next_and_lie_within_their_rings(seed: int) -> None:
+    sun = tuple(vector_from_angles(-20, 35))
+    _, vectors = grid(60, 0.6)
+    rays = np.concatenate([vectors, [sun]])
+    whole = {
+        count: Ghosts(sun=sun, count=count, scatter=0.0, seed=seed) for count in (0, 1, 2, 3, 5)
+    }
+    assert not whole[0].glow(FISHEYE, rays).any()
+    assert whole[0].rings(FISHEYE) == Ghosts().rings(FISHEYE) == ()
+    light = 10 ** (-0.4 * SUN_V)
+    for ghosts in whole.values():
+        rings = ghosts.rings(FISHEYE)
+        assert len(rings) == ghosts.count
+        expected = np.zeros(len(rays))
+        for number, ring in enumerate(rings):
+            # The ring ends where its Gaussian does, four standard deviations out.
+            assert ring.inner_rad == 0
+            sigma = ring.outer_rad / 4
+            assert 0.005 <= np.degrees(sigma) / 95 <= 0.03
+            angles = np.arccos(np.clip(rays @ ring.centre, -1, 1))
+            peak = 1e-4 * light / 2**number / (2 * np.pi * sigma**2)
+            expected += np.where(angles < 4 * sigma, peak * np.exp(-((angles / sigma) ** 2) / 2), 0)
+        assert len({ring.outer_rad for ring in rings}) == ghosts.count
+        np.testing.assert_allclose(ghosts.glow(FISHEYE, rays), expected, rtol=2e-3, atol=1e3)
+
+
+def test_ghosts_scatter_the_suns_light_as_glare_does() -> None:
+    sun = vector_from_angles(5, 0)
+    _, vectors = grid(30, 1)
+    glare = Ghosts(sun=tuple(sun), count=0, scatter=0.02).glow(FISHEYE, vectors)
+    angles = np.arccos(np.clip(vectors @ sun, -1, 1))
+    expected = 10 ** (-0.4 * SUN_V) * aureole(angles, 0.02)
+    np.testing.assert_allclose(glare, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_glint_is_of_bars_with_sizes_by_the_half_field(seed: int) -> None:
+    """A bar's light is its area's; from its ring comes its diagonal."""
+    (ring,) = Glint(seed=seed, count=1).rings(FISHEYE)
+    away_deg = np.degrees(np.arccos(ring.centre[2]))
+    assert 0.7 * 95 <= away_deg <= 0.98 * 95
+    assert ring.inner_rad == 0
+    half = np.degrees(ring.outer_rad) / 95  # half length and half width
+    assert 0.014 <= half <= 0.17
+    # Directions around the bar, even in its plane.
+    one = np.cross(ring.centre, [0, 0, 1.0])
+    one /= np.linalg.norm(one)
+    other = np.cross(ring.centre, one)
+    ticks = np.linspace(-1.2, 1.2, 301) * ring.outer_rad
+    u, v = (axis.ravel() for axis in np.meshgrid(ticks, ticks))
+    rays = np.outer(np.sqrt(1 - u**2 - v**2), ring.centre) + np.outer(u, one) + np.outer(v, other)
+    fine = Looking(np.eye(3), 190, 190, 95, 1e-4)
+    share = Glint(seed=seed, count=1, surface=1.0).glow(fine, rays) / SUN_SURFACE
+    lit = share > 0.5
+    points = np.stack([u[lit], v[lit]])
+    # A rectangle's principal moments are the thirds of its squared halves.
+    width, length = np.sqrt(3 * np.linalg.eigvalsh(np.cov(points)))
+    assert length + width == pytest.approx(ring.outer_rad, rel=0.03)
+    assert 0.01 * 0.97 <= np.degrees(length) / 95 <= 0.15 * 1.03
+    assert 0.004 * 0.9 <= np.degrees(width) / 95 <= 0.02 * 1.1
+    area = lit.sum() * (ticks[1] - ticks[0]) ** 2
+    assert area == pytest.approx(4 * length * width, rel=0.04)
+    assert share.max() == pytest.approx(1.0)
+    # Its edge is a pixel wide, half of it on either side.
+    wide = Looking(np.eye(3), 190, 190, 95, float(width))
+    soft = Glint(seed=seed, count=1, surface=1.0).glow(wide, rays) / SUN_SURFACE
+    assert soft.sum() == pytest.approx(share.sum(), rel=0.05)
+    assert ((soft > 0.05) & (soft < 0.95)).sum() > ((share > 0.05) & (share < 0.95)).sum()
