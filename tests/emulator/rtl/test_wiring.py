@@ -1,5 +1,6 @@
 """The wirings of boards, and calls with names that they do not have."""
 
+from fractions import Fraction
 from itertools import product
 
 import numpy as np
@@ -8,6 +9,9 @@ import pytest
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.factory import make_engine
+from cubestack.emulator.rtl.wiring import BusPins
+from cubestack.emulator.sim.fpga_port import STEPS, Transactions
+from cubestack.firmware_model.mcu.external_bus import EBI
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.flow.generate import rtlil_text
@@ -62,3 +66,54 @@ def test_wrong_names_and_levels(kind):
     with pytest.raises(ValueError, match="SUNACK or NADACK only, not on DATA"):
         engine.run(1, ("DATA", 1))
     assert np.shares_memory(engine.sram, engine.memories["sun"])
+
+
+class Device:
+    """A memory with an address latch on the lines of the external bus."""
+
+    def __init__(self, pins):
+        self.pins, self.lines = pins, {pins.read: 1, pins.write: 1, pins.latch: 0}
+        self.lines |= dict.fromkeys(pins.selects, 1) | {pins.high: 0, f"{pins.low}_I": 0}
+        self.latched = 0
+        self.strobes: list[tuple[str, str, int, int]] = []
+
+    def event(self, levels):
+        """The lines go to ``levels``; the strobe counts when it rises, with what is selected."""
+        before, self.lines = self.lines, {**self.lines, **dict(levels)}
+        pins, low = self.pins, self.lines[f"{self.pins.low}_I"]
+        if self.lines[pins.latch]:
+            self.latched = self.lines[pins.high] << 8 | low
+        for strobe in (pins.read, pins.write):
+            if self.lines[strobe] and not before[strobe]:
+                (select,) = [pin for pin in pins.selects if not self.lines[pin]]
+                address = self.latched << 8 | self.lines[pins.high]
+                self.strobes.append((select, strobe, address, low))
+
+
+@pytest.mark.parametrize("write", [False, True])
+@pytest.mark.parametrize("select", [0, 1])
+def test_a_latch_and_a_memory_understand_the_bus(write, select):
+    pins = BusPins(("A_CS", "B_CS"), "AH", "AL", "ALE", "RE", "WE")
+    addresses = np.array([0x123456, 0x00FF01, 0xABCDEF, 0], np.int32)
+    data = np.array([0x5A, 1, 0xFF, 0x80], np.uint8)
+    one = Transactions(addresses, data, write, Fraction(1), EBI.cycles, select)
+    device = Device(pins)
+    for event in range(len(one) * STEPS):
+        levels = pins.levels(one, event)
+        assert {name for name, _ in levels} <= device.lines.keys()
+        device.event(levels)
+        if event % STEPS == STEPS - 1:  # all is as before, and nothing selected
+            assert [device.lines[pin] for pin in (*pins.selects, "RE", "WE", "ALE")] == [
+                1,
+                1,
+                1,
+                1,
+                0,
+            ]
+    kept = [address >> 8 & 0xFF for address in addresses.tolist()]
+    low = data.tolist() if write else kept
+    expected = [
+        (pins.selects[select], "WE" if write else "RE", address, byte)
+        for address, byte in zip(addresses.tolist(), low, strict=True)
+    ]
+    assert device.strobes == expected
