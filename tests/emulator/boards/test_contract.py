@@ -120,3 +120,13 @@ def test_lines_and_probes(stack: ExitStack) -> None:
         "cubesense": [*("uart", "bench_uart", "awake", "resets"), *latest],
         "aramis": ["uart", "awake", "resets", "task", "measurement"],
     }
+
+
+def test_what_waits_for_the_end_is_done_before_the_board_is_closed() -> None:
+    board, done = BOARDS["cubestar"](), []
+    assert board.engine is not None
+    close = board.engine.close
+    board.engine.close = lambda: (done.append("engine"), close())[1]  # type: ignore[method-assign]
+    board.on_close += [lambda: done.append("first"), lambda: done.append("second")]
+    board.close()
+    assert done == ["first", "second", "engine"]
