@@ -1,0 +1,59 @@
+"""How the filter is installed, on a C library of the test's own."""
+
+import ctypes
+import errno
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.i2cdev.seccomp import launcher
+
+STEPS = bytes(range(1, 25))
+CALL = 317
+
+
+class Libc:
+    """Takes note of calls; ``fails`` names those that do, ``flags`` those that it knows."""
+
+    def __init__(self, fails: str = "", flags: tuple[int, ...] = (8 | 32, 8)) -> None:
+        self.calls: list[tuple[Any, ...]] = []
+        self.fails, self.flags = fails, flags
+
+    def prctl(self, *arguments: int) -> int:
+        self.calls.append(arguments)
+        ctypes.set_errno(errno.EACCES)
+        return -1 if self.fails == "prctl" else 0
+
+    def syscall(self, number: int, mode: int, flags: int, program: Any) -> int:
+        made = program._obj
+        self.calls.append((number, mode, flags, made.steps[: 8 * made.length]))
+        ctypes.set_errno(errno.EBUSY)
+        return 7 if flags in self.flags else -1
+
+
+def install(libc: Libc) -> int:
+    return launcher.install(libc, CALL, STEPS)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("flags", "tried"), [((40, 8), [40]), ((8,), [40, 8])], ids=["linux-5.19", "before"]
+)
+def test_the_kernel_gets_the_steps_and_gives_a_listener(
+    flags: tuple[int, ...], tried: list[int]
+) -> None:
+    """PR_SET_NO_NEW_PRIVS is 38, SECCOMP_SET_MODE_FILTER 1; flags as in linux/seccomp.h."""
+    libc = Libc(flags=flags)
+    assert install(libc) == 7
+    assert libc.calls == [(38, 1, 0, 0, 0), *((CALL, 1, flag, STEPS) for flag in tried)]
+
+
+def test_what_the_kernel_refuses_is_told() -> None:
+    with pytest.raises(OSError, match="can not give up new privileges") as caught:
+        install(Libc("prctl"))
+    assert caught.value.errno == errno.EACCES
+    with pytest.raises(OSError, match=r"the kernel refuses a seccomp listener \(.*busy") as caught:
+        install(Libc(flags=()))
+    assert caught.value.errno == errno.EBUSY
+    zero = Libc()
+    zero.syscall = lambda *_arguments: 0  # type: ignore[method-assign]
+    assert install(zero) == 0
