@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from tests.mutation.mutants import Mutant
-from tests.mutation.reached import BUDGET_S, Reached, collected
+from tests.mutation.reached import BUDGET_S, DOCUMENTS, Reached, collected
 from tests.mutation.trial import UNKNOWN_S
 
 ROOT = Path(__file__).parents[2]
@@ -39,8 +39,8 @@ class Suite:
 
 
 def near(path: Path, tests: list[str]) -> list[str]:
-    """Those that stand in the test files for a module."""
-    files = {str(file) for file in files_for(path)}
+    """Those that stand in the test files for a module, or compare tables with the documents."""
+    files = {*DOCUMENTS, *map(str, files_for(path))}
     return [test for test in tests if test.partition("::")[0] in files]
 
 
