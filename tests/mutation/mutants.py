@@ -19,6 +19,7 @@ COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.In: ast.NotIn,
     ast.NotIn: ast.In,
 }
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 SIGNS: dict[type[ast.operator], type[ast.operator]] = {ast.Add: ast.Sub, ast.Sub: ast.Add}
 
 
@@ -71,6 +72,7 @@ def mutants(path: Path, text: str) -> list[Mutant]:
 
 def _changes(tree: ast.AST) -> Iterator[tuple[int, ast.expr | ast.stmt, str]]:
     """Nodes, after the first lines of their statements, and what stands there instead."""
+    same_as_pass = {id(node.body[-1]) for node in ast.walk(tree) if isinstance(node, FUNCTIONS)}
     for statement, node in _nodes(tree):
         match node:
             case ast.Compare(left, [operator], [right]) if type(operator) in COMPARISONS:
@@ -90,6 +92,8 @@ def _changes(tree: ast.AST) -> Iterator[tuple[int, ast.expr | ast.stmt, str]]:
                     yield statement, node, f"({value + 1!r})"
             case ast.Expr(ast.Call() | ast.Yield() | ast.YieldFrom()) | ast.Raise():
                 yield statement, node, "pass"
+            case ast.Return(ast.Constant(None)) if id(node) in same_as_pass:
+                pass
             case ast.Return(value) if value is not None:
                 yield statement, node, "pass"
         if isinstance(node, ast.If | ast.While | ast.IfExp):

@@ -24,6 +24,15 @@ HERE = Path("a.py")
         ("f(7)", ["pass", "f((8))"]),
         ("if a:\n    f()", ["if (not (a)):\n    f()", "if a:\n    pass"]),
         ("def f():\n    return a", ["def f():\n    pass"]),
+        ("def f():\n    return None", []),
+        (
+            "def f():\n    if a:\n        return None\n    g()",
+            [
+                "def f():\n    if (not (a)):\n        return None\n    g()",
+                "def f():\n    if a:\n        pass\n    g()",
+                "def f():\n    if a:\n        return None\n    pass",
+            ],
+        ),
         ("raise a", ["pass"]),
         ("a = 'é', b is None", ["a = 'é', (b is not None)"]),
         ("a: Literal[3] = True", []),
