@@ -1,0 +1,88 @@
+"""What all sensors do with scenes, supply and pictures, at one that renders a number."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.camera.common.image_sensor import ImageSensor
+from cubestack.emulator.camera.common.view import View
+from cubestack.firmware_model.interface.cameras import mt9m001 as chip
+
+
+class Sensor(ImageSensor[Any, Any]):
+    scene_types = (str,)
+    sees = "it sees words"
+
+    def __init__(self, seen: Any, condition: Any = "good") -> None:
+        self.made: list[Any] = []
+        self.told: list[int] = []
+        self.restarts: list[int] = []
+        super().__init__(seen, condition, chip.REGISTERS, 3_000_000)
+        self.on_change = lambda: self.told.append(1)
+
+    def _check(self, scene: Any, condition: Any) -> None:
+        if scene == "odd":
+            raise ValueError("odd")
+
+    def _restarted(self, now_ps: int) -> None:
+        self.restarts.append(now_ps)
+
+    def look(self, frame: object) -> int:
+        def make() -> Any:
+            self.made.append(frame)
+            return np.array([len(self.made)])
+
+        return int(self._once(frame, make)[0])
+
+
+def test_pictures_are_made_once_and_two_are_kept() -> None:
+    sensor = Sensor("sky")
+    assert sensor.rendered is None
+    assert [sensor.look(frame) for frame in (1, 1, 2, 1)] == [1, 1, 2, 1]
+    assert sensor.rendered is not None
+    assert sensor.rendered[0] == 1  # the frame looked at last, not the one made last
+    assert sensor.look(3) == 3  # and frame 2 goes, which was looked at before
+    assert [sensor.look(frame) for frame in (1, 3)] == [1, 3]
+    assert sensor.look(2) == 4
+    assert sensor.made == [1, 2, 3, 2]
+
+
+def test_another_scene_or_condition_makes_another_picture() -> None:
+    sensor = Sensor("sky")
+    assert sensor.look(1) == 1
+    sensor.scene = "ground"
+    assert sensor.look(1) == 2
+    sensor.condition = "bad"
+    assert sensor.look(1) == 3
+    sensor.scene = View("ground", "good")
+    assert sensor.look(1) == 2  # kept
+    assert (sensor.scene, sensor.condition) == ("ground", "good")
+
+
+def test_what_it_can_not_see_changes_nothing() -> None:
+    sensor = Sensor(View("sky", "bad"))
+    assert (sensor.scene, sensor.condition) == ("sky", "bad")
+    with pytest.raises(TypeError, match="it sees words, not 3"):
+        sensor.scene = 3
+    with pytest.raises(TypeError, match="it sees words, not 3"):
+        sensor.scene = View(3, "good")
+    with pytest.raises(ValueError, match="odd"):
+        sensor.scene = "odd"
+    assert (sensor.scene, sensor.condition) == ("sky", "bad")
+
+
+def test_supply_and_clock() -> None:
+    sensor = Sensor("sky")
+    assert sensor.running
+    assert sensor.period * 3 == 10**6
+    sensor.registers.store("SHUTTER_WIDTH", 5)
+    sensor.power(True, 10)
+    assert (sensor.restarts, sensor.told) == ([], [])
+    sensor.power(False, 20)
+    assert not sensor.running
+    sensor.power(False, 25)
+    sensor.power(True, 30)
+    assert sensor.running
+    assert (sensor.restarts, sensor.told) == ([20, 30], [1, 1])
+    assert sensor.registers.active("SHUTTER_WIDTH") == 0x0419
