@@ -1,6 +1,7 @@
 """Device files of another process's bus, with the server in this one."""
 
 import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -85,3 +86,20 @@ def test_the_emulation_goes(remote):
 def test_nobody_serves(tmp_path):
     with pytest.raises(PortError, match=r"no emulation serves .*start one with cubestack emulate"):
         RemoteBus(tmp_path / "bus")
+
+
+def test_closing_leaves_no_descriptor_and_fails_what_waits(served):
+    before = set(os.listdir("/proc/self/fd"))
+    bus = RemoteBus(Path(served.server.name))
+    files = [bus.open() for _ in range(3)]
+    replies: list[bytes] = []
+    files[0].perform(linux.Call.READ, linux.pack_read(1), replies.append)
+    files[1].close()
+    files[1].close()
+    assert len(bus.watched()) == 1
+    bus.close()
+    assert [linux.split_reply(reply)[0] for reply in replies] == [-errno.EIO]
+    files[2].perform(linux.Call.READ, linux.pack_read(1), replies.append)
+    assert len(replies) == 2
+    served.serve()  # whose ends are hung up now
+    assert set(os.listdir("/proc/self/fd")) == before

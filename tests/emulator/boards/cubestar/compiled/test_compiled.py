@@ -1,6 +1,7 @@
 """The reference algorithms as compiled code on the simulated part: same bits, and their cycles."""
 
 import shutil
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from cubestack.emulator.boards.cubestar.compiled.build import (
     rewritten,
 )
 from cubestack.emulator.boards.cubestar.compiled.machine import Timing, started
+from cubestack.emulator.boards.processor_registers import peek
 from cubestack.emulator.iss.calls import CallError, Calls
+from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.firmware_model.mcu.compiled import measured
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
@@ -115,3 +118,52 @@ def test_the_python_program_charges_what_the_compiled_one_takes(fast: Calls, see
         if ms > 0.05:
             tolerance = 0.15 if ms > 1.5 else 0.4
             assert charges[phase] == pytest.approx(count, rel=tolerance), phase
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("timing", "mode"),
+    [
+        (Timing(0, True, False, (0, 1, 2, 3)), 0),
+        (Timing(1, False, False, (3, 3, 63, 0)), 1),
+        (Timing(2, True, True, (1, 0, 5, 2)), 4),
+    ],
+)
+def test_the_part_s_registers_say_the_timing(timing: Timing, mode: int) -> None:
+    """By the fields' names: MSC, EBI and CMU of the EFM32GG Reference Manual."""
+    machine = started(compiled(Build("O2"), generated()), timing).machine
+
+    def fields(what: str) -> dict[str, int]:
+        (found,) = peek(machine, Symbols(None), what)
+        return found.fields
+
+    control = fields("MSC.READCTRL")
+    assert (control["MODE"], control["IFCDIS"]) == (mode, int(not timing.cache))
+    assert control["PREFETCH"] == timing.prefetch
+    address, setup, strobe, hold = timing.bus
+    assert fields("EBI.ADDRTIMING")["ADDRSETUP"] == address
+    for way, name in (("RD", "RDTIMING"), ("WR", "WRTIMING")):
+        phases = fields(f"EBI.{name}")
+        assert (phases[f"{way}SETUP"], phases[f"{way}STRB"]) == (setup, strobe)
+        assert phases[f"{way}HOLD"] == hold
+    bus, route = fields("EBI.CTRL"), fields("EBI.ROUTE")
+    assert (bus["MODE"], bus["BANK0EN"]) == (2, 1)  # D8A24ALE
+    assert (route["EBIPEN"], route["CS0PEN"], route["ALEPEN"]) == (1, 1, 1)
+    assert machine.write(0x8000_0005, 0xA5, 1)
+    assert machine.read(0x8000_0005, 1) == 0xA5
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"flash_waits": 3}, {"flash_waits": -1}]
+    + [
+        {"bus": bus}
+        for bus in ((4, 0, 0, 0), (0, 4, 0, 0), (0, 0, 64, 0), (0, 0, 0, 4), (-1, 0, 0, 0))
+    ],
+)
+def test_timings_that_registers_can_not_hold(changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="flash waits are 0 to 2, waits of the bus 0 to 3, 3, 63"):
+        Timing(**changes)
+    assert str(Timing(0, False, True, (3, 3, 63, 3))) == (
+        "0 flash waits, no cache, prefetch, bus 3-3-63-3"
+    )
