@@ -35,8 +35,10 @@ class Copy:
         site.mkdir()
         text = SITE.format(tree=str(self._tree))
         (site / "sitecustomize.py").write_text(text, "utf-8")
-        environment = {"PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"}
-        self._environment = os.environ | environment | {FAILED: str(self._failed)}
+        environment = {"PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": ""}
+        environment[FAILED] = str(self._failed)
+        self._environment = os.environ | environment
+        self._writes = 0
         self._sound: dict[str, bool] = {}
 
     def killed(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
@@ -44,11 +46,11 @@ class Copy:
         target = self._tree / mutant.path
         original = target.read_text("utf-8")
         while tests:
-            target.write_text(mutant.put_into(original), "utf-8")
+            self._write(target, mutant.put_into(original))
             try:
                 passed = self._pass(tests, limit_s)
             finally:
-                target.write_text(original, "utf-8")
+                self._write(target, original)
             if passed or not self._failed.exists():
                 return not passed  # not in time, or not even imported
             failed = self._failed.read_text("utf-8")
@@ -60,6 +62,12 @@ class Copy:
                 f"--deselect={failed}"
             ]
         return False
+
+    def _write(self, target: Path, text: str) -> None:
+        """Each time with another date, in s, by which Python knows what it has compiled."""
+        target.write_text(text, "utf-8")
+        self._writes += 1
+        os.utime(target, (self._writes, self._writes))
 
     def _pass(self, tests: list[str], timeout_s: float) -> bool:
         self._failed.unlink(missing_ok=True)
