@@ -40,12 +40,17 @@ class Suite:
 
 def near(path: Path, tests: list[str]) -> list[str]:
     """Those that stand in the test files for a module, or compare tables with the documents."""
-    files = {*DOCUMENTS, *map(str, files_for(path))}
+    files = {*DOCUMENTS, *map(str, _ranked(path))}
     return [test for test in tests if test.partition("::")[0] in files]
 
 
 def files_for(path: Path) -> list[Path]:
     """Test files for a module: its mirror image first, then who imports it, the nearest first."""
+    return _ranked(path)[:MOST_FILES]
+
+
+@cache
+def _ranked(path: Path) -> list[Path]:
     folder, own = Path("tests") / path.parent, f"test_{path.stem}.py"
     if path.stem == "__init__":
         folder, own = folder.parent, f"test_{path.parent.name}.py"
@@ -61,7 +66,7 @@ def files_for(path: Path) -> list[Path]:
     while not ranked and folder != Path("tests"):
         folder = folder.parent
         ranked = [(True, True, 0, file) for file, _ in _test_texts() if file.parent == folder]
-    return [file for *_, file in sorted(ranked)[:MOST_FILES]]
+    return [file for *_, file in sorted(ranked)]
 
 
 @cache
