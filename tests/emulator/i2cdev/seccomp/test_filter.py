@@ -1,6 +1,8 @@
 """The seccomp filter, run by an interpreter of its own: which calls it sends to the supervisor."""
 
+import re
 import struct
+from pathlib import Path
 
 import pytest
 
@@ -81,3 +83,24 @@ def test_everything_else_passes(abi: Abi):
     # Other processors, and their numbers.
     assert decide(abi, abi.calls["openat"], arch=0x40000003) == ALLOW  # i386
     assert decide(abi, abi.calls["openat"] | 0x40000000) == ALLOW  # x32
+
+
+@pytest.mark.parametrize(
+    ("machines", "header"),
+    [
+        (("x86_64",), "x86_64-linux-gnu/asm/unistd_64.h"),
+        (("aarch64", "riscv64"), "asm-generic/unistd.h"),
+    ],
+)
+def test_numbers_are_those_of_the_kernel_s_headers(machines: tuple[str, ...], header: str):
+    path = Path("/usr/include", header)
+    if not path.exists():
+        pytest.skip(f"no {path}")
+    text = path.read_text()
+    numbers = re.findall(r"#define __NR(?:3264)?_(\w+)\s+(\d+)", text)
+    found = {name: int(number) for name, number in numbers}
+    found.setdefault("newfstatat", found.get("fstatat", -1))  # by a macro
+    for machine in machines:
+        abi = ABIS[machine]
+        calls = {**abi.calls, "seccomp": abi.seccomp}
+        assert calls == {name: found[name] for name in calls}
