@@ -21,9 +21,6 @@ from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.hazard import Hazard
 
-ARCSEC2_PER_SR = (648_000 / math.pi) ** 2
-"""So many stars of V = 0 a steradian are V 0 a square arcsecond."""
-
 SUN_V = -26.74
 """Apparent magnitude of the Sun from the Earth (Allen's Astrophysical Quantities, section 14.2)."""
 
@@ -166,11 +163,6 @@ class SkyHazard(Hazard):
         """Where light of points at ``vectors`` (n, 3) seems to come from."""
         del looking
         return vectors
-
-
-def brightness(mag_arcsec2: ArrayLike) -> NDArray[np.float64]:
-    """Surface brightness in V = 0 stars a steradian, of V magnitudes a square arcsecond."""
-    return np.asarray(ARCSEC2_PER_SR * 10 ** (-0.4 * np.asarray(mag_arcsec2, np.float64)))
 
 
 def direction(name: str, values: ArrayLike) -> Vectors:
