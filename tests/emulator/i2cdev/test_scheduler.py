@@ -311,3 +311,31 @@ def test_as_fast_as_possible_a_device_at_work_goes_ahead(make):
     bench.scheduler.run()
     assert program.ends[0] < 10**10
     assert program.ends[1] > 10**11
+
+
+@pytest.mark.parametrize(("stall_ns", "done"), [(0, True), (4_000 * US, True), (6_000 * US, False)])
+def test_as_fast_as_possible_a_transfer_takes_one_visit_but_no_longer_than_that(
+    make, stall_ns, done
+):
+    """A visit may last ``VISIT_NS`` of wall time, 5 ms."""
+    bench = make(fast=True)
+    program = bench.program(0, 1, lambda: [I2cMessage(0x1A, read=8192)])
+    bench.world.now_ns += 1_000 * US
+    bench.world.stalls = [(bench.world.now_ns + 50 * US, stall_ns)]
+    bench.calls.exchange(bench.kernel.now)
+    assert bool(program.ends) is done
+    assert bench.adapter.busy is not done
+    bench.scheduler.run()
+    assert program.ends
+
+
+def test_while_somebody_holds_virtual_time_nothing_is_served(make):
+    bench = make(fast=True)
+    program = bench.program(0, 1)
+    bench.world.now_ns += 1_000 * US
+    bench.kernel.hold("me")
+    bench.calls.exchange(bench.kernel.now)
+    assert not bench.adapter.busy
+    bench.kernel.release("me")
+    bench.calls.exchange(bench.kernel.now)
+    assert program.ends
