@@ -101,14 +101,22 @@ def _changes(tree: ast.AST) -> Iterator[tuple[int, ast.expr | ast.stmt, str]]:
 
 
 def _nodes(tree: ast.AST, statement: int = 0) -> Iterator[tuple[int, ast.AST]]:
-    """All but annotations, f-strings, whose parts have no places, and what only types need."""
+    """All but annotations, f-strings, whose parts have no places, and what only types need: among
+    that are functions without a body, of protocols."""
     for name, value in ast.iter_fields(tree):
         if name in ("annotation", "returns") or isinstance(tree, ast.JoinedStr):
             continue
         for child in value if isinstance(value, list) else [value]:
             if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
                 continue
+            if isinstance(child, FUNCTIONS) and all(_says_only(line) for line in child.body):
+                continue
             if isinstance(child, ast.AST):
                 begins = child.lineno if isinstance(child, ast.stmt) else statement
                 yield begins, child
                 yield from _nodes(child, begins)
+
+
+def _says_only(statement: ast.stmt) -> bool:
+    """Whether it is a text, or three dots."""
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)

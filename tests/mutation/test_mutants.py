@@ -37,7 +37,9 @@ HERE = Path("a.py")
         ("a = 'é', b is None", ["a = 'é', (b is not None)"]),
         ("a: Literal[3] = True", []),
         ("a = f'{b + 1}'", []),
-        ("def f(a: Literal[1]) -> Literal[2]: ...", []),
+        ("def f(a: Literal[1] = 3) -> Literal[2]: ...", []),
+        ("def f(a=3):\n    'It does.'", []),
+        ("def f(a=3):\n    b", ["def f(a=(4)):\n    b"]),
     ],
 )
 def test_mutants_of_a_text(text: str, expected: list[str]) -> None:
