@@ -53,3 +53,17 @@ def test_wrong_values_in_python() -> None:
         SkyScene([0, 0, 0, 1], rate_deg_s=(0, np.nan, 0))
     with pytest.raises(SceneError, match="a quaternion has 4 numbers"):
         SkyScene([0, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("starts", "right"),
+    [((), True), ((0.0,), True), ((1.0, 1.0, 2.0), True), ((2.0, 1.0), False), ((-0.1,), False)],
+)
+def test_poses_come_one_after_the_other(starts: tuple[float, ...], right: bool) -> None:
+    q = quaternion_from_pointing(10, 20, 30)
+    poses = tuple(Pose(q, start_s=start_s) for start_s in starts)
+    if right:
+        assert SkyScene(q, poses=poses).poses == poses
+        return
+    with pytest.raises(SceneError, match="poses must start one after the other from 0 s on"):
+        SkyScene(q, poses=poses)

@@ -1,0 +1,119 @@
+"""Directions that scenes name, and where hazards are placed."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.hazards.contract import (
+    EARTH_RADIANCE,
+    Looking,
+    SkyHazard,
+    angles_rad,
+    aside,
+    direction,
+    refuse_strangers,
+)
+from cubestack.emulator.scene.hazards.moon import Moon
+
+AXES = Rotation.from_euler("zyx", [50, -20, 10], degrees=True).as_matrix()
+ROUND = Looking(AXES, 40, 20, 15, 1e-3)
+
+
+def off_axis_deg(looking: Looking, vector: np.ndarray) -> float:
+    return float(np.degrees(np.arccos(np.clip(looking.boresight @ vector, -1, 1))))
+
+
+@pytest.mark.parametrize(
+    ("values", "vector"),
+    [
+        ((0, 0), (1, 0, 0)),
+        ((90, 0), (0, 1, 0)),
+        ((-90, 0), (0, -1, 0)),
+        ((360, 0), (1, 0, 0)),
+        ((-360, 0), (1, 0, 0)),
+        ((123, 90), (0, 0, 1)),
+        ((123, -90), (0, 0, -1)),
+        ((45, 45), (0.5, 0.5, np.sqrt(0.5))),
+        ((0, 0, 5), (0, 0, 1)),
+        ((3, 0, 4), (0.6, 0, 0.8)),
+        ((0, -1e-9, 0), (0, -1, 0)),
+    ],
+)
+def test_a_direction_is_three_numbers_or_two_angles(values: Any, vector: Any) -> None:
+    np.testing.assert_allclose(direction("it", values), vector, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((360.1, 0), "it must be a right ascension of -360 to 360 deg and a declination of -90"),
+        ((-360.1, 0), "it must be a right ascension"),
+        ((0, 90.1), "it must be a right ascension"),
+        ((0, -90.1), "it must be a right ascension"),
+        ((0, 0, 0), "it must be 3 numbers, not all 0, or right ascension and declination"),
+        ((np.nan, 0), "it must be 3 numbers"),
+        ((np.inf, 0, 0), "it must be 3 numbers"),
+        ((1,), "it must be 3 numbers"),
+        ((1, 2, 3, 4), "it must be 3 numbers"),
+    ],
+)
+def test_what_is_no_direction(values: Any, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        direction("it", values)
+
+
+def test_angles_are_exact_for_small_ones_too() -> None:
+    for angle in (1e-9, 1e-4, 1.0, 3.0, np.pi):
+        vectors = np.array([[np.cos(angle), np.sin(angle), 0.0], [1.0, 0.0, 0.0]])
+        expected = [angle, 0.0]
+        found = angles_rad(vectors, np.array([1.0, 0, 0]))
+        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-15)
+
+
+def test_places_are_in_the_picture_and_all_over_it() -> None:
+    generator = np.random.default_rng(2)
+    vectors = np.array([ROUND.anywhere(generator) for _ in range(2000)])
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1)
+    x, y, z = AXES @ vectors.T
+    angle = np.degrees(np.arccos(z))
+    across, down = angle * x / np.hypot(x, y), angle * y / np.hypot(x, y)
+    assert angle.max() <= 15 + 1e-9
+    assert angle.max() > 14.5  # the half field, which is less than half of the width
+    assert np.abs(down).max() <= 10 + 1e-9
+    for values, half in ((across, 15), (down, 10)):
+        assert abs(values.mean()) < 0.05 * half
+        assert values.max() > 0.95 * half
+        assert values.min() < -0.95 * half
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 10.0, 90.0, 170.0])
+def test_beside_and_aside_are_at_the_angle_to_any_side(angle_deg: float) -> None:
+    generator = np.random.default_rng(3)
+    places = [ROUND.beside(angle_deg, generator) for _ in range(200)]
+    others = [aside(ROUND.boresight, angle_deg, generator) for _ in range(200)]
+    for found in (places, others):
+        for vector in found:
+            assert np.linalg.norm(vector) == pytest.approx(1)
+            assert off_axis_deg(ROUND, vector) == pytest.approx(angle_deg, abs=1e-5)
+        mean = np.mean(found, axis=0) - np.cos(np.radians(angle_deg)) * ROUND.boresight
+        assert np.linalg.norm(mean) < 0.2
+
+
+def test_a_hazard_by_itself_is_nothing() -> None:
+    vectors = np.eye(3)
+    nothing = SkyHazard()
+    assert nothing.lights(ROUND) is nothing.glow(ROUND, vectors) is None
+    assert nothing.hidden(ROUND, vectors) is None
+    assert (nothing.rings(ROUND), nothing.speed_deg_s, nothing.seed) == ((), 0.0, 0)
+    assert nothing.seen(ROUND, vectors) is vectors
+    refuse_strangers((nothing, Moon()))
+    with pytest.raises(SceneError, match="hazards must be hazards of light, not 5"):
+        refuse_strangers((nothing, 5))
+
+
+def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
+    """0.3 of the Sun's light on a Lambert surface, by pi; the Sun is V -26.74."""
+    assert np.pi * EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
