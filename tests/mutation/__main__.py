@@ -2,6 +2,7 @@
 
 examples, from the project's folder:
   python -m tests.mutation --record                          which tests run which lines; once
+  python -m tests.mutation --record-new                      add tests written since then
   python -m tests.mutation                                   40 mutants of all three parts
   python -m tests.mutation --count 400 --seed 7 --jobs 2
   python -m tests.mutation --folder firmware_model/cubestar
@@ -68,14 +69,15 @@ def main() -> int:
     parser.add_argument("--folder", type=Path, default=Path(), help="only what is below it")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="at the same time")
     parser.add_argument("--record", action="store_true", help="run all tests, see which run what")
+    parser.add_argument("--record-new", action="store_true", help="run those not on record yet")
     args = parser.parse_args()
     for name in ("count", "jobs"):
         if getattr(args, name) < 1:
             parser.error(f"--{name} must be at least 1, not {getattr(args, name)}")
     if not any(path.is_relative_to(args.folder) for path in modules(ROOT)):
         parser.error(f"{args.folder} has no module; it is below {', '.join(PARTS)}")
-    if args.record:
-        return record(ROOT)
+    if args.record or args.record_new:
+        return record(ROOT, new=args.record_new)
     facing = list(islice(chosen(args.folder, args.seed), args.count))
     tried = survived = 0
     for mutant, killed in results(facing, args.jobs):

@@ -12,6 +12,9 @@ PLUGIN = __name__
 COLLECTED, DURATIONS, FAILED = "MUTATION_COLLECTED", "MUTATION_DURATIONS", "MUTATION_FAILED"
 """Environment variables: the files to write, if any."""
 
+KNOWN = "MUTATION_KNOWN"
+"""Environment variable: durations of tests to leave out; they stay in what is written."""
+
 _GROUP = re.compile(r"@[\w ./-]+$")
 _durations: dict[str, float] = defaultdict(float)
 
@@ -27,6 +30,15 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         Path(path).write_text(json.dumps([item.nodeid for item in session.items]), "utf-8")
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what is known."""
+    known = _known()
+    left_out = [item for item in items if without_group(item.nodeid) in known]
+    if left_out:
+        items[:] = [item for item in items if without_group(item.nodeid) not in known]
+        config.hook.pytest_deselected(items=left_out)
+
+
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """A phase of a test has ended."""
     test = without_group(report.nodeid)
@@ -39,4 +51,10 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """Written by the process that has heard of all tests, not by its workers."""
     path = os.environ.get(DURATIONS)
     if path and not hasattr(session.config, "workerinput"):
-        Path(path).write_text(json.dumps(_durations), "utf-8")
+        Path(path).write_text(json.dumps(_known() | _durations), "utf-8")
+
+
+def _known() -> dict[str, float]:
+    path = os.environ.get(KNOWN)
+    durations: dict[str, float] = json.loads(Path(path).read_text("utf-8")) if path else {}
+    return durations

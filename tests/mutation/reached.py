@@ -13,7 +13,7 @@ from pathlib import Path
 from coverage import CoverageData
 
 from tests.mutation.mutants import PARTS, Mutant
-from tests.mutation.plugin import COLLECTED, DURATIONS, PLUGIN, without_group
+from tests.mutation.plugin import COLLECTED, DURATIONS, KNOWN, PLUGIN, without_group
 
 FOLDER = Path("out/mutation")
 DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
@@ -24,8 +24,11 @@ DOCUMENTS = ("tests/system/test_documents.py", "tests/system/test_protocol_pages
 """They compare tables with the documents, and need not run a line for it."""
 
 
-def record(root: Path) -> int:
-    """Run all tests of the project in ``root`` under coverage.py; pytest's exit code."""
+def record(root: Path, *, new: bool = False) -> int:
+    """Run all tests of the project in ``root`` under coverage.py; pytest's exit code.
+
+    Or only those that are ``new``, and add them to what is on record.
+    """
     folder = root / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     (folder / SETTINGS).write_text(
@@ -37,6 +40,9 @@ def record(root: Path) -> int:
     call += ["-p", PLUGIN, f"--cov-config={folder / SETTINGS}"]
     call += [*(f"--cov={part}" for part in PARTS), "--cov-context=test", "--cov-report="]
     environment = os.environ | {DURATIONS: str(folder / TIMES)}
+    if new:
+        call += ["--cov-append"]
+        environment |= {KNOWN: str(folder / TIMES)}
     return subprocess.call(call, cwd=root, env=environment)
 
 
