@@ -26,14 +26,15 @@ def as_on_record(
     name: str, meter: Meter, result: Sequence[float] = (), within: float = 0.0
 ) -> None:
     """Fail unless ``meter`` has counted what is on record under ``name``, and the numbers of
-    ``result`` are those, ``within`` so much."""
+    ``result`` are those, ``within`` so much or, if that is not 0, a ten-thousandth."""
     counted = {operation: count for operation, count in sorted(meter.counts.items()) if count}
     if os.environ.get(RECORD):
         _write(name, {**counted, "result": [round(float(n), 9) for n in result]})
     entry = dict(_on_record()[name])
     expected = entry.pop("result", [])
     assert counted == entry
-    assert list(result) == pytest.approx(expected, abs=within, nan_ok=True)
+    part = 1e-4 if within else 0.0
+    assert list(result) == pytest.approx(expected, abs=within, rel=part, nan_ok=True)
 
 
 @cache

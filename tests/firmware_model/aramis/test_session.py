@@ -1,0 +1,121 @@
+"""Telecommands on a sky, one after the other, with the whole program on fake hardware."""
+
+import zlib
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
+from cubestack.firmware_model.aramis.hardware import FrameEnd
+from cubestack.firmware_model.aramis.link import AramisLink
+from cubestack.firmware_model.aramis.program import AramisProgram
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
+from cubestack.firmware_model.mcu.requests import Routine
+
+from ..sessions import Step, as_recorded
+from .harness import Harness
+from .sky import database
+from .test_pipeline import sky
+
+FRAME_US = 33_000
+BLOCK = bytes(range(128))
+
+STEPS: list[Step] = [
+    ("GetAttitude", {}),
+    ("Activate", {}),
+    ("GetAttitude", {}),
+    ("GetAttitudeNearVector", {"X": 0.0, "Y": 0.0, "Z": 2.0}),
+    ("GetAttitudeNearPoint", {"RightAscension": 1.0, "Declination": 0.3}),
+    ("SetDetection", {"Spikes": 2, "Subtract": 0}),
+    ("GetAttitude", {}),
+    ("SetIdentification", {"Verify": 0, "Noise": 0.3, "Pivots": 3}),
+    ("GetAttitude", {}),
+    ("SetExposure", {"Rows": 300}),
+    ("SetGain", {"Gain": 3.0}),
+    ("SetField", {"FieldOfView": 18.0}),
+    ("SetBodyRotation", {"Q0": 0.6, "Q3": 0.8}),
+    ("SetSystemTime", {"JulianDay": 2_460_000, "Millisecond": 5}),
+    ("SaveConfig", {}),
+    ("ImageBlockSet", {"BlockNumber": 7}),
+    ("WriteCameraRegister", {"Address": 9, "Value": 5}),
+    ("SelectCameraRegister", {"Address": 9}),
+    ("GetAttitude", {}),
+    ("ClearConfig", {}),
+    ("LatchUpAction", {"Step": 0}),
+    ("GetAttitude", {}),
+    ("LatchUpAction", {"Step": 1}),
+    ("ReloadCatalogue", {}),
+    ("RefreshCatalogue", {}),
+    ("BeginCatalogue", {"Length": len(BLOCK), "Checksum": zlib.crc32(BLOCK)}),
+    ("CommitCatalogue", {}),
+    ("CatalogueBlock", {"BlockNumber": 0, "Data": BLOCK}),
+    ("GetAttitude", {}),
+]
+LATER: list[Step] = [
+    ("CommitCatalogue", {}),
+    ("Deactivate", {}),
+    ("StartLoop", {}),
+    ("ClearErrorFlags", {}),
+    ("Reset", {}),
+]
+
+
+@lru_cache(maxsize=1)
+def flash() -> NDArray[np.uint8]:
+    return flash_image(database().pack())
+
+
+class Unit(Harness):
+    """The whole program; each frame that it waits for shows a sky."""
+
+    boot_us = 2_000
+
+    def __init__(self, switches: AramisSwitches) -> None:
+        super().__init__()
+        self.switches = switches
+        self.frame, image = sky(9)[1], flash()
+        self.catalogue_flash[: len(image)] = image
+        self.catalogue_flash[[3, 9_000]] ^= 1
+        self._boot()
+        self.run()
+
+    def start(self) -> Routine[None]:
+        self.program = AramisProgram(self, self.meter, self.switches)
+        return self.program.main()
+
+    @property
+    def link(self) -> AramisLink:
+        return self.program.link
+
+    @property
+    def waiting(self) -> bool:
+        return not self.program.commands.running and not self.link.queue
+
+    def _slept(self, request: object, until_us: int | None) -> bool:
+        if self.captures:
+            self.captures.pop()[:] = self.frame
+            self.now_us += FRAME_US
+            self.program.frame_ended(FrameEnd.STORED)
+        return super()._slept(request, until_us)
+
+    def stop_capture(self) -> None:
+        self.captures.clear()
+
+
+@pytest.mark.parametrize("profile", ["published", "extended"])
+def test_session(profile: str) -> None:
+    unit = Unit(AramisSwitches.of(profile))
+    as_recorded(unit, f"AraMiS session, {profile}", STEPS)
+    as_recorded(unit, f"AraMiS session, {profile}, later", LATER)
+
+
+@pytest.mark.parametrize("profile", ["published", "extended"])
+def test_loop(profile: str) -> None:
+    unit = Unit(AramisSwitches.of(profile))
+    unit.command("SetReloadPeriod", Period=2)
+    unit.command("Activate")
+    unit.command("StartLoop", Period=700, Mode=1)
+    unit.run(until_us=5_000_000)
+    as_recorded(unit, f"AraMiS loop, {profile}", [])
