@@ -117,6 +117,58 @@ def test_what_is_no_sun(
     assert (result.detect, result.pixels) == (DetectResult.SUN_NOT_FOUND, pixels)
 
 
+def squares(*sides: int, level: int = 255) -> NDArray[np.uint8]:
+    """A window of the picture's middle, with a bright rectangle in the middle of it."""
+    width, height = sides
+    data = np.zeros(window_bytes(), np.uint8)
+    data[:4] = (104, 1, 100, 0)  # (360, 100)
+    pixels = data[4:].reshape(15, 15)
+    top, left = (15 - height) // 2, (15 - width) // 2
+    pixels[top : top + height, left : left + width] = level
+    return data
+
+
+def hollow() -> NDArray[np.uint8]:
+    data = squares(9, 9)
+    data[4:].reshape(15, 15)[6:9, 6:9] = 0
+    return data
+
+
+def nowhere() -> NDArray[np.uint8]:
+    data = squares(9, 9)
+    data[:4] = (0xFF, 3, 0xFF, 1)  # SUN_NOT_FOUND
+    return data
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (nowhere(), Reason.NO_LIGHT),
+        (squares(3, 2), Reason.NO_LIGHT),  # 6 of at least 7 pixels, in no other way wrong
+        (squares(7, 1), Reason.NOT_ROUND),
+        (squares(15, 13), Reason.TOO_LARGE),  # 195 of at most 190
+        (squares(9, 9, level=254), Reason.NOT_SATURATED),
+        (squares(5, 10), Reason.NOT_ROUND),  # sides that differ by 5
+        (squares(5, 9), Reason.SHARP),  # by 4
+        (hollow(), Reason.NOT_ROUND),
+    ],
+)
+def test_each_reason_has_its_light(
+    ours: SunConfig, meter: Meter, data: NDArray[np.uint8], reason: Reason
+) -> None:
+    result = find_sun(data, ours, meter)
+    assert result.reason is reason
+    assert (result.detect is DetectResult.SUCCESS) == (reason is Reason.SHARP)
+
+
+def test_half_of_the_pixels_must_be_saturated(ours: SunConfig, meter: Meter) -> None:
+    for saturated, reason in ((40, Reason.SHARP), (39, Reason.NOT_SATURATED)):
+        data = squares(8, 10, level=230)
+        pixels = data[4:]
+        pixels[np.flatnonzero(pixels)[:saturated]] = 255
+        assert find_sun(data, ours, meter).reason is reason
+
+
 def test_masked_pixels_do_not_count(ours: SunConfig, meter: Meter) -> None:
     data = window(sun(np.array([300.0, 200.0]), 6))
     masked = SunConfig(ours.table, masks=(Mask(280, 320, 180, 220),))
