@@ -20,7 +20,11 @@ DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
 BUDGET_S, MOST_TESTS = 25.0, 150
 """What a mutant has to face: so many seconds of tests at most, and so many tests."""
 
-DOCUMENTS = ("tests/system/test_documents.py", "tests/system/test_protocol_pages.py")
+DOCUMENTS = (
+    "tests/system/test_documents.py",
+    "tests/system/test_protocol_pages.py",
+    "tests/host/export/test_interface.py",
+)
 """They compare tables with the documents, and need not run a line for it."""
 
 
