@@ -59,9 +59,6 @@ def pic18f45k20() -> CostTable:
             "i8": Cost(4, "assumed", "load, operate, test and branch, or store"),
             "i16_add": Cost(12, "assumed", "half of 32 bits; addition, shift or comparison"),
             "i16_div": Cost(350, "assumed", "a quarter of 32 bits: long division"),
-            "i32_add": measured(24),
-            "i32_mul": measured(326),
-            "i32_div": measured(1385),
             "table_byte": measured(19),
             "array_byte": Cost(
                 array, "assumed", "an int added to an array's place on the stack: FSR, both bytes"

@@ -19,6 +19,7 @@ Step = tuple[str, dict[str, Any]]
 def as_recorded(unit: Any, name: str, steps: Iterable[Step]) -> None:
     """Send each telecommand of ``steps``, with values other than those after a reset, and let the
     program of the harness ``unit`` execute or refuse it; then ask for all telemetry."""
+    as_on_record(f"{name}: before", unit.meter, [unit.now_us])
     for number, (command, values) in enumerate(steps):
         before, began_us = unit.meter.counts.copy(), unit.now_us
         error = unit.send(command, **values)

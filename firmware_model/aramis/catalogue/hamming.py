@@ -21,7 +21,7 @@ DATA_BYTES = 8
 CODED_BYTES = 9
 
 DATA_BITS = 8 * DATA_BYTES
-CLEAN, LOST = -2, -1
+LOST = -1
 
 
 def _columns() -> list[int]:
@@ -32,10 +32,10 @@ def _columns() -> list[int]:
 
 
 def _tables() -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
-    """Check byte of each value (8, 256) of each data byte, and the bit (256,) of each syndrome."""
+    """Check byte of each value (8, 256) of each data byte, and the bit (256,) of each syndrome
+    that is not 0."""
     checks = np.zeros((DATA_BYTES, 256), np.uint8)
     located = np.full(256, LOST, np.int16)
-    located[0] = CLEAN
     located[1 << np.arange(8)] = DATA_BITS + np.arange(8)
     for bit, column in enumerate(_columns()):
         checks[bit // 8] ^= ((np.arange(256) >> bit % 8 & 1) * column).astype(np.uint8)

@@ -114,3 +114,38 @@ def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
 def test_limits(settings: type, setting: dict[str, float], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         settings(**setting)
+
+
+@pytest.mark.parametrize(
+    ("settings", "name", "low", "high"),
+    [
+        (Field, "fov_deg", 1, 90),
+        (Field, "columns", 16, 4096),
+        (Field, "rows", 16, 4096),
+        (Field, "pitch_x_mm", 0.0001, 1),
+        (Field, "pitch_y_mm", 0.0001, 1),
+        (Detection, "sigmas", 0, 20),
+        (Detection, "needed", 1, 25),
+        (Detection, "min_pixels", 1, 2500),
+        (Detection, "max_pixels", 1, 1_000_000),
+        (Detection, "max_stars", 3, 255),
+        (Profile, "sigma_rad", 1e-7, 0.01),
+        (Profile, "pivots", 0, 3),
+        (Profile, "tolerance_rad", 1e-5, 0.05),
+        (Profile, "side_tolerance_rad", 1e-6, 0.05),
+        (Profile, "largest_chance", 0, 1),
+        (Profile, "largest_sigma_rad", 0, 1),
+        (Profile, "within_ms", 1, 10_000),
+        (Profile, "hint_tolerance_deg", 0, 180),
+        (Profile, "smear_px", 1, 1000),
+        (Profile, "skew_px", 0, 1000),
+        (Profile, "moved_px", 0, 1000),
+        (Profile, "motion_sigma_rad", 0, 0.1),
+    ],
+)
+def test_a_range_ends_where_it_says(settings: type, name: str, low: float, high: float) -> None:
+    for value in (low, high):
+        assert getattr(settings(**{name: value}), name) == value
+    for value in (low - 1e-9, high + 1e-9):
+        with pytest.raises(ValueError, match="must be"):
+            settings(**{name: value})

@@ -65,6 +65,10 @@ def test_bench_letter_is_named():
     assert byte_names.name_answer_byte(INTERFACE, whole, "bench_uart", 0).endswith(
         "answer to letter 'q'"
     )
+    both = recording((b"a", b"Y"), (b"q", b"YY"), port="bench_uart")
+    assert [
+        byte_names.name_answer_byte(INTERFACE, both, "bench_uart", index)[-3:] for index in range(3)
+    ] == ["'a'", "'q'", "'q'"]
 
 
 def test_request_byte_is_named():

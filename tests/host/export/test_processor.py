@@ -12,6 +12,8 @@ from cubestack.firmware_model.interface.cubestar.processor_header import PROCESS
 from cubestack.host.cli.main import main
 from cubestack.host.export.processor import processor_header, render_processor
 
+ROOT = Path(__file__).parents[3]
+
 
 @pytest.mark.parametrize("format_name", ["table", "markdown", "json"])
 def test_every_register_is_listed_at_its_address(format_name: str) -> None:
@@ -38,6 +40,25 @@ def test_the_c_header_compiles_and_has_the_pins(tmp_path: Path) -> None:
     (tmp_path / "main.c").write_text(source, encoding="utf-8")
     flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-Wno-int-to-pointer-cast"]
     subprocess.run(["cc", *flags, "-fsyntax-only", "main.c"], cwd=tmp_path, check=True)
+
+
+def test_the_c_header_has_all_that_the_reference_program_uses() -> None:
+    """Board names of its sources, each beside a device name; and some of them by number."""
+    defined = dict(re.findall(r"^#define (\w+) (\S+)", processor_header(PROCESSOR), re.MULTILINE))
+    text = "".join(
+        path.read_text("utf-8") for path in (ROOT / "firmware_model/reference").rglob("*.[ch]")
+    )
+    units = "(?:SATELLITE|CAMERA|MEMORY|IMAGER)_(?:UART|I2C|SWITCH|ADC|COMPARATOR|MA_PER_VOLT)"
+    used = set(re.findall(rf"\b(?:FPGA_(?!H\b)[A-Z]+|LED\d|{units}\w*|SUPPLY_VOLTS)\b", text))
+    assert len(used) > 25
+    assert used - {"CAMERA_I2C_ADDRESS"} <= defined.keys()
+    for unit in ("SATELLITE_UART", "SATELLITE_I2C", "CAMERA_I2C"):
+        assert defined[f"{unit}_CLOCK"] == f"CMU_HFPERCLKEN0_{defined[unit]}"
+        assert defined[f"{unit}_CLOCK"] in defined
+    pins = {"FPGA_ENABLE": "PA8", "FPGA_DATA": "PE0", "CAMERA_RESET": "PA7", "MEMORY_SWITCH": "PC6"}
+    pins |= {"SATELLITE_UART_TX_PIN": "PD0", "CAMERA_I2C_SCL_PIN": "PB12", "LED1": "PB4"}
+    for name, pin in pins.items():
+        assert defined[name] == f"{16 * (ord(pin[1]) - ord('A')) + int(pin[2:])}u", name
 
 
 def test_a_device_without_firmware_of_one_s_own_says_so(capsys: pytest.CaptureFixture[str]) -> None:
