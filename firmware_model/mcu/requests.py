@@ -93,8 +93,8 @@ class BusAccess:
     data: NDArray[np.uint8]
     write: bool
     cycles: int
-    select: int = 0
-    above: int = 255
+    select: int
+    above: int
 
 
 @dataclass(frozen=True)

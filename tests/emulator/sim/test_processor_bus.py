@@ -44,7 +44,7 @@ def desk_with(*steps: object, tick_ns: int | None = None) -> Desk:
 
 def read(count: int = PIXELS, above: int = 255) -> tuple[BusAccess, np.ndarray]:
     data = np.zeros(count, np.uint8)
-    return BusAccess(SECOND[:count].copy(), data, False, CYCLES, above=above), data
+    return BusAccess(SECOND[:count].copy(), data, False, CYCLES, 0, above), data
 
 
 @pytest.mark.parametrize("tick_ns", [None, 7, 130, 1001])
@@ -72,7 +72,7 @@ def test_a_search_stops_where_the_byte_is() -> None:
 
 def test_writes_are_in_memory() -> None:
     values = np.arange(PIXELS, dtype=np.uint8)[::-1].copy()
-    desk = desk_with(BusAccess(SECOND.copy(), values, True, CYCLES), tick_ns=333).run(1000)
+    desk = desk_with(BusAccess(SECOND.copy(), values, True, CYCLES, 0, 255), tick_ns=333).run(1000)
     assert np.array_equal(desk.engine.memories["SRAM2"], values)
 
 
