@@ -1,0 +1,45 @@
+"""The tables of the reference program, as C."""
+
+import re
+from itertools import pairwise
+
+import pytest
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.firmware_model.reference import tables
+
+
+@pytest.mark.parametrize(
+    ("allowed", "expected"),
+    [
+        ({0, 1, 2, 5, 9}, [(0, 2), (5, 5), (9, 9)]),
+        (set(), []),
+        ({*range(10)}, [(0, 9)]),
+        ({1, 3}, [(1, 1), (3, 3)]),
+    ],
+)
+def test_values_that_follow_each_other_are_one_range(
+    allowed: set[int], expected: list[tuple[int, int]]
+) -> None:
+    assert tables._ranges(9, lambda raw: raw in allowed) == expected
+
+
+def test_ranges_that_a_field_depends_on_cover_all_values() -> None:
+    """Of the other field, one behind the other, each with what the table allows."""
+    message = INTERFACE.telecommand("ImageBlockSet")
+    field = message.field("BlockNumber")
+    groups = list(tables._allowed(message, field))
+    assert groups[0][1] == 0
+    assert groups[-1][2] == 255
+    assert all(next_[1] == one[2] + 1 for one, next_ in pairwise(groups))
+    for place, low, high, ranges in groups:
+        assert place == message.field("BlockSize").bit_offset // 8
+        for size in (low, high):
+            for number in (0, 2047, 2048, 4095, 4096, 8191, 8192, 16383, 16384, 65535):
+                allowed = field.allows(number, {"BlockSize": size})
+                assert any(a <= number <= b for a, b in ranges) == allowed, (size, number)
+
+
+def test_limits_are_written_as_c() -> None:
+    assert [tables._bound(None, "-"), tables._bound(5, "")] == ["-INFINITY", "5.0f"]
+    assert re.fullmatch(r"0\.1f", tables._bound(0.1, "-"))
