@@ -20,6 +20,20 @@ DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
 BUDGET_S, MOST_TESTS = 25.0, 150
 """What a mutant has to face: so many seconds of tests at most, and so many tests."""
 
+SITE = """
+import os
+if test := os.environ.get("PYTEST_CURRENT_TEST"):
+    import atexit
+    import coverage
+    recorded = coverage.Coverage(
+        {data!r}, True, config_file=False, source={source!r}, context=test, messages=False
+    )
+    recorded.set_option("run:disable_warnings", ["no-data-collected", "module-not-imported"])
+    recorded.start()
+    atexit.register(lambda: (recorded.stop(), recorded.save()))
+"""
+"""Makes interpreters that a test starts record what they run, in its name."""
+
 DOCUMENTS = (
     "tests/system/test_documents.py",
     "tests/system/test_protocol_pages.py",
@@ -34,7 +48,11 @@ def record(root: Path, *, new: bool = False) -> int:
     Or only those that are ``new``, and add them to what is on record.
     """
     folder = root / FOLDER
-    folder.mkdir(parents=True, exist_ok=True)
+    site = folder / "site"
+    site.mkdir(parents=True, exist_ok=True)
+    source = [str(root / part) for part in PARTS]
+    text = SITE.format(data=str(folder / DATA), source=source)
+    (site / "sitecustomize.py").write_text(text, "utf-8")
     (folder / SETTINGS).write_text(
         f"[run]\nrelative_files = true\ndata_file = {folder / DATA}\n"
         "disable_warnings = no-data-collected, module-not-imported\n",
@@ -43,7 +61,7 @@ def record(root: Path, *, new: bool = False) -> int:
     call = [sys.executable, "-m", "pytest", "-q", "-n", "auto", "--dist", "loadgroup"]
     call += ["-p", PLUGIN, f"--cov-config={folder / SETTINGS}"]
     call += [*(f"--cov={part}" for part in PARTS), "--cov-context=test", "--cov-report="]
-    environment = os.environ | {DURATIONS: str(folder / TIMES)}
+    environment = os.environ | {DURATIONS: str(folder / TIMES), "PYTHONPATH": str(site)}
     if new:
         call += ["--cov-append"]
         environment |= {KNOWN: str(folder / TIMES)}
@@ -93,7 +111,10 @@ class Reached:
         by_line = self._lines[mutant.path]
         # Of a statement over several lines, Python reports some only.
         lines = range(mutant.statement, mutant.end + 1)
-        found = _names(context for line in lines for context in by_line.get(line, ()))
+        contexts = {context for line in lines for context in by_line.get(line, ())}
+        found = _names(contexts)
+        if not found and "" not in contexts:
+            found = _names_of_processes(contexts)
         spent, taken = 0.0, []
         if not found:
             found = _names(context for each in by_line.values() for context in each)
@@ -127,3 +148,8 @@ class Reached:
 def _names(contexts: Iterable[str]) -> set[str]:
     """Of tests: a context is a test's name and the phase of it; that of imports has no name."""
     return {without_group(context.rpartition("|")[0]) for context in contexts} - {""}
+
+
+def _names_of_processes(contexts: Iterable[str]) -> set[str]:
+    """Of tests that started one: as pytest tells them, with the phase in brackets."""
+    return {without_group(context.rpartition(" (")[0]) for context in contexts} - {""}

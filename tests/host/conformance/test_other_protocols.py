@@ -1,0 +1,153 @@
+"""Checks of registers behind a pointer and of bench letters: what is good passes, the rest not."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.registers import RegisterClient
+from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
+from cubestack.host.conformance.writes import check_writes
+from cubestack.host.devices.device import ConformanceNotes
+from cubestack.host.devices.targets import Target
+from tests.host.conftest import FakeNode, LetterLine, Slave, UartLink
+
+#: Of CubeSense without most of its messages, which other tests walk.
+BARE = replace(INTERFACE, telecommands=(), telemetries=INTERFACE.telemetries[:1])
+SETTINGS = [one for one in REGISTERS if one.writable and one.readable]
+assert INTERFACE.service_port is not None
+LETTERS = INTERFACE.service_port.letters
+
+
+class Registers(Slave):
+    """Behave well: a value that is not allowed is ignored.
+
+    Attributes:
+        kept: names of registers that no write changes.
+        takes_all: whether any value is taken.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.kept: set[str] = set()
+        self.takes_all = False
+        for one in SETTINGS:
+            self.content[one.address] = bytes([int(one.field.reset or one.field.minimum or 0)])
+
+    def i2c_rdwr(self, *messages: Any) -> None:
+        before = dict(self.content)
+        super().i2c_rdwr(*messages)
+        for one in SETTINGS:
+            value = one.decode(self.content[one.address])
+            if one.name in self.kept or not (self.takes_all or one.allows(value)):
+                self.content[one.address] = before[one.address]
+
+
+@pytest.fixture
+def slave() -> Registers:
+    return Registers()
+
+
+@pytest.fixture
+def bench() -> LetterLine:
+    return LetterLine(**{one.letter: one.answer or bytes(one.length) for one in LETTERS})
+
+
+def checked(slave: Slave | None, bench: LetterLine | None, **notes: Any) -> dict[str, CheckResult]:
+    """The checks that were run, by name."""
+    client = NodeClient(UartLink(FakeNode(BARE)), BARE, retries=0)
+    registers = None if slave is None else RegisterClient(slave, REGISTERS)
+    target = Target("fake", BARE, client, registers=registers, service_port=bench)
+    run = CheckRun(target, allow_write=True, notes=ConformanceNotes(**notes))
+    check_writes(run)
+    return {check.name: check for check in run.checks}
+
+
+def failed(checks: dict[str, CheckResult]) -> dict[str, str]:
+    return {name: one.detail for name, one in checks.items() if one.verdict is Verdict.FAILED}
+
+
+def test_what_behaves_well_passes_and_is_as_before(slave: Registers, bench: LetterLine) -> None:
+    before = dict(slave.content)
+    checks = checked(slave, bench)
+    assert {one.verdict for one in checks.values()} == {Verdict.PASSED}
+    assert set(checks) == {
+        "unknown telecommand IDs",
+        *(f"register {one.name}: written" for one in SETTINGS),
+        *(f"bench letter {one.letter!r}" for one in LETTERS),
+        "bench: no letter of the protocol",
+    }
+    assert slave.content == before
+    assert checks["unknown telecommand IDs"].detail == "128 refused"
+    assert checks["bench: no letter of the protocol"].detail == "no answer"
+    for one in LETTERS:
+        assert checks[f"bench letter {one.letter!r}"].detail == f"{one.length} bytes"
+
+
+def test_each_setting_is_written_at_both_ends_and_beyond(
+    slave: Registers, bench: LetterLine
+) -> None:
+    checks = checked(slave, bench)
+    for one in SETTINGS:
+        written = [data[1] for data in slave.written if data[0] == one.address]
+        allowed = [value for value in range(256) if one.allows(one.decode(bytes([value])))]
+        assert {min(allowed), max(allowed)} <= set(written)
+        beyond = max(allowed) + 1
+        assert (beyond in written) == (beyond < 256)
+        detail = "read back, wrong value ignored" if beyond < 256 else "read back"
+        assert checks[f"register {one.name}: written"].detail == detail
+
+
+@pytest.mark.parametrize("name", [one.name for one in SETTINGS])
+def test_a_setting_that_does_not_change_is_found(
+    name: str, slave: Registers, bench: LetterLine
+) -> None:
+    slave.kept = {name}
+    found = failed(checked(slave, bench))
+    assert set(found) == {f"register {name}: written"}
+    assert " was written, " in found[f"register {name}: written"]
+    assert failed(checked(slave, bench, optional=frozenset({name}))) == {}
+
+
+def test_a_wrong_value_that_is_taken_is_found(slave: Registers, bench: LetterLine) -> None:
+    slave.takes_all = True
+    narrow = [one for one in SETTINGS if not one.allows(one.decode(b"\xff"))]
+    found = failed(checked(slave, bench))
+    assert set(found) == {f"register {one.name}: written" for one in narrow}
+    assert all("is not allowed, but" in detail for detail in found.values())
+
+
+def test_without_lines_they_are_left_out() -> None:
+    checks = checked(None, None)
+    skipped = {name: one.detail for name, one in checks.items() if one.verdict is Verdict.SKIPPED}
+    assert set(checks) - set(skipped) == {"unknown telecommand IDs"}
+    for name, detail in skipped.items():
+        expected = "no I2C bus" if name.startswith("register") else "no line with the bench"
+        assert detail.startswith(expected)
+
+
+def test_an_answer_that_is_too_short_is_found(slave: Registers, bench: LetterLine) -> None:
+    one = next(letter for letter in LETTERS if letter.answer is None and letter.length > 1)
+    bench.answers[one.letter] = bytes(one.length - 1)
+    found = failed(checked(slave, bench))
+    assert f"declared {one.length}" in found[f"bench letter {one.letter!r}"]
+
+
+def test_a_wrong_fixed_answer_is_found(slave: Registers, bench: LetterLine) -> None:
+    one = next(letter for letter in LETTERS if letter.answer is not None)
+    bench.answers[one.letter] = bytes(one.length)
+    assert f"bench letter {one.letter!r}" in failed(checked(slave, bench))
+
+
+def test_an_answer_to_no_letter_is_found(slave: Registers, bench: LetterLine) -> None:
+    class Chatty(LetterLine):
+        def write(self, data: bytes) -> None:
+            super().write(data)
+            if data.decode("latin-1") not in self.answers:
+                self.pending += b"abc"
+
+    found = failed(checked(slave, Chatty(**bench.answers)))
+    assert found["bench: no letter of the protocol"].endswith("was answered with 3 bytes")
