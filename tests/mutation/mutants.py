@@ -101,8 +101,9 @@ def _changes(tree: ast.AST) -> Iterator[tuple[int, ast.expr | ast.stmt, str]]:
 
 
 def _nodes(tree: ast.AST, statement: int = 0) -> Iterator[tuple[int, ast.AST]]:
-    """All but annotations, f-strings, whose parts have no places, and what only types need: among
-    that are functions without a body, of protocols."""
+    """All but annotations, f-strings, whose parts have no places, what only types need, as
+    functions without a body of protocols, and colours, which nobody tells from those beside
+    them."""
     for name, value in ast.iter_fields(tree):
         if name in ("annotation", "returns") or isinstance(tree, ast.JoinedStr):
             continue
@@ -111,7 +112,7 @@ def _nodes(tree: ast.AST, statement: int = 0) -> Iterator[tuple[int, ast.AST]]:
                 continue
             if isinstance(child, FUNCTIONS) and all(_says_only(line) for line in child.body):
                 continue
-            if isinstance(child, ast.AST):
+            if isinstance(child, ast.AST) and not _is_colour(child):
                 begins = child.lineno if isinstance(child, ast.stmt) else statement
                 yield begins, child
                 yield from _nodes(child, begins)
@@ -120,3 +121,12 @@ def _nodes(tree: ast.AST, statement: int = 0) -> Iterator[tuple[int, ast.AST]]:
 def _says_only(statement: ast.stmt) -> bool:
     """Whether it is a text, or three dots."""
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+
+
+def _is_colour(node: ast.AST) -> bool:
+    """Whether it is red, green and blue of 255."""
+    match node:
+        case ast.Tuple([ast.Constant(red), ast.Constant(green), ast.Constant(blue)]):
+            shares = red, green, blue
+            return all(isinstance(share, int) and 10 <= share <= 255 for share in shares)
+    return False

@@ -40,6 +40,8 @@ HERE = Path("a.py")
         ("def f(a: Literal[1] = 3) -> Literal[2]: ...", []),
         ("def f(a=3):\n    'It does.'", []),
         ("def f(a=3):\n    b", ["def f(a=(4)):\n    b"]),
+        ("a = (255, 90, 60)", []),
+        ("def f(a: Literal[1]) -> Literal[2]: ...", []),
     ],
 )
 def test_mutants_of_a_text(text: str, expected: list[str]) -> None:
