@@ -49,6 +49,15 @@ def test_telemetry_is_asked_for_again(client: I2cClient, i2c: Any) -> None:
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}
 
 
+def test_a_telecommand_that_was_not_acknowledged_is_never_repeated(
+    client: I2cClient, node: Any, i2c: Any
+) -> None:
+    i2c.failures = 1
+    with pytest.raises(NoAnswerError, match="CaptureImage not acknowledged"):
+        client.command("CaptureImage")
+    assert node.log == []
+
+
 def test_a_silent_address_is_named(i2c: Any) -> None:
     client = I2cClient(i2c, INTERFACE, 0x55, wait=i2c.waits.append)
     with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags .* address 0x55 in 3 attempts"):

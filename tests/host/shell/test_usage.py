@@ -1,0 +1,175 @@
+"""The shell's words for ports and controls: how many, what they do, and how long it waits."""
+
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+
+from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.controls import EmulatedControls
+from cubestack.host.devices.targets import Target
+from cubestack.host.shell.language import Shell, ShellError
+from cubestack.host.shell.result import check_count, to_number
+
+from ..conftest import LetterLine, UartLink
+
+CONTROLS = {
+    "faults": ("latch-up SRAM1",),
+    "fault_parameters": {},
+    "channels": ("SRAM1",),
+    "fault_log.return_value": ["0.1 s latch-up SRAM1"],
+    "currents.return_value": {"total": 71.94, "SRAM1": 0.25},
+    "time_s.return_value": 1.5,
+    "peek.return_value": {"TIMER0.CNT": (7, "0x7"), "x": (None, "not there")},
+}
+
+
+class Known:
+    """A shell on a CubeSense, and what is behind it."""
+
+    def __init__(self, sense: Any) -> None:
+        self.line = UartLink(sense)
+        self.letters = LetterLine(q=b"Y", a=b"12345678", b=b"123456789")
+        self.controls = Mock(EmulatedControls, **CONTROLS)
+        self.target = Target(
+            *("fake", INTERFACE, NodeClient(self.line, INTERFACE), self.line),
+            service_port=self.letters,
+            controls=self.controls,
+        )
+        self.shell = Shell(self.target)
+
+
+@pytest.fixture
+def known(sense: Any) -> Known:
+    return Known(sense)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("peek", "peek a b", "time 1 2", "scene", "scene a b", "dump x", "list a b"),
+        *("bench", "bench q s", "image", "image a.png b c", "watch", "watch a 1 2 3"),
+    ],
+)
+def test_too_few_or_too_many_words_are_told_with_the_usage(known: Known, line: str) -> None:
+    name, *words = line.split()
+    with pytest.raises(ShellError, match=f"^{name}: {len(words)} words; usage: {name}"):
+        known.shell.execute(line)
+    assert known.line.silences == known.letters.silences == []
+
+
+@pytest.mark.parametrize("line", ["power SRAM1", "power SRAM1 on off", "power SRAM1 maybe"])
+def test_power_is_switched_on_or_off(known: Known, line: str) -> None:
+    with pytest.raises(ShellError, match=r"usage: power \[CHANNEL on\|off\]"):
+        known.shell.execute(line)
+    known.controls.switch.assert_not_called()
+
+
+@pytest.mark.parametrize(("word", "on"), [("on", True), ("off", False)])
+def test_power_shows_what_it_costs(known: Known, word: str, on: bool) -> None:
+    found = known.shell.execute(f"power SRAM1 {word}")
+    known.controls.switch.assert_called_once_with("SRAM1", on)
+    assert found is not None
+    assert found.rows == [("total", "71.9 mA"), ("SRAM1", "0.2 mA")]
+    assert found.data == {"currents_ma": {"total": 71.94, "SRAM1": 0.25}}
+    assert known.shell.execute("power") == found
+
+
+def test_time_passes_and_is_told(known: Known) -> None:
+    found = known.shell.execute("time 0.25")
+    known.controls.advance.assert_called_once_with(0.25)
+    assert found is not None
+    assert (found.rows, found.data) == ([("time", "1.500000 s")], {"time_s": 1.5})
+    assert known.shell.execute("time") == found
+    known.controls.advance.assert_called_once_with(0.25)
+    with pytest.raises(ShellError, match="time: '-1' is not a number of at least 0"):
+        known.shell.execute("time -1")
+
+
+def test_scenes_faults_and_what_they_did(known: Known) -> None:
+    assert known.shell.execute("scene a.toml").data == {"scene": "a.toml"}  # type: ignore[union-attr]
+    known.controls.scene.assert_called_once_with(Path("a.toml"))
+    listed = known.shell.execute("fault")
+    assert listed is not None
+    assert (listed.rows, listed.data) == ([("", "latch-up SRAM1")], {"faults": ("latch-up SRAM1",)})
+    log = known.shell.execute("fault log")
+    assert log is not None
+    assert log.rows == [("", "0.1 s latch-up SRAM1")]
+    known.controls.fault.assert_not_called()
+    done = known.shell.execute("fault latch-up SRAM1 for_s=2")
+    known.controls.fault.assert_called_once_with(["latch-up", "SRAM1", "for_s=2"])
+    assert done is not None
+    assert done.data == {"fault": "latch-up SRAM1 for_s=2"}
+
+
+def test_a_look_at_firmware(known: Known) -> None:
+    found = known.shell.execute("peek TIMER0")
+    known.controls.peek.assert_called_once_with("TIMER0")
+    assert found is not None
+    assert found.rows == [("TIMER0.CNT", "0x7"), ("x", "not there")]
+    assert found.data == {"values": {"TIMER0.CNT": 7, "x": None}}
+
+
+def test_raw_bytes_wait_a_moment_for_more(known: Known) -> None:
+    found = known.shell.execute("raw 1f7f 80 1fff")
+    assert found is not None
+    assert found.data["answer"].startswith("1f7f")
+    assert found.rows == [("", bytes.fromhex(found.data["answer"]).hex(" "))]
+    (waited_s,) = known.line.silences
+    assert 0.1 <= waited_s <= 0.5
+    with pytest.raises(ShellError, match="usage: raw HEX"):
+        known.shell.execute("raw")
+    with pytest.raises(ShellError, match="'1 2 3' is not hexadecimal bytes"):
+        known.shell.execute("raw 1 2 3")
+
+
+def test_short_answers_to_letters_are_shown_and_long_ones_counted(known: Known) -> None:
+    assert INTERFACE.service_port is not None
+    for letter in INTERFACE.service_port.letters:
+        known.letters.answers[letter.letter] = b"x" * letter.length
+        found = known.shell.execute(f"bench {letter.letter}")
+        assert found is not None
+        short = letter.length <= 8
+        text = repr("x" * letter.length) if short else f"{letter.length} bytes"
+        assert found.rows == [(letter.name, text)]
+        assert found.data == {"letter": letter.letter, "answer": (b"x" * letter.length).hex()}
+        known.letters.answers[letter.letter] = b"x" * (letter.length - 1)
+        cut = known.shell.execute(f"bench {letter.letter}")
+        assert cut is not None
+        assert cut.rows == [(letter.name, f"{letter.length - 1} bytes of {letter.length}")]
+
+
+@pytest.mark.parametrize("word", ["é", "qq", "€"])
+def test_what_is_no_letter_is_told_with_those_that_are(known: Known, word: str) -> None:
+    with pytest.raises(ShellError, match=f"no letter '{word}'; known: "):
+        known.shell.execute(f"bench {word}")
+
+
+@pytest.mark.parametrize(("count", "good"), [(0, False), (1, True), (2, True), (3, False)])
+def test_counts_are_from_least_to_most(count: int, good: bool) -> None:
+    if good:
+        check_count("do A [B]", ["x"] * count, 1, 2)
+        return
+    with pytest.raises(ShellError, match=rf"^do: {count} words; usage: do A \[B\]$"):
+        check_count("do A [B]", ["x"] * count, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "good"),
+    [
+        ("2", True),
+        ("1.99", False),
+        ("999999999", True),
+        ("1e9", False),
+        ("x", False),
+        ("nan", False),
+    ],
+)
+def test_numbers_are_at_least_and_not_without_end(text: str, good: bool) -> None:
+    if good:
+        assert to_number("do", text, 2) == float(text)
+        return
+    with pytest.raises(ShellError, match=f"do: '{text}' is not a number of at least 2"):
+        to_number("do", text, 2)
