@@ -1,0 +1,192 @@
+"""The shell on a terminal: what is asked, what is kept, and that an error ends nothing."""
+
+import io
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from cubestack.host.cli import shell
+from cubestack.host.errors import NoAnswerError
+from cubestack.host.shell.result import Result, ShellError
+from tests.conftest import Run
+
+
+class Asked:
+    """A shell that answers without a device.
+
+    Attributes:
+        lines: that were executed.
+        closed: whether its target is.
+    """
+
+    def __init__(self) -> None:
+        self.lines = list[str]()
+        self.closed = False
+        self.interface = SimpleNamespace(name="CubeStar")
+        self.target, self.name = self, "fake"
+        self.on_row: Callable[[Result], None] = lambda _result: None
+
+    def close(self) -> None:
+        self.closed = True
+
+    def execute(self, line: str) -> Result | None:
+        line = line.strip()
+        self.lines.append(line)
+        if line == "nothing":
+            return None
+        if line == "wrong":
+            raise ShellError("no command 'wrong'")
+        if line == "silent":
+            raise NoAnswerError("no answer")
+        if line == "rows":
+            self.on_row(Result([("row", "1")], {"row": 1}))
+        return Result([("a", "1"), ("longer", "2"), ("", "alone")], {"line": line})
+
+    def complete(self, line: str) -> list[str]:
+        return {"re": ["read", "reset"], "write A ": ["Gain=", "B"]}.get(line, [])
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
+    one = Asked()
+    monkeypatch.setattr(shell, "open_any_target", lambda *_of: one)
+    monkeypatch.setattr(shell, "Shell", lambda _target: one)
+    return one
+
+
+class Terminal(io.StringIO):
+    """Standard input, typed by somebody."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
+    """Lines that are typed, and exceptions that come in place of one; and prompts."""
+    lines, prompts = list[Any](), list[str]()
+
+    def ask(prompt: str) -> str:
+        prompts.append(prompt)
+        line = lines.pop(0) if lines else EOFError()
+        if isinstance(line, BaseException):
+            raise line
+        return str(line)
+
+    monkeypatch.setattr("builtins.input", ask)
+    monkeypatch.setattr(sys, "stdin", Terminal())
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    lines.extend([])
+    return lines
+
+
+SHOWN = "a       1\nlonger  2\nalone\n"
+
+
+def test_commands_are_asked_for_until_the_end(run: Run, asked: Asked, typed: list[Any]) -> None:
+    typed += ["one", "nothing", "wrong", "silent", KeyboardInterrupt(), "two"]
+    code, out, err = run("shell", "fake")
+    assert code == 0
+    assert asked.lines == ["one", "nothing", "wrong", "silent", "two"]
+    assert out == SHOWN + "\n" + SHOWN + "\n"  # a line of its own after ^C, and after ^D
+    assert err.splitlines() == [
+        "CubeStar at fake; Tab completes, help lists",
+        "error: no command 'wrong'",
+        "error: no answer",
+    ]
+    assert asked.closed
+
+
+@pytest.mark.parametrize("word", ["quit", "exit", " quit "])
+def test_quit_ends_it(run: Run, asked: Asked, typed: list[Any], word: str) -> None:
+    typed += ["one", word, "two"]
+    assert run("shell", "fake").code == 0
+    assert (asked.lines, typed, asked.closed) == (["one"], ["two"], True)
+
+
+def test_what_was_typed_is_kept_and_words_complete(
+    run: Run, asked: Asked, typed: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readline = pytest.importorskip("readline")
+    seen = dict[str, Any]()
+    monkeypatch.setattr(readline, "get_endidx", lambda: len(seen["line"]))
+    monkeypatch.setattr(readline, "get_line_buffer", lambda: seen["line"] + " behind the cursor")
+
+    class Typist(list[Any]):
+        """Looks at completions before the line is done."""
+
+        def pop(self, *_at: Any) -> Any:
+            complete, found = readline.get_completer(), {}
+            for line in ("re", "write A ", "x"):
+                seen["line"] = line
+                words = [complete("", 0)]
+                while words[-1] is not None:
+                    words.append(complete("", len(words)))
+                found[line] = words
+            seen["found"] = found
+            readline.add_history("what was typed")
+            return super().pop(0)
+
+    lines = Typist(["one"])
+    monkeypatch.setattr("builtins.input", lambda _prompt: lines.pop() if lines else "quit")
+    assert run("shell", "fake").code == 0
+    assert seen["found"] == {
+        "re": ["read ", "reset ", None],
+        "write A ": ["Gain=", "B ", None],
+        "x": [None],
+    }
+    history = tmp_path / "cubestack" / "history"
+    assert "what was typed" in history.read_text("utf-8")
+    readline.clear_history()
+    assert run("shell", "fake").code == 0
+    assert readline.get_history_item(readline.get_current_history_length()) == "what was typed"
+
+
+def test_a_terminal_without_an_editor_is_asked_as_well(
+    run: Run, asked: Asked, typed: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "readline", None)
+    typed += ["one"]
+    assert run("shell", "fake").code == 0
+    assert asked.lines == ["one"]
+
+
+def test_a_pipe_is_read_to_its_end(run: Run, asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO("one\nnothing\n  exit \ntwo\n"))
+    assert run("shell", "fake") == (0, SHOWN, "")
+    assert asked.lines == ["one", "nothing"]
+    assert asked.closed
+
+
+def test_json_has_an_object_for_each_command_and_no_rows_between(run: Run, asked: Asked) -> None:
+    code, out, _ = run("shell", "fake", "--json", "-c", "rows; nothing", "-c", "two")
+    assert code == 0
+    assert [json.loads(line)["line"] for line in out.splitlines()] == ["rows", "two"]
+    shown = run("shell", "fake", "-c", "rows").out
+    assert shown == "row  1\n" + SHOWN
+
+
+def test_the_first_failure_ends_a_script_and_closes_the_device(run: Run, asked: Asked) -> None:
+    assert run("shell", "fake", "-c", "one;wrong;two").code == 2
+    assert (asked.lines, asked.closed) == (["one", "wrong"], True)
+    assert run("shell", "fake", "-c", "silent").code == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "commands"),
+    [
+        ("a;b", ["a", "b"]),
+        ("a\nb;", ["a", "b", ""]),
+        ("say 'x;y';b", ["say 'x;y'", "b"]),
+        ('say "it\'s;" ; b', ['say "it\'s;" ', " b"]),
+        ("'a\nb'", ["'a\nb'"]),
+        ("", [""]),
+    ],
+)
+def test_commands_are_split_outside_of_quotes(text: str, commands: list[str]) -> None:
+    assert list(shell.split_commands(text)) == commands
