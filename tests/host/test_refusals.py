@@ -1,0 +1,294 @@
+"""What can not be done is refused in a sentence that says why, and leaves nothing half done."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices import targets
+from cubestack.host.devices.orbiting import _seen
+from cubestack.host.devices.registry import device
+from cubestack.host.devices.targets import Target, connect, open_target
+from cubestack.host.errors import BadAnswerError, PortOpenError, TargetError
+from cubestack.host.experiments import workers
+from cubestack.host.experiments.campaigns.plan import Plan
+from cubestack.host.experiments.fidelity import fidelity_of, rewritten
+from cubestack.host.experiments.hazards import album
+from cubestack.host.experiments.measure import experiment_of, measure
+from cubestack.host.experiments.upsets import experiment as upsets
+from cubestack.host.experiments.upsets.clean import Interval
+from cubestack.host.pictures.campaigns import figure
+from cubestack.host.pictures.hazards import save_curves
+from cubestack.host.recording.setups import read_document
+from cubestack.host.shell.language import Shell
+from cubestack.host.shell.result import ShellError
+from tests.conftest import Run
+
+from .conftest import FakeCubeStar, UartLink, over_i2c
+
+compiled = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+# --- the command line -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["campaign"], "name a plan: a file, or one of --list"),
+        (["memory", "cubesense", "--firmware", "x"], "--firmware is an option of cubestar alone"),
+        (["memory", "cubesense", "--seconds", "3"], "--seconds has no effect for cubesense"),
+        (
+            ["run", "--device", "cubestar", "--device", "aramis", "--faults", "x", "--", "true"],
+            "--scene and --faults are of one device, and several are on the bus",
+        ),
+        (
+            ["run", "--device", "cubestar", "--device", "aramis", "--scene", "x", "--", "true"],
+            "--scene and --faults are of one device",
+        ),
+        (["picture", "cubestar", "--ra", "1", "--out", "x.png"], "needs both --ra and --dec"),
+        (["picture", "cubestar", "--dec", "1", "--out", "x.png"], "needs both --ra and --dec"),
+        (["picture", "cubestar", "--roll", "1", "--out", "x.png"], "needs both --ra and --dec"),
+        (["picture", "cubestar", "--out", "x.png"], "needs a pose, --ra and --dec, or --scene"),
+    ],
+)
+def test_wrong_calls_are_one_line(run: Run, words: list[str], told: str) -> None:
+    found = run(*words)
+    assert found.code == 2
+    assert told in found.line
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--listen", "0.0.0.0"], "--listen: of which port? It goes with --tcp, --rfc2217 or"),
+        (["--gdb-wait"], "--gdb-wait: give the port as well: --gdb PORT"),
+    ],
+)
+def test_options_of_ports_that_are_not_served(run: Run, more: list[str], told: str) -> None:
+    found = run("emulate", "cubestar", *more)
+    assert found.code == 2
+    assert told in found.err
+
+
+def test_a_scene_that_is_no_sky_has_no_pose(run: Run, tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((512, 1024), np.uint8)).save(tmp_path / "p.png")
+    (tmp_path / "s.toml").write_text('kind = "picture"\nfile = "p.png"\n', "utf-8")
+    words = ["picture", "cubestar", "--scene", tmp_path / "s.toml", "--out", tmp_path / "x.png"]
+    found = run(*words)
+    assert (found.code, found.line.endswith("s.toml is no sky")) == (2, True)
+
+
+@compiled
+def test_a_picture_that_can_not_be_written(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "no" / "x.png"
+    found = run("picture", "cubestar", "--ra", "84", "--dec", "-1", "--out", out)
+    assert found.code == 2
+    assert f"can not write {out}: No such file" in found.err
+
+
+def test_without_pyarrow_there_is_no_parquet(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from cubestack.host.cli.decode import _write
+
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ValueError, match=r"pyarrow: pip install cubestack\[parquet\]"):
+        _write(tmp_path / "x.parquet", [])
+
+
+# --- targets and clients --------------------------------------------------------------------------
+
+
+def test_no_emulation_here_has_a_control_port() -> None:
+    for text in ("emulated:cubestar", "recorded:a.rec"):
+        with pytest.raises(TargetError, match=f"--control is for a device that another .* {text}"):
+            open_target(text, control="http://127.0.0.1:1")
+        with pytest.raises(TargetError, match=f"--backup is for a serial line, not for {text}"):
+            open_target(text, backup=True)
+
+
+def test_what_nobody_registered_has_no_client(
+    node: FakeCubeStar, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = Target("x", INTERFACE, over_i2c(node))
+    monkeypatch.setattr(targets, "open_target", lambda *_of, **_how: target)
+    with pytest.raises(TargetError, match="x: no registered device"):
+        connect("x")
+
+
+def test_a_bus_that_one_may_not_open_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    import smbus2
+
+    def refused(_number: int) -> Any:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(smbus2, "SMBus", refused)
+    with pytest.raises(PortOpenError, match="can not open /dev/i2c-7: Permission denied"):
+        open_target("i2c:7:0x1a")
+
+
+def test_what_a_device_does_not_do_is_told_by_its_name(node: FakeCubeStar) -> None:
+    client = DeviceClient(NodeClient(UartLink(node), INTERFACE))
+    with pytest.raises(TargetError, match="CubeStar takes no picture by the wire"):
+        client.upload(np.zeros((2, 2), np.uint8))
+    with pytest.raises(TargetError, match="CubeStar looks for no stars"):
+        client.stars()
+    assert client.step_timeout_s == 10.0
+
+
+@pytest.mark.parametrize("length", [127, 129, 0])
+def test_a_block_of_another_length_is_no_part_of_a_picture(
+    node: FakeCubeStar, monkeypatch: pytest.MonkeyPatch, length: int
+) -> None:
+    client = CubeStar(NodeClient(UartLink(node), INTERFACE))
+    blocks = [bytes(128), bytes(length)]
+    monkeypatch.setattr(client.client, "stream", lambda _name, _count: iter(blocks))
+    told = list[tuple[int, int]]()
+    with pytest.raises(BadAnswerError, match=f"block of {length} bytes, not 128"):
+        client._stream("StreamDownImage", 2, 128, lambda *done: told.append(done))
+    assert told == [(1, 2)]
+    blocks[1] = b"x" * 128
+    assert client._stream("StreamDownImage", 2, 128, None) == bytes(128) + b"x" * 128
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("write", "usage: write NAME"),
+        ("write UploadBlock 0 xy", "field Data: 'xy' is not hexadecimal"),
+        ("raw 00", "raw: x is no serial line"),
+        ("bench q", "bench: CubeStar has no bench protocol"),
+        ("image x.jpg", r"image: x\.jpg must end in \.png"),
+        ("image x.png", "image: CubeStar sends no picture"),
+    ],
+)
+def test_the_shell_says_what_there_is_not(node: FakeCubeStar, line: str, told: str) -> None:
+    shell = Shell(Target("x", INTERFACE, over_i2c(node)))
+    with pytest.raises(ValueError, match=told):
+        shell.execute(line)
+
+
+def test_a_bench_line_must_be_given(sense: Any) -> None:
+    with pytest.raises(ShellError, match="no line with the bench protocol is open: give --bench"):
+        Shell(Target("x", sense.interface, over_i2c(sense))).execute("bench q")
+
+
+def test_a_document_that_can_not_be_read(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"can not read .*none\.toml: No such file"):
+        read_document(tmp_path / "none.toml")
+
+
+def test_a_picture_follows_no_orbit() -> None:
+    looking: Any = SimpleNamespace(scene=object(), device=device("cubestar"))
+    with pytest.raises(ValueError, match="cubestar looks at a picture, which follows no orbit"):
+        _seen(SimpleNamespace(), looking)  # type: ignore[arg-type]
+
+
+# --- experiments ----------------------------------------------------------------------------------
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("name", "mode", "told"),
+    [
+        ("cubestar", "assisted", "--mode assisted needs a scene whose attitude is known"),
+        ("cubestar", "tracking", "--mode tracking needs a scene whose attitude is known"),
+        ("aramis", "assisted", "--mode assisted needs a scene whose attitude is known"),
+    ],
+)
+def test_a_hint_needs_a_truth(name: str, mode: str, told: str, tmp_path: Path) -> None:
+    size = (512, 1024) if name == "cubestar" else (1024, 1280)
+    Image.fromarray(np.zeros(size, np.uint8)).save(tmp_path / "p.png")
+    with pytest.raises(ValueError, match=told):
+        list(measure(name, image=tmp_path / "p.png", mode=mode))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["options", "grid", "random"])
+def test_tables_of_a_plan_are_tables(name: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} must be a table of options"):
+        Plan(device="cubestar", frames=1, **{name: [1]})  # type: ignore[arg-type]
+
+
+def test_a_device_without_figures_or_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    from cubestack.host.experiments import fidelity
+
+    bare = replace(device("cubestar"), fidelity=None)
+    monkeypatch.setattr(fidelity, "registered", lambda _name: bare)
+    with pytest.raises(ValueError, match="cubestar declares no published figures"):
+        fidelity_of("cubestar")
+    with pytest.raises(ValueError, match="cubestar has no command 'dance', only measure, "):
+        experiment_of(device("cubestar"), "dance")
+
+
+def test_a_page_without_a_place_for_a_table() -> None:
+    row: Any = SimpleNamespace(table="pace")
+    with pytest.raises(ValueError, match="the page has no line '<!-- rows: pace -->'"):
+        rewritten("nothing\n", [row])
+
+
+def test_what_must_be_installed_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    for name in ("matplotlib.figure", "distributed"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ValueError, match=r"matplotlib: pip install cubestack\[plots\]"):
+        figure(1, 1)
+    with pytest.raises(ValueError, match="figures need matplotlib"):
+        save_curves({}, "", "", lambda _count, _of: (0, 1), tmp_path / "x.png")
+    with pytest.raises(ValueError, match=r"needs distributed: pip install cubestack\[cluster\]"):
+        workers._cluster("tcp://x").__enter__()
+    monkeypatch.setattr(album, "find_spec", lambda _name: None)
+    with pytest.raises(ValueError, match="--out: figures need matplotlib"):
+        album.check(tmp_path)
+
+
+@pytest.mark.parametrize(("threads", "told"), [({}, "has no workers"), ({"a": 2, "b": 3}, "")])
+def test_a_cluster_needs_workers(
+    monkeypatch: pytest.MonkeyPatch, threads: dict[str, int], told: str
+) -> None:
+    class Client:
+        """Of a scheduler."""
+
+        def __init__(self, address: str, timeout: object) -> None:
+            self.address = address
+
+        def __enter__(self) -> "Client":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def nthreads(self) -> dict[str, int]:
+            return threads
+
+        def get_executor(self, *, pure: bool) -> str:
+            return f"executor, pure: {pure}"
+
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(Client=Client))
+    if told:
+        with pytest.raises(workers.WorkersError, match=f"scheduler at tcp://x {told}"):
+            workers._cluster("tcp://x").__enter__()
+        return
+    with workers._cluster("tcp://x") as found:
+        assert found == ("executor, pure: False", 5)
+
+
+def test_a_phase_that_a_loop_has_not_is_told_with_those_it_has() -> None:
+    loop = [Interval("idle", 0, 10), Interval("storing", 10, 30), Interval("idle", 30, 60)]
+    rng = np.random.default_rng(1)
+    with pytest.raises(ValueError, match="a loop has no phase reading: "):
+        upsets._moment(loop, "reading", rng)
+    times = np.array([upsets._moment(loop, "idle", rng) for _ in range(2000)])
+    assert np.all((times < 10) | ((times >= 30) & (times < 60)))
+    assert np.mean(times < 10) == pytest.approx(0.25, abs=0.04)  # each moment as likely
+    assert np.all([10 <= upsets._moment(loop, "storing", rng) < 30 for _ in range(100)])
