@@ -1,4 +1,4 @@
-"""An emulation that is served, and steered by its control port."""
+"""An emulation that is served, and steered by its control port; the page at all sensors."""
 
 import http.client
 import json
@@ -15,11 +15,14 @@ from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.past import Past
+from cubestack.host.devices.registry import device_names
 from cubestack.host.ground.control_api import control_app
 from cubestack.host.ground.emulation import Emulation
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.serving import Serving
 from cubestack.host.recording.setups import emulated_setup
+
+from .browser import look, shown, station
 
 TOKEN = "the token of the tests"
 SOON_S = 30.0
@@ -89,3 +92,19 @@ def controlled(tmp_path: Path) -> Iterator[Controlled]:
         port.close()
     past.close()
     devices[0].close()
+
+
+@pytest.fixture(scope="module")
+def address(chromium: Any) -> Iterator[str]:
+    """Of a page with all sensors; for modules that are one xdist group, so that they start once."""
+    targets = [f"emulated:{name}" for name in device_names()]
+    with station(*targets, "--seed", "5") as opened:
+        yield opened
+
+
+@pytest.fixture
+def page(chromium: Any, address: str) -> Iterator[Any]:
+    """A tab that looks at a CubeStar."""
+    with shown(chromium, address) as opened:
+        look(opened, "CubeStar")
+        yield opened

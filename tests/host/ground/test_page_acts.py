@@ -1,11 +1,6 @@
 """What a page commands, in a real browser: settings and registers, kept lines, waveforms."""
 
-import json
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,36 +9,9 @@ import pytest
 from cubestack.host.devices.targets import open_target
 from tests.emulator.recording import vcd
 
-from .test_page import SOON_MS, line, local
+from .browser import line, look, shown, station
 
 pytestmark = pytest.mark.xdist_group("page acts")
-
-
-@contextmanager
-def station(*words: str) -> Iterator[str]:
-    """Address of a page."""
-    call = [sys.executable, "-m", "cubestack", "ground", *words, "--json"]
-    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
-        assert process.stdout is not None
-        try:
-            yield json.loads(process.stdout.readline())["page"]
-        finally:
-            process.send_signal(signal.SIGINT)
-
-
-@contextmanager
-def shown(chromium: Any, address: str) -> Iterator[Any]:
-    """The page at ``address``; nothing in it may go wrong or ask another machine."""
-    page = chromium.new_context().new_page()
-    page.set_default_timeout(SOON_MS)
-    wrong = list[str]()
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("request", lambda one: wrong.append(one.url) if not local(one.url) else None)
-    page.goto(address)
-    page.wait_for_selector("#line")
-    yield page
-    page.context.close()
-    assert not wrong
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +24,6 @@ def address(chromium: Any) -> Iterator[str]:
 def page(chromium: Any, address: str) -> Iterator[Any]:
     with shown(chromium, address) as opened:
         yield opened
-
-
-def look(page: Any, device: str) -> None:
-    page.click(f"nav >> text={device}")
-    page.wait_for_function(
-        "(device) => document.title.startsWith(device) && document.querySelector('#read-settings')",
-        arg=device,
-    )
 
 
 def test_a_setting_that_differs_is_marked(page: Any) -> None:

@@ -1,0 +1,66 @@
+"""The page in a real browser, for the tests about it."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+SOON_MS = 30_000
+
+
+@contextmanager
+def station(*words: str, environment: dict[str, str] | None = None) -> Iterator[str]:
+    """Address of the page of `cubestack ground` with ``words``."""
+    call = [sys.executable, "-m", "cubestack", "ground", *words, "--json"]
+    pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+    with subprocess.Popen(call, stdout=pipe, stderr=nothing, env=environment) as process:
+        assert process.stdout is not None
+        try:
+            yield json.loads(process.stdout.readline())["page"]
+        finally:
+            process.send_signal(signal.SIGINT)
+
+
+@contextmanager
+def shown(chromium: Any, address: str, **options: Any) -> Iterator[Any]:
+    """The page at ``address``; nothing in it may go wrong or ask another machine."""
+    page = chromium.new_context(**options).new_page()
+    page.set_default_timeout(SOON_MS)
+    wrong = list[str]()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda one: wrong.append(one.url) if not local(one.url) else None)
+    page.goto(address)
+    page.wait_for_selector("#line")
+    yield page
+    page.context.close()
+    assert not wrong
+
+
+def local(url: str) -> bool:
+    return url.startswith(("http://127.0.0.1:", "data:", "blob:"))
+
+
+def look(page: Any, device: str, *, emulated: bool = True) -> None:
+    """Look at another target, until it is there; if it is ``emulated`` until its time is told."""
+    page.click(f"nav >> text={device}")
+    page.wait_for_function(
+        "([device, emulated]) => document.title.startsWith(device) &&"
+        "(!emulated || document.querySelector('#time').textContent.endsWith(' s'))",
+        arg=[device, emulated],
+    )
+
+
+def line(page: Any, words: str) -> str:
+    """Do a line of the shell; what the page tells of it."""
+    before = page.locator("#lines li").count()
+    page.fill("#line", words)
+    page.press("#line", "Enter")
+    page.wait_for_function(
+        "([words, before]) => { const told = document.querySelectorAll('#lines li');"
+        "return told.length > before && told[0].innerText.includes(words) }",
+        arg=[words, before],
+    )
+    return str(page.locator("#lines li").first.inner_text())

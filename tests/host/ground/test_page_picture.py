@@ -1,0 +1,120 @@
+"""Pictures in the page, in a real browser, at emulations of all sensors."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cubestack.host.pictures.images import save_picture
+
+from .browser import line, look
+
+GREEN = (
+    "() => { const c = document.querySelector('#over');"
+    "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+    "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 1] > d[i] + 60) n++;"
+    "return n }"
+)
+"""Pixels of what is drawn over the picture that are green."""
+
+pytestmark = pytest.mark.xdist_group("page picture")  # so that its emulations are started once
+
+
+def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
+    page.select_option("#command", "CaptureAndProcess")
+    page.click("#send")
+    # At power-up a memory holds noise; the picture is a dark sky with stars.
+    page.wait_for_function(
+        "() => { const c = document.querySelector('#canvas');"
+        "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+        "const lit = d.filter((v, i) => i % 4 === 0 && v > 200).length;"
+        "return c.width === 1024 && lit > 10 && lit < 20000 }"
+    )
+    page.check("#marks")
+    page.wait_for_selector("#picture >> text=/found, .* of them known/")
+    page.select_option("#frame", "AttitudeQuaternion")
+    page.wait_for_function(
+        "() => document.querySelector('#telemetry').innerText.includes('LOST_IN')"
+    )
+
+
+def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
+    look(page, "CubeSense")
+    page.wait_for_selector("#attitude-told >> text=CubeSense answers no attitude")
+    page.check("#marks")
+    line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
+    page.wait_for_selector("#picture >> text=/^[1-9][0-9]* found/")
+    assert page.evaluate(GREEN) > 50
+    assert page.locator("#found-legend").is_visible()
+
+
+def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
+    """By keys alone, by the wheel once it is chosen, and by the pointer."""
+    picture = page.locator("#frame-of-picture")
+    wide = "document.querySelector('#canvas').clientWidth"
+    shifted = "document.querySelector('#frame-of-picture').scrollLeft"
+    page.wait_for_function("() => document.querySelector('#canvas').width === 1024")
+    before = page.evaluate(wide)
+    picture.press("+")
+    assert page.evaluate(wide) == pytest.approx(2 * before, abs=2)
+    assert page.evaluate(shifted) == pytest.approx(before / 2, abs=3)  # its middle stays
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_function(f"() => {shifted} < {before / 2 - 10}")
+    page.keyboard.press("0")
+    assert page.evaluate(wide) == before
+    picture.hover()
+    page.mouse.wheel(0, -100)
+    assert page.evaluate(wide) > before
+    page.keyboard.press("0")
+    page.keyboard.press("+")
+    at = page.evaluate(shifted)
+    picture.hover()
+    box = picture.bounding_box()
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 40, box["y"] + box["height"] / 2)
+    page.mouse.up()
+    assert page.evaluate(shifted) == at - 40
+    page.click("#sizes >> text=whole")
+    assert page.evaluate(wide) == before
+
+
+def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
+    page.check("#marks")
+    line(page, "write CaptureAndProcess")
+    page.wait_for_selector("#picture >> text=/found, .* of them known/")
+    page.wait_for_function(f"() => ({GREEN})() > 50")
+    before = page.evaluate(GREEN)
+    page.check("#magnitudes")
+    # A picture that comes meanwhile has nothing to be seen until it is read.
+    page.wait_for_function(f"() => ({GREEN})() > {before}")
+
+
+def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> None:
+    picture = np.random.default_rng(1).integers(0, 2, (512, 1024), np.uint8) * 200
+    picture[40:] = 0  # black blocks are not sent
+    sent = tmp_path / "sent.png"
+    save_picture(picture, sent)
+    page.select_option("#speed", "fast")
+    page.set_input_files("#upload", sent)
+    page.wait_for_selector("#transfer-told >> text=/^upload: .* done$/")
+    page.click("#download")
+    page.wait_for_function("() => document.querySelector('#progress').value > 20")
+    page.click("#hold")
+    page.wait_for_selector("#transfer-told >> text=/ held$/")
+    page.click("#hold")
+    page.wait_for_selector("#transfer-told >> text=/^download: 4096 of 4096 blocks, done$/")
+    with page.expect_download() as saving:
+        page.click("#carried")
+    saving.value.save_as(tmp_path / "back.png")
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "back.png")), picture)
+    page.click("#download")
+    page.wait_for_selector("#transfer-told >> text=/^download: .* on its way/")
+    page.click("#give-up")
+    page.wait_for_selector("#transfer-told >> text=/given up after/")
+    page.select_option("#speed", "1")
+    look(page, "CubeSense")
+    assert page.locator("#upload").is_disabled()
+    assert "takes no picture" in page.inner_text("#transfer-told")
+    assert page.locator("#source option").all_inner_texts() == ["sram1", "sram2"]

@@ -1,0 +1,131 @@
+"""The page in a real browser: by keys, in several tabs, narrow and dark."""
+
+from typing import Any
+
+import pytest
+
+from .browser import line, look, shown
+
+COVERED = """() => {
+  const all = [...document.querySelectorAll("button, input, select, canvas, p, h1, h2, li, td")];
+  const seen = all.filter((one) => one.checkVisibility() && !one.closest("#lines, .under"));
+  const shown = (one) => { // without what is scrolled out of sight
+    let { left, right, top, bottom } = one.getBoundingClientRect();
+    for (let up = one.parentElement; up !== document.body; up = up.parentElement) {
+      if (getComputedStyle(up).overflow === "visible") continue;
+      const frame = up.getBoundingClientRect();
+      left = Math.max(left, frame.left), right = Math.min(right, frame.right);
+      top = Math.max(top, frame.top), bottom = Math.min(bottom, frame.bottom);
+    }
+    return { left, right, top, bottom };
+  };
+  const boxes = seen.map(shown);
+  const meet = (a, b) =>
+    Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
+    Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+  const found = [];
+  seen.forEach((one, i) => seen.slice(i + 1).forEach((other, j) => {
+    if (one.contains(other) || !meet(boxes[i], boxes[i + 1 + j])) return;
+    found.push(`${one.outerHTML.slice(0, 60)} and ${other.outerHTML.slice(0, 60)}`);
+  }));
+  return found;
+}"""
+"""What lies on something else."""
+
+PALE = """() => {
+  const numbers = (colour) => colour.match(/[0-9.]+/g).map(Number);
+  const light = (colour) => numbers(colour).slice(0, 3).reduce((sum, part, i) => {
+    const share = part / 255;
+    const linear = share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+    return sum + [0.2126, 0.7152, 0.0722][i] * linear;
+  }, 0.05);
+  const ground = (one) => {
+    const colour = getComputedStyle(one).backgroundColor;
+    return numbers(colour)[3] === 0 ? ground(one.parentElement) : colour;
+  };
+  const own = (one) => [...one.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
+  return [...document.body.querySelectorAll("*")]
+    .filter((one) => own(one) && one.checkVisibility() && !one.matches("option, :disabled"))
+    .map((one) => [one, light(getComputedStyle(one).color), light(ground(one))])
+    .filter(([, a, b]) => Math.max(a, b) / Math.min(a, b) < 4.5)
+    .map(([one]) => one.outerHTML.slice(0, 80));
+}"""
+"""Text with less contrast than WCAG 2.2, 1.4.3, asks for."""
+
+pytestmark = pytest.mark.xdist_group("page view")  # so that its emulations are started once
+
+
+def test_two_tabs_see_the_same(chromium: Any, address: str, page: Any) -> None:
+    with shown(chromium, address) as other:
+        page.click("#pause")
+        other.wait_for_selector("#pause[aria-pressed=true]")
+        other.click("#pause")
+        page.wait_for_selector("#pause[aria-pressed=false]")
+
+
+def test_two_tabs_look_at_what_they_like(chromium: Any, address: str, page: Any) -> None:
+    with shown(chromium, address) as other:
+        look(other, "CubeSense")
+        page.select_option("#band", "IDMode.Mode")
+        page.click("#add-band")
+        other.select_option("#band", "NadirSearchMode.Search")
+        other.click("#add-band")
+        page.wait_for_selector("#timeline-told >> text=/IDMode.Mode [A-Z]/")
+        other.wait_for_selector("#timeline-told >> text=/NadirSearchMode.Search [A-Z]/")
+        assert "Nadir" not in page.inner_text("#timeline-told")
+        assert other.locator("#supplies li").count() > page.locator("#supplies li").count()
+
+
+def test_the_view_can_be_reached_by_tab(page: Any) -> None:
+    """Every control of the live view, in the order of the page, and none holds the focus."""
+    page.wait_for_selector("#sphere:visible")
+    page.focus("#picture-name")
+    reached = list[str]()
+    for _ in range(80):
+        reached.append(page.evaluate("document.activeElement.id"))
+        page.keyboard.press("Tab")
+    sought = ("magnitudes", "frame-of-picture", "sphere", "band", "add-band", "lamps-ErrorFlags")
+    at = [reached.index(name) for name in sought]
+    assert at == sorted(at)
+
+
+def test_the_keyboard_is_enough(page: Any) -> None:
+    page.focus("#newest")
+    for _ in range(150):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "pause":
+            break
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#pause[aria-pressed=true]")
+    page.keyboard.press("Space")
+    page.wait_for_selector("#pause[aria-pressed=false]")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_is_cut_off_covered_or_pale(
+    chromium: Any, address: str, width: int, scheme: str
+) -> None:
+    size = {"width": width, "height": 850}
+    with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
+        for device in ("AraMiS", "CubeSense", "CubeStar"):
+            look(page, device)
+            page.click("#add-band")
+            page.wait_for_selector("#timeline-legend li")
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.evaluate(COVERED) == []
+            assert page.evaluate(PALE) == []
+        dark = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 28)"
+        assert dark == (scheme == "dark")
+
+
+@pytest.mark.parametrize("device", ["AraMiS", "CubeSense", "CubeStar"])
+def test_every_message_has_its_form_or_table(page: Any, device: str) -> None:
+    look(page, device)
+    for chooser, form in (("#command", "#commands form"), ("#frame", "#telemetry table")):
+        names = page.locator(f"{chooser} option").all_inner_texts()
+        assert len(names) > 10
+        for name in names:
+            page.select_option(chooser, name)
+            assert page.locator(form).first.is_visible()
+    assert "Identification" in line(page, "list")
