@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.host.clients.contract import DeviceClient
+from cubestack.host.clients.contract import Columns, DeviceClient
 from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, HostError, NoAnswerError
@@ -246,9 +246,13 @@ class Desk:
 
     def _results(self) -> JsonObject:
         try:
-            return {} if self._client is None else dict(self._asked(self._client.latest))
+            return {} if self._client is None else dict(self._asked(self._latest))
         except (HostError, ValueError) as error:
             return {"error": str(error)}
+
+    def _latest(self) -> Columns:
+        assert self._client is not None
+        return self._shell.asked(self._client.latest)
 
     def _do(self, line: str) -> JsonObject:
         if len(line) > LONGEST_LINE:

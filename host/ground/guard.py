@@ -18,6 +18,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from cubestack.host.ground.serving import loopback_name
 
 COOKIE = "cubestack"
+"""Begins its name; the port follows, as browsers give a cookie to all ports of a host."""
+
 LARGEST_BODY = 8 << 20
 """Bytes: a picture of any of the sensors, as PNG or raw."""
 
@@ -73,7 +75,7 @@ class Guard:
             await refusal(scope, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope, headers: Headers) -> Response | None:
-        host = urlsplit(f"//{headers.get('host', '')}").hostname or ""
+        host, cookie = _asked_by(headers.get("host", ""))
         if not self.any_host and not loopback_name(host):
             return refused(f"this is not {host}", HTTPStatus.MISDIRECTED_REQUEST)
         origin = headers.get("origin")
@@ -83,12 +85,12 @@ class Guard:
         if scope["type"] == "http" and scope["method"] == "GET" and self._knows(given):
             # The page's address is seen and kept by browsers: the token goes out of it.
             answer = RedirectResponse(scope["path"], HTTPStatus.SEE_OTHER)
-            answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict")
+            answer.set_cookie(cookie, self.token, httponly=True, samesite="strict")
             return answer
         bearer = headers.get("authorization", "").partition(" ")
         cookies = cookie_parser(headers.get("cookie", ""))
         if self._knows(
-            [bearer[2] if bearer[0].lower() == "bearer" else "", cookies.get(COOKIE, "")]
+            [bearer[2] if bearer[0].lower() == "bearer" else "", cookies.get(cookie, "")]
         ):
             return None
         return refused(
@@ -98,6 +100,15 @@ class Guard:
     def _knows(self, given: Iterable[str]) -> bool:
         own = self.token.encode()
         return any(secrets.compare_digest(one.encode("utf-8", "replace"), own) for one in given)
+
+
+def _asked_by(host: str) -> tuple[str, str]:
+    """Name of the host that a request names, and of the cookie that is for it."""
+    parts = urlsplit(f"//{host}")
+    try:
+        return parts.hostname or "", f"{COOKIE}-{parts.port}"
+    except ValueError:  # no port has such a number
+        return parts.hostname or "", COOKIE
 
 
 class TooLargeError(ValueError):

@@ -7,6 +7,7 @@ sent; what a device does not do raises the client's errors.
 
 import shlex
 from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 from cubestack.firmware_model.interface.codec.field import suggestion
 from cubestack.firmware_model.interface.codec.message import Kind
@@ -20,6 +21,8 @@ from cubestack.host.shell.registers import RegisterCommands
 from cubestack.host.shell.result import Result, ShellCommand, ShellError
 
 __all__ = ["Result", "Shell", "ShellError"]
+
+T = TypeVar("T")
 
 
 class Shell:
@@ -65,13 +68,17 @@ class Shell:
         if command.emulated_only and self.target.controls is None:
             where = f"{self.target.name} is not emulated here"
             raise ShellError(f"{name}: {where}: use emulated:DEVICE, or --control URL")
+        return self.asked(lambda: command.run(arguments))
+
+    def asked(self, act: Callable[[], T]) -> T:
+        """What ``act`` gets from the node; errors as ``execute``'s."""
         try:
-            result = command.run(arguments)
+            found = act()
         except (NoAnswerError, BadAnswerError) as error:
             why = self._why_silent()
             raise (type(error)(f"{error}; {why}") if why else error) from None
         self._answered = True
-        return result
+        return found
 
     def _why_silent(self) -> str:
         """Looked for once: what was told stays true until there is an answer."""

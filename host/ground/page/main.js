@@ -137,9 +137,11 @@ function look(number) {
       }
       for (const line of message.log ?? []) tell(line);
     },
-    () => {
+    async () => {
       link.className = "bad";
       link.textContent = "the program behind this page has gone; waiting for it";
+      // Another one in its place does not know this page.
+      await ask("/targets").catch((error) => (link.textContent = `${error.message}; waiting`));
     },
   );
   live.want(wanted);

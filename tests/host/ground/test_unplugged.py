@@ -1,49 +1,17 @@
 """A page's serial line between two terminals: pulled, and put back."""
 
 import shutil
-import subprocess
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cubestack.host.devices.targets import open_target
-from cubestack.host.errors import PortClosedError
 from cubestack.host.ground.desk import Desk
 from cubestack.host.transport.streams import SerialTransport
 
+from .cable import cable
 from .conftest import SOON_S
-
-BAUD = 57600
-
-
-@contextmanager
-def cable(ours: Path, theirs: Path, uart: Any) -> Iterator[None]:
-    """Two terminals, and a node at the far end."""
-    ends = [f"pty,raw,echo=0,link={end}" for end in (ours, theirs)]
-    with subprocess.Popen(["socat", "-d", "-d", *ends], stderr=subprocess.PIPE) as process:
-        assert process.stderr is not None
-        assert any(b"data transfer loop" in line for line in process.stderr)
-        far = SerialTransport(str(theirs), BAUD)
-
-        def serve() -> None:
-            with suppress(PortClosedError):
-                while True:
-                    uart.write(far.read(1000, SOON_S))
-                    far.write(uart.read(1000, 0.0))
-
-        thread = threading.Thread(target=serve)
-        thread.start()
-        try:
-            yield
-        finally:
-            process.terminate()
-            process.wait()
-            thread.join(SOON_S)
-            far.close()
 
 
 @pytest.mark.skipif(shutil.which("socat") is None, reason="no socat")

@@ -1,0 +1,67 @@
+"""The page and the program behind it lose each other."""
+
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from .browser import line, shown, station
+from .relay import Relay
+
+pytestmark = pytest.mark.xdist_group("page serial")
+
+
+@pytest.fixture
+def relayed() -> Iterator[tuple[Relay, str]]:
+    """A relay, and the address of the page through it."""
+    with station("emulated:cubesense") as address:
+        parts = urlsplit(address)
+        assert parts.port is not None
+        relay = Relay(parts.port)
+        yield relay, address.replace(f":{parts.port}", f":{relay.port}")
+        relay.close()
+
+
+def test_a_connection_is_lost_and_comes_back(chromium: Any, relayed: tuple[Relay, str]) -> None:
+    """The page tells, goes on without a reload, and still shows what was chosen."""
+    relay, address = relayed
+    with shown(chromium, address) as page:
+        page.evaluate("window.here = true")
+        line(page, "write DetectionThreshold1 77")
+        page.select_option("#frame", "Configuration")
+        value = page.locator("#telemetry td.value").first
+        value.filter(has_text="77").wait_for()
+        relay.cut()
+        page.locator("#link.bad").filter(has_text="waiting").wait_for()
+        assert "does not answer" in line(page, "read Identification")
+        relay.up = True
+        page.wait_for_selector("#link:not(.bad) >> text=emulated:cubesense")
+        line(page, "write DetectionThreshold1 78")
+        value.filter(has_text="78").wait_for()
+        assert page.evaluate("window.here")
+
+
+def test_another_program_in_its_place_is_told(chromium: Any, relayed: tuple[Relay, str]) -> None:
+    """Its token is another one: who does not open its address waits for ever."""
+    relay, address = relayed
+    with station("emulated:cubesense") as other, shown(chromium, address) as page:
+        page.wait_for_selector("#link >> text=emulated:cubesense")
+        relay.cut()
+        relay.to_port = urlsplit(other).port or 0
+        relay.up = True
+        page.locator("#link.bad").filter(has_text="open the address that was printed").wait_for()
+
+
+def test_two_pages_in_one_browser_know_their_programs(chromium: Any) -> None:
+    """A browser has one set of cookies for all ports."""
+    with (
+        station("emulated:cubesense") as one,
+        station("emulated:cubesense") as other,
+        shown(chromium, one) as page,
+    ):
+        second = page.context.new_page()
+        second.goto(other)
+        second.wait_for_selector("#line")
+        for each in (page, second):
+            assert "NodeType" in line(each, "read Identification")
