@@ -1,0 +1,67 @@
+"""Pictures that a page sent and fetched are those that any other host has, byte for byte."""
+
+import re
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.host.devices.emulating import emulating
+from cubestack.host.devices.targets import connect
+from cubestack.host.pictures.images import png, save_picture
+
+from .browser import line, shown, station
+
+pytestmark = pytest.mark.xdist_group("page carried")
+
+SERVES = re.compile(r" serves on (tcp://\S+?),? ")
+
+
+@pytest.fixture
+def port(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Where a device is emulated, for one host after the other."""
+    words = [request.param, "--tcp", "0", "--pace", "fast", "--seed", "3"]
+    with emulating(words) as said:
+        yield next(found[1] for one in said if (found := SERVES.search(one)))
+
+
+def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
+    """The file that the page saves of a download."""
+    if source is not None:
+        page.select_option("#source", source)
+    page.click("#download")
+    page.wait_for_selector("#transfer-told >> text=/^download: .* done$/")
+    with page.expect_download() as saving:
+        page.click("#carried")
+    saving.value.save_as(path)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("port", ["cubestar"], indirect=True)
+def test_what_is_uploaded_is_downloaded(chromium: Any, tmp_path: Path, port: str) -> None:
+    """By the page and by a plain client, each to the other."""
+    sent = np.zeros((2, 512, 1024), np.uint8)
+    sent[:, 100:130] = np.random.default_rng(4).integers(0, 256, (2, 30, 1024), np.uint8)
+    save_picture(sent[0], tmp_path / "sent.png")
+    with station(port, "--device", "cubestar") as address, shown(chromium, address) as page:
+        page.set_input_files("#upload", tmp_path / "sent.png")
+        page.wait_for_selector("#transfer-told >> text=/^upload: .* done$/")
+    with closing(connect(port, "cubestar")) as client:
+        assert client.picture().tobytes() == sent[0].tobytes()
+        client.upload(sent[1])
+    with station(port, "--device", "cubestar") as address, shown(chromium, address) as page:
+        assert downloaded(page, tmp_path / "other.png") == png(sent[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("port", ["cubesense"], indirect=True)
+def test_what_was_taken_is_downloaded(chromium: Any, tmp_path: Path, port: str) -> None:
+    with station(port, "--device", "cubesense") as address, shown(chromium, address) as page:
+        line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
+        page.wait_for_selector("#lines li.good >> text=CaptureAndDetect: done")
+        by_page = downloaded(page, tmp_path / "sram2.png", "sram2")
+    with closing(connect(port, "cubesense")) as client:
+        assert by_page == png(client.picture("sram2"))
