@@ -10,6 +10,7 @@ from cubestack.host.devices.targets import open_target
 from tests.emulator.recording import vcd
 
 from .browser import line, look, shown, station
+from .hostile import HOSTILE
 
 pytestmark = pytest.mark.xdist_group("page acts")
 
@@ -84,9 +85,6 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     page.wait_for_selector("#pause[aria-pressed=false]")
 
 
-HOSTILE = "<img src=x onerror=document.hacked=1>"
-
-
 def test_lines_are_kept_by_the_browser_for_a_device(page: Any) -> None:
     look(page, "CubeSense")
     page.fill("#line", "read Identification RuntimeSeconds")
@@ -109,42 +107,6 @@ def test_lines_are_kept_by_the_browser_for_a_device(page: Any) -> None:
     page.wait_for_selector("#keep")
     look(page, "CubeSense")
     assert page.locator("#kept li").count() == 0
-
-
-def hostile(value: Any) -> Any:
-    """The same with script text in place of every text that is told and not asked with."""
-    if isinstance(value, dict):
-        kept = ("type", "frame", "field", "access")
-        return {key: one if key in kept else hostile(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [hostile(one) for one in value]
-    return value + HOSTILE if isinstance(value, str) else value
-
-
-@pytest.mark.parametrize("missing", [False, True])
-def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: bool) -> None:
-    with shown(chromium, address) as page:
-
-        def told(route: Any) -> None:
-            abouts = [hostile(one) for one in route.fetch().json()]
-            for about in abouts:
-                names = [*about["missing"], "controls", "raw", "results", "download", "registers"]
-                about["missing"] = dict.fromkeys(names, HOSTILE) if missing else {}
-            route.fulfill(json=abouts)
-
-        page.route("**/targets", told)
-        page.route("**/do", lambda route: route.fulfill(json={"rows": [[HOSTILE, HOSTILE]]}))
-        page.reload()
-        page.wait_for_selector(f"nav >> text={HOSTILE}")
-        for number in (0, 1):
-            page.locator("nav button").nth(number).click()
-            page.wait_for_selector("#line")
-            line(page, HOSTILE)
-            for chooser in ("#command", "#frame"):
-                for option in page.locator(f"{chooser} option").all_inner_texts()[:5]:
-                    page.select_option(chooser, option)
-        assert page.locator("img, script:not([type=module])").count() == 0
-        assert page.evaluate("document.hacked") is None
 
 
 def test_a_recording_is_played(chromium: Any, tmp_path: Path) -> None:

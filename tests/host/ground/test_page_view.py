@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from .browser import line, look, shown
+from .browser import look, shown
 
 COVERED = """() => {
   const all = [...document.querySelectorAll("button, input, select, canvas, p, h1, h2, li, td")];
@@ -117,15 +117,3 @@ def test_nothing_is_cut_off_covered_or_pale(
             assert page.evaluate(PALE) == []
         dark = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 28)"
         assert dark == (scheme == "dark")
-
-
-@pytest.mark.parametrize("device", ["AraMiS", "CubeSense", "CubeStar"])
-def test_every_message_has_its_form_or_table(page: Any, device: str) -> None:
-    look(page, device)
-    for chooser, form in (("#command", "#commands form"), ("#frame", "#telemetry table")):
-        names = page.locator(f"{chooser} option").all_inner_texts()
-        assert len(names) > 10
-        for name in names:
-            page.select_option(chooser, name)
-            assert page.locator(form).first.is_visible()
-    assert "Identification" in line(page, "list")

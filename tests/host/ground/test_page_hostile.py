@@ -1,0 +1,151 @@
+"""No text that comes to the page is markup, by whichever way it comes."""
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from .browser import line, look, shown, station
+from .hostile import HOSTILE, hostile
+
+pytestmark = pytest.mark.xdist_group("page hostile")
+
+Change = Callable[[dict[str, Any]], dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def address(chromium: Any) -> Iterator[str]:
+    with station("emulated:cubestar", "emulated:cubesense", "--seed", "5") as opened:
+        yield opened
+
+
+def nothing_ran(page: Any) -> None:
+    assert page.locator("img, script:not([type=module])").count() == 0
+    assert page.evaluate("document.hacked") is None
+
+
+def lives(page: Any, change: Change) -> None:
+    """From now on what the server tells by itself is changed."""
+
+    def connect(socket: Any) -> None:
+        server = socket.connect_to_server()
+        server.on_message(lambda text: socket.send(json.dumps(change(json.loads(text)))))
+
+    page.route_web_socket("**/live", connect)
+    page.reload()
+    page.wait_for_selector("#line")
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: bool) -> None:
+    with shown(chromium, address) as page:
+
+        def told(route: Any) -> None:
+            abouts = [hostile(one) for one in route.fetch().json()]
+            for about in abouts:
+                names = [*about["missing"], "controls", "raw", "results", "download", "registers"]
+                about["missing"] = dict.fromkeys(names, HOSTILE) if missing else {}
+            route.fulfill(json=abouts)
+
+        page.route("**/targets", told)
+        page.route("**/do", lambda route: route.fulfill(json={"rows": [[HOSTILE, HOSTILE]]}))
+        page.reload()
+        page.wait_for_selector(f"nav >> text={HOSTILE}")
+        for number in (0, 1):
+            page.locator("nav button").nth(number).click()
+            page.wait_for_selector("#line")
+            line(page, HOSTILE)
+            for chooser in ("#command", "#frame"):
+                for option in page.locator(f"{chooser} option").all_inner_texts()[:5]:
+                    page.select_option(chooser, option)
+        nothing_ran(page)
+
+
+def test_no_text_of_a_live_device_is_markup(chromium: Any, address: str) -> None:
+    """Results, names of snapshots, memories, supplies and probes, and what faults did."""
+
+    def change(told: dict[str, Any]) -> dict[str, Any]:
+        made = hostile(told) | {"log": [HOSTILE]}
+        made["values"] = {
+            frame: dict.fromkeys(values, HOSTILE)
+            for frame, values in told.get("values", {}).items()
+        }
+        return made
+
+    with shown(chromium, address) as page:
+        page.click("#snapshot")
+        page.wait_for_selector("#lines li.good >> text=snapshot")
+        lives(page, change)
+        for place in ("#lines li", "#results td", "#timeline-told", "#supplies li", "#state"):
+            page.locator(place).filter(has_text=HOSTILE).first.wait_for()
+        page.locator("#telemetry td").filter(has_text=HOSTILE).first.wait_for()
+        for chooser in ("#snapshots option", "#picture-name option"):
+            page.locator(chooser).filter(has_text=HOSTILE).first.wait_for(state="attached")
+        nothing_ran(page)
+
+
+def test_no_live_failure_is_markup(chromium: Any, address: str) -> None:
+    def change(told: dict[str, Any]) -> dict[str, Any]:
+        carried = {"what": HOSTILE, "done": 1, "total": 2, "held": False, "ended": HOSTILE}
+        return {
+            "link": told["link"] | {"failed": 1, "error": HOSTILE},
+            "carried": carried | {"saved": False},
+            "played": None,
+            "values": {frame: {"error": HOSTILE} for frame in told.get("values", {})},
+            "results": {"error": HOSTILE},
+            "emulation": {"error": HOSTILE},
+        }
+
+    with shown(chromium, address) as page:
+        lives(page, change)
+        for place in ("#link-health", "#transfer-told", "#telemetry p", "#results", "#state"):
+            page.locator(place).filter(has_text=HOSTILE).first.wait_for()
+        page.locator("#attitude-told").filter(has_text=HOSTILE).wait_for()
+        nothing_ran(page)
+
+
+def test_no_answer_is_markup(chromium: Any, address: str) -> None:
+    """Of a register of the image sensor, of stars, and of whatever is refused."""
+    with shown(chromium, address) as page:
+        look(page, "CubeStar")
+        answer = {"value": HOSTILE, "bits": {HOSTILE: HOSTILE}}
+        page.route("**/sensor-registers/*", lambda route: route.fulfill(json=answer))
+        page.click("#read-sensor")
+        page.click("#settings summary >> text=image sensor register")
+        page.locator("#sensor-rows td").filter(has_text=HOSTILE).first.wait_for()
+        star = {"x": 500, "y": 200, "name": HOSTILE, "v_mag": 1.0}
+        page.route("**/found/*", lambda r: r.fulfill(json={"marks": [star], "lines": []}))
+        page.check("#marks")
+        page.wait_for_selector("#picture >> text=/1 found, 1 of them known/")
+        for path in ("do", "pause", "sensor-registers/*", "found/*", "download"):
+            page.route(
+                f"**/{path}", lambda route: route.fulfill(status=400, json={"error": HOSTILE})
+            )
+        before = page.locator("#lines li.bad").count()
+        page.click("#pause")
+        page.click("#download")
+        page.click("#read-sensor")
+        line(page, "help")
+        bad = page.locator("#lines li.bad").filter(has_text=HOSTILE)
+        bad.nth(before + 3).wait_for()
+        page.uncheck("#marks")
+        page.check("#marks")
+        page.locator("#picture p").filter(has_text=HOSTILE).first.wait_for()
+        nothing_ran(page)
+
+
+def test_a_scene_s_name_and_a_snapshot_s_are_text(chromium: Any, address: str) -> None:
+    """What a user writes comes back from the emulation, in a refusal and in a list."""
+    with shown(chromium, address) as page:
+        page.click("#emulation summary")
+        page.fill("#scene", f"kind = '{HOSTILE}'")
+        page.click("#show-scene")
+        page.locator("#lines li.bad").filter(has_text=HOSTILE).wait_for()
+        path = "/targets/0/snapshot"
+        page.evaluate(
+            "([path, name]) => fetch(path, {method: 'POST', body: JSON.stringify({name})})",
+            [path, HOSTILE],
+        )
+        page.locator("#snapshots option").filter(has_text=HOSTILE).wait_for(state="attached")
+        nothing_ran(page)
