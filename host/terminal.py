@@ -1,6 +1,6 @@
 """What the terminal shows: results on standard output, progress on standard error."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 from time import monotonic
@@ -16,6 +16,9 @@ console = Console()
 _errors = Console(stderr=True)
 
 T = TypeVar("T")
+
+Told = Callable[[int, int], None]
+"""Told how much is done, and of how many."""
 
 _WIDEST = 10_000
 """Columns that no table has."""
@@ -40,6 +43,23 @@ def hush(quiet: bool) -> None:
 def say(text: str) -> None:
     """A line for the reader, not for a script: on standard error."""
     _errors.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def tell(text: str) -> None:
+    """A line of a result: on standard output, and never broken in two.
+
+    On the terminal it comes above a bar that is shown.
+    """
+    above = _open[0].console if _open and console.is_terminal else console
+    above.print(text, markup=False, soft_wrap=True)
+
+
+def head(title: str) -> None:
+    """A title above what follows: ruled where the terminal is wide enough, else a plain line."""
+    if console.is_terminal and len(title) + 4 <= console.width:
+        console.rule(Text(title))
+    else:
+        tell(f"== {title} ==")
 
 
 def show(table: Table) -> None:
@@ -80,32 +100,59 @@ def progress_bar() -> bars.Progress:
         console=_errors,
         disable=_errors.quiet or not _errors.is_terminal,
         transient=True,
+        redirect_stdout=False,  # it may be a file, and not the terminal
     )
 
 
 def progress(
     items: Iterable[T], total: int, label: str, *, quiet: bool = False, before: int = 0
 ) -> Iterator[T]:
-    """Pass ``items`` through with a bar, unless ``quiet``; it may be inside another's loop.
+    """Pass ``items`` through, and tell how far they are unless ``quiet``.
 
-    The first ``before`` of them were done before, and tell nothing about the rate. Off a terminal
-    there is a line every `EVERY_S` of wall time instead.
+    The first ``before`` of them were done before, and tell nothing about the rate.
     """
     if quiet:
         yield from items
         return
-    if not _errors.is_terminal:
-        yield from _told(items, total, label, before)
-        return
-    with _shown_bar() as bar:
-        task = bar.add_task(label, total=total)
-        for item in items:
+    with busy(label, before) as shown:
+        shown(0, total)
+        for done, item in enumerate(items, 1):
             yield item
-            bar.advance(task)
+            shown(done, total)
+
+
+@contextmanager
+def busy(label: str, before: int = 0) -> Iterator[Told]:
+    """Tell that ``label`` goes on as long as the block lasts; it may be inside of another.
+
+    On a terminal that is a bar which goes away; elsewhere a line every `EVERY_S` of wall time, of
+    the innermost one. Yields what may be told how much is done, and of how many, of which
+    ``before`` were done before.
+    """
+    if _errors.is_terminal:
+        with _shown_bar() as bar:
+            task = bar.add_task(label, total=None)
+            try:
+                yield lambda done, total: bar.update(task, completed=done, total=total)
+            finally:
+                bar.remove_task(task)
+        return
+    teller = _Teller(label, before)
+    _telling.append(teller)
+    teller.start()
+    try:
+        yield teller.show
+    finally:
+        _telling.remove(teller)
+        teller.over.set()
+        teller.join()
 
 
 #: The display that is on the terminal; a second one can not be.
 _open: list[bars.Progress] = []
+
+#: Who tells how far it is where there is no terminal: the last one.
+_telling: "list[_Teller]" = []
 
 
 @contextmanager
@@ -121,22 +168,30 @@ def _shown_bar() -> Iterator[bars.Progress]:
             _open.clear()
 
 
-def _told(items: Iterable[T], total: int, label: str, before: int) -> Iterator[T]:
-    """Pass ``items`` through; a thread says how far it is, as one may take long."""
-    done, over, begun = 0, Event(), monotonic()
+class _Teller(Thread):
+    """Says every few seconds how far something is, as one step of it may take long."""
 
-    def tell() -> None:
-        while not over.wait(EVERY_S):
-            rate = max(0, done - before) / (monotonic() - begun)
-            rest = f", {rate:.3g}/s, {(total - done) / rate:.0f} s left" if rate else ""
-            say(f"{label}: {done} of {total}{rest}")
+    def __init__(self, label: str, before: int) -> None:
+        super().__init__(daemon=True)
+        self.label, self.before = label, before
+        self.done = self.total = 0
+        self.begun = monotonic()
+        self.over = Event()
 
-    teller = Thread(target=tell, daemon=True)
-    teller.start()
-    try:
-        for item in items:
-            yield item
-            done += 1
-    finally:
-        over.set()
-        teller.join()
+    def show(self, done: int, total: int) -> None:
+        """Note how much is done."""
+        self.done, self.total = done, total
+
+    def run(self) -> None:
+        """Until it is over."""
+        while not self.over.wait(EVERY_S):
+            if _telling[-1:] == [self]:
+                say(f"{self.label}: {self._text()}")
+
+    def _text(self) -> str:
+        took_s = monotonic() - self.begun
+        if not self.total:
+            return f"{took_s:.0f} s"
+        rate = max(0, self.done - self.before) / took_s
+        left = f"{rate:.3g}/s, {(self.total - self.done) / rate:.0f} s left" if rate else ""
+        return f"{self.done} of {self.total}, {left or f'{took_s:.0f} s'}"

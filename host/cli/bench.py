@@ -4,7 +4,7 @@ import argparse
 import json
 
 from cubestack.host.devices.registry import devices
-from cubestack.host.terminal import console
+from cubestack.host.terminal import tell
 
 COMPARISON = "What compares the engines that can run the FPGA designs is `make bench-engines`."
 
@@ -31,5 +31,5 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(figures))
         return 0
     for name, value in figures.items():
-        console.print(f"{name:>18}  {value:,}")
+        tell(f"{name:>18}  {value:,}")
     return 0

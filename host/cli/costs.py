@@ -18,7 +18,7 @@ from rich.table import Table
 from cubestack.host.devices.costs import CostReport, Measurement
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
-from cubestack.host.terminal import console, show
+from cubestack.host.terminal import show, tell
 
 _BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
 
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     for one in report.measure(levels, precisions):
         found.append(one)
         if not args.json:
-            console.print(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
+            tell(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
     if args.write:
         report.file.write_text(json.dumps(report.as_data(found), indent=1) + "\n", "utf-8")
         _rewrite(Path("docs") / report.document, report.page(found))

@@ -51,7 +51,7 @@ def _write(path: Path, messages: list[Said]) -> None:
             arrow: Any = import_module("pyarrow")
             files: Any = import_module("pyarrow.parquet")
         except ModuleNotFoundError:
-            raise ValueError("Parquet needs pyarrow: pip install cubestack[parquet]") from None
+            raise ValueError('Parquet needs pyarrow: pip install "cubestack[parquet]"') from None
         numbers = ("time_s", "value")
         schema = [
             (name, arrow.float64() if name in numbers else arrow.string()) for name in COLUMNS

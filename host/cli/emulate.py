@@ -33,7 +33,7 @@ from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.options import flag
 from cubestack.host.recording.setups import emulated_setup
-from cubestack.host.terminal import progress, say
+from cubestack.host.terminal import busy, progress, say
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import SerialLine
@@ -119,16 +119,17 @@ def run(args: argparse.Namespace) -> int:
         for name in args.devices:
             found = device(name)
             options = device_options.chosen_options(args, found)
-            found.prepare(progress)
-            emulated = power_up(
-                found,
-                args.scene,
-                seed=args.seed,
-                engine=args.engine,
-                baud=args.baud,
-                beside=opened[0] if opened else None,
-                **options,
-            )
+            with busy(f"starting {found.title}"):
+                found.prepare(progress)
+                emulated = power_up(
+                    found,
+                    args.scene,
+                    seed=args.seed,
+                    engine=args.engine,
+                    baud=args.baud,
+                    beside=opened[0] if opened else None,
+                    **options,
+                )
             opened.append(emulated)
             setups.append(emulated_setup(args.seed, args.scene, args.faults, options))
             device_options.tell_notices(found, options, say)

@@ -24,7 +24,7 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments import fidelity
 from cubestack.host.experiments.workers import cores
-from cubestack.host.terminal import console, say
+from cubestack.host.terminal import say, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -128,5 +128,5 @@ def _show(args: argparse.Namespace, rows: list[fidelity.Measured], page: Path | 
     else:
         for row in rows:
             ours = "; ".join(f"{profile} {value}" for profile, value in row.ours.items())
-            console.print(f"{row.key}: {row.figure} ({row.source})", soft_wrap=True)
-            console.print(f"    document {row.published}; {ours}; {row.word}", soft_wrap=True)
+            tell(f"{row.key}: {row.figure} ({row.source})")
+            tell(f"    document {row.published}; {ours}; {row.word}")

@@ -154,12 +154,14 @@ def _verilog(args: argparse.Namespace) -> int:
 
 def _prove(args: argparse.Namespace) -> int:
     from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
+    from cubestack.host.terminal import progress, tell
 
+    chosen = _chosen(args.proofs(), args.names, "proof")
     done = []
-    for verdict in verdicts(_chosen(args.proofs(), args.names, "proof")):
+    for verdict in progress(verdicts(chosen), len(chosen), "proofs", quiet=args.json):
         done.append(verdict)
         if not args.json:
-            print(verdict_text(verdict), flush=True)
+            tell(verdict_text(verdict))
     if args.json:
         print(verdict_json(done))
     return 0 if all(verdict.good for verdict in done) else 1

@@ -7,6 +7,7 @@ ended by one. An error is one line: what, where, and what would be right.
 import logging
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
@@ -14,7 +15,7 @@ from importlib.metadata import version
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
-from cubestack.host.terminal import hush
+from cubestack.host.terminal import hush, say
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
 SIGNALLED = 128
@@ -113,7 +114,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = make_parser().parse_args(arguments)
     _set_loudness(args.verbose, quiet=args.quiet)
     try:
-        return int(args.run(args) or DONE)
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda text, *_, **__: say(f"cubestack {args.command}: {text}")
+            return int(args.run(args) or DONE)
     except KeyboardInterrupt:
         return SIGNALLED + signal.SIGINT
     except BrokenPipeError:

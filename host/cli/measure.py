@@ -33,7 +33,7 @@ from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import between
-from cubestack.host.terminal import console, progress, say, show
+from cubestack.host.terminal import progress, say, show, tell
 
 PERCENT = between(0, 100, "a number of percent in 0..100")
 SHOWN = 40
@@ -161,6 +161,6 @@ def _report(
             table.add_row(*experiment.row(number, result))
         show(table)
         if len(results) > SHOWN:
-            console.print(f"... and {len(results) - SHOWN} more; --json lists them all")
+            tell(f"... and {len(results) - SHOWN} more; --json lists them all")
     for line in experiment.summarise(results, wall_s):
-        console.print(line, soft_wrap=True)
+        tell(line)

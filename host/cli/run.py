@@ -16,7 +16,7 @@ import argparse
 import errno
 import shutil
 import tempfile
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +25,7 @@ from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device, device_names, devices
-from cubestack.host.terminal import say
+from cubestack.host.terminal import busy, say
 
 if TYPE_CHECKING:
     from cubestack.emulator.i2cdev.running import HostBus
@@ -133,11 +133,12 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
     for name in names:
         beside = opened[0] if opened else None
         options = device_options.chosen_options(args, device(name))
-        opened.append(
-            open_device(
-                name, args.scene, seed=args.seed, engine=args.engine, beside=beside, **options
+        with nullcontext() if args.quiet else busy(f"starting {device(name).title}"):
+            opened.append(
+                open_device(
+                    name, args.scene, seed=args.seed, engine=args.engine, beside=beside, **options
+                )
             )
-        )
         stack.callback(opened[-1].close)
     board = opened[0].board
     device_options.inject_plan(opened[0].faults, args.faults, None if args.quiet else say)
@@ -146,14 +147,14 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
     for old, new in args.i2c_addr:
         bus.move(old, new)
 
-    def busy() -> bool:
+    def at_work() -> bool:
         return any(one.board.busy() for one in opened)
 
-    while busy() and kernel.now < BOOT_LIMIT_PS:
+    while at_work() and kernel.now < BOOT_LIMIT_PS:
         kernel.step()
     adapter = I2cAdapter(kernel, bus, address_errno=int(getattr(errno, args.nack_errno)))
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-"))
-    host_bus = emulated_bus(kernel, busy, adapter, Path(folder) / f"i2c-{args.bus}")
+    host_bus = emulated_bus(kernel, at_work, adapter, Path(folder) / f"i2c-{args.bus}")
     stack.callback(host_bus.port.close)
     return host_bus
 

@@ -8,7 +8,7 @@ from cubestack.host.cli.device_options import add_board_arguments, given_options
 from cubestack.host.devices.registry import device_names
 from cubestack.host.devices.remote_controls import TOKEN
 from cubestack.host.devices.targets import FORMS, Target, open_target
-from cubestack.host.terminal import say
+from cubestack.host.terminal import busy, say
 
 
 def add_target_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,18 +32,19 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
 def open_any_target(text: str, args: argparse.Namespace) -> Target:
     """Open the target ``text`` with these options; raises what ``open_target`` does."""
     options = given_options(args)
-    target = open_target(
-        text,
-        args.device,
-        service_port=args.bench,
-        backup=args.backup,
-        baud=args.baud,
-        scene=args.scene,
-        seed=args.seed,
-        record=args.record,
-        control=args.control,
-        options=options,
-    )
+    with busy(f"opening {text}"):
+        target = open_target(
+            text,
+            args.device,
+            service_port=args.bench,
+            backup=args.backup,
+            baud=args.baud,
+            scene=args.scene,
+            seed=args.seed,
+            record=args.record,
+            control=args.control,
+            options=options,
+        )
     if target.device is not None:
         tell_notices(target.device, options, say)
     return target

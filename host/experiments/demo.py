@@ -13,7 +13,7 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device
 from cubestack.host.devices.emulating import emulating
 from cubestack.host.errors import PortClosedError, PortOpenError
-from cubestack.host.terminal import console, progress_bar, say
+from cubestack.host.terminal import busy, head, say, tell
 from cubestack.host.transport.streams import open_transport
 
 ANSWER_TIMEOUT_S = 5.0
@@ -32,7 +32,7 @@ class Demo:
         self.out = out
         self.name = name
         self._started = time.monotonic()
-        console.rule(title)
+        head(title)
 
     @contextmanager
     def client(
@@ -56,7 +56,7 @@ class Demo:
         wall = f"{time.monotonic() - self._started:.1f} s of wall time"
         times = wall if virtual_s is None else f"{virtual_s:.1f} s of virtual time in {wall}"
         names = ", ".join(str(self.out / picture) for picture in pictures)
-        console.print(f"{times}; pictures: {names}", soft_wrap=True)
+        tell(f"{times}; pictures: {names}")
 
 
 @contextmanager
@@ -66,10 +66,12 @@ def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
     line = ""
     try:
         with emulating([*words, "--pty", str(port), "--pace", "fast"]) as said:
-            line = next(said, "")
-            if not port.exists():
-                raise PortOpenError(line or "the emulator did not start")
-            say(line)
+            for line in said:
+                say(line)  # where it serves, or that it takes long, or what is wrong
+                if port.exists():
+                    break
+            else:
+                raise PortOpenError("the emulator did not start")
             yield port
     except PortClosedError:
         say(f"the emulator ended: {[line, *said][-1]}")
@@ -78,12 +80,11 @@ def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
 
 def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """The picture that ``fetch`` gets, with a progress bar."""
-    with progress_bar() as bar:
-        task = bar.add_task(f"downloading {what}", total=None)
-        return fetch(lambda done, total: bar.update(task, completed=done, total=total))
+    with busy(f"downloading {what}") as shown:
+        return fetch(shown)
 
 
 def tell_times(phases_ms: dict[str, float], indent: str = "") -> None:
     """Tell the virtual times of a measurement's steps."""
     times = ", ".join(f"{name} {ms:.1f} ms" for name, ms in phases_ms.items())
-    console.print(f"{indent}virtual time: {times}", soft_wrap=True)
+    tell(f"{indent}virtual time: {times}")

@@ -134,7 +134,8 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
     try:
         connect: Any = import_module("distributed").Client
     except ModuleNotFoundError:
-        raise ValueError("a scheduler needs distributed: pip install cubestack[cluster]") from None
+        text = 'a scheduler needs distributed: pip install "cubestack[cluster]"'
+        raise ValueError(text) from None
     try:
         client = connect(address, timeout=CONNECT)
     except (OSError, ValueError) as error:

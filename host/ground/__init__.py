@@ -1,1 +1,7 @@
 """Pages and programs that look at a sensor and steer it, by HTTP."""
+
+from importlib.util import find_spec
+
+for _name in ("starlette", "uvicorn", "websockets"):
+    if find_spec(_name) is None:
+        raise ValueError(f'this needs {_name}: pip install "cubestack[ground]"')

@@ -7,14 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
 
-try:
-    from starlette.types import ASGIApp
-    from uvicorn import Config, Server
-    from uvicorn.protocols.http.h11_impl import H11Protocol
-except ModuleNotFoundError as missing:
-    raise ValueError(
-        f"this needs {missing.name}, which is not installed: pip install cubestack[ground]"
-    ) from None
+from starlette.types import ASGIApp
+from uvicorn import Config, Server
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from cubestack.host.errors import PortOpenError
 

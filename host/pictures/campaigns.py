@@ -20,7 +20,7 @@ def figure(width: float, height: float) -> "Figure":
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise ValueError("figures need matplotlib: pip install cubestack[plots]") from None
+        raise ValueError('figures need matplotlib: pip install "cubestack[plots]"') from None
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -194,7 +194,8 @@ def test_any_program_opens_its_port(sensor: Installed, tmp_path: Path) -> None:
     with serving:
         try:
             assert serving.stderr is not None
-            assert f"SunSlit serves on {port}" in serving.stderr.readline()
+            while f"SunSlit serves on {port}" not in (line := serving.stderr.readline()):
+                assert line
             with library.connect(str(port), "sunslit") as client:
                 found = client.measure()
         finally:

@@ -29,7 +29,7 @@ def test_off_a_terminal_lines_tell_how_far_it_is(monkeypatch: pytest.MonkeyPatch
             yield number
 
     assert list(terminal.progress(slow(), 3, "measuring")) == [0, 1, 2]
-    assert lines[0] == "measuring: 0 of 3"
+    assert lines[0] == "measuring: 0 of 3, 0 s"
     assert any(line.startswith("measuring: 2 of 3, ") for line in lines)
     assert all(line.endswith(" s left") for line in lines[1:] if "0 of 3" not in line)
 
@@ -44,7 +44,54 @@ def test_what_was_done_before_tells_nothing_about_the_rate(monkeypatch: pytest.M
         assert heard.wait(10.0)
 
     assert len(list(terminal.progress(items(), 1001, "measuring", before=1000))) == 1000
-    assert lines[-1] == "measuring: 1000 of 1001"
+    assert lines[-1] == "measuring: 1000 of 1001, 0 s"
+
+
+def test_what_has_no_steps_tells_how_long_it_has_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines, heard = list[str](), Event()
+    monkeypatch.setattr(terminal, "EVERY_S", 0.01)
+    monkeypatch.setattr(terminal, "say", lambda text: (lines.append(text), heard.set()))
+    with terminal.busy("starting CubeStar"):
+        assert heard.wait(10.0)
+    assert set(lines) == {"starting CubeStar: 0 s"}
+
+
+def test_only_the_innermost_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines, heard = list[str](), Event()
+    monkeypatch.setattr(terminal, "EVERY_S", 0.01)
+    monkeypatch.setattr(terminal, "say", lambda text: (lines.append(text), heard.set()))
+    with terminal.busy("starting AraMiS"):
+        with terminal.busy("scanning the sky") as shown:
+            shown(3, 10)
+            for _ in range(3):
+                heard.clear()
+                assert heard.wait(10.0)
+            inside = lines[-2:]
+        heard.clear()
+        assert heard.wait(10.0)
+    assert all(line.startswith("scanning the sky: 3 of 10, ") for line in inside)
+    assert lines[-1].startswith("starting AraMiS: ")
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_a_long_line_of_a_result_is_not_broken(
+    monkeypatch: pytest.MonkeyPatch, is_terminal: bool
+) -> None:
+    file, long = StringIO(), "[no markup] " + "many words " * 20
+    console = Console(file=file, width=30, force_terminal=is_terminal, color_system=None)
+    monkeypatch.setattr(terminal, "console", console)
+    terminal.tell(long)
+    terminal.head(long)
+    assert file.getvalue().splitlines() == [long, f"== {long} =="]
+
+
+def test_a_title_is_ruled_where_it_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = StringIO()
+    console = Console(file=file, width=30, force_terminal=True, color_system=None)
+    monkeypatch.setattr(terminal, "console", console)
+    terminal.head("a title")
+    assert " a title " in file.getvalue()
+    assert "──" in file.getvalue()
 
 
 def test_quick_or_quiet_work_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:
@@ -88,3 +135,21 @@ def test_a_table_is_drawn_where_it_has_room(monkeypatch: pytest.MonkeyPatch) -> 
     lines = printed(monkeypatch, 80, is_terminal=True)
     assert any("┃" in line for line in lines)
     assert any("calculated, MaxStarsDetection" in line for line in lines)
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_results_come_above_the_bar_or_go_to_their_file(
+    monkeypatch: pytest.MonkeyPatch, is_terminal: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results, errors = StringIO(), StringIO()
+    for name, file, drawn in (("console", results, is_terminal), ("_errors", errors, True)):
+        console = Console(file=file, width=30, force_terminal=drawn, color_system=None)
+        monkeypatch.setattr(terminal, name, console)
+    long = "a result that is longer than the terminal is wide"
+    for _ in terminal.progress(range(2), 2, "proofs"):
+        terminal.tell(long)
+        print("printed")
+    assert "proofs" in errors.getvalue()
+    assert results.getvalue().splitlines() == ([] if is_terminal else [long, long])
+    assert errors.getvalue().count(long) == (2 if is_terminal else 0)
+    assert capsys.readouterr().out == "printed\nprinted\n"

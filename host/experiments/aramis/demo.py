@@ -15,7 +15,7 @@ from cubestack.host.experiments.attitude import errors
 from cubestack.host.experiments.demo import Demo, download, tell_times
 from cubestack.host.experiments.star_truth import true_stars
 from cubestack.host.pictures.images import annotate, save_picture
-from cubestack.host.terminal import console
+from cubestack.host.terminal import tell
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.board import AramisBoard
@@ -42,7 +42,7 @@ def show(
     truth = quaternion_from_pointing(ra, dec, roll)
     scene = f'kind = "sky"\nra_deg = {ra}\ndec_deg = {dec}\nroll_deg = {roll}\nseed = {seed}\n'
     with demo.client(device, scene, board) as (aramis, _):
-        console.print(f"activated; catalogue: {aramis.activate().name.lower()}")
+        tell(f"activated; catalogue: {aramis.activate().name.lower()}")
         lost = aramis.measure()
         _report("lost in space", lost, truth)
         boresight = matrix_from_quaternion(truth)[2]
@@ -68,11 +68,10 @@ def show(
 def _report(title: str, attitude: Attitude, truth: NDArray[np.float64]) -> None:
     outcome = f"{attitude.outcome.name.lower()}: {attitude.reason.name.lower()}"
     if not attitude.valid or attitude.quaternion is None:
-        console.print(f"{title}: {outcome}")
+        tell(f"{title}: {outcome}")
         return
     across, about = errors(attitude.quaternion, truth)
-    console.print(
+    tell(
         f"{title}: {outcome}, {attitude.matched} of {attitude.detected} stars; error: "
-        f"{3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight",
-        soft_wrap=True,
+        f"{3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight"
     )

@@ -21,7 +21,7 @@ def write(folder: Folder) -> Path:
         arrow: Any = import_module("pyarrow")
         files: Any = import_module("pyarrow.parquet")
     except ModuleNotFoundError:
-        raise ValueError("Parquet needs pyarrow: pip install cubestack[parquet]") from None
+        raise ValueError('Parquet needs pyarrow: pip install "cubestack[parquet]"') from None
     table = arrow.Table.from_pylist([vars(row) for row in folder.rows()])
     if not table.num_rows:
         raise ValueError(f"{folder.path} has no rows yet")

@@ -15,7 +15,7 @@ from cubestack.host.devices.device import Device
 from cubestack.host.experiments.demo import Demo, download, tell_times
 from cubestack.host.pictures.cubesense import annotate_nadir, annotate_sun
 from cubestack.host.pictures.images import save_picture
-from cubestack.host.terminal import console
+from cubestack.host.terminal import tell
 from cubestack.host.transport.streams import open_transport
 
 if TYPE_CHECKING:
@@ -77,17 +77,16 @@ def _measure(
 def _report(measured: Measurement, truth: tuple[float, float], phases_ms: dict[str, float]) -> None:
     name = measured.camera.name.lower()
     if not measured.detected:
-        console.print(f"{name}: {measured.capture.name}, {measured.detect.name}")
+        tell(f"{name}: {measured.capture.name}, {measured.detect.name}")
         return
     cosine = float(measured.vector @ direction(*truth))
     error_deg = np.degrees(np.arccos(min(1.0, cosine)))
-    console.print(
+    tell(
         f"{name}: measured alpha {measured.alpha_deg:+.2f}°, beta {measured.beta_deg:+.2f}°; "
-        f"truth {truth[0]:+.2f}°, {truth[1]:+.2f}°; error {error_deg:.3f}°",
-        soft_wrap=True,
+        f"truth {truth[0]:+.2f}°, {truth[1]:+.2f}°; error {error_deg:.3f}°"
     )
     tell_times(phases_ms, "  ")
-    console.print(f"  published:    {PUBLISHED_MS[measured.camera]} ms from imaging to centroid")
+    tell(f"  published:    {PUBLISHED_MS[measured.camera]} ms from imaging to centroid")
 
 
 def _annotate(

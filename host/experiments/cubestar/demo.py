@@ -20,7 +20,7 @@ from cubestack.host.experiments.demo import Demo, download, tell_times
 from cubestack.host.experiments.star_truth import true_stars
 from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.pictures.sheet import Lens
-from cubestack.host.terminal import console
+from cubestack.host.terminal import tell
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
@@ -127,15 +127,15 @@ def _show(
         if subject.camera is not None:
             fit = calibrate(load_camera(subject.camera).cropped(*CROP))
             cubestar.configure(fit.settings)
-            console.print(f"camera parameters loaded; the fit is good to {fit.rms_px:.2f} px rms")
+            tell(f"camera parameters loaded; the fit is good to {fit.rms_px:.2f} px rms")
         threshold = find_threshold(cubestar)
-        console.print(f"detection threshold found by trying: {threshold} DN")
+        tell(f"detection threshold found by trying: {threshold} DN")
         cubestar.capture_and_process()
         attitude = cubestar.attitude()
         _report(attitude, subject.truth)
         phases = cubestar.phase_times()
         tell_times({name: phases[name] for name in PUBLISHED_PHASES})
-        console.print(f"published:    {PUBLISHED_TIMES}", soft_wrap=True)
+        tell(f"published:    {PUBLISHED_TIMES}")
         stars = cubestar.stars()
         left_out = left_out_by(cubestar)
         picture = download("the picture over the serial line", cubestar.stream_image)
@@ -182,19 +182,16 @@ def _report(found: Attitude, truth: NDArray[np.float64]) -> None:
     from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
 
     if not found.valid:
-        console.print("no attitude found in this picture")
+        tell("no attitude found in this picture")
         return
     if found.quaternion @ truth < 0:
         truth = -truth  # the same attitude
-    console.print(f"attitude from {found.matched} stars, measured beside the truth:")
+    tell(f"attitude from {found.matched} stars, measured beside the truth:")
     for name, q in (("measured", found.quaternion), ("truth", truth)):
         ra, dec, roll = pointing_from_matrix(matrix_from_quaternion(q))
         parts = " ".join(f"{part:+.5f}" for part in q)
-        console.print(
-            f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]",
-            soft_wrap=True,
-        )
+        tell(f"  {name:<9} RA {ra:8.4f}°  Dec {dec:+8.4f}°  roll {roll:+9.4f}°  q [{parts}]")
     across, about = errors(found.quaternion, truth)
-    console.print(
+    tell(
         f"error: {3600 * across:.1f} arcsec across, {3600 * about:+.1f} arcsec about the boresight"
     )

@@ -28,7 +28,7 @@ TITLE = f"# Hard skies\n\n{BEGIN}{END}"
 def check(folder: Path) -> None:
     """Make the folder; ValueError when it can not be one, or figures or a page have no place."""
     if find_spec("matplotlib") is None:
-        raise ValueError("--out: figures need matplotlib: pip install cubestack[plots]")
+        raise ValueError('--out: figures need matplotlib: pip install "cubestack[plots]"')
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):

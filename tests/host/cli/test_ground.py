@@ -37,13 +37,14 @@ def test_a_port_that_there_is_not() -> None:
     assert "/dev/nothing" in line
 
 
+@pytest.mark.parametrize("missing", ["starlette", "uvicorn", "websockets"])
 @pytest.mark.parametrize("words", [["ground", "emulated:cubestar"], CONTROLLED])
-def test_what_must_be_installed_is_told(words: list[str]) -> None:
+def test_what_must_be_installed_is_told(words: list[str], missing: str) -> None:
     text = (
-        "import sys; sys.modules['uvicorn'] = None; from cubestack.host.cli.main import main; "
+        f"import sys; sys.modules['{missing}'] = None; from cubestack.host.cli.main import main; "
         f"sys.exit(main({words}))"
     )
     call = [sys.executable, "-c", text]
     ended = subprocess.run(call, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 2
-    assert "needs uvicorn, which is not installed: pip install cubestack[ground]" in ended.stderr
+    assert ended.stderr.endswith(f'this needs {missing}: pip install "cubestack[ground]"\n')

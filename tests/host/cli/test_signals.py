@@ -39,7 +39,8 @@ def test_no_link_is_left(number: signal.Signals, tmp_path: Path) -> None:
     link = tmp_path / "tty"
     with begun("emulate", "cubestar", "--pty", str(link)) as process:
         assert process.stderr is not None
-        assert "serves on" in process.stderr.readline()
+        while "serves on" not in (line := process.stderr.readline()):
+            assert line
         assert link.is_symlink()
         process.send_signal(number)
         process.communicate(timeout=SOON_S)
