@@ -303,6 +303,10 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         if judged and len(right) < POOR * judged:
             yield f"what may help: {self.advice(results)}"
 
+    def succeeded(self, results: Sequence[AttitudeResultT]) -> bool:
+        """At least one has an attitude."""
+        return any(result.solved for result in results)
+
     def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
         """Where on the sky it was right."""
         known = [each for each in results if each.get("truth") is not None]

@@ -267,6 +267,10 @@ class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult])
                     yield f"{sensor}: {claimed}"
         yield f"{wall_s:.1f} s wall time"
 
+    def succeeded(self, results: Sequence[SensorResult]) -> bool:
+        """Something was found, or rightly nothing."""
+        return any(result.detected or result.right for result in results)
+
 
 def _ending(result: SensorResult) -> str:
     """What became of it, and why nothing was found."""

@@ -165,7 +165,7 @@ def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, image
         f'{{"f_px": 1071, "cx_px": 512, "cy_px": 256, "images": {images}}}', encoding="utf-8"
     )
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera, "--json")
-    assert outcome.code == DONE
+    assert outcome.code == FAILED  # the picture is black
     assert json.loads(outcome.out)["truth"] is None
 
 
@@ -262,6 +262,9 @@ def test_measure_as_a_check(run: Run) -> None:
     outcome = run(*call, "--min-right", "0")
     assert outcome.code == DONE
     assert "what may help: 0 stars found: --threshold below 250" in outcome.out
+    outcome = run(*call)
+    assert outcome.code == FAILED  # nothing at all was measured
+    assert "of 2: 0.0 % solved" in outcome.out
     check_one_line(run(*call, "--min-right", "101"), "'101'", "0..100")
 
 
