@@ -8,12 +8,10 @@ import re
 import shlex
 import shutil
 import subprocess
-import textwrap
 import tomllib
 from collections.abc import Iterator
-from itertools import takewhile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 import yaml
@@ -24,30 +22,21 @@ from cubestack.host.devices.emulated import open_device
 from tests.conftest import Run
 
 from .conftest import ROOT, Served
+from .document_code import (
+    BLOCKS,
+    LEFT,
+    LONG,
+    SERVES,
+    Code,
+    lines_of,
+    own_call,
+    reader_files,
+    words_of,
+)
 
-BLOCK = re.compile(r"^( *)```([^\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 LANGUAGES = {"sh", "python", "toml", "yaml", "text", "csv"}
 #: Dialogues and register accesses of the protocol pages, whose own tests run them.
 LANGUAGES |= {"wire", "wire-sky", "registers", "py"}
-ENVIRONMENT = re.compile(r"[A-Z_]+=\S*")
-
-
-class Code(NamedTuple):
-    """A block, or a line of one."""
-
-    document: str
-    language: str
-    text: str
-
-
-def blocks() -> Iterator[Code]:
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
-        for indent, language, text in BLOCK.findall(path.read_text(encoding="utf-8")):
-            shown = textwrap.dedent(text) if indent else text
-            yield Code(path.name, language, shown)
-
-
-BLOCKS = list(blocks())
 
 
 def of(language: str) -> list[Any]:
@@ -56,24 +45,20 @@ def of(language: str) -> list[Any]:
 
 
 def commands() -> Iterator[tuple[str, list[str]]]:
-    """Document and words of each command of a shell; without environment, `&` and redirections."""
+    """Document and words of each command of a shell; without environment."""
     for block in BLOCKS:
         if block.language == "sh":
-            for line in block.text.replace("\\\n", " ").splitlines():
+            for line in lines_of(block.text):
                 for part in re.split(r";(?=\s*printf|\s*head)", line):
-                    words = shlex.split(part, comments=True)
-                    while words and ENVIRONMENT.fullmatch(words[0]):
-                        del words[0]
-                    if words:
+                    if words := words_of(part):
                         yield block.document, words
 
 
 def own() -> Iterator[tuple[str, str]]:
     """Document and line of each command of this project."""
     for document, words in commands():
-        if Path(words[0]).name == "cubestack":
-            call = takewhile(lambda word: word not in ("|", ">", "&", "&&", ";"), words[1:])
-            yield document, shlex.join(call)
+        if (call := own_call(words)) is not None:
+            yield document, call
 
 
 OWN = sorted(set(own()))
@@ -83,15 +68,7 @@ OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", 
 OTHERS |= {"", "gdb-multiarch"}  # the first one is `.`
 
 #: Commands that are parsed and not run here, and why.
-LEFT = {
-    r"\bglow\b": "a device of the text: tests/examples/test_adding_a_sensor.py",
-    r"^emulate\b|^ground\b": "serves until Ctrl-C",
-    r"/dev/ttyUSB0|\./tty": "a port that somebody has to serve",
-    r"program\.elf|picture\.elf": "needs the firmware of tests/system/test_own_firmware.py",
-    r"sky\.jpg|night/|bench/": "needs photographs",
-    r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",
-    r"^campaign (?!--list)|^upsets|^fidelity|^costs|^hdl|^bench|^layouts": "minutes to hours",
-}
+NOT_HERE = LEFT | {SERVES: "serves until Ctrl-C", LONG: "minutes to hours"}
 
 #: Commands that take a moment; all others that are run are slow.
 QUICK = r"^registers|^export|^catalogue|^picture|--list$|^shell|^decode|^replay|^log .*--each"
@@ -153,24 +130,14 @@ def test_the_command_takes_it(document: str, line: str, folder: Path) -> None:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of a reader: files that the documents name are there, with what they say."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    texts = {
-        name: next(one.text for one in BLOCKS if one.document == page and one.language == "toml")
-        for name, page in {
-            "unit.toml": "calibration.md",
-            "plan.toml": "faults.md",
-            "false-stars.toml": "campaigns.md",
-        }.items()
-    }
-    sky = 'kind = "sky"\nra_deg = 83.8\ndec_deg = -5.4\n'
-    texts |= {"sky.toml": sky, "drift.toml": sky, "sun.toml": 'kind = "earth-sun"\n'}
-    for name, text in texts.items():
+    for name, text in reader_files().items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 def runnable() -> list[Any]:
-    found = [one for one in OWN if not any(re.search(left, one[1]) for left in LEFT)]
+    found = [one for one in OWN if not any(re.search(left, one[1]) for left in NOT_HERE)]
     return [
         pytest.param(*one, marks=() if re.search(QUICK, one[1]) else pytest.mark.slow)
         for one in found
@@ -178,7 +145,7 @@ def runnable() -> list[Any]:
 
 
 def test_nothing_is_left_out_that_is_not_there() -> None:
-    for left in LEFT:
+    for left in NOT_HERE:
         assert any(re.search(left, line) for _, line in OWN), left
     assert len(runnable()) > 30
 

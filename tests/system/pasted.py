@@ -1,0 +1,257 @@
+"""Pastes the commands of README.md and docs/, in their order, as somebody would who has just come.
+
+``python -m tests.system.pasted`` makes a fresh clone, and in it runs every block of shell of
+README.md and then of each page, line by line in one shell a document: what one line activates,
+installs or writes, the next one has. What serves until Ctrl-C serves until its document ends, or
+the next one takes its place; scripts of README.md run beside it. The tutorial has an empty folder.
+
+It tells of each command how it ended, how long it took, or why it was left out; the exit code is 1
+when one of them failed. ``--long`` has those too that take minutes to hours.
+"""
+
+import argparse
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import NamedTuple
+
+from .document_code import (
+    LEFT,
+    LONG,
+    ROOT,
+    SERVES,
+    Code,
+    blocks,
+    lines_of,
+    own_call,
+    reader_files,
+    words_of,
+)
+
+MARK = "-- pasted, exit code"
+READY = "Ctrl-C ends it"
+LONG_TARGETS = {"test", "test-all", "test-hdl", "mutants", "bench-engines", "libraries"}
+EMPTY_FOLDER = {"tutorial.md"}
+ENDING_S = 20.0
+
+
+class Pasted(NamedTuple):
+    """A command, and what became of it; ``code`` is None where it was left out."""
+
+    document: str
+    line: str
+    code: int | None
+    seconds: float
+    said: str
+
+    @property
+    def good(self) -> bool:
+        """Whether it did not fail."""
+        return not self.code
+
+    def __str__(self) -> str:
+        ended = "left out" if self.code is None else "failed" if self.code else "ok"
+        told = f": {self.said}" if self.code or self.code is None else ""
+        return f"{self.document}  {ended:8} {self.seconds:6.1f} s  {self.line}{told}"
+
+
+class Shell:
+    """A bash that is typed into; job control is on, as in a terminal."""
+
+    def __init__(self, folder: Path) -> None:
+        """Start it in ``folder``, with nothing of this process's virtual environment."""
+        own = os.environ.get("VIRTUAL_ENV")
+        path = [one for one in os.environ["PATH"].split(":") if not own or own not in one]
+        dropped = {"VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME"}
+        environment = {name: value for name, value in os.environ.items() if name not in dropped}
+        self.folder = folder
+        self._process = subprocess.Popen(
+            ["bash", "--noprofile", "--norc"],
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            env=environment | {"PATH": ":".join(path)},
+        )
+        self._said = SimpleQueue[str | None]()
+        self._listener = Thread(target=self._listen, daemon=True)
+        self._listener.start()
+        self._served: list[int] = []
+        self.run("set -m", 10.0)
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self._said.put(line.rstrip())
+        self._said.put(None)
+
+    def run(self, line: str, limit_s: float) -> tuple[int, list[str]]:
+        """Its exit code, and what it said; it is interrupted after ``limit_s``."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{{ {line}\n}} </dev/null\nprintf '\\n{MARK} %s\\n' $?\n")
+        self._process.stdin.flush()
+        until, said = time.monotonic() + limit_s, list[str]()
+        while True:
+            try:
+                heard = self._said.get(timeout=max(0.0, until - time.monotonic()))
+            except Empty:
+                said.append(f"interrupted after {limit_s:.0f} s")
+                self._interrupt()
+                until = time.monotonic() + ENDING_S
+                continue
+            if heard is None:
+                return 1, [*said, "the shell ended"]
+            if heard.startswith(MARK):
+                return int(heard.removeprefix(MARK)), said
+            said.append(heard)
+
+    def _interrupt(self) -> None:
+        """End all of the command; by Ctrl-C the shell would end as well."""
+        tasks = Path(f"/proc/{self._process.pid}/task").glob("*/children")
+        for child in {int(one) for task in tasks for one in task.read_text().split()}:
+            if child not in self._served:
+                os.killpg(child, signal.SIGTERM)
+
+    def serve(self, line: str, limit_s: float) -> tuple[int, list[str]]:
+        """Start what serves, and wait until it says so; what served before has ended."""
+        self.hang_up()
+        log = self.folder / "served.log"
+        code, said = self.run(f"{line.split(' #')[0]} >{log} 2>&1 & echo $!", 10.0)
+        process = int(next(word for word in said if word.isdecimal()))
+        until = time.monotonic() + limit_s
+        while READY not in log.read_text():
+            if time.monotonic() > until or not Path(f"/proc/{process}").exists():
+                return 1, log.read_text().splitlines()
+            time.sleep(0.05)
+        self._served.append(process)
+        return code, log.read_text().splitlines()
+
+    def hang_up(self) -> None:
+        """Press Ctrl-C where something serves."""
+        while self._served:
+            os.killpg(process := self._served.pop(), signal.SIGINT)
+            self.run(f"wait {process}", ENDING_S)
+
+    def close(self) -> None:
+        """End it, and what it began."""
+        self.hang_up()
+        self._process.communicate("exit\n", ENDING_S)
+        self._listener.join(ENDING_S)
+
+
+def left_out(line: str, folder: Path, *, long: bool) -> str:
+    """Why a line is not pasted; empty where it is."""
+    words = words_of(line)
+    if words[0] == "make" and not long and LONG_TARGETS & set(words):
+        return "takes minutes"
+    call = own_call(words)
+    reasons = LEFT if call is not None else {}
+    for left, reason in reasons.items():
+        if re.search(left, call or ""):
+            port = re.search(r"\./tty\S*", call or "")
+            there = port is not None and (folder / port[0]).exists()
+            if not there and not (port is not None and re.search(SERVES, call or "")):
+                return reason
+    if call is not None and not long and re.search(LONG, call):
+        return "minutes to hours"
+    if any(word in line for word in ("PROGRAM", "my_script", "picture.elf", "./star", "dask")):
+        return "the reader's turn"
+    return ""
+
+
+def pasted(
+    document: Path, folder: Path, *, long: bool, limit_s: float, ready: Sequence[str] = ()
+) -> Iterator[Pasted]:
+    """Paste the blocks of ``document`` into a shell in ``folder``, after the lines ``ready``."""
+    shell = Shell(folder)
+    try:
+        for line in ready:
+            shell.run(line, limit_s)
+        for number, block in enumerate(blocks(document)):
+            if block.language == "sh":
+                for line in lines_of(block.text):
+                    yield _paste(shell, document.name, line, long=long, limit_s=limit_s)
+            elif block.language == "python":
+                yield from _paste_python(shell, block, number, limit_s)
+    finally:
+        shell.close()
+
+
+def _paste(shell: Shell, document: str, line: str, *, long: bool, limit_s: float) -> Pasted:
+    shown = shlex.join(words_of(line))
+    if reason := left_out(line, shell.folder, long=long):
+        return Pasted(document, shown, None, 0.0, reason)
+    call, started = own_call(words_of(line)), time.monotonic()
+    serves = call is not None and re.search(SERVES, call)
+    code, said = (shell.serve if serves else shell.run)(line, limit_s)
+    heard = [one for one in said if one.strip()]
+    return Pasted(document, shown, code, time.monotonic() - started, (heard or [""])[-1])
+
+
+def _paste_python(shell: Shell, block: Code, number: int, limit_s: float) -> Iterator[Pasted]:
+    """Save a block that names its file; of README.md, run one that is a script."""
+    named = re.match(r"# (\w+\.py)\n", block.text)
+    name = named[1] if named else f"pasted{number}.py"
+    if named or block.document == "README.md":
+        (shell.folder / name).write_text(block.text, "utf-8")
+    if not named and block.document == "README.md":
+        line = f".venv/bin/python {name}"
+        yield _paste(shell, block.document, line, long=True, limit_s=limit_s)
+
+
+def fresh(folder: Path) -> Path:
+    """A copy of the project in ``folder``, as somebody has it who has just got it."""
+    if (ROOT / ".git").exists():
+        subprocess.run(["git", "clone", "-q", str(ROOT), str(folder)], check=True)
+    else:
+        made = shutil.ignore_patterns(".venv", "out", "build", "*.egg-info", "__pycache__")
+        shutil.copytree(ROOT, folder, ignore=made)
+    return folder
+
+
+def main() -> int:
+    """Paste, and report."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("documents", nargs="*", help="README.md, docs/….md; default: all")
+    parser.add_argument("--long", action="store_true", help="those too that take minutes to hours")
+    parser.add_argument("--limit", type=float, default=900.0, metavar="S", help="of a command")
+    args = parser.parse_args()
+    bad = 0
+    with tempfile.TemporaryDirectory(prefix="pasted-") as base:
+        clone = fresh(Path(base) / "cubestack")
+        pages = (str(one.relative_to(clone)) for one in sorted((clone / "docs").glob("*.md")))
+        for name in args.documents or ("README.md", *pages):
+            document, ready = clone / name, list[str]()
+            folder = clone
+            if document.name in EMPTY_FOLDER:
+                folder = Path(base) / document.stem
+                folder.mkdir()
+                text = document.read_text("utf-8")
+                document.write_text(
+                    text.replace("pip install cubestack ", f"pip install {clone} "), "utf-8"
+                )
+            elif document.name != "README.md":
+                ready = ["make -s venv", ". .venv/bin/activate"]
+                for file, content in reader_files().items():
+                    (folder / file).write_text(content, "utf-8")
+            for one in pasted(document, folder, long=args.long, limit_s=args.limit, ready=ready):
+                print(one, flush=True)
+                bad += not one.good
+    print(f"{bad} failed" if bad else "all went well")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
