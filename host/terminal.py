@@ -35,6 +35,10 @@ class _Rate(bars.ProgressColumn):
         return Text("" if speed is None else f"{speed:.3g}/s", style="progress.data.speed")
 
 
+def _draws(shown: Console) -> bool:
+    return shown.is_terminal and not shown.is_dumb_terminal
+
+
 def hush(quiet: bool) -> None:
     """Show neither progress nor lines for the reader while ``quiet``."""
     _errors.quiet = quiet
@@ -98,7 +102,7 @@ def progress_bar() -> bars.Progress:
         bars.TimeElapsedColumn(),
         bars.TimeRemainingColumn(),
         console=_errors,
-        disable=_errors.quiet or not _errors.is_terminal,
+        disable=_errors.quiet or not _draws(_errors),
         transient=True,
         redirect_stdout=False,  # it may be a file, and not the terminal
     )
@@ -129,7 +133,7 @@ def busy(label: str, before: int = 0) -> Iterator[Told]:
     the innermost one. Yields what may be told how much is done, and of how many, of which
     ``before`` were done before.
     """
-    if _errors.is_terminal:
+    if _draws(_errors):
         with _shown_bar() as bar:
             task = bar.add_task(label, total=None)
             try:

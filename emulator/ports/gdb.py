@@ -5,6 +5,7 @@ leaves, by whichever way, its breakpoints are removed and the processor runs on.
 """
 
 import contextlib
+import os
 import select
 import socket
 import time
@@ -39,9 +40,9 @@ class GdbEndpoint(Endpoint):
         try:
             self._server = socket.create_server((LOOPBACK, port))
         except OSError as error:
-            raise PortError(
-                f"can not listen on {LOOPBACK}:{port}: {error.strerror}; choose another port"
-            ) from error
+            told = os.strerror(error.errno or 0)
+            text = f"can not listen on {LOOPBACK}:{port}: {told}; choose another port"
+            raise PortError(text) from error
         self._server.setblocking(False)
         self.address: tuple[str, int] = self._server.getsockname()
         self.name = f"{self.address[0]}:{self.address[1]}"

@@ -2,6 +2,7 @@
 
 import contextlib
 import ipaddress
+import os
 import select
 import socket
 
@@ -125,9 +126,8 @@ def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
     try:
         server = socket.create_server((str(address[0]), port), family=family)
     except OSError as error:
-        raise PortError(
-            f"can not listen on {host}:{port}: {error.strerror}; choose another port"
-        ) from error
+        told = os.strerror(error.errno) if error.errno else error
+        raise PortError(f"can not listen on {host}:{port}: {told}; choose another port") from error
     server.setblocking(False)
     server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
     return server

@@ -1,5 +1,6 @@
 """A picture file as light: the part of a photograph that a sensor sees, in 8-bit grey values."""
 
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -76,7 +77,11 @@ def load_picture(file: Path) -> NDArray[np.uint8]:
             refuses it.
     """
     try:
-        with Image.open(file) as image:
+        with warnings.catch_warnings():
+            # Where Pillow warns of the size it still reads; the file is the user's own.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(file)
+        with image:
             if image.format not in FORMATS:
                 raise SceneError(
                     f"{file.name} is a {image.format} picture; right would be {', '.join(FORMATS)}"

@@ -4,6 +4,7 @@ import argparse
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import Field
+from importlib.metadata import metadata
 from typing import Any, NoReturn, TypeVar
 
 from cubestack.host import options
@@ -20,9 +21,20 @@ class Parser(argparse.ArgumentParser):
         """Take what every parser takes."""
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
 
+    def format_help(self) -> str:
+        """The help; where it names documents, also where they are, as an installation has none."""
+        text = super().format_help()
+        return f"{text}\ndocs/: {_documents()}\n" if "docs/" in text else text
+
     def error(self, message: str) -> NoReturn:
         """End with exit code 2."""
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def _documents() -> str:
+    """Where the documents are, as the distribution says it."""
+    links: list[str] = metadata("cubestack").get_all("Project-URL") or []
+    return next(one.removeprefix("Documentation, ") for one in links if one.startswith("Doc"))
 
 
 def typed(kind: Kind[T]) -> Callable[[str], T]:

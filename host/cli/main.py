@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
+from io import TextIOWrapper
 
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.reports import reports
@@ -97,6 +98,13 @@ def _end_in_order() -> None:
             signal.signal(number, end)
 
 
+def _write_anywhere() -> None:
+    """Have a locale without our letters print question marks in their place."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
 def _set_loudness(verbose: int, *, quiet: bool) -> None:
     """What goes to standard error beside errors: warnings, with ``verbose`` more, or nothing."""
     hush(quiet)
@@ -111,6 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line ``arguments`` (default: the process's own); returns the exit code."""
     if arguments is None:
         _end_in_order()
+        _write_anywhere()
     args = make_parser().parse_args(arguments)
     _set_loudness(args.verbose, quiet=args.quiet)
     try:
@@ -125,7 +134,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return WRONG_CALL
     except OSError as error:
-        print(f"cubestack {args.command}: {error}", file=sys.stderr)
+        named = f"{error.filename}: {error.strerror}" if error.filename else error
+        print(f"cubestack {args.command}: {named}", file=sys.stderr)
         return FAILED
     except RuntimeError as error:
         from cubestack.emulator.native.compiler import CompilerError

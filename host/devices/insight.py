@@ -59,7 +59,8 @@ def own_firmware(emulated: AnyEmulated, what: str) -> Any:
     """The insight into a device's own firmware; ValueError where it runs none."""
     insight = emulated.board.insight
     if insight is None:
-        raise ValueError(f"{what}: {emulated.device.name} runs no firmware of its own: --firmware")
+        name = emulated.device.name
+        raise ValueError(f"{what}: {name} runs no firmware of its own: give --firmware")
     return insight
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from inspect import cleandoc
 
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.host.export import field_text
@@ -43,7 +44,7 @@ def _markdown(interface: Interface) -> str:
         *field_text.choice_rows(interface.ack_errors),
     ]
     for choices in interface.choices:
-        parts += ["", f"## {choices.__name__}", "", f"{choices.__doc__}", ""]
+        parts += ["", f"## {choices.__name__}", "", cleandoc(choices.__doc__ or ""), ""]
         parts += field_text.choice_rows(choices)
     for message in interface.messages:
         title = f"{message.kind.value.capitalize()} {message.id}: {message.name}"

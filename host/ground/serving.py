@@ -2,6 +2,7 @@
 
 import asyncio
 import ipaddress
+import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -113,7 +114,7 @@ def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
     try:
         return socket.create_server(address[:2], family=family)
     except (OSError, OverflowError) as error:
-        told = getattr(error, "strerror", None) or error
+        told = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
         raise PortOpenError(f"can not listen on {host}:{port}: {told}") from None
 
 

@@ -1,6 +1,7 @@
 """A picture on its way over the wire, down or up: how far it is, held, and given up."""
 
 import threading
+import warnings
 from collections.abc import Callable
 from io import BytesIO
 
@@ -89,7 +90,10 @@ class Transfer:
 def grey_values(content: bytes) -> NDArray[np.uint8]:
     """Grey values (rows, columns) of a picture file; ValueError for what is none."""
     try:
-        with Image.open(BytesIO(content)) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(BytesIO(content))
+        with image:
             return np.asarray(image.convert("L"))
     except (OSError, Image.DecompressionBombError) as error:
         raise ValueError(f"that is no picture: {error}") from None

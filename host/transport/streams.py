@@ -6,6 +6,7 @@ emulator's in-process link does.
 
 import select
 import socket
+import termios
 from collections.abc import Callable
 from typing import Protocol
 from urllib.parse import urlsplit
@@ -202,4 +203,6 @@ def _reason(error: Exception) -> str:
     """The plain reason of a failure, without pyserial's wrapping."""
     inner = error.__context__ if isinstance(error, serial.SerialException) else error
     text = inner.strerror if isinstance(inner, OSError) and inner.strerror else str(error)
+    if isinstance(inner, termios.error):
+        text = f"it is no serial port ({inner.args[-1]})"
     return " ".join(text.split())

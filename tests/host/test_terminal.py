@@ -78,7 +78,9 @@ def test_a_long_line_of_a_result_is_not_broken(
     monkeypatch: pytest.MonkeyPatch, is_terminal: bool
 ) -> None:
     file, long = StringIO(), "[no markup] " + "many words " * 20
-    console = Console(file=file, width=30, force_terminal=is_terminal, color_system=None)
+    console = Console(
+        file=file, width=30, force_terminal=is_terminal, color_system=None, _environ=TERMINAL
+    )
     monkeypatch.setattr(terminal, "console", console)
     terminal.tell(long)
     terminal.head(long)
@@ -87,7 +89,9 @@ def test_a_long_line_of_a_result_is_not_broken(
 
 def test_a_title_is_ruled_where_it_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
     file = StringIO()
-    console = Console(file=file, width=30, force_terminal=True, color_system=None)
+    console = Console(
+        file=file, width=30, force_terminal=True, color_system=None, _environ=TERMINAL
+    )
     monkeypatch.setattr(terminal, "console", console)
     terminal.head("a title")
     assert " a title " in file.getvalue()
@@ -99,6 +103,8 @@ def test_quick_or_quiet_work_says_nothing(capfd: pytest.CaptureFixture[str]) -> 
     assert list(terminal.progress([1, 2], 2, "measuring", quiet=True)) == [1, 2]
     assert capfd.readouterr() == ("", "")
 
+
+TERMINAL = {"TERM": "xterm"}
 
 ROWS = [("0", "calculated, MaxStarsDetection"), ("12", "no\nstars [2]")]
 
@@ -114,7 +120,9 @@ def table() -> Table:
 
 def printed(monkeypatch: pytest.MonkeyPatch, width: int, *, is_terminal: bool) -> list[str]:
     file = StringIO()
-    console = Console(file=file, width=width, force_terminal=is_terminal, color_system=None)
+    console = Console(
+        file=file, width=width, force_terminal=is_terminal, color_system=None, _environ=TERMINAL
+    )
     monkeypatch.setattr(terminal, "console", console)
     terminal.show(table())
     return file.getvalue().splitlines()
@@ -143,7 +151,9 @@ def test_results_come_above_the_bar_or_go_to_their_file(
 ) -> None:
     results, errors = StringIO(), StringIO()
     for name, file, drawn in (("console", results, is_terminal), ("_errors", errors, True)):
-        console = Console(file=file, width=30, force_terminal=drawn, color_system=None)
+        console = Console(
+            file=file, width=30, force_terminal=drawn, color_system=None, _environ=TERMINAL
+        )
         monkeypatch.setattr(terminal, name, console)
     long = "a result that is longer than the terminal is wide"
     for _ in terminal.progress(range(2), 2, "proofs"):
@@ -153,3 +163,15 @@ def test_results_come_above_the_bar_or_go_to_their_file(
     assert results.getvalue().splitlines() == ([] if is_terminal else [long, long])
     assert errors.getvalue().count(long) == (2 if is_terminal else 0)
     assert capsys.readouterr().out == "printed\nprinted\n"
+
+
+def test_where_nothing_can_be_drawn_lines_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = StringIO()
+    dumb = Console(file=file, force_terminal=True, _environ={"TERM": "dumb"})
+    monkeypatch.setattr(terminal, "_errors", dumb)
+    monkeypatch.setattr(terminal, "EVERY_S", 0.01)
+    heard, say = Event(), terminal.say
+    monkeypatch.setattr(terminal, "say", lambda text: (say(text), heard.set()))
+    with terminal.busy("starting"):
+        assert heard.wait(10.0)
+    assert file.getvalue().startswith("starting: 0 s")

@@ -128,6 +128,7 @@ class Shell:
         """Start what serves, and wait until it says so; what served before has ended."""
         self.hang_up()
         log = self.folder / "served.log"
+        log.touch()
         code, said = self.run(f"{line.split(' #')[0]} >{log} 2>&1 & echo $!", 10.0)
         process = int(next(word for word in said if word.isdecimal()))
         until = time.monotonic() + limit_s

@@ -135,7 +135,7 @@ def test_shell_peeks_at_registers_and_variables(run: Run, program: Path) -> None
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [
-        (("memory", "cubestar"), "runs no firmware of its own: --firmware"),
+        (("memory", "cubestar"), "runs no firmware of its own: give --firmware"),
         (("shell", "emulated:cubestar", "-c", "peek CMU"), "give --firmware"),
         (("emulate", "cubestar", "--tcp", 0, "--gdb", 0), "runs no firmware of its own"),
         (("emulate", "cubestar", "--tcp", 0, "--gdb-wait"), "--gdb-wait: give the port as well"),

@@ -78,6 +78,12 @@ def test_damaged_pictures(tmp_path: Path, values: np.ndarray) -> None:
         load_picture(tmp_path / "a.png")
 
 
+def test_larger_than_pillow_warns_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Image.new("L", (1024, 512)).save(tmp_path / "a.png")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1024 * 511)
+    assert load_picture(tmp_path / "a.png").shape == (512, 1024)
+
+
 def test_larger_than_pillow_permits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Image.new("L", (1024, 512)).save(tmp_path / "a.png")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
