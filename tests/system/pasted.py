@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Thread
@@ -102,19 +103,19 @@ class Shell:
         assert self._process.stdin is not None
         self._process.stdin.write(f"{{ {line}\n}} </dev/null\nprintf '\\n{MARK} %s\\n' $?\n")
         self._process.stdin.flush()
-        until, said = time.monotonic() + limit_s, list[str]()
+        until, said, last = time.monotonic() + limit_s, list[str](), list[str]()
         while True:
             try:
                 heard = self._said.get(timeout=max(0.0, until - time.monotonic()))
             except Empty:
-                said.append(f"interrupted after {limit_s:.0f} s")
+                last = [f"interrupted after {limit_s:.0f} s"]
                 self._interrupt()
                 until = time.monotonic() + ENDING_S
                 continue
             if heard is None:
                 return 1, [*said, "the shell ended"]
             if heard.startswith(MARK):
-                return int(heard.removeprefix(MARK)), said
+                return int(heard.removeprefix(MARK)), said + last
             said.append(heard)
 
     def _interrupt(self) -> None:
@@ -122,13 +123,14 @@ class Shell:
         tasks = Path(f"/proc/{self._process.pid}/task").glob("*/children")
         for child in {int(one) for task in tasks for one in task.read_text().split()}:
             if child not in self._served:
-                os.killpg(child, signal.SIGTERM)
+                with suppress(ProcessLookupError):
+                    os.killpg(child, signal.SIGTERM)
 
     def serve(self, line: str, limit_s: float) -> tuple[int, list[str]]:
         """Start what serves, and wait until it says so; what served before has ended."""
         self.hang_up()
         log = self.folder / "served.log"
-        log.touch()
+        log.write_text("")
         code, said = self.run(f"{line.split(' #')[0]} >{log} 2>&1 & echo $!", 10.0)
         process = int(next(word for word in said if word.isdecimal()))
         until = time.monotonic() + limit_s
@@ -142,7 +144,9 @@ class Shell:
     def hang_up(self) -> None:
         """Press Ctrl-C where something serves."""
         while self._served:
-            os.killpg(process := self._served.pop(), signal.SIGINT)
+            process = self._served.pop()
+            with suppress(ProcessLookupError):  # it may have ended by itself
+                os.killpg(process, signal.SIGINT)
             self.run(f"wait {process}", ENDING_S)
 
     def close(self) -> None:

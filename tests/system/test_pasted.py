@@ -1,0 +1,110 @@
+"""Pasting the documents: what lines become, in one shell, with what serves beside them."""
+
+import stat
+from pathlib import Path
+
+import pytest
+
+from .document_code import LEFT
+from .pasted import Pasted, left_out, pasted
+
+DOCUMENT = """
+```sh
+export WORD=kept; cd .
+echo $WORD > written; cat written    # a comment
+echo why it failed; false
+sleep 1000
+cubestack emulate cubestar --pty ./tty
+cubestack shell ./tty --device cubestar
+cubestack emulate aramis --firmware program.elf
+cubestack emulate cubesense
+make test
+```
+
+```python
+# saved.py
+print("saved")
+```
+
+```sh
+python3 saved.py
+cubestack ended
+```
+"""
+
+CUBESTACK = """#!/usr/bin/env bash
+case $1 in
+emulate)
+    [ $2 = cubesense ] && { echo it does not start; exit 1; }
+    trap "echo $2 ended > ended; kill %1; exit 0" INT
+    : > tty
+    sleep 1000 &
+    echo "$2 serves; Ctrl-C ends it"
+    wait ;;
+ended) cat ended ;;
+shell) echo asked ;;
+esac
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pasted]:
+    """A document pasted, with a command that does little."""
+    folder = tmp_path_factory.mktemp("reader")
+    command = folder / "bin" / "cubestack"
+    command.parent.mkdir()
+    command.write_text(CUBESTACK, "utf-8")
+    command.chmod(command.stat().st_mode | stat.S_IXUSR)
+    document = folder / "page.md"
+    document.write_text(DOCUMENT, "utf-8")
+    ready = [f"PATH={command.parent}:$PATH"]
+    found = pasted(document, folder, long=False, limit_s=2.0, ready=ready)
+    return {one.line: one for one in found}
+
+
+def test_lines_share_a_shell_and_tell_how_they_ended(done: dict[str, Pasted]) -> None:
+    codes = {line: one.code for line, one in done.items()}
+    assert codes == {
+        "export 'WORD=kept;' cd .": 0,
+        "echo '$WORD' '>' 'written;' cat written": 0,
+        "echo why it 'failed;' false": 1,
+        "sleep 1000": 143,
+        "cubestack emulate cubestar --pty ./tty": 0,
+        "cubestack shell ./tty --device cubestar": 0,
+        "cubestack emulate aramis --firmware program.elf": None,
+        "cubestack emulate cubesense": 1,
+        "make test": None,
+        "python3 saved.py": 0,
+        "cubestack ended": 0,
+    }
+
+
+def test_what_they_said_is_told(done: dict[str, Pasted]) -> None:
+    said = {line: one.said for line, one in done.items()}
+    assert said["echo '$WORD' '>' 'written;' cat written"] == "kept"
+    assert said["echo why it 'failed;' false"] == "why it failed"
+    assert said["sleep 1000"] == "interrupted after 2 s"
+    assert said["cubestack shell ./tty --device cubestar"] == "asked"
+    assert (
+        said["cubestack emulate aramis --firmware program.elf"]
+        == LEFT[r"program\.elf|picture\.elf"]
+    )
+    assert said["cubestack emulate cubesense"] == "it does not start"
+    assert said["python3 saved.py"] == "saved"
+
+
+def test_what_serves_ends_when_the_next_one_takes_its_place(done: dict[str, Pasted]) -> None:
+    assert done["cubestack ended"].said == "cubestar ended"
+
+
+def test_a_client_of_a_port_that_nobody_serves_is_left_out(tmp_path: Path) -> None:
+    line = "cubestack shell ./tty --device cubestar"
+    assert "somebody has to serve" in left_out(line, tmp_path, long=False)
+    (tmp_path / "tty").touch()
+    assert left_out(line, tmp_path, long=False) == ""
+
+
+@pytest.mark.parametrize("long", [False, True])
+def test_long_ones_are_pasted_on_demand(tmp_path: Path, long: bool) -> None:
+    for line in ("make test-all", "cubestack layouts"):
+        assert (left_out(line, tmp_path, long=long) == "") is long
