@@ -6,6 +6,7 @@ import select
 import struct
 import time
 from collections.abc import Sequence
+from functools import cache
 
 from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.emulator.ports.realtime import Watched
@@ -28,8 +29,13 @@ ALONE_AGAIN_NS = NS_PER_S
 _ENTRY = struct.Struct("=ihh")  # struct pollfd
 _TIMEOUT = struct.Struct("=qq")  # struct timespec
 
-_libc = ctypes.CDLL(None)
-_libc.ppoll.argtypes = (ctypes.c_char_p, ctypes.c_ulong, ctypes.c_char_p, ctypes.c_void_p)
+
+@cache
+def _libc() -> ctypes.CDLL:
+    """The C library; only Linux's has what is asked for here."""
+    library = ctypes.CDLL(None)
+    library.ppoll.argtypes = (ctypes.c_char_p, ctypes.c_ulong, ctypes.c_char_p, ctypes.c_void_p)
+    return library
 
 
 class Watch:
@@ -93,11 +99,11 @@ def has_priority() -> bool:
 
 def sharpen_timers() -> None:
     """Ask the kernel to wake this process in time, not up to 50 us late as it usually does."""
-    _libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    _libc().prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
 def wait_precisely(watched: Watched, timeout_s: float) -> None:
     """Like the scheduler's ``wait_ready``, but never too late: it may end ``EARLY_S`` early."""
     entries = b"".join(_ENTRY.pack(fileno, events, 0) for fileno, events in watched)
     timeout_ns = max(0, int((timeout_s - EARLY_S) * NS_PER_S))
-    _libc.ppoll(entries, len(watched), _TIMEOUT.pack(*divmod(timeout_ns, NS_PER_S)), None)
+    _libc().ppoll(entries, len(watched), _TIMEOUT.pack(*divmod(timeout_ns, NS_PER_S)), None)

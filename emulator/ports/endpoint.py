@@ -3,6 +3,9 @@
 import select
 from abc import ABC, abstractmethod
 
+HUNG_UP: int = getattr(select, "POLLRDHUP", select.POLLHUP)
+"""Event of a client that sends nothing more; where there is none, of one that has gone."""
+
 
 class PortError(OSError):
     """A port can not be opened; the text names it and what would be right."""

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from cubestack.emulator.iss.gdb.session import Session
 from cubestack.emulator.iss.gdb.target import Target
-from cubestack.emulator.ports.endpoint import Endpoint, PortError, poll_now
+from cubestack.emulator.ports.endpoint import HUNG_UP, Endpoint, PortError, poll_now
 
 LOOPBACK = "127.0.0.1"
 LARGEST_READ = 1 << 16
@@ -110,7 +110,7 @@ class GdbEndpoint(Endpoint):
             newcomer = self._server.accept()[0]
         except OSError:  # nobody, or gone again
             return
-        if self._client is not None and not poll_now(self._client.fileno(), select.POLLRDHUP):
+        if self._client is not None and not poll_now(self._client.fileno(), HUNG_UP):
             newcomer.close()
             return
         self._drop()

@@ -7,7 +7,7 @@ import select
 import socket
 
 from cubestack.emulator.bus.uart import Uart
-from cubestack.emulator.ports.endpoint import PortError, poll_now
+from cubestack.emulator.ports.endpoint import HUNG_UP, PortError, poll_now
 from cubestack.emulator.ports.serial_port import SerialPort
 
 TCP_RECEIVE_BUFFER = 4096
@@ -69,7 +69,7 @@ class TcpEndpoint(SerialPort):
             return self._client
         newcomer.setblocking(False)
         # Hang-ups and errors are always told.
-        if self._client is not None and not poll_now(self._client.fileno(), select.POLLRDHUP):
+        if self._client is not None and not poll_now(self._client.fileno(), HUNG_UP):
             with contextlib.suppress(OSError):
                 newcomer.send(REFUSAL)
             newcomer.close()

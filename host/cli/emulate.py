@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, open_ports
+from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.past import Past
 from cubestack.host.devices.registry import device, device_names, devices
@@ -111,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
             value = getattr(args, name)
             if value not in (None, "") and value is not False:
                 raise ValueError(f"{flag(name)} belongs to one device, and there are several")
+    if args.i2c is not None:
+        check_linux()
     with ExitStack() as stack:
         opened: list[AnyEmulated] = []
         setups: list[Setup] = []

@@ -1,6 +1,7 @@
 """Options that say where a device's serial lines are served, and the ports that they open."""
 
 import argparse
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -55,6 +56,12 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let other machines connect; there is no protection",
     )
+
+
+def check_linux() -> None:
+    """ValueError where there are no I2C buses for unmodified programs."""
+    if not sys.platform.startswith("linux"):
+        raise ValueError("an I2C bus for unmodified programs is there on Linux alone")
 
 
 def open_ports(

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.ports import check_linux
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.terminal import busy, say
@@ -99,6 +100,7 @@ def run(args: argparse.Namespace) -> int:
     from cubestack.emulator.i2cdev.guest_process import RouteError
     from cubestack.emulator.i2cdev.running import attached_bus, run_program
 
+    check_linux()
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")
     with ExitStack() as stack:
