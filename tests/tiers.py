@@ -10,7 +10,7 @@ from _pytest.mark import ParameterSet
 def quick(cases: Iterable[Any], count: int) -> list[Any]:
     """All cases; ``count`` of them, evenly spread, run each time, and the others are slow.
 
-    A tuple is a case of several values, as pytest has it.
+    A tuple is a case of several values; a value that is a tuple is to be a ``pytest.param``.
     """
     found = list(cases)
     kept = {place * len(found) // count for place in range(count)}

@@ -24,8 +24,8 @@ from tests.tiers import quick
 SENSORS = [(counted(sensor.TOPS), sensor.AREA_FILE) for sensor in (cubestar, cubesense)]
 DESIGNS = {name: design for table, _ in SENSORS for name, design in table.items()}
 
-DESIGNS = [(name, design, file) for table, file in SENSORS for name, design in table.items()]
-every_design = pytest.mark.parametrize(("name", "design", "file"), DESIGNS)
+ROWS = [(name, design, file) for table, file in SENSORS for name, design in table.items()]
+every_design = pytest.mark.parametrize(("name", "design", "file"), ROWS)
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -102,7 +102,7 @@ def tiles(name):
     return count_tiles(DESIGNS[name].make())
 
 
-@pytest.mark.parametrize(("name", "design", "file"), quick(DESIGNS, 6))
+@pytest.mark.parametrize(("name", "design", "file"), quick(ROWS, 6))
 def test_no_design_grows_unnoticed(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 

@@ -32,12 +32,12 @@ FAST = [name for name in PROOFS if not name.startswith("nadir") and name not in 
 SHALLOW = [name for name in FAST if name not in ("sun-ack", "sun-scan", "sun-first-pixel")]
 
 
-@pytest.mark.parametrize("name", FAST)
+@pytest.mark.parametrize("name", quick(FAST, 14))
 def test_property_is_proved(name: str) -> None:
     assert prove(PROOFS[name])[:2] == (True, False)
 
 
-@pytest.mark.parametrize("name", quick(SHALLOW, 12))
+@pytest.mark.parametrize("name", quick(SHALLOW, 6))
 def test_planted_bug_is_found(name: str) -> None:
     assert prove(PROOFS[name], planted=True)[:2] == (False, True)
 

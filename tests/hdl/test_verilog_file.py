@@ -17,6 +17,7 @@ from cubestack.hdl.flow.verilog import verilog_file
 from tests.hdl import flow_checks
 from tests.hdl.flow_checks import said
 from tests.hdl.regression import STAR, modules
+from tests.tiers import quick
 
 TOPS = tops_in({**CUBESTAR, **CUBESENSE})
 need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
@@ -25,7 +26,7 @@ need_verilator = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module", params=TOPS)
+@pytest.fixture(scope="module", params=quick(TOPS, 5))
 def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

@@ -179,6 +179,7 @@ def processed(halting: bool) -> tuple[str, object, int]:
         return stream.getvalue(), state, len(halts)
 
 
+@pytest.mark.slow
 def test_halts_leave_no_mark_while_the_fpga_stores_a_picture() -> None:
     """Every pin, byte, function and cycle is the same."""
     alone, halting = processed(False), processed(True)

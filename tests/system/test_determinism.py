@@ -13,6 +13,7 @@ from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.devices.emulated import open_device
 from tests.system.conftest import Ear
+from tests.tiers import quick
 
 SKY = SkyScene.pointing(84, -1)
 EARTH = EarthSunScene.facing(sun_deg=(20, 10), nadir_deg=(-8, 12), rate_deg_s=(0.5, -1.0, 2.0))
@@ -45,7 +46,7 @@ def run(name: str, seed: int) -> tuple[dict[str, Any], list[bytes]]:
         return vars(ear), [memory.tobytes() for memory in opened.board.engine.memories.values()]
 
 
-@pytest.mark.parametrize("name", VIEWS)
+@pytest.mark.parametrize("name", quick(VIEWS, 1))
 def test_wire_repeats_to_the_picosecond_and_another_seed_differs(name: str) -> None:
     first, other = run(name, 1), run(name, 2)
     assert len(first[0]["sent"]) > 150

@@ -134,6 +134,7 @@ def test_the_attitude_loop_settles() -> None:
     assert max(errors[45:]) < 0.005
 
 
+@pytest.mark.slow
 def test_a_part_of_an_orbit_is_flown(tmp_path: Path) -> None:
     orbit = HERE / "orbits" / "sun-synchronous.toml"
     call = [sys.executable, HERE / "one_orbit.py", orbit, tmp_path, "8"]

@@ -26,6 +26,7 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.experiments.attitude import errors
 from tests.system.conftest import Ear
+from tests.tiers import quick
 
 EVENTS = int(os.environ.get("CUBESTACK_FUZZ_EVENTS", "5000"))
 CHECK_EVERY = 500
@@ -230,7 +231,7 @@ SCENES = {
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", quick(SCENES, 1))
 def test_nothing_upsets_a_board_for_good(name: str) -> None:
     runs = []
     for _ in range(2):

@@ -234,6 +234,7 @@ def test_banks_are_kept_apart_where_there_are_any(node: Node, published: Publish
     assert node.client.telemetry("LoopStatus")["Bank"] == 1
 
 
+@pytest.mark.slow
 def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -> None:
     """Twice the rate with two memories; no layout without a copy is older than 600 ms."""
     assert main(["layouts", "--seconds", "2", "--json", "--profile", "extended"]) == 0

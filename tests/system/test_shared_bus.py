@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.devices.targets import open_target
 from tests.system.conftest import COMMAND, Served
+from tests.tiers import quick
 
 BUS = 16 + os.getpid() % 200
 ADDRESSES = [device.interface.i2c_address for device in devices()]
@@ -35,7 +36,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
             yield
 
 
-@pytest.mark.parametrize("route", ["seccomp", "preload"])
+@pytest.mark.parametrize("route", quick(["seccomp", "preload"], 1))
 def test_a_program_finds_every_device(served: None, route: str) -> None:
     run = [*COMMAND, "run", "--bus", str(BUS), "--attach", "--route", route, "--"]
     probe = subprocess.run([*run, "true"], capture_output=True, text=True, timeout=60)

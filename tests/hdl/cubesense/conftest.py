@@ -8,6 +8,7 @@ from amaranth.lib.wiring import Component
 
 from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 from tests.hdl.regression import PAIR, modules, pair_environment
+from tests.tiers import quick
 
 #: Small pictures: no power of two; powers of two; and a window as large as the picture is high.
 SMALL = (
@@ -17,10 +18,7 @@ SMALL = (
 )
 
 
-@pytest.fixture(
-    params=[pytest.param(SMALL[0], marks=pytest.mark.slow), *SMALL[1:]],
-    ids=lambda size: f"{size.columns}x{size.rows}",
-)
+@pytest.fixture(params=quick(reversed(SMALL), 1), ids=lambda size: f"{size.columns}x{size.rows}")
 def read_out(request: pytest.FixtureRequest) -> ReadOut:
     return request.param
 

@@ -14,13 +14,8 @@ from tests.hdl.cubestar.as_published import AsPublished, DoubleAsPublished, Shar
 from tests.hdl.regression import STAR, TIERS, modules
 from tests.tiers import quick
 
-SIZES = [(8, 4), (5, 3), (16, 8)]
-#: One seed for each small size, and the others.
-SIZED_SEEDS = [
-    pytest.param(*size, seed, marks=() if number + 1 == seed < 3 else pytest.mark.slow)
-    for number, size in enumerate(SIZES)
-    for seed in (1, 2, 3)
-]
+SIZES = [(5, 3), (8, 4), (16, 8)]
+SIZED_SEEDS = quick([(*size, seed) for seed in (1, 2, 3) for size in SIZES], 1)
 STORING = modules(STAR, "store", "borders")
 NEXT_VERSION = ["cubestar-shared", "cubestar-double", "cubestar-boards"]
 

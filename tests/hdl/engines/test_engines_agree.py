@@ -50,7 +50,7 @@ class Case(NamedTuple):
         return self.events(0, END_PS // 3)
 
 
-@pytest.fixture(scope="module", params=BOARDS)
+@pytest.fixture(scope="module", params=quick(BOARDS, 3))
 def case(request, tmp_path_factory) -> Case:
     wiring = BOARDS[request.param].wiring(False)
     icarus = IcarusBoard(tmp_path_factory.mktemp("top"), wiring, verilog_text(wiring.component))

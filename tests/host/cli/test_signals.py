@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tiers import quick
+
 SOON_S = 60.0
 CALL = [sys.executable, "-m", "cubestack"]
 
@@ -48,7 +50,7 @@ def test_no_link_is_left(number: signal.Signals, tmp_path: Path) -> None:
     assert process.returncode == (128 + number if number is signal.SIGHUP else 0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", quick([signal.SIGKILL, signal.SIGTERM], 1))
 @pytest.mark.parametrize("words", [("ground", "emulated:cubestar"), ("demo", "--out", "{folder}")])
 def test_no_emulation_is_left(
     words: tuple[str, ...], number: signal.Signals, tmp_path: Path

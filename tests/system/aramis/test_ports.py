@@ -66,6 +66,7 @@ def test_the_same_over_i2c(session: Open) -> None:
         assert attitude_error_deg(found.quaternion, TRUTH)[0] < 0.01
 
 
+@pytest.mark.slow
 def test_demonstration(tmp_path: Path) -> None:
     assert main(["demo", "aramis", "--out", str(tmp_path)]) == 0
     for name in ("aramis-raw.png", "aramis-stars.png"):

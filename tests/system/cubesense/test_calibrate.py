@@ -21,6 +21,7 @@ def calibrate(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[str]) -> None:
     which = ("--sensor", "nadir", "--seed", 2, "--emulated", 20, "--check-poses", 8)
     found = calibrate(capsys, *which, "--profile", "extended", "--set", "lens=residuals")

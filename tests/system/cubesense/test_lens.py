@@ -50,6 +50,7 @@ def test_a_unit_has_the_lenses_of_its_seed(ready: Open, profile: str) -> None:
         assert opened.board.cameras[Camera.SUN].lens == NOMINAL
 
 
+@pytest.mark.slow
 def test_errors_of_published_lenses(measure: Measure) -> None:
     """Figures 7.1 and 7.3: the order of 0.14 deg at nadir; the Sun is found too far out."""
     errors = [

@@ -36,6 +36,7 @@ def test_a_frame_gives_one_result_of_each_sensor(measure: Measure) -> None:
     assert frames[0]["phase_ms"].keys() == {"wait", "store", "search", "centroid", "total"}
 
 
+@pytest.mark.slow
 def test_nadir_sensor_meets_its_goal_with_the_published_number_of_edges(nadir: Frames) -> None:
     assert all(frame["detected"] for frame in nadir)
     for axis in ("alpha", "beta"):
@@ -47,6 +48,7 @@ def test_nadir_sensor_meets_its_goal_with_the_published_number_of_edges(nadir: F
     assert all(18 <= frame["edges"] <= 24 for frame in nadir)
 
 
+@pytest.mark.slow
 def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
     assert all(frame["detected"] for frame in sun)
     angle = np.array([np.hypot(f["truth_alpha_deg"], f["truth_beta_deg"]) for f in sun])
@@ -56,6 +58,7 @@ def test_sun_sensor_meets_its_goal(sun: Frames) -> None:
     assert [f["tolerance_deg"] for f in sun] == np.where(angle > 45, 2.0, 0.2).tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bloom", [5, 6, 7])
 def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float) -> None:
     angles = ("--bloom", bloom, "--sun-angle", 45)
@@ -63,6 +66,7 @@ def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float) -> None:
     assert np.percentile([frame["error_deg"] for frame in frames], 95) < 0.2
 
 
+@pytest.mark.slow
 def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
     """The nadir sensor's time is a prediction; published are 245 ms, for the published program.
 
@@ -76,6 +80,7 @@ def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
     assert all(frame["phase_ms"]["store"] == pytest.approx(30.5, abs=0.1) for frame in nadir)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [NADIR, SUN], ids=lambda which: which[1])
 def test_the_published_profile_is_quicker_and_worse(
     measure: Measure, nadir: Frames, sun: Frames, which: tuple[str, str]

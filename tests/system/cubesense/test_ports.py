@@ -155,6 +155,7 @@ def test_both_i2c_protocols_measure(ready: Open) -> None:
         check_right(node.result(Camera.NADIR))
 
 
+@pytest.mark.slow
 def test_image_register_streams_the_picture(ready: Open) -> None:
     with ready() as opened:
         bus = opened.board.i2c()

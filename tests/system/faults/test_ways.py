@@ -17,6 +17,7 @@ from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.targets import open_target
 from cubestack.host.shell.language import Shell
 from tests.system.conftest import Ear
+from tests.tiers import quick
 
 from .bench import BENCHES, Bench, Star, Tracker, powered
 
@@ -159,7 +160,7 @@ def played(device: str, seed: int, until_s: float = math.inf) -> tuple[Any, list
         return (found, ears), [str(event) for event in bench.faults.log], set(bench.faults.kinds())
 
 
-@pytest.mark.parametrize("device", BENCHES)
+@pytest.mark.parametrize("device", quick(BENCHES, 1))
 def test_a_plan_of_every_kind_repeats_to_the_byte(device: str) -> None:
     first = played(device, 8)
     _, log, kinds = first

@@ -9,6 +9,7 @@ from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
 from cubestack.emulator.rtl.cxxrtl.variants import members, variant_text
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.flow.generate import cxxrtl_text, rtlil_text
+from tests.tiers import quick
 
 from ..pair_board import SIZES
 
@@ -30,7 +31,9 @@ def test_each_way_to_store_has_one():
     assert all(dict(levels)["CLK"] == dict(levels)["EDGE"] == 0 for levels in WIRING.burst_levels)
 
 
-@pytest.mark.parametrize("levels", WIRING.burst_levels, ids=lambda levels: str(dict(levels)))
+@pytest.mark.parametrize(
+    "levels", quick(map(pytest.param, WIRING.burst_levels), 2), ids=lambda levels: str(dict(levels))
+)
 def test_the_writers_stay_and_their_state_that_no_output_shows(rtlil, levels):
     pins = dict(levels)
     side, domain = ("nadir" if pins["SUNEN"] else "sun"), "pix"

@@ -106,7 +106,7 @@ def test_each_layout_has_its_registers(layout: str) -> None:
         assert sum(result.phases_s.values()) == pytest.approx(result.period_s)
 
 
-@pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
+@pytest.mark.parametrize("gateware", quick(["as-flown", "corrected"], 1))
 def test_two_linked_fpgas(gateware: str) -> None:
     results = measured(
         *("cubesense", cubesense.EXPERIMENT),
