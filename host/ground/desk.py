@@ -200,9 +200,9 @@ class Desk:
         before = self.target
         self.target, end = emulator.restart(before, options, files)
         self._shell, self.link, self.carried = Shell(self.target), Link(), None
+        self.begun += 1  # before what tells of it is told anew
         for name in ("about", "_client"):
             vars(self).pop(name, None)
-        self.begun += 1
         before.close()
         end()
         return {"rows": list(self.about["chosen"].items())}

@@ -38,7 +38,12 @@ export class SkyMap {
     };
     this.canvas.onkeydown = (event) => this.key(event);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    const scheme = matchMedia("(prefers-color-scheme: dark)");
+    const redraw = () => {
+      if (this.canvas.isConnected) this.draw();
+      else scheme.removeEventListener("change", redraw);
+    };
+    scheme.addEventListener("change", redraw);
   }
 
   // `chosen` is the direction that is being put, in the axes of the scene; null for none.

@@ -14,12 +14,14 @@ from .test_page_acts import HOSTILE, hostile, look, shown, station
 
 pytestmark = pytest.mark.xdist_group("page")
 
+STARTED_MS = 120_000
 VALUE = "label:has-text('{}') input.scene-value"
 
 
 @pytest.fixture(scope="module")
 def address(chromium: Any) -> Iterator[str]:
     with station("emulated:cubestar", "emulated:cubesense", "--seed", "5") as opened:
+        await_devices(chromium, opened)
         yield opened
 
 
@@ -28,6 +30,14 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
     with shown(chromium, address) as opened:
         stage(opened, "CubeStar")
         yield opened
+
+
+def await_devices(chromium: Any, address: str) -> None:
+    """Until all have started, which takes long where much else runs."""
+    page = chromium.new_context().new_page()
+    page.goto(address)
+    page.wait_for_selector("#line", timeout=STARTED_MS)
+    page.context.close()
 
 
 def stage(page: Any, device: str) -> None:

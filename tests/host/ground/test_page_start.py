@@ -8,7 +8,7 @@ import pytest
 from cubestack.firmware_model.reference.image import reference_image
 
 from .test_page_acts import shown, station
-from .test_page_scene import fill
+from .test_page_scene import STARTED_MS, await_devices, fill
 
 pytestmark = pytest.mark.xdist_group("page")
 
@@ -16,11 +16,12 @@ pytestmark = pytest.mark.xdist_group("page")
 @pytest.fixture(scope="module")
 def address(chromium: Any) -> Iterator[str]:
     with station("emulated:cubestar", "--seed", "5") as opened:
+        await_devices(chromium, opened)
         yield opened
 
 
 def runs(page: Any, text: str) -> None:
-    page.wait_for_selector(f"#start-told >> text={text}")
+    page.wait_for_selector(f"#start-told >> text={text}", timeout=STARTED_MS)
 
 
 def test_profile_and_firmware_are_chosen(chromium: Any, address: str, tmp_path: Any) -> None:
@@ -31,7 +32,8 @@ def test_profile_and_firmware_are_chosen(chromium: Any, address: str, tmp_path: 
         page.wait_for_selector("#lines li.good >> text=scene")
         page.select_option("#option-profile", "extended")
         page.press("#restart", "Enter")
-        page.wait_for_selector("#lines li.good >> text=/start again.*profile: extended/s")
+        done = "#lines li.good >> text=/start again.*profile: extended/s"
+        page.wait_for_selector(done, timeout=STARTED_MS)
         for tab in (page, other):
             runs(tab, "runs now: seed 5, profile extended")
             tab.wait_for_selector("#scene-told >> text=/camera 120.0°/")
