@@ -109,7 +109,7 @@ function look(number) {
   live = listen(
     `${path}/live`,
     (message) => {
-      if (message.begun !== about.begun) {
+      if ((message.begun ?? about.begun) !== about.begun) {
         renew();
         return;
       }

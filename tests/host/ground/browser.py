@@ -10,6 +10,9 @@ from typing import Any
 
 SOON_MS = 30_000
 
+STARTED_MS = 120_000
+"""Until devices have started, which takes long where much else runs."""
+
 
 @contextmanager
 def station(*words: str, environment: dict[str, str] | None = None) -> Iterator[str]:
@@ -37,6 +40,14 @@ def shown(chromium: Any, address: str, **options: Any) -> Iterator[Any]:
     yield page
     page.context.close()
     assert not wrong
+
+
+def await_devices(chromium: Any, address: str) -> None:
+    """Until all devices of a page have started."""
+    page = chromium.new_context().new_page()
+    page.goto(address)
+    page.wait_for_selector("#line", timeout=STARTED_MS)
+    page.context.close()
 
 
 def local(url: str) -> bool:

@@ -9,12 +9,20 @@ import pytest
 
 from cubestack.host.devices.targets import open_target
 
-from .test_page import COVERED, PALE, SOON_MS, local
-from .test_page_acts import HOSTILE, hostile, look, shown, station
+from .browser import await_devices, look, shown, station
+from .hostile import HOSTILE, hostile
+from .looks import COVERED, PALE
 
-pytestmark = pytest.mark.xdist_group("page")
+pytestmark = pytest.mark.xdist_group("page scene")
 
-STARTED_MS = 120_000
+INK = (
+    "() => { const c = document.querySelector('#sky-map'); const n = new Set();"
+    "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+    "for (let i = 0; i < d.length; i += 4) n.add(d[i] << 16 | d[i + 1] << 8 | d[i + 2]);"
+    "return n.size }"
+)
+"""How many colours the map has."""
+
 VALUE = "label:has-text('{}') input.scene-value"
 
 
@@ -30,14 +38,6 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
     with shown(chromium, address) as opened:
         stage(opened, "CubeStar")
         yield opened
-
-
-def await_devices(chromium: Any, address: str) -> None:
-    """Until all have started, which takes long where much else runs."""
-    page = chromium.new_context().new_page()
-    page.goto(address)
-    page.wait_for_selector("#line", timeout=STARTED_MS)
-    page.context.close()
 
 
 def stage(page: Any, device: str) -> None:
@@ -201,25 +201,16 @@ def test_directions_are_answered_beside_the_truth(page: Any) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_is_seen_whole(chromium: Any, address: str, width: int, scheme: str) -> None:
     size = {"width": width, "height": 850}
-    page = chromium.new_context(viewport=size, color_scheme=scheme).new_page()
-    page.set_default_timeout(SOON_MS)
-    page.goto(address)
-    for device in ("CubeStar", "CubeSense"):
-        stage(page, device)
-        for summary in page.locator("#scene-keys > div > details > summary").all():
-            summary.click()
-        page.click("[aria-label='add to hazards']")
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        assert page.evaluate(COVERED) == []
-        assert page.evaluate(PALE) == []
-        ink = (
-            "() => { const c = document.querySelector('#sky-map'); const n = new Set();"
-            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
-            "for (let i = 0; i < d.length; i += 4) n.add(d[i] << 16 | d[i + 1] << 8 | d[i + 2]);"
-            "return n.size }"
-        )
-        assert page.evaluate(ink) > 50  # grid, stars or discs, names, outlines
-    page.context.close()
+    with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
+        for device in ("CubeStar", "CubeSense"):
+            stage(page, device)
+            for summary in page.locator("#scene-keys > div > details > summary").all():
+                summary.click()
+            page.click("[aria-label='add to hazards']")
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.evaluate(COVERED) == []
+            assert page.evaluate(PALE) == []
+            assert page.evaluate(INK) > 50  # grid, stars or discs, names, outlines
 
 
 def test_no_key_is_markup(chromium: Any, address: str) -> None:
@@ -261,4 +252,3 @@ def test_what_is_not_emulated_has_no_scene(chromium: Any, tmp_path: Any) -> None
             assert page.locator(control).is_disabled()
             assert "no control port" in page.locator(control).get_attribute("title")
         assert not page.locator("#sky-map").is_visible()
-        assert local(address)

@@ -7,10 +7,10 @@ import pytest
 
 from cubestack.firmware_model.reference.image import reference_image
 
-from .test_page_acts import shown, station
-from .test_page_scene import STARTED_MS, await_devices, fill
+from .browser import STARTED_MS, await_devices, shown, station
+from .test_page_scene import fill
 
-pytestmark = pytest.mark.xdist_group("page")
+pytestmark = pytest.mark.xdist_group("page start")
 
 
 @pytest.fixture(scope="module")
