@@ -72,6 +72,7 @@ class Copy:
     def _pass(self, tests: list[str], timeout_s: float) -> bool:
         self._failed.unlink(missing_ok=True)
         call = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", PLUGIN]
+        call += ["-p", "no:unraisableexception"]  # of whatever was imported, at the first test
         nothing = subprocess.DEVNULL
         with subprocess.Popen(
             [*call, *tests],

@@ -64,6 +64,13 @@ def test_telnet_escapes_both_ways(port, device, connect):
     assert received_until(client, b"\xff\xffz")
 
 
+def test_what_the_device_says_goes_out_in_the_same_turn(port, device, connect):
+    client = connect()
+    device.uart.send(b"hello")
+    port.exchange(device.advance(100))
+    assert received_until(client, b"o").endswith(b"hello")
+
+
 def test_new_client_has_the_devices_format(port, device, connect):
     first = connect()
     serve(port, device, first, baud_option(9600))

@@ -108,6 +108,16 @@ def test_one_direction_out_of_reach_does_not_hide_the_others() -> None:
     np.testing.assert_array_equal(lens.project(vectors)[:reach], lens.project(vectors[:reach]))
 
 
+@pytest.mark.parametrize("stop_deg", [10.0, 40.0, 179.0, 180.0, 360.0])
+def test_a_light_shade_lets_a_round_field_through(stop_deg: float) -> None:
+    """Of 180 deg and more there is none."""
+    angles = np.radians([0.0, stop_deg / 2 - 0.01, stop_deg / 2 + 0.01, 89.6])
+    vectors = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=1)
+    light = replace(LENS, field_stop_deg=stop_deg).transmission(vectors)
+    beyond = float(stop_deg >= 180)
+    assert light.tolist() == [1, 1, beyond, beyond]
+
+
 def test_vignetting() -> None:
     vectors = np.array([[0, 0, 1.0], [np.sin(0.5), 0, np.cos(0.5)]])
     np.testing.assert_array_equal(LENS.transmission(vectors), [1, 1])

@@ -19,6 +19,12 @@ def test_grid_of_a_whole_period() -> None:
         PixelClock(0)
 
 
+def test_the_slowest_clock() -> None:
+    assert PixelClock(1).edge_ps(2) == 2 * 10**12
+    with pytest.raises(ValueError, match="positive frequency, not -1 Hz"):
+        PixelClock(-1)
+
+
 def test_grid_does_not_drift() -> None:
     clock = PixelClock(11_000_000)
     assert clock.period == Fraction(10**12, 11_000_000)
