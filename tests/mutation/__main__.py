@@ -43,11 +43,12 @@ def chosen(folder: Path, seed: int) -> Iterator[Mutant]:
 
 def results(tried: list[Mutant], jobs: int) -> Iterator[tuple[Mutant, bool]]:
     """Each with whether it was killed, in their order; in so many copies at the same time."""
-    suite = Suite()
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         copies: Queue[Copy] = Queue()
         for job in range(jobs):
             copies.put(Copy(ROOT, Path(folder, str(job))))
+
+        suite = Suite(copies.queue[0].collected)
 
         def one(mutant: Mutant) -> bool:
             copy = copies.get()

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Mapping, Set
 from functools import cached_property
 from pathlib import Path
 
@@ -68,15 +68,15 @@ def record(root: Path, *, new: bool = False) -> int:
     return subprocess.call(call, cwd=root, env=environment)
 
 
-def collected(root: Path) -> set[str]:
-    """The tests that are there now; none of a file that can not be imported."""
+def collected(root: Path, environment: Mapping[str, str]) -> set[str]:
+    """The tests that there are in ``root``; none of a file that can not be imported."""
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         names = Path(folder, "names.json")
         call = [sys.executable, "-m", "pytest", "-q", "--collect-only", "-p", "no:cacheprovider"]
         subprocess.run(
             [*call, "-p", PLUGIN],
             cwd=root,
-            env=os.environ | {COLLECTED: str(names)},
+            env={**environment, COLLECTED: str(names)},
             stdout=subprocess.DEVNULL,
             check=False,
         )
@@ -103,9 +103,10 @@ class Reached:
         data.read()
         return data
 
-    def tests(self, mutant: Mutant) -> list[str]:
+    def tests(self, mutant: Mutant, files: Set[str]) -> list[str]:
         """Those that run its line: of each file the quickest, the nearest file first, then the
-        next of each. Where it runs when it is imported, those of `DOCUMENTS` and of its module."""
+        next of each. Where it runs when it is imported, those of `DOCUMENTS`, and those of its
+        module and of the ``files`` that are about it."""
         if mutant.path not in self._lines:
             self._lines[mutant.path] = self._data.contexts_by_lineno(str(mutant.path))
         by_line = self._lines[mutant.path]
@@ -118,6 +119,7 @@ class Reached:
         spent, taken = 0.0, []
         if not found:
             found = _names(context for each in by_line.values() for context in each)
+            found |= {test for test in self.durations if test.partition("::")[0] in files}
             taken = [test for test in self.durations if test.partition("::")[0] in DOCUMENTS]
         for test in self._in_turn(mutant.path, (found & self.durations.keys()) - {*taken}):
             spent += self.durations[test]

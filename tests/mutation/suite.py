@@ -1,11 +1,12 @@
 """The tests that a mutant has to face."""
 
 import os
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 from tests.mutation.mutants import Mutant
-from tests.mutation.reached import BUDGET_S, DOCUMENTS, Reached, collected
+from tests.mutation.reached import BUDGET_S, DOCUMENTS, Reached
 from tests.mutation.trial import UNKNOWN_S
 
 ROOT = Path(__file__).parents[2]
@@ -17,21 +18,22 @@ LEAST_S, SLOWER = 30.0, 3.0
 
 
 class Suite:
-    """Chooses the tests that a mutant has to face."""
+    """Chooses the tests that a mutant has to face, of those that are ``present`` in a copy."""
 
-    def __init__(self) -> None:
+    def __init__(self, present: Callable[[], set[str]]) -> None:
         self._reached: Reached | None = None
         self._new: list[str] = []
         try:
             self._reached = Reached(ROOT)
         except FileNotFoundError:
             return
-        self._new = self._reached.update(collected(ROOT))
+        self._new = self._reached.update(present())
 
     def tests(self, mutant: Mutant) -> tuple[list[str], float]:
         """Arguments for pytest, and the seconds that it may take."""
         if self._reached:
-            recorded, new = self._reached.tests(mutant), near(mutant.path, self._new)
+            files = {str(file) for file in files_for(mutant.path)}
+            recorded, new = self._reached.tests(mutant, files), near(mutant.path, self._new)
             known_s = sum(map(self._reached.durations.__getitem__, recorded))
             if recorded or new:
                 return new + recorded, LEAST_S + SLOWER * (known_s + BUDGET_S * bool(new))

@@ -89,7 +89,8 @@ def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_besid
 def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) -> None:
     (tmp_path / FOLDER).mkdir(parents=True)
     of_documents = f"{DOCUMENTS[0]}::test_defaults"
-    recorded = dict.fromkeys(("tests/test_a.py::test_f", "test_b.py::test_g", of_documents), 1.0)
+    names = "tests/test_a.py::test_f", "test_b.py::test_g", "test_c.py::test_h", of_documents
+    recorded = dict.fromkeys(names, 1.0)
     (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
     data = CoverageData(str(tmp_path / FOLDER / DATA))
     for context, line in (
@@ -102,6 +103,8 @@ def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) 
     data.write()
     reached = Reached(tmp_path)
     for line, expected in ((3, ["tests/test_a.py::test_f"]), (4, ["test_b.py::test_g"])):
-        assert reached.tests(Mutant(HERE, line, line, line, 0, 1, "a", "b")) == expected
-    at_import = reached.tests(Mutant(HERE, 1, 1, 1, 0, 1, "a", "b"))
-    assert at_import == [of_documents, "tests/test_a.py::test_f", "test_b.py::test_g"]
+        assert reached.tests(Mutant(HERE, line, line, line, 0, 1, "a", "b"), set()) == expected
+    at_import = Mutant(HERE, 1, 1, 1, 0, 1, "a", "b")
+    run, beside = ["tests/test_a.py::test_f", "test_b.py::test_g"], "test_c.py::test_h"
+    assert reached.tests(at_import, set()) == [of_documents, *run]
+    assert reached.tests(at_import, {"test_c.py"}) == [of_documents, *run, beside]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tests.mutation.mutants import Mutant
 from tests.mutation.plugin import FAILED, PLUGIN
+from tests.mutation.reached import collected
 
 UNKNOWN_S = 600.0
 """The time that tests may take of which it is not known how long they take."""
@@ -40,6 +41,10 @@ class Copy:
         self._environment = os.environ | environment
         self._writes = 0
         self._sound: dict[str, bool] = {}
+
+    def collected(self) -> set[str]:
+        """Its tests: without those that need what stands beside the project."""
+        return collected(self._tree, self._environment)
 
     def killed(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
         """Whether one of the tests, that passes without it, fails with the mutant."""

@@ -101,3 +101,19 @@ def test_a_first_guess_of_the_focal_length_is_refined() -> None:
     fit = fitted(scaled(measured, 1.03, METER), reference, scale=1.027)
     assert fit.scale == pytest.approx(1.03, abs=2e-4)
     assert np.linalg.norm(error(fit.quaternion, truth)) < 5e-5
+
+
+def test_a_belief_that_is_too_small_blames_no_star() -> None:
+    """Residuals five times as large as believed are taken for the belief's fault."""
+    rng, apart = np.random.default_rng(1), []
+    for _ in range(40):
+        measured, reference, truth = seen(rng, count=15)
+        measured[:1] = unit(measured[:1] + rng.normal(0, 8 * SIGMA, (1, 3)))
+        right, small = (
+            robust_fit(
+                measured, reference, np.full(15, believed, np.float32), METER, scale=1.0, excess=1.0
+            )
+            for believed in (SIGMA, SIGMA / 5)
+        )
+        apart.append(error(right.quaternion, truth) - error(small.quaternion, truth))
+    assert np.sqrt(np.mean(np.square(apart))) < 0.08 * SIGMA
