@@ -34,6 +34,11 @@ if test := os.environ.get("PYTEST_CURRENT_TEST"):
 """
 """Makes interpreters that a test starts record what they run, in its name."""
 
+AT_ONCE = 8
+"""Tests of a module's own file for each one of the others: what is declared in it, all commands
+run, and few look at.
+"""
+
 DOCUMENTS = (
     "tests/system/test_documents.py",
     "tests/system/test_protocol_pages.py",
@@ -104,9 +109,9 @@ class Reached:
         return data
 
     def tests(self, mutant: Mutant, files: Set[str]) -> list[str]:
-        """Those that run its line: of each file the quickest, the nearest file first, then the
-        next of each. Where it runs when it is imported, those of `DOCUMENTS`, and those of its
-        module and of the ``files`` that are about it."""
+        """Those that run its line: of each file the quickest, of its own some, the nearest file
+        first, then the next of each. Where it runs when it is imported, those of `DOCUMENTS`, and
+        those of its module and of the ``files`` that are about it."""
         if mutant.path not in self._lines:
             self._lines[mutant.path] = self._data.contexts_by_lineno(str(mutant.path))
         by_line = self._lines[mutant.path]
@@ -140,7 +145,7 @@ class Reached:
 
         order = {file: place for place, file in enumerate(sorted(by_file, key=distance))}
         turns = [
-            (turn, order[file], test)
+            (turn if distance(file)[0] else turn // AT_ONCE, order[file], turn, test)
             for file, found in by_file.items()
             for turn, test in enumerate(found)
         ]

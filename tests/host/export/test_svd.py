@@ -54,3 +54,35 @@ def test_a_parser_finds_every_register_where_it_is(tables, tmp_path: Path) -> No
         for instance in layout.instances
         for number in instance.interrupts.values()
     }
+
+
+@EACH
+def test_a_parser_knows_the_part_and_who_may_access_what(tables, tmp_path: Path) -> None:
+    path = tmp_path / "part.svd"
+    path.write_text(svd(tables))
+    device = SVDParser.for_xml_file(str(path)).get_device()
+    assert device.name == tables.name
+    assert (device.address_unit_bits, device.width, device.size) == (8, 32, 32)
+    layouts = {one.name: layout for layout in tables.layouts for one in layout.instances}
+    for peripheral in device.peripherals:
+        layout = layouts[peripheral.name]
+        assert peripheral.description == layout.title
+        (block,) = peripheral.address_blocks or ()
+        ends = [register.offset + 4 for register in layout.registers]
+        assert (block.offset, block.size) == (0, max(ends, default=4))
+        known = {register.name: register for register in layout.registers}
+        for register in peripheral.registers or ():
+            wanted = known[register.name]
+            assert register.size == 32
+            assert str(register.access.value) == access(wanted.readable, wanted.writable)
+            assert ("only keeps it" in register.description) == (not wanted.modelled)
+            assert (register.read_action is not None) == bool(wanted.action)
+            fields = {field.name: field for field in wanted.fields}
+            for field in register.fields or ():
+                own = fields[field.name]
+                assert str(field.access.value) == access(own.readable, own.writable)
+
+
+def access(readable: object, writable: object) -> str:
+    names = {(True, True): "read-write", (False, True): "write-only"}
+    return names.get((bool(readable), bool(writable)), "read-only")

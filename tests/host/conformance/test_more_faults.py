@@ -1,0 +1,234 @@
+"""Faults that a node must not have, each of them alone: all are found and named."""
+
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.codec.register_pointer import FILL
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
+from cubestack.firmware_model.interface.cubestar import ResetCause
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.clients.registers import RegisterClient, RegisterLine
+from cubestack.host.conformance import contract
+from cubestack.host.conformance.contract import CheckResult, CheckRun, FailedError, Verdict
+from cubestack.host.conformance.effects import check_watchdog
+from cubestack.host.conformance.reads import check_reads
+from cubestack.host.devices.shown_settings import read_back
+from cubestack.host.devices.targets import Target
+from cubestack.host.errors import NoAnswerError
+from tests.host.conformance.test_suite import SMALL, failures, good, suite
+from tests.host.conftest import FakeNode, Line, Slave, UartLink
+
+__all__ = ["good"]
+
+
+def after(monkeypatch: pytest.MonkeyPatch, node: Any, telecommand: str, spoil: Any) -> None:
+    """Let something happen once a telecommand was executed."""
+    execute = node.execute
+
+    def do(name: str, values: dict[str, Any]) -> None:
+        execute(name, values)
+        if name == telecommand:
+            spoil(values)
+
+    monkeypatch.setattr(node, "execute", do)
+
+
+def test_a_block_that_arrives_changed(
+    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def spoil(values: dict[str, Any]) -> None:
+        good.memory[128 * values["BlockNumber"] + 7] ^= 1
+
+    after(monkeypatch, good, "UploadBlock", spoil)
+    found = failures(suite(good, uart, allow_write=True))
+    assert found == {"telecommand UploadBlock": "block 3 is not what was uploaded"}
+
+
+def test_a_reset_that_was_not_the_watchdog_s(
+    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = next(cause for cause in ResetCause if cause is not ResetCause.WATCHDOG)
+
+    def spoil(_values: dict[str, Any]) -> None:
+        good.values["ExtendedIdentification"]["ResetCause"] = other
+
+    after(monkeypatch, good, "TestWDG", spoil)
+    found = failures(suite(good, uart, allow_write=True))
+    assert set(found) == {"telecommand TestWDG"}
+    assert "declared WATCHDOG" in found["telecommand TestWDG"]
+
+
+@pytest.mark.parametrize(("before", "cleared"), [(0, True), (3, False)])
+def test_a_counter_of_resets_that_were_there_is_left(
+    good: Any, uart: Any, before: int, cleared: bool
+) -> None:
+    good.values["ExtendedIdentification"]["WDGResetCount"] = before
+    run, seen = suite(good, uart, allow_write=True), list[str]()
+    check_watchdog(run, CUBESTAR.telecommand("TestWDG"), seen)
+    assert seen == ["reset and counted"]
+    names = [name for name, _ in good.log]
+    assert names == ["TestWDG", *(["ClearWDGResetCounter"] if cleared else [])]
+
+
+def test_a_refusal_that_changes_something(
+    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer, message = good.answer, CUBESTAR.telecommand("setIDMode")
+    ((telemetry, field),) = read_back(CUBESTAR, message, SMALL).values()
+
+    def careless(payload: bytes) -> bytes | None:
+        reply: bytes | None = answer(payload)
+        if reply == b"\x03" and payload[0] == message.id:
+            shown = good.values[telemetry.name]
+            shown[field.name] = 1 - shown[field.name]
+        return reply
+
+    monkeypatch.setattr(good, "answer", careless)
+    found = failures(suite(good, uart, allow_write=True))
+    (name,) = found
+    assert name.startswith("telecommand setIDMode: ")
+    assert found[name].startswith("refused, but ")
+    assert found[name].endswith(" changed what is read back")
+
+
+def test_switches_that_show_something_else(
+    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def spoil(_values: dict[str, Any]) -> None:
+        shown = good.values["Profile"]
+        name = next(iter(shown))
+        shown[name] = 1 - min(1, int(shown[name]))
+
+    after(monkeypatch, good, "SetSwitch", spoil)
+    found = failures(suite(good, uart, allow_write=True))
+    assert "was set, Profile is {" in found["telecommand SetSwitch"]
+
+
+def test_a_node_that_does_not_come_back(
+    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = suite(good, uart, allow_write=True)
+    waits, polls = list[float](), list[str]()
+
+    class Gone:
+        """Executes one telecommand, and is not heard of for ``silence`` polls."""
+
+        silence = 10**6
+
+        def command(self, name: str, **_values: object) -> None:
+            polls.clear()
+
+        def wait_processed(self, timeout_s: float) -> None:
+            raise NoAnswerError(f"no answer for {timeout_s:g} s")
+
+        def telemetry(self, name: str) -> dict[str, int]:
+            polls.append(name)
+            if len(polls) <= self.silence:
+                raise NoAnswerError("no answer")
+            return {}
+
+        def pause(self, seconds: float) -> None:
+            waits.append(seconds)
+
+    gone: Any = Gone()
+    run.target.node = gone
+    with pytest.raises(FailedError, match=r"no answer for 10 s after Reset"):
+        run.perform("Reset", {})
+    assert sum(waits) == pytest.approx(contract.RESTART_TIMEOUT_S)
+    assert set(polls) == {CUBESTAR.telemetries[0].name}
+    gone.silence = 3
+    waits.clear()
+    run.perform("Reset", {})
+    assert len(waits) == 3
+
+
+# --- registers ------------------------------------------------------------------------------------
+
+
+class Filled(Slave):
+    """Registers that all have a value that is allowed; behind other addresses there is fill."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        for one in REGISTERS:
+            if one.readable and not one.streams:
+                least = int(max(one.field.minimum or 0, 0))
+                self.content[one.address] = least.to_bytes(one.length, "big")
+
+
+def reads(slave: Any, *, line: bool = False) -> dict[str, CheckResult]:
+    node = NodeClient(UartLink(FakeNode(CUBESENSE)), CUBESENSE, retries=0)
+    bus = RegisterLine(slave, timeout_s=0.0) if line else slave
+    registers = RegisterClient(bus, REGISTERS, retries=0, wait=lambda _s: None)
+    run = CheckRun(Target("fake", CUBESENSE, node, registers=registers))
+    check_reads(run)
+    return {one.name: one for one in run.checks if one.name.startswith("register")}
+
+
+def test_registers_are_read_and_told() -> None:
+    found = reads(Filled())
+    names = {f"register {one.name}" for one in REGISTERS if one.readable and not one.streams}
+    assert names < set(found)
+    (unused,) = set(found) - names
+    assert "without a register" in unused
+    assert {one.verdict for one in found.values()} == {Verdict.PASSED}
+    assert found[unused].detail == bytes([FILL, FILL]).hex()
+
+
+NARROW = [
+    one.name
+    for one in REGISTERS
+    if one.readable and one.writable and not one.field.allows(one.decode(b"\xff"), {})
+]
+
+
+@pytest.mark.parametrize("name", NARROW)
+def test_a_value_that_is_not_allowed_is_found(name: str) -> None:
+    slave, register = Filled(), REGISTERS[name]
+    slave.content[register.address] = b"\xff"
+    found = reads(slave)
+    wrong = {one.name: one.detail for one in found.values() if one.verdict is Verdict.FAILED}
+    assert set(wrong) == {f"register {name}"}
+    assert wrong[f"register {name}"].endswith(" is not allowed")
+
+
+def test_what_stands_where_no_register_is() -> None:
+    slave = Filled()
+    unused = max(address for address in range(256) if REGISTERS.at(address) is None)
+    slave.content[unused] = b"\x12\x34"
+    found = reads(slave)[f"register address {unused:#04x} without a register"]
+    assert (found.verdict, found.detail) == (
+        Verdict.FAILED,
+        f"read 1234, declared {FILL:#04x} in each byte",
+    )
+
+
+class Uart(Line):
+    """A slave's registers on a serial line: no byte comes where there is no register.
+
+    Attributes:
+        talks: whether one comes all the same.
+    """
+
+    talks = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.slave = Filled()
+
+    def write(self, data: bytes) -> None:
+        _, address = data
+        self.pending += self.slave.content.get(address, b"\x12\x34" if self.talks else b"")
+
+
+@pytest.mark.parametrize("talks", [False, True])
+def test_on_a_line_nothing_comes_without_a_register(talks: bool) -> None:
+    line = Uart()
+    line.talks = talks
+    (found,) = (one for name, one in reads(line, line=True).items() if "without" in name)
+    verdict = Verdict.FAILED if talks else Verdict.PASSED
+    detail = "read 1234, declared no answer" if talks else "no answer"
+    assert (found.verdict, found.detail) == (verdict, detail)

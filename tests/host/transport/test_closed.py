@@ -1,0 +1,168 @@
+"""A line that goes away is told by its name, and comes back where that is wanted."""
+
+import os
+import tty
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import serial
+
+from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.transport.streams import SerialTransport, open_transport, read_answer
+
+
+class Port:
+    """What pyserial opens, that can be pulled out.
+
+    Attributes:
+        out: whether it is.
+        opened: how often it was opened again.
+        said: what was written.
+        timeouts: how often one was set.
+    """
+
+    baudrates = (9600, 57_600)
+
+    def __init__(self) -> None:
+        self.out = False
+        self.opened = 0
+        self.said = b""
+        self.timeouts = 0
+        self.pending = b""
+        self._baudrate, self._timeout = 57_600, 0.0
+
+    def _check(self) -> None:
+        if self.out:
+            raise serial.SerialException("device disconnected")
+
+    @property
+    def baudrate(self) -> int:
+        return self._baudrate
+
+    @baudrate.setter
+    def baudrate(self, baud: int) -> None:
+        self._check()
+        if baud not in self.baudrates:
+            raise ValueError(baud)
+        self._baudrate = baud
+
+    @property
+    def timeout(self) -> float:
+        return self._timeout
+
+    @timeout.setter
+    def timeout(self, timeout_s: float) -> None:
+        self.timeouts += 1
+        self._timeout = timeout_s
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self.pending)
+
+    def write(self, data: bytes) -> None:
+        self._check()
+        self.said += data
+
+    def read(self, count: int) -> bytes:
+        self._check()
+        data, self.pending = self.pending[:count], self.pending[count:]
+        return data
+
+    def open(self) -> None:
+        self._check()
+        self.opened += 1
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch) -> Port:
+    made = Port()
+    monkeypatch.setattr(serial, "serial_for_url", lambda *_of, **_how: made)
+    return made
+
+
+@pytest.fixture
+def line(port: Port) -> SerialTransport:
+    return SerialTransport("/dev/x", 57_600)
+
+
+ACTS: list[Any] = [
+    pytest.param(lambda line: line.write(b"a"), id="write"),
+    pytest.param(lambda line: line.read(9, 0.0), id="read"),
+    pytest.param(lambda line: line.set_baud(9600), id="baud"),
+]
+
+
+@pytest.mark.parametrize("act", ACTS)
+def test_a_port_that_was_pulled_out_is_told(port: Port, line: SerialTransport, act: Any) -> None:
+    port.out = True
+    with pytest.raises(PortClosedError, match="/dev/x: device disconnected"):
+        act(line)
+
+
+@pytest.mark.parametrize("act", ACTS[:2])
+@pytest.mark.parametrize("reopens", [False, True])
+def test_it_is_opened_again_only_where_that_is_wanted(
+    port: Port, line: SerialTransport, act: Any, reopens: bool
+) -> None:
+    line.reopens = reopens
+    act(line)
+    assert port.opened == 0
+    port.out = True
+    for _ in range(3):
+        with pytest.raises(PortClosedError):
+            act(line)
+    port.out = False
+    act(line)
+    act(line)
+    assert port.opened == int(reopens)
+
+
+def test_a_rate_is_taken_or_not(port: Port, line: SerialTransport) -> None:
+    assert (line.set_baud(9600), line.baud, port.baudrate) == (True, 9600, 9600)
+    assert (line.set_baud(7), line.baud) == (False, 9600)
+
+
+def test_all_that_has_come_is_read_at_once(port: Port, line: SerialTransport) -> None:
+    port.pending = b"abcdef"
+    assert line.read(4, 0.5) == b"abcd"
+    assert line.read(4, 0.5) == b"ef"
+    assert line.read(4, 0.5) == b""
+    assert line.read(1, 0.5) == b""
+    assert (port.timeout, port.timeouts) == (0.5, 1)  # setting it touches the port
+
+
+def test_an_answer_is_as_long_as_it_should_be_or_what_came(
+    port: Port, line: SerialTransport
+) -> None:
+    port.pending = b"abcd"
+    assert read_answer(line, 4, 0.1) == b"abcd"
+    port.pending = b"ef"
+    assert read_answer(line, 4, 0.1) == b"ef"
+    assert read_answer(line, 4, 0.1) == b""
+
+
+@pytest.fixture
+def terminal() -> Iterator[tuple[str, int]]:
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    yield os.ttyname(slave), master
+    os.close(slave)
+
+
+def test_a_terminal_whose_other_end_closes(terminal: tuple[str, int]) -> None:
+    name, master = terminal
+    line = open_transport(name, 57_600)
+    os.close(master)
+    with pytest.raises(PortClosedError, match=name):
+        line.write(b"x")
+    line.close()
+
+
+def test_a_port_that_there_is_not() -> None:
+    for text in ("/dev/nothing", "tcp://127.0.0.1:1"):
+        with pytest.raises(PortOpenError, match=f"can not open {text}: "):
+            open_transport(text, 57_600)
