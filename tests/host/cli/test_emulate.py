@@ -1,0 +1,209 @@
+"""`cubestack emulate` in this process: what it serves, says and keeps, and that its pipe ends it."""
+
+import os
+import re
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.recording import load_recording
+from cubestack.host.cli import emulate
+from cubestack.host.cli.main import main
+from cubestack.host.devices.remote_controls import TOKEN, ControlClient
+from cubestack.host.devices.targets import open_target
+from cubestack.host.errors import PortOpenError
+from tests.conftest import Run
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+SOON_S = 60.0
+BUS = 213  # nobody's
+
+
+class Serving:
+    """Runs the command, and a function beside it once it serves; then its pipe ends.
+
+    Attributes:
+        said: lines for the reader.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.said = list[str]()
+        self._serves = threading.Event()
+        self._failure: BaseException | None = None
+        for module in (emulate, emulate.device_options):
+            monkeypatch.setattr(module, "say", self._say)
+
+    def _say(self, text: str) -> None:
+        self.said.append(text)
+        if text.endswith("Ctrl-C ends it") and self._last in text:
+            self._serves.set()
+
+    def __call__(self, *words: object, last: str, beside: Callable[[], None]) -> int:
+        """The exit code; ``last`` names the device that is told of last."""
+        self._last = last
+        reading, writing = os.pipe()
+
+        def act() -> None:
+            try:
+                assert self._serves.wait(SOON_S)
+                beside()
+            except BaseException as failure:
+                self._failure = failure
+            finally:
+                os.close(writing)
+
+        actor = threading.Thread(target=act)
+        actor.start()
+        try:
+            code = main(["emulate", *map(str, words), "--lifeline", str(reading)])
+        finally:
+            self._serves.set()
+            actor.join()
+        if self._failure is not None:
+            raise self._failure
+        return code
+
+    def ports(self, title: str) -> list[str]:
+        """Where a device serves, in its order."""
+        (line,) = (line for line in self.said if line.startswith(f"{title} serves on "))
+        return re.findall(r"(\S+) at \d+ baud", line)
+
+
+@pytest.fixture
+def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Serving]:
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield Serving(monkeypatch)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+def asked(port: str, name: str) -> dict[str, Any]:
+    """Who answers at a port."""
+    target = open_target(port, name)
+    try:
+        return dict(target.node.telemetry("Identification"))
+    finally:
+        target.close()
+
+
+def test_a_terminal_is_served_and_what_is_said_recorded(serving: Serving, tmp_path: Path) -> None:
+    port, kept = tmp_path / "tty", tmp_path / "kept.rec"
+    found = dict[str, Any]()
+
+    def beside() -> None:
+        assert port.is_symlink()
+        found.update(asked(str(port), "cubestar"))
+
+    words = ("cubestar", "--pty", port, "--pace", "fast", "--record", kept, "--seed", "7")
+    assert serving(*words, "--baud", "115200", last="CubeStar", beside=beside) == 0
+    assert found["NodeType"] == 5
+    assert not port.is_symlink()
+    assert f"CubeStar serves on {port} at 115200 baud; Ctrl-C ends it" in serving.said
+    recording = load_recording(kept)
+    assert recording.device == "cubestar"
+    assert recording.bauds["uart"] == 115_200
+    assert recording.sent("uart", "host")[0]
+
+
+def test_several_devices_share_a_bus_and_have_ports_of_their_own(serving: Serving) -> None:
+    found = list[int]()
+
+    def beside() -> None:
+        (star,), (sense, bench) = serving.ports("CubeStar"), serving.ports("CubeSense")
+        assert len({star, sense, bench}) == 3
+        found.extend(asked(port, name)["NodeType"]
+                     for port, name in ((star, "cubestar"), (sense, "cubesense")))  # fmt: skip
+        assert socket_path(BUS).exists()
+
+    words = ("cubestar", "cubesense", "--tcp", "0", "--pace", "fast", "--i2c", BUS)
+    assert serving(*words, last="CubeSense", beside=beside) == 0
+    assert found == [5, 4]
+    assert not socket_path(BUS).exists()
+    assert f"I2C bus {BUS}: cubestack run --attach --bus {BUS} -- PROGRAM" in serving.said
+    (line,) = (line for line in serving.said if line.startswith("CubeSense serves on "))
+    assert re.search(r"^CubeSense serves on tcp://\S+ at 57600 baud, .*\w+ on tcp://\S+ at", line)
+
+
+def test_it_is_steered_with_its_token_alone(
+    serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(TOKEN, "a-secret")
+    about = dict[str, Any]()
+
+    def beside() -> None:
+        (line,) = (line for line in serving.said if line.startswith("control on "))
+        url, told = re.findall(r"control on (\S+), token (\S+)", line)[0]
+        assert told == "a-secret"
+        about["devices"] = ControlClient(url, told).ask("GET", "/")["devices"]
+        about["no_past"] = ControlClient(url, told).ask("GET", "/devices/aramis")["no_past"]
+        with pytest.raises(PortOpenError, match="wants its token"):
+            ControlClient(url, "another").ask("GET", "/")
+
+    words = ("aramis", "--tcp", "0", "--pace", "fast", "--control", "0")
+    assert serving(*words, last="AraMiS", beside=beside) == 0
+    assert about == {"devices": ["aramis"], "no_past": ""}
+
+
+@pytest.mark.parametrize(
+    ("option", "given"),
+    [
+        ("scene", "x.toml"),
+        ("faults", "x.toml"),
+        ("record", "x.rec"),
+        ("trace", "x.vcd"),
+        ("set", "a=b"),
+        ("gdb", "7"),
+        ("gdb-wait", None),
+        ("profile-out", "x"),
+        ("coverage-out", "x"),
+    ],
+)
+def test_options_of_one_device_are_refused_for_several(
+    run: Run, option: str, given: str | None
+) -> None:
+    found = run("emulate", "cubestar", "aramis", f"--{option}", *([given] if given else []))
+    assert found.code == 2
+    assert found.line.endswith(f"--{option} belongs to one device, and there are several")
+
+
+def test_an_orbit_that_does_not_fit_is_told_with_its_file(run: Run, tmp_path: Path) -> None:
+    orbit = tmp_path / "orbit.toml"
+    orbit.write_text("altitude = high\n", "utf-8")
+    found = run("emulate", "cubestar", "--pty", tmp_path / "tty", "--orbit", orbit)
+    assert found.code == 2
+    assert str(orbit) in found.err
+    assert not (tmp_path / "tty").is_symlink()
+
+
+@pytest.mark.parametrize(
+    ("given", "past"),
+    [
+        ({"control": None}, "nothing is on record"),
+        ({"control": 1, "trace": "x"}, "--trace goes forward only"),
+        ({"control": None, "gdb": 7, "orbit": "x"}, "--gdb goes forward only"),
+        ({"control": 1, "profile_out": "x"}, "--profile-out goes forward only"),
+        ({"control": 1, "coverage_out": "x"}, "--coverage-out goes forward only"),
+        ({"control": 1, "orbit": "x"}, "--orbit goes forward only"),
+    ],
+)
+@pytest.mark.parametrize("devices", [1, 2])
+def test_why_nobody_can_go_back(
+    monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], past: str, devices: int
+) -> None:
+    from argparse import Namespace
+    from contextlib import ExitStack
+
+    recorded = list[Any]()
+    monkeypatch.setattr(emulate.device_options, "record", lambda *of: recorded.append(of[1]))
+    nothing = dict.fromkeys(("control", *emulate.FORWARD_ONLY))
+    opened: list[Any] = [object()] * devices
+    args = Namespace(**nothing | given, record=None)
+    assert emulate._past(args, opened, [None] * devices, ExitStack()) == past  # type: ignore[list-item]
+    assert recorded == (opened if devices == 1 else [])
