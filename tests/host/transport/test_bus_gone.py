@@ -1,0 +1,62 @@
+"""An emulated bus whose process goes away, and which of several is meant."""
+
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cubestack.firmware_model.formats import linux_i2c
+from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.transport.smbus import CubeSMBus, _find_socket
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[socket.socket]:
+    """Somebody who serves a bus."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening:
+        listening.bind(str(tmp_path / "bus"))
+        listening.listen()
+        yield listening
+
+
+@pytest.mark.parametrize("reply", [b"", b"\x01", b"\x10\x00\x00\x00abc"])
+def test_an_emulation_that_ends_within_an_answer(
+    server: socket.socket, tmp_path: Path, reply: bytes
+) -> None:
+    def answer() -> None:
+        connection = server.accept()[0]
+        with connection:
+            connection.recv(1 << 12)
+            if reply:
+                connection.sendall(reply)
+
+    serving = threading.Thread(target=answer)
+    serving.start()
+    with pytest.raises(PortClosedError, match="the emulation has gone"):
+        CubeSMBus(str(tmp_path / "bus"))
+    serving.join()
+
+
+def test_a_bus_that_nobody_serves(tmp_path: Path) -> None:
+    with pytest.raises(PortOpenError, match=r"no emulation serves .*bus \(No such file"):
+        CubeSMBus(str(tmp_path / "bus"))
+
+
+@pytest.mark.parametrize(
+    ("around", "number", "own"),
+    [("7", "7", True), ("7", "8", False), (None, "7", False), ("7", None, False)],
+)
+def test_a_program_below_run_has_the_bus_around_it(
+    monkeypatch: pytest.MonkeyPatch, around: str | None, number: str | None, own: bool
+) -> None:
+    for name, value in (("BUS", around), ("SOCKET", "/the/socket" if number else None)):
+        if value is None:
+            monkeypatch.delenv(f"CUBESTACK_I2C_{name}", raising=False)
+        else:
+            monkeypatch.setenv(f"CUBESTACK_I2C_{name}", value)
+    wanted = int(number or 7)
+    served = Path("/the/socket") if own else linux_i2c.socket_path(wanted)
+    assert _find_socket(wanted) == _find_socket(f"/dev/i2c-{wanted}") == served
+    assert _find_socket("/some/where") == Path("/some/where")
