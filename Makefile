@@ -11,16 +11,20 @@ MUTANTS ?=
 SEED ?= 0
 SIMULATOR ?= icarus
 
+# What `make pasted` pastes; all when it is empty.
+DOCUMENTS ?=
+
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test test-all test-hdl firmware mutants lint libraries bench bench-engines clean
+.PHONY: help venv run docs test test-all test-hdl pasted firmware mutants lint libraries bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
 	@echo "make test      set up, then run the tests, but for those that take long"
 	@echo "make test-all  set up, then run all tests"
 	@echo "make test-hdl  set up, then simulate the gateware: more than make test does, with coverage"
+	@echo "make pasted    paste the commands of README.md and docs/ into a fresh clone, and tell how they end"
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make docs      set up, then build the documents as a site in out/site"
@@ -48,6 +52,9 @@ test: .venv/ready-dev
 
 test-all: .venv/ready-dev
 	@$(BIN)/pytest -n auto --dist loadgroup -m "slow or not slow"
+
+pasted:
+	@$(PYTHON) -m tests.system.pasted $(DOCUMENTS)
 
 firmware: .venv/ready-run
 	@command -v arm-none-eabi-gcc >/dev/null 2>&1 || { \

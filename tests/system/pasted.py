@@ -44,6 +44,8 @@ READY = "Ctrl-C ends it"
 LONG_TARGETS = {"test", "test-all", "test-hdl", "mutants", "bench-engines", "libraries"}
 EMPTY_FOLDER = {"tutorial.md"}
 ENDING_S = 20.0
+TOLD = 15
+"""Lines of what failed."""
 
 
 class Pasted(NamedTuple):
@@ -171,7 +173,8 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
                 return reason
     if call is not None and not long and re.search(LONG, call):
         return "minutes to hours"
-    if any(word in line for word in ("PROGRAM", "my_script", "picture.elf", "./star", "dask")):
+    typed = shlex.join(words)
+    if any(word in typed for word in ("PROGRAM", "my_script", "picture.elf", "./star", "dask")):
         return "the reader's turn"
     return ""
 
@@ -202,7 +205,8 @@ def _paste(shell: Shell, document: str, line: str, *, long: bool, limit_s: float
     serves = call is not None and re.search(SERVES, call)
     code, said = (shell.serve if serves else shell.run)(line, limit_s)
     heard = [one for one in said if one.strip()]
-    return Pasted(document, shown, code, time.monotonic() - started, (heard or [""])[-1])
+    told = "\n    ".join(["", *heard[-TOLD:]]) if code else (heard or [""])[-1]
+    return Pasted(document, shown, code, time.monotonic() - started, told)
 
 
 def _paste_python(shell: Shell, block: Code, number: int, limit_s: float) -> Iterator[Pasted]:
