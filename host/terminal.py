@@ -115,10 +115,7 @@ def progress(
 
     The first ``before`` of them were done before, and tell nothing about the rate.
     """
-    if quiet:
-        yield from items
-        return
-    with busy(label, before) as shown:
+    with busy(label, before, quiet=quiet) as shown:
         shown(0, total)
         for done, item in enumerate(items, 1):
             yield item
@@ -126,13 +123,16 @@ def progress(
 
 
 @contextmanager
-def busy(label: str, before: int = 0) -> Iterator[Told]:
+def busy(label: str, before: int = 0, *, quiet: bool = False) -> Iterator[Told]:
     """Tell that ``label`` goes on as long as the block lasts; it may be inside of another.
 
     On a terminal that is a bar which goes away; elsewhere a line every `EVERY_S` of wall time, of
     the innermost one. Yields what may be told how much is done, and of how many, of which
-    ``before`` were done before.
+    ``before`` were done before. While ``quiet`` nothing is told.
     """
+    if quiet:
+        yield lambda _done, _total: None
+        return
     if _draws(_errors):
         with _shown_bar() as bar:
             task = bar.add_task(label, total=None)

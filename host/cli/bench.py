@@ -4,7 +4,7 @@ import argparse
 import json
 
 from cubestack.host.devices.registry import devices
-from cubestack.host.terminal import tell
+from cubestack.host.terminal import busy, tell
 
 COMPARISON = "What compares the engines that can run the FPGA designs is `make bench-engines`."
 
@@ -26,7 +26,8 @@ def run(args: argparse.Namespace) -> int:
     figures: dict[str, float] = {}
     for device in devices():
         if device.benchmark is not None:
-            figures |= device.benchmark().run(device)
+            with busy(f"measuring {device.title}", quiet=args.json):
+                figures |= device.benchmark().run(device)
     if args.json:
         print(json.dumps(figures))
         return 0

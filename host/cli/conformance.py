@@ -14,12 +14,14 @@ examples:
 
 import argparse
 import json
+import sys
 from collections import Counter
 
 from cubestack.host.cli.device_options import given_options
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.suite import compare, run_suite
+from cubestack.host.terminal import busy, tell
 
 MARKS = {Verdict.PASSED: "ok", Verdict.FAILED: "FAILED"}
 NAME_COLUMNS = 52
@@ -50,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
             args.device = args.device or target.interface.name.lower()
             # The second target's results are compared only.
             on_check = (lambda _check: None) if number else show
-            runs.append(run_suite(target, args.allow_write, on_check))
+            with busy(f"checking {target.name}", quiet=args.json):
+                runs.append(run_suite(target, args.allow_write, on_check))
         finally:
             target.close()
     difference = compare(*runs) if len(runs) == 2 else None
@@ -62,14 +65,15 @@ def _show_text(check: CheckResult) -> None:
     if check.verdict is Verdict.SKIPPED:
         return  # summed up at the end
     detail = check.detail
-    if len(detail) > DETAIL_COLUMNS and check.verdict is Verdict.PASSED:
+    short = sys.stdout.isatty() and check.verdict is Verdict.PASSED
+    if short and len(detail) > DETAIL_COLUMNS:
         detail = detail[: DETAIL_COLUMNS - 3] + "..."
-    print(f"{MARKS[check.verdict]:<7}{check.name:<{NAME_COLUMNS}} {detail}".rstrip())
+    tell(f"{MARKS[check.verdict]:<7}{check.name:<{NAME_COLUMNS}} {detail}".rstrip())
 
 
 def _show_json(check: CheckResult) -> None:
     content = {"check": check.name, "outcome": check.verdict.value, "detail": check.detail}
-    print(json.dumps(content))
+    print(json.dumps(content), flush=True)
 
 
 def _summarise(runs: list[CheckRun], difference: str | None, *, as_json: bool) -> None:

@@ -18,7 +18,7 @@ from rich.table import Table
 from cubestack.host.devices.costs import CostReport, Measurement
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
-from cubestack.host.terminal import show, tell
+from cubestack.host.terminal import busy, show, tell
 
 _BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
 
@@ -42,10 +42,11 @@ def run(args: argparse.Namespace) -> int:
     levels = _known("--level", args.level, report.levels)
     precisions = _known("--precision", args.precision, report.precisions)
     found = []
-    for one in report.measure(levels, precisions):
-        found.append(one)
-        if not args.json:
-            tell(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
+    with busy("compiling and counting", quiet=args.json):
+        for one in report.measure(levels, precisions):
+            found.append(one)
+            if not args.json:
+                tell(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
     if args.write:
         report.file.write_text(json.dumps(report.as_data(found), indent=1) + "\n", "utf-8")
         _rewrite(Path("docs") / report.document, report.page(found))

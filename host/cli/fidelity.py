@@ -24,7 +24,7 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments import fidelity
 from cubestack.host.experiments.workers import cores
-from cubestack.host.terminal import say, tell
+from cubestack.host.terminal import busy, say, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -78,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
     ]
     workers = min(args.workers or cores(), len(jobs))
     told = _Rest(jobs, quiet=args.json)
-    found = fidelity.run_jobs(jobs, workers, told)
+    with busy("measuring", quiet=args.json) as shown:
+        found = fidelity.run_jobs(jobs, workers, lambda job: shown(told(job), len(jobs)))
     for name, rows in chosen.items():
         _show(args, list(fidelity.filled(name, rows, found)), pages.get(name))
     return 0
@@ -92,7 +93,8 @@ class _Rest:
         self.count, self.done, self.quiet = len(jobs), 0, quiet
         self.started = time.monotonic()
 
-    def __call__(self, job: fidelity.Job) -> None:
+    def __call__(self, job: fidelity.Job) -> int:
+        """Tell it of ``job``; how many are done."""
         self.done += 1
         self.rest_s -= job.seconds
         if not self.quiet:
@@ -102,6 +104,7 @@ class _Rest:
                 f"{self.done}/{self.count} {job.device} {job.trial}, {job.profile}: "
                 f"{took_s:.0f} s, about {rest_s:.0f} s to go"
             )
+        return self.done
 
 
 def _page(folder: Path, name: str) -> Path:

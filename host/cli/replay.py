@@ -27,7 +27,7 @@ from cubestack.host.devices.past import Recipe
 from cubestack.host.devices.records import create_file, start_trace
 from cubestack.host.options import between
 from cubestack.host.recording.setups import setup_for
-from cubestack.host.terminal import say
+from cubestack.host.terminal import busy, say
 
 LATEST_S = 1e8
 
@@ -69,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
             board.kernel.advance_to(end_ps)
             trace.close(end_ps)
             return 0
-        differences = replay.run(opened.device.interface)
+        with busy("replaying", quiet=args.json):
+            differences = replay.run(opened.device.interface)
     if args.json:
         print(json.dumps({"recording": str(args.recording), "differences": differences}))
     else:

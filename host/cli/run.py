@@ -16,7 +16,7 @@ import argparse
 import errno
 import shutil
 import tempfile
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -135,7 +135,7 @@ def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
     for name in names:
         beside = opened[0] if opened else None
         options = device_options.chosen_options(args, device(name))
-        with nullcontext() if args.quiet else busy(f"starting {device(name).title}"):
+        with busy(f"starting {device(name).title}", quiet=args.quiet):
             opened.append(
                 open_device(
                     name, args.scene, seed=args.seed, engine=args.engine, beside=beside, **options
