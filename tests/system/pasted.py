@@ -164,15 +164,15 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
     if words[0] == "make" and not long and LONG_TARGETS & set(words):
         return "takes minutes"
     call = own_call(words)
-    reasons = LEFT if call is not None else {}
-    for left, reason in reasons.items():
-        if re.search(left, call or ""):
-            port = re.search(r"\./tty\S*", call or "")
-            there = port is not None and (folder / port[0]).exists()
-            if not there and not (port is not None and re.search(SERVES, call or "")):
+    if call is not None:
+        port = re.search(r"\./tty\S*", call)
+        if port is not None and (re.search(SERVES, call) or (folder / port[0]).exists()):
+            call = call.replace(port[0], "PORT")  # it is served, or will be
+        for left, reason in LEFT.items():
+            if re.search(left, call):
                 return reason
-    if call is not None and not long and re.search(LONG, call):
-        return "minutes to hours"
+        if not long and re.search(LONG, call):
+            return "minutes to hours"
     typed = shlex.join(words)
     if any(word in typed for word in ("PROGRAM", "my_script", "picture.elf", "./star", "dask")):
         return "the reader's turn"

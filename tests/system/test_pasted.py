@@ -16,7 +16,7 @@ echo $WORD > written; cat written    # a comment
 echo why it failed; false
 cubestack emulate cubestar --pty ./tty
 cubestack shell ./tty --device cubestar
-cubestack emulate aramis --firmware program.elf
+cubestack emulate aramis --firmware program.elf --pty ./tty
 cubestack emulate cubesense
 make test
 ```
@@ -70,7 +70,7 @@ def test_lines_share_a_shell_and_tell_how_they_ended(done: dict[str, Pasted]) ->
         "echo why it 'failed;' false": 1,
         "cubestack emulate cubestar --pty ./tty": 0,
         "cubestack shell ./tty --device cubestar": 0,
-        "cubestack emulate aramis --firmware program.elf": None,
+        "cubestack emulate aramis --firmware program.elf --pty ./tty": None,
         "cubestack emulate cubesense": 1,
         "make test": None,
         "cat saved.py": 0,
@@ -84,7 +84,7 @@ def test_what_they_said_is_told(done: dict[str, Pasted]) -> None:
     assert said["echo why it 'failed;' false"].strip() == "why it failed"
     assert said["cubestack shell ./tty --device cubestar"] == "asked"
     assert (
-        said["cubestack emulate aramis --firmware program.elf"]
+        said["cubestack emulate aramis --firmware program.elf --pty ./tty"]
         == LEFT[r"program\.elf|picture\.elf"]
     )
     assert said["cubestack emulate cubesense"].strip() == "it does not start"
