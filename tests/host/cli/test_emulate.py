@@ -1,4 +1,4 @@
-"""`cubestack emulate` in this process: what it serves, says and keeps, and that its pipe ends it."""
+"""`cubestack emulate` in this process: what it serves, says and keeps; its pipe ends it."""
 
 import os
 import re
