@@ -11,17 +11,13 @@ examples:
 """
 
 import argparse
-import csv
 import json
-from contextlib import ExitStack
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from cubestack.firmware_model.formats.recording import load_recording
-from cubestack.host.devices.records import create_file
 from cubestack.host.devices.registry import device
-from cubestack.host.recording.said import COLUMNS, Said, said
+from cubestack.host.recording.said import Said, said
+from cubestack.host.recording.tables import TABLES
 from cubestack.host.terminal import say
 
 
@@ -45,25 +41,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(path: Path, messages: list[Said]) -> None:
-    rows = [row for one in messages for row in one.rows()]
-    if path.suffix == ".parquet":
-        try:
-            arrow: Any = import_module("pyarrow")
-            files: Any = import_module("pyarrow.parquet")
-        except ModuleNotFoundError:
-            raise ValueError('Parquet needs pyarrow: pip install "cubestack[parquet]"') from None
-        numbers = ("time_s", "value")
-        schema = [
-            (name, arrow.float64() if name in numbers else arrow.string()) for name in COLUMNS
-        ]
-        files.write_table(arrow.Table.from_pylist(rows, arrow.schema(schema)), path)
-    elif path.suffix == ".csv":
-        with ExitStack() as stack:
-            writer = csv.DictWriter(create_file(path, stack), COLUMNS)
-            writer.writeheader()
-            writer.writerows(rows)
-    else:
+    kind = path.suffix.removeprefix(".")
+    if kind not in TABLES:
         raise ValueError(f"{path}: a table is .csv or .parquet, not {path.suffix}")
+    content = TABLES[kind](messages)
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise ValueError(f"can not write {path}: {error.strerror}") from None
 
 
 def _object(one: Said) -> dict[str, object]:

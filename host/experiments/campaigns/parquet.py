@@ -1,10 +1,9 @@
 """A campaign's rows as one Parquet file, for pandas, polars, DuckDB and their like."""
 
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from cubestack.host.experiments.campaigns.folder import Folder
+from cubestack.host.export.parquet import arrow as pyarrow
 
 FILE = "rows.parquet"
 
@@ -17,11 +16,7 @@ def write(folder: Folder) -> Path:
 
     Raises ValueError without rows, and without pyarrow.
     """
-    try:
-        arrow: Any = import_module("pyarrow")
-        files: Any = import_module("pyarrow.parquet")
-    except ModuleNotFoundError:
-        raise ValueError('Parquet needs pyarrow: pip install "cubestack[parquet]"') from None
+    arrow = pyarrow()
     table = arrow.Table.from_pylist([vars(row) for row in folder.rows()])
     if not table.num_rows:
         raise ValueError(f"{folder.path} has no rows yet")
@@ -32,5 +27,5 @@ def write(folder: Folder) -> Path:
         for name, column in zip((one.name for one in fields.type), fields.flatten(), strict=True):
             table = table.append_column(f"{nested}.{name}", column)
     new = folder.path / f"{FILE}.new"
-    files.write_table(table, new)
+    arrow.parquet.write_table(table, new)
     return new.replace(folder.path / FILE)

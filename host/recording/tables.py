@@ -1,0 +1,30 @@
+"""What was said in a recording as a table: a row for each field of each message."""
+
+import csv
+from collections.abc import Iterable
+from io import StringIO
+
+from cubestack.host.export.parquet import parquet_file
+from cubestack.host.recording.said import COLUMNS, Said
+
+NUMBERS = ("time_s", "value")
+"""Columns that are numbers."""
+
+
+def csv_table(messages: Iterable[Said]) -> bytes:
+    """The table as a CSV file."""
+    text = StringIO(newline="")
+    writer = csv.DictWriter(text, COLUMNS)
+    writer.writeheader()
+    writer.writerows(row for one in messages for row in one.rows())
+    return text.getvalue().encode()
+
+
+def parquet_table(messages: Iterable[Said]) -> bytes:
+    """The table as a Parquet file; ValueError without pyarrow."""
+    rows = [row for one in messages for row in one.rows()]
+    return parquet_file({name: [row[name] for row in rows] for name in COLUMNS}, NUMBERS)
+
+
+TABLES = {"csv": csv_table, "parquet": parquet_table}
+"""By what the name of a file ends with."""

@@ -1,0 +1,47 @@
+"""Tables as Parquet files, read back by the library that others use."""
+
+import sys
+from io import BytesIO
+
+import pyarrow.parquet
+import pytest
+
+from cubestack.host.export.parquet import MISSING, missing, parquet_file
+
+
+def test_each_column_has_one_type() -> None:
+    columns = {
+        "number": [1, None, 2.5],
+        "truth": [True, False, None],
+        "word": ["a", None, "b\n\N{GREEK SMALL LETTER MU}"],
+        "mixed": [1, "x", True],
+        "nothing": [None, None, None],
+    }
+    table = pyarrow.parquet.read_table(BytesIO(parquet_file(columns)))
+    assert table.to_pydict() == columns | {"mixed": ["1", "x", "True"]}
+    assert [str(one.type) for one in table.schema] == [
+        "double",
+        "bool",
+        "string",
+        "string",
+        "string",
+    ]
+
+
+def test_named_columns_are_numbers_whatever_is_in_them() -> None:
+    made = parquet_file({"value": [None], "text": [None]}, numbers=("value",))
+    schema = pyarrow.parquet.read_schema(BytesIO(made))
+    assert [str(one.type) for one in schema] == ["double", "string"]
+
+
+def test_columns_of_several_lengths_are_refused() -> None:
+    with pytest.raises(ValueError, match="of one length"):
+        parquet_file({"a": [1], "b": []})
+
+
+def test_what_must_be_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert missing() == ""
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert missing() == MISSING
+    with pytest.raises(ValueError, match=r'pip install "cubestack\[parquet\]"'):
+        parquet_file({"a": [1]})
