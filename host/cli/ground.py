@@ -7,6 +7,7 @@ examples:
   cubestack ground emulated:{first} emulated:{second}
   cubestack ground emulated:{first} --profile extended --scene sky.toml
   cubestack ground /dev/ttyUSB0 --device {second}
+  cubestack ground /dev/ttyUSB0 --device {second} --record run.rec
   cubestack ground run.rec
   cubestack ground ./tty --device {first} --control http://127.0.0.1:8700
 """
@@ -17,6 +18,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.cli.arguments import whole
@@ -41,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of its emulation; its token in ${TOKEN}"
     )
+    parser.add_argument(
+        "--record", type=Path, metavar="FILE", help="what is said to a device not emulated here"
+    )
     parser.add_argument("--scene", metavar="FILE", help="of an emulated device")
     parser.add_argument("--seed", type=whole(0), help="of an emulated device")
     add_board_arguments(parser)
@@ -60,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: ended.set())
     options = _options(args)
-    _check(args.targets, options)
+    _check(args.targets, options, args.record)
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(len(args.targets)))
         desks = [pool.submit(_open, text, options, args) for text in args.targets]
@@ -77,8 +82,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _check(targets: Sequence[str], options: Mapping[str, Any]) -> None:
-    """TargetError for a device that can not be emulated, or options where none is."""
+def _check(targets: Sequence[str], options: Mapping[str, Any], record: Path | None) -> None:
+    """TargetError for a device that can not be emulated, and options that are for none."""
     emulated = [one.removeprefix(EMULATED) for one in targets if one.startswith(EMULATED)]
     for name in emulated:
         if name not in device_names():
@@ -88,6 +93,12 @@ def _check(targets: Sequence[str], options: Mapping[str, Any]) -> None:
         from cubestack.host.ground.emulators import words
 
         raise TargetError(f"{' '.join(words(options))} is for emulated:DEVICE")
+    if record is None:
+        return
+    from cubestack.host.ground.played import is_recording
+
+    if len(targets) > 1 or emulated or is_recording(targets[0]):
+        raise TargetError(f"--record {record} is for one device that is not emulated here")
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -100,7 +111,7 @@ def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "D
     from cubestack.host.ground.desk import Desk
     from cubestack.host.ground.emulators import Emulator
     from cubestack.host.ground.played import is_recording, open_recording
-    from cubestack.host.transport.streams import SerialTransport
+    from cubestack.host.transport.streams import SerialTransport, port_of
 
     if text.startswith(EMULATED):
         emulator = Emulator(text.removeprefix(EMULATED), options)
@@ -115,9 +126,11 @@ def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "D
         target = open_target(
             *(text, args.device),
             **{"service_port": args.bench, "baud": args.baud, "control": args.control},
+            record=args.record,
         )
-    if isinstance(target.line, SerialTransport):
-        target.line.reopens = True
+    port = None if target.line is None else port_of(target.line)
+    if isinstance(port, SerialTransport):
+        port.reopens = True
     return Desk(target)
 
 

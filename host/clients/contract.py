@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
 from cubestack.firmware_model.interface.codec.field import Value
@@ -16,6 +17,7 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
     switches_shown,
 )
 from cubestack.firmware_model.interface.codec.switches import Switches
+from cubestack.host.clients.exchanges import Exchanges
 from cubestack.host.errors import (
     BadAnswerError,
     CommandRefusedError,
@@ -61,11 +63,14 @@ class Client(Closable):
 
     Attributes:
         interface: the node's messages.
-        repeated: how often telemetry had to be asked for again.
     """
 
     interface: Interface
-    repeated: int = 0
+
+    @cached_property
+    def exchanges(self) -> Exchanges:
+        """What went over the wire by now."""
+        return Exchanges()
 
     @abstractmethod
     def command(self, name: str, **parameters: object) -> None:
@@ -132,6 +137,7 @@ class Client(Closable):
     def _check_error(self, message: Message, error: int) -> None:
         """Raise CommandRefusedError when an acknowledge's ``error`` code is one."""
         if error:
+            self.exchanges.refused += 1
             known = {int(code): code for code in self.interface.ack_errors}
             raise CommandRefusedError(message.name, known.get(error, error))
 

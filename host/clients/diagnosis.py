@@ -2,7 +2,13 @@
 
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.host.transport.streams import SerialTransport, TcpTransport, Transport, read_answer
+from cubestack.host.transport.streams import (
+    SerialTransport,
+    TcpTransport,
+    Transport,
+    port_of,
+    read_answer,
+)
 
 BAUDS = (57600, 115200, 9600, 19200, 38400, 230400, 460800, 921600, 4800, 2400)
 """Those that are usual, the likeliest first."""
@@ -20,23 +26,24 @@ def why_silent(line: Transport, interface: Interface) -> str:
     rate as it was. Empty when it answers, and for lines that are no port: recordings, emulations in
     this process. Raises TransportError.
     """
-    if not isinstance(line, SerialTransport | TcpTransport):
+    port = port_of(line)
+    if not isinstance(port, SerialTransport | TcpTransport):
         return ""
     heard = _ask(line, interface)
     if _answers(heard, interface):
         return ""
-    if isinstance(line, SerialTransport):
-        own = line.baud
+    if isinstance(port, SerialTransport):
+        own = port.baud
         try:
             for baud in (one for one in BAUDS if one != own):
                 if (
                     baud != own
-                    and line.set_baud(baud)
+                    and port.set_baud(baud)
                     and _answers(_ask(line, interface), interface)
                 ):
                     return f"it answers at {baud} baud, and this is {own}"
         finally:
-            line.set_baud(own)
+            port.set_baud(own)
     return _likely(heard, interface)
 
 

@@ -15,6 +15,7 @@ from smbus2 import i2c_msg
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.contract import Client
+from cubestack.host.clients.exchanges import Exchanges
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
 
 RETRY_PERIOD_S = 0.01
@@ -30,19 +31,32 @@ class I2cBus(Protocol):
 
 
 def acknowledged(
-    transfer: Callable[[], T], attempts: int, wait: Callable[[float], None], what: str
+    transfer: Callable[[], T],
+    attempts: int,
+    wait: Callable[[float], None],
+    what: str,
+    exchanges: Exchanges,
 ) -> T:
-    """Result of a ``transfer`` that is tried so many times; NoAnswerError ``what`` after them."""
+    """Result of a ``transfer`` that is tried so many times; NoAnswerError ``what`` after them.
+
+    What goes over the wire is counted in ``exchanges``.
+    """
     failure = None
     for attempt in range(attempts):
         if attempt:
             wait(RETRY_PERIOD_S)
+        exchanges.sent += 1
+        exchanges.repeated += attempt > 0
         try:
-            return transfer()
+            found = transfer()
         except TransportError:
             raise
         except OSError as error:
             failure = error
+            exchanges.ended(False)
+        else:
+            exchanges.ended(True)
+            return found
     raise NoAnswerError(what) from failure
 
 
@@ -81,19 +95,15 @@ class I2cClient(Client):
             raise CommandRefusedError(message.name, code, f", {wrong[0][0].name} is out of range")
         what = f"telecommand {message.name} not acknowledged at I2C address {self._address:#04x}"
         write = i2c_msg.write(self._address, bytes([message.id]) + data)
-        acknowledged(lambda: self._bus.i2c_rdwr(write), 1, self._wait, what)
+        acknowledged(lambda: self._bus.i2c_rdwr(write), 1, self._wait, what, self.exchanges)
         values = self.wait_processed(self._processing_timeout_s)
         self._check_error(message, int(values.get("Error", 0)))
 
     def telemetry(self, name: str) -> dict[str, Value]:
         """Read a telemetry frame; one that steps may skip a record when a transfer broke off."""
         message = self._asked(name)
-        tried = 0
 
         def read() -> bytes:
-            nonlocal tried
-            self.repeated += tried > 0
-            tried += 1
             answer = i2c_msg.read(self._address, message.length)
             self._bus.i2c_rdwr(i2c_msg.write(self._address, [message.id]), answer)
             return bytes(answer)
@@ -101,7 +111,7 @@ class I2cClient(Client):
         attempts = 1 + self._retries
         where = f"I2C address {self._address:#04x} in {attempts} attempts"
         what = f"telemetry {message.name} not acknowledged at {where}"
-        return message.unpack(acknowledged(read, attempts, self._wait, what))
+        return message.unpack(acknowledged(read, attempts, self._wait, what, self.exchanges))
 
     def pause(self, seconds: float) -> None:
         """Let time pass on the node's side."""

@@ -62,7 +62,7 @@ class NodeClient(Client):
         message = self._asked(name)
         answer = None
         for attempt in range(1 + self._retries):
-            self.repeated += attempt > 0
+            self.exchanges.repeated += attempt > 0
             answer = self.request(bytes([message.id]))
             if answer is not None and len(answer) == message.length:
                 return message.unpack(answer)
@@ -89,7 +89,10 @@ class NodeClient(Client):
         self._transport.write(wire)
         if rest:
             self._transport.write(rest)
-        return self._next_frame()
+        self.exchanges.sent += 1
+        answer = self._next_frame()
+        self.exchanges.ended(answer is not None)
+        return answer
 
     def stream(self, name: str, count: int) -> Iterator[bytes]:
         """Send telecommand ``name``, then yield the payloads of the next ``count`` frames."""
@@ -98,6 +101,7 @@ class NodeClient(Client):
             payload = self._next_frame()
             if payload is None:
                 raise NoAnswerError(f"{name}: the stream ended after {number} of {count} frames")
+            self.exchanges.streamed += 1
             yield payload
 
     def _next_frame(self) -> bytes | None:

@@ -15,6 +15,7 @@ from smbus2 import i2c_msg
 from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 from cubestack.host.clients.contract import Progress
+from cubestack.host.clients.exchanges import Exchanges
 from cubestack.host.clients.i2c import I2cBus, T, acknowledged
 from cubestack.host.transport.streams import READ_BYTES, Transport
 
@@ -26,7 +27,12 @@ I2C_READ = 1
 
 
 class RegisterClient:
-    """Reads and writes registers by name. The bus stays its owner's."""
+    """Reads and writes registers by name. The bus stays its owner's.
+
+    Attributes:
+        registers: the map.
+        exchanges: what went over the wire by now; of a register that streams, the whole of it.
+    """
 
     def __init__(
         self,
@@ -42,7 +48,7 @@ class RegisterClient:
         A transfer that is not acknowledged is repeated up to ``retries`` times, ``wait`` lets
         seconds pass between; only a write is never repeated, as it may have been executed.
         """
-        self.registers = registers
+        self.registers, self.exchanges = registers, Exchanges()
         self._bus = bus
         self._address = registers.i2c_address if address is None else address
         self._wait = wait
@@ -116,7 +122,7 @@ class RegisterClient:
         times = f"{attempts} attempt" + ("s" if attempts > 1 else "")
         where = f"I2C address {self._address:#04x} in {times}"
         what = f"register {register.name} not acknowledged at {where}"
-        return acknowledged(transfer, attempts, self._wait, what)
+        return acknowledged(transfer, attempts, self._wait, what, self.exchanges)
 
 
 @dataclass(eq=False)

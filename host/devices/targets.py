@@ -64,6 +64,7 @@ class Target:
         service_port: serial line with the one-letter protocol; None where it is not within reach.
         controls: None for a device that is not emulated here.
         device: what it is; None for an interface that nobody registered.
+        recorded: file with what was said by now; None where nothing is recorded.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Target:
     service_port: Transport | None = None
     controls: Controls | None = None
     device: AnyDevice | None = None
+    recorded: Path | None = None
     on_close: list[Callable[[], None]] = field(default_factory=list)
 
     def close(self) -> None:
@@ -146,7 +148,7 @@ def open_target(
             controls = None if control is None else controlled(control, device)
             owner = device if controls is None else controls.device
             target = _open_real(text, owner, service_port, backup, baud, tape)
-            target.controls = controls
+            target.controls, target.recorded = controls, record
         target.on_close.insert(0, stack.pop_all().close)
         return target
 

@@ -139,7 +139,11 @@ CALLS = (
         {"pace": (str, "real"), "speed": (NUMBER, 1.0)},
     ),
     Call("GET", "/devices/{device}", "ports, faults and channels that it has", Emulation.about),
-    Call("GET", "/devices/{device}/log", "what faults have done", Emulation.log),
+    Call(
+        *("GET", "/devices/{device}/log", "what faults have done, from line `since` on"),
+        lambda emulation, device, since: emulation.log(device, int(since)),
+        {"since": (NUMBER, 0)},
+    ),
     Call("GET", "/devices/{device}/pictures", "those in its memories", Emulation.pictures),
     Call("GET", "/devices/{device}/pictures/{name}", "one, as PNG", Emulation.picture),
     Call("GET", "/devices/{device}/recording", "what passed its ports", Emulation.recording),

@@ -10,12 +10,14 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.contract import Columns, DeviceClient
 from cubestack.host.devices.remote_controls import RemoteControls
 from cubestack.host.devices.targets import Target
-from cubestack.host.errors import CommandRefusedError, HostError, NoAnswerError
+from cubestack.host.errors import CommandRefusedError, HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
+from cubestack.host.export.parquet import missing as parquet_missing
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import Emulator, SentFile
 from cubestack.host.ground.magnitudes import magnitude
 from cubestack.host.ground.played import PlayedClient
+from cubestack.host.ground.results import ResultLog
 from cubestack.host.ground.tables import (
     pointer_row,
     read_sensor_register,
@@ -38,15 +40,16 @@ LONGEST_LINE = 10_000
 
 @dataclass
 class Link:
-    """How the link to a target is: requests, those that the device refused, those without a right
-    answer, those of them without any in time, telemetry that had to be asked for again; the last
-    failure."""
+    """What became of what pages asked for.
 
-    requests: int = 0
-    refused: int = 0
+    Attributes:
+        failed: how much had no right answer in the end.
+        broken: whether the last had none.
+        error: of the last failure.
+    """
+
     failed: int = 0
-    late: int = 0
-    repeated: int = 0
+    broken: bool = False
     error: str = ""
 
 
@@ -56,6 +59,7 @@ class Desk:
     link: how its link is.
     carried: the latest picture that went over the wire; None for none.
     begun: how often its emulation was started again.
+    log: results that were read.
     """
 
     def __init__(self, target: Target, emulator: Emulator | None = None) -> None:
@@ -63,6 +67,7 @@ class Desk:
         self.target, self.link, self._emulator = target, Link(), emulator
         self.carried: Transfer | None = None
         self.begun = 0
+        self.log = ResultLog()
         self._shell = Shell(target)
         self._thread = ThreadPoolExecutor(1, "target")
 
@@ -95,6 +100,12 @@ class Desk:
             missing["sensor_registers"] = none
         if self._emulator is None:
             missing["restart"] = f"no emulation of {target.name} was started by this page"
+        if controls is None and target.recorded is None:
+            missing["recording"] = f"{target.name} is not recorded: begin with --record FILE"
+        elif controls is not None and controls.no_past:
+            missing["recording"] = controls.no_past
+        if none := parquet_missing():
+            missing["parquet"] = none
         if target.service_port is None:
             missing["bench"] = "no line with the bench protocol is open"
         return {
@@ -115,6 +126,12 @@ class Desk:
             "played": self.played.state if self.played else None,
             "missing": missing,
         }
+
+    @property
+    def health(self) -> JsonObject:
+        """How the link is: ``Link``, and what went over the wire as ``Exchanges`` counts it."""
+        registers, passed = self.target.registers, self.target.node.exchanges
+        return vars(self.link) | vars(passed if registers is None else passed + registers.exchanges)
 
     @property
     def controls(self) -> RemoteControls | None:
@@ -191,6 +208,7 @@ class Desk:
             self.carried.give_up()
         self._thread.shutdown(cancel_futures=True)
         self.target.close()
+        self.log.close()
         if self._emulator is not None:
             self._emulator.close()
 
@@ -270,19 +288,17 @@ class Desk:
             return {"error": str(error)}
 
     def _asked(self, act: Callable[[], T]) -> T:
-        self.link.requests += 1
         try:
-            return act()
+            found = act()
         except CommandRefusedError:
-            self.link.refused += 1
+            self.link.broken = False
             raise
         except HostError as error:
             self.link.failed += 1
-            self.link.late += isinstance(error, NoAnswerError)
-            self.link.error = str(error)
+            self.link.broken, self.link.error = True, str(error)
             raise
-        finally:
-            self.link.repeated = self.target.node.repeated
+        self.link.broken = False
+        return found
 
 
 def _message(one: Message) -> JsonObject:

@@ -3,7 +3,7 @@
 import asyncio
 import base64
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -24,6 +24,7 @@ from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import SentFile
 from cubestack.host.ground.guard import TooLargeError, refused
+from cubestack.host.ground.logs import recording, results_table, said_table
 
 PAGE = Path(__file__).parent / "page"
 
@@ -70,7 +71,9 @@ def page_app(desks: "Sequence[Future[Desk]]") -> Starlette:
             Route("/", page),
             Route("/targets", targets),
             Route("/targets/{number:int}/pictures/{name}", of(relays.picture)),
-            Route("/targets/{number:int}/recording", of(relays.recording)),
+            Route("/targets/{number:int}/recording", of(_recording)),
+            Route("/targets/{number:int}/said/{kind}", of(_said)),
+            Route("/targets/{number:int}/results/{kind}", of(_results)),
             Route("/targets/{number:int}/trace", of(relays.trace)),
             Route("/targets/{number:int}/found/{name}", of(_found)),
             Route("/targets/{number:int}/sensor-registers/{name}", of(_sensor_register)),
@@ -159,6 +162,25 @@ async def _sensor_register(desk: Desk, _body: JsonObject, path: JsonObject) -> J
     return await asyncio.wrap_future(desk.sensor_register(path["name"]))
 
 
+async def _recording(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response:
+    content = await asyncio.to_thread(recording, desk)
+    return Response(content, media_type="text/plain", headers=_file(desk, "rec"))
+
+
+async def _said(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:
+    return await _table(desk, said_table, path["kind"])
+
+
+async def _results(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:
+    return await _table(desk, results_table, path["kind"])
+
+
+async def _table(desk: Desk, make: Callable[[Desk, str], bytes], kind: str) -> Response:
+    content = await asyncio.to_thread(make, desk, kind)
+    media = "text/csv" if kind == "csv" else "application/vnd.apache.parquet"
+    return Response(content, media_type=media, headers=_file(desk, kind))
+
+
 async def _download(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
     return desk.transfer("download", body.get("source")).state
 
@@ -184,9 +206,13 @@ async def _transfer(desk: Desk, _body: JsonObject, path: JsonObject) -> JsonObje
 async def _carried(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response:
     if desk.carried is None or desk.carried.picture is None:
         raise ValueError("no picture has come over the wire")
-    name = f'attachment; filename="{desk.target.interface.name.lower()}.png"'
-    headers = {"content-disposition": name}
-    return Response(desk.carried.picture, media_type="image/png", headers=headers)
+    return Response(desk.carried.picture, media_type="image/png", headers=_file(desk, "png"))
+
+
+def _file(desk: Desk, kind: str) -> dict[str, str]:
+    """Headers of what browsers save as a file."""
+    name = f"{desk.target.interface.name.lower()}.{kind}"
+    return {"content-disposition": f'attachment; filename="{name}"'}
 
 
 async def _live(desk: Desk, socket: WebSocket) -> None:
@@ -201,18 +227,21 @@ async def _live(desk: Desk, socket: WebSocket) -> None:
                 hears = asyncio.create_task(socket.receive_json())
             if desk.begun != begun:
                 logged, begun = 0, desk.begun
-            told: JsonObject = {"link": vars(desk.link), "begun": begun}
+            told: JsonObject = {"link": desk.health, "begun": begun}
             carried = desk.carried
             told["carried"] = carried.state if carried else None
             told["played"] = desk.played.state if desk.played else None
-            free = carried is None or not carried.runs
+            if desk.controls is not None:
+                told |= await asyncio.to_thread(_emulation, desk, logged)
+                logged = told.get("logged", logged)
+            held = told.get("emulation", {}).get("held", False)  # nobody would answer
+            free = not held and (carried is None or not carried.runs)
             if wanted.show and free:
                 told["values"] = await asyncio.wrap_future(desk.read(wanted.show))
             if wanted.results and free:
                 told["results"] = await asyncio.wrap_future(desk.results())
-            if desk.controls is not None:
-                told |= await asyncio.to_thread(_emulation, desk, logged)
-                logged = told.get("logged", logged)
+                desk.log.add(told["results"], told.get("emulation", {}).get("truth", {}))
+            told["kept"] = desk.log.count
             await socket.send_json(told)
             await asyncio.wait([hears], timeout=wanted.every_s)
     except (WebSocketDisconnect, RuntimeError):
@@ -229,13 +258,13 @@ def _emulation(desk: Desk, logged: int) -> JsonObject:
     client, device = desk.controls.client, desk.controls.device
     try:
         state = client.ask("GET", "/state")
-        log = client.ask("GET", f"/devices/{device}/log")["log"]
+        log = client.ask("GET", f"/devices/{device}/log?since={logged}")
         pictures = client.ask("GET", f"/devices/{device}/pictures")["pictures"]
     except (HostError, ValueError) as error:
         return {"emulation": {"error": str(error)}}
     own = state["devices"][device]
     emulation = {name: state[name] for name in SHARED} | own
-    seen = {"pictures": pictures, "log": log[logged:], "logged": len(log)}
+    seen = {"pictures": pictures, "log": log["log"], "logged": log["count"]}
     return {"emulation": emulation, **seen}
 
 

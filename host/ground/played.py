@@ -94,4 +94,5 @@ def open_recording(text: str) -> Target:
         raise PortOpenError(f"can not open {path}: {error.strerror}") from error
     owner = device(recording.device)
     node = PlayedClient(recording, owner.interface)
-    return Target(f"{RECORDED}{path}", owner.interface, node, device=owner)
+    name = f"{RECORDED}{path}"
+    return Target(name, owner.interface, node, device=owner, recorded=path)

@@ -59,13 +59,6 @@ async def picture(desk: Desk, _body: JsonObject, path: JsonObject) -> Response:
     return Response(content, media_type="image/png")
 
 
-async def recording(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response:
-    """What passed its ports, as a file."""
-    name = f'attachment; filename="{desk.target.interface.name.lower()}.rec"'
-    content = await fetched(desk, "recording")
-    return Response(content, media_type="text/plain", headers={"content-disposition": name})
-
-
 async def trace(desk: Desk, body: JsonObject, _path: JsonObject) -> Response:
     """A waveform of a span of its past."""
     span = urlencode([(name, body[name]) for name in ("from_s", "to_s") if name in body])

@@ -59,9 +59,10 @@ class HostRecorder:
         return (self._clock_ns() - self._start_ns) * PS_PER_NS
 
     def write(self, event: recording.LineBytes | recording.BusTransfer) -> None:
-        """Record an event."""
+        """Record an event; who reads the file meanwhile finds whole lines."""
         assert self._writer is not None
         self._writer.write(event)
+        self._writer.flush()
 
 
 @dataclass

@@ -35,6 +35,12 @@ class Transport(Protocol):
         """Release the line."""
 
 
+def port_of(line: Transport) -> Transport:
+    """The port beneath a line that is recorded, else the line itself."""
+    beneath: Transport = getattr(line, "transport", line)
+    return beneath
+
+
 def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
     """What comes, until it is ``length`` bytes or the line is silent for ``silence_s``."""
     answer = bytearray()

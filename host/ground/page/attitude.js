@@ -1,7 +1,7 @@
 // Where the sensor looks, on a sphere of the sky seen from outside: its answer, and the truth
 // beside it where that is known.
 
-import { make } from "./dom.js";
+import { atNextFrame, make } from "./dom.js";
 
 const SIZE = 420;
 const RADIUS = 150;
@@ -18,6 +18,7 @@ export class Attitude {
   constructor(place, about) {
     const none = about.missing.results;
     this.device = about.device;
+    this.drawSoon = atNextFrame(() => this.draw());
     this.azimuth = -30 * RAD;
     this.height = 20 * RAD;
     this.told = make("p", { className: "quiet", id: "attitude-told" });
@@ -58,7 +59,7 @@ export class Attitude {
     if (this.truth && valid)
       words.push(`error ${apart(this.measured, this.truth).toFixed(4)}° in all`);
     this.told.textContent = words.join("; ");
-    this.draw();
+    this.drawSoon();
   }
 
   turnBy(event) {

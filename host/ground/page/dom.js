@@ -21,3 +21,23 @@ export function choose(options, attributes = {}) {
 export function labelled(text, control, attributes = {}) {
   return make("label", attributes, text, control);
 }
+
+// `draw` with the next frame that the browser shows, once however often it is asked for by then.
+export function atNextFrame(draw) {
+  let asked = false;
+  return () => {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      draw();
+    });
+  };
+}
+
+// A file for the user, as if it were downloaded.
+export function save(blob, name) {
+  const address = URL.createObjectURL(blob);
+  make("a", { href: address, download: name }).click();
+  URL.revokeObjectURL(address);
+}

@@ -3,9 +3,8 @@
 import { choose, labelled, make } from "./dom.js";
 
 export class Emulation {
-  // `steer(call, body)` asks the emulation, `act(line)` does a line of the shell, `path` leads to
-  // the target.
-  constructor(place, about, steer, act, path) {
+  // `steer(call, body)` asks the emulation, `act(line)` does a line of the shell.
+  constructor(place, about, steer, act) {
     const why = about.missing.controls;
     this.time = make("output", { id: "time", className: "value" });
     this.state = make("p", { className: "quiet", id: "state" });
@@ -44,9 +43,6 @@ export class Emulation {
       button("Snapshot", "snapshot", take),
       labelled("snapshots", this.snapshots),
       button("Go back", "back", back),
-      button("Save recording", "recording", () =>
-        make("a", { href: `${path}/recording`, download: "" }).click(),
-      ),
     );
     this.fault = choose(about.faults, { id: "fault" });
     this.parameters = make("input", { id: "parameters", size: 26, placeholder: "for_s=2" });

@@ -56,13 +56,13 @@ export class Lamps {
       }
   }
 
-  hearLink({ requests, failed, late, refused, repeated, error }) {
-    const well = requests - failed - refused;
-    this.link.className = failed ? "bad" : "quiet";
+  hearLink({ sent, answered, late, repeated, refused, streamed, failed, broken, error }) {
+    this.link.className = broken ? "bad" : "quiet";
+    const pictures = streamed ? `, ${streamed} frames of pictures` : "";
     const last = error ? `; the last: ${error}` : "";
     this.link.textContent =
-      `link: ${requests} requests, ${well} answered, ${refused} refused, ${repeated} repeated, ` +
-      `${failed} failed, ${late} of them without an answer in time${last}`;
+      `wire: ${sent} requests, ${answered} answered, ${late} without an answer in time, ` +
+      `${repeated} repeated, ${refused} refused${pictures}; in the end ${failed} failed${last}`;
   }
 
   hearEmulation({ currents_ma }) {

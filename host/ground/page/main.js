@@ -11,6 +11,7 @@ import { Played } from "./played.js";
 import { Results } from "./results.js";
 import { Scene } from "./scene.js";
 import { ask, listen } from "./server.js";
+import { Said } from "./said.js";
 import { Settings } from "./settings.js";
 import { Start } from "./start.js";
 import { Telemetry } from "./telemetry.js";
@@ -27,6 +28,7 @@ const parts = [
   "picture",
   "wire",
   "attitude",
+  "said",
   "results",
   "loop",
   "health",
@@ -93,18 +95,19 @@ function look(number) {
   const commands = new Commands(place("commands"), about, act);
   new Favourites(place("commands"), about, commands);
   new Settings(place("settings"), about, path, tell);
+  new Said(place("said"), about, path, tell);
   const played = new Played(place("played"), about, path, tell);
   const waveform = new Waveform(place("waveform"), about, path, tell);
-  const emulation = new Emulation(place("emulation"), about, steer, act, path);
+  const emulation = new Emulation(place("emulation"), about, steer, act);
   new Start(place("start"), about, path, told);
   new Scene(place("scene"), about, path, told);
-  const pictures = new Pictures(place("picture"), about, path);
+  const pictures = new Pictures(place("picture"), about, path, (every_s) => want({ every_s }));
   live = null; // what the parts want is told when it is there
   const transfer = new Transfer(place("wire"), path, about, tell);
   const attitude = new Attitude(place("attitude"), about);
   const timeline = new Timeline(place("loop"), about, (names) => show("loop", names));
   const lamps = new Lamps(place("health"), about, (names) => show("lamps", names));
-  const results = new Results(place("results"), about, (on) => want({ results: on }));
+  const results = new Results(place("results"), about, path, tell, (on) => want({ results: on }));
   const telemetry = new Telemetry(place("telemetry"), about, (names) => show("telemetry", names));
   live = listen(
     `${path}/live`,
@@ -113,7 +116,7 @@ function look(number) {
         renew();
         return;
       }
-      link.className = message.link.failed ? "bad" : "";
+      link.className = message.link.broken ? "bad" : "";
       link.textContent = about.name;
       lamps.hearLink(message.link);
       transfer.hear(message.carried);
@@ -124,7 +127,7 @@ function look(number) {
         lamps.hear(message.values);
       }
       if (message.results) {
-        results.hear(message.results, truth);
+        results.hear(message.results, truth, message.kept);
         attitude.hear(message.results, truth);
       }
       const time = time_s ?? (Date.now() - begun) / 1000;

@@ -6,9 +6,15 @@ import { drawFound } from "./overlay.js";
 import { ask } from "./server.js";
 
 export class Pictures {
-  // `path` leads to the target.
-  constructor(place, about, path) {
+  // `path` leads to the target, `every(seconds)` says how often it is looked for another one.
+  constructor(place, about, path, every) {
     this.path = path;
+    const rate = choose(["1", "2", "5"], {
+      id: "rate",
+      title: "pictures and telemetry a second, at most",
+      disabled: Boolean(about.missing.controls),
+      onchange: () => every(1 / Number(rate.value)),
+    });
     this.known = {};
     this.found = { marks: [], lines: [] };
     this.late = false;
@@ -53,6 +59,7 @@ export class Pictures {
         labelled("what it found", this.marks, { className: "beside" }),
         labelled("magnitudes", this.magnitudes, { className: "beside" }),
         labelled("brightness", this.stretch),
+        labelled("a second", rate),
       ),
       this.enlarged.place,
       this.enlarged.buttons,
@@ -106,10 +113,12 @@ export class Pictures {
     const from = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
     from.drawImage(bitmap, 0, 0);
     this.pixels = from.getImageData(0, 0, bitmap.width, bitmap.height);
-    this.canvas.width = bitmap.width;
-    this.canvas.height = bitmap.height;
-    this.canvas.setAttribute("aria-label", `${name}, ${bitmap.width} x ${bitmap.height}`);
-    this.value.textContent = `${name}: ${bitmap.width} x ${bitmap.height}, at ${this.known[name]} s`;
+    const { width, height } = bitmap;
+    bitmap.close(); // its memory is the browser's, and not collected in time
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.canvas.setAttribute("aria-label", `${name}, ${width} x ${height}`);
+    this.value.textContent = `${name}: ${width} x ${height}, at ${this.known[name]} s`;
     this.draw();
   }
 

@@ -1,17 +1,19 @@
 // What the device answered last, beside the truth where it is emulated, on the sky, and in a log.
 
-import { labelled, make } from "./dom.js";
+import { atNextFrame, labelled, make, save } from "./dom.js";
+import { fetched } from "./server.js";
 import { apart, fromParts } from "./sphere.js";
 
-const KEPT = 100_000; // lines of the log: more than a day at one a second
 const TRAIL = 600;
 const GRID_DEG = 30;
 const [ALPHA, BETA] = ["_alpha_deg", "_beta_deg"]; // ends of the names of a direction's angles
 
 export class Results {
-  // `want(on)` says whether results are to be read again and again.
-  constructor(place, about, want) {
-    this.lines = [];
+  // `path` leads to the target, `tell(text, kind)` tells what went wrong, `want(on)` says whether
+  // results are to be read again and again.
+  constructor(place, about, path, tell, want) {
+    this.trail = []; // where it looked
+    this.drawSoon = atNextFrame(() => this.draw());
     const none = about.missing.results;
     this.on = make("input", { type: "checkbox", id: "results-on", disabled: Boolean(none) });
     this.on.checked = !none;
@@ -21,19 +23,23 @@ export class Results {
     this.sky = make("canvas", { width: 720, height: 400, role: "img", hidden: true });
     this.sky.setAttribute("aria-label", "where the sensor looks on the sky");
     const heads = ["", "answer", "truth", "error"].map((text) => make("th", { textContent: text }));
-    const save = make("button", {
-      textContent: "Save log as CSV",
-      id: "save",
-      type: "button",
-      disabled: Boolean(none),
-      onclick: () => this.save(about.device),
-    });
+    const name = about.device.toLowerCase();
+    const button = (text, id, onclick, why) =>
+      make("button", { textContent: text, id, type: "button", onclick, disabled: Boolean(why), title: why ?? "" });
+    const file = (end) => async () => {
+      try {
+        save(await (await fetched(`${path}/results/${end}`)).blob(), `${name}.${end}`);
+      } catch (error) {
+        tell(`log of results\n  ${error.message}`, "bad");
+      }
+    };
     place.append(
       make(
         "div",
         { className: "row" },
         labelled("read every second", this.on, { className: "beside" }),
-        save,
+        button("Save log as CSV", "save", file("csv"), none),
+        button("Save log as Parquet", "save-parquet", file("parquet"), none ?? about.missing.parquet),
         this.count,
       ),
       make("table", {}, make("thead", {}, make("tr", {}, ...heads)), this.table),
@@ -43,36 +49,37 @@ export class Results {
     want(this.on.checked);
   }
 
-  hear(results, truth = {}) {
+  // `kept` lines are in the log, which the server has.
+  hear(results, truth = {}, kept = 0) {
     if ("error" in results) {
       this.count.textContent = results.error;
       return;
     }
-    const errors = {};
     const rows = Object.entries(results).map(([name, value]) => {
       const true_ = name.endsWith("_deg") ? truth[name] : undefined;
       const known = true_ !== undefined && true_ !== null;
       const error = known && value !== null ? turned(value - true_) : null;
-      if (error !== null) errors[`${name.slice(0, -4)}_error_deg`] = error;
       if (known) return row(name, worded(name, value), worded(name, true_), error);
       const all = make("td", { className: "value", colSpan: 3, textContent: worded(name, value) });
       return make("tr", {}, make("th", { scope: "row", textContent: name }), all);
     });
     for (const { name, answer, true_ } of directions(results, truth)) {
       const error = answer && apart(answer, true_);
-      if (answer) errors[`${name}_error_deg`] = error;
       const shown = row(`${name} direction`, answer ? pointed(answer) : "–", pointed(true_), error);
       shown.className = "direction";
       rows.push(shown);
     }
     this.table.replaceChildren(...rows);
-    this.lines.push({ utc: new Date().toISOString(), ...results, ...errors });
-    if (this.lines.length > KEPT) this.lines.shift();
-    this.count.textContent = `${this.lines.length} lines`;
-    if ("ra_deg" in results) this.draw(truth);
+    this.count.textContent = `${kept} lines`;
+    if (!("ra_deg" in results)) return;
+    if (results.ra_deg !== null) this.trail.push([results.ra_deg, results.dec_deg]);
+    if (this.trail.length > TRAIL) this.trail.shift();
+    this.truth = truth;
+    this.drawSoon();
   }
 
-  draw(truth) {
+  draw() {
+    const { truth } = this;
     this.sky.hidden = false;
     const pen = this.sky.getContext("2d");
     const { width, height } = this.sky;
@@ -97,10 +104,9 @@ export class Results {
     pen.textAlign = "center";
     pen.fillText("right ascension; declination upward", width / 2, height - 4);
     pen.fillStyle = "#2f81f7";
-    const seen = this.lines.slice(-TRAIL).filter((one) => one.ra_deg !== null);
-    for (const one of seen) dot(pen, x(one.ra_deg), y(one.dec_deg), 2);
-    const last = seen.at(-1);
-    if (last) dot(pen, x(last.ra_deg), y(last.dec_deg), 6);
+    for (const [ra, dec] of this.trail) dot(pen, x(ra), y(dec), 2);
+    const last = this.trail.at(-1);
+    if (last) dot(pen, x(last[0]), y(last[1]), 6);
     if (truth.ra_deg !== undefined) {
       pen.strokeStyle = "#d29922";
       pen.lineWidth = 2;
@@ -109,15 +115,6 @@ export class Results {
       pen.stroke();
       pen.lineWidth = 1;
     }
-  }
-
-  save(device) {
-    const names = [...new Set(this.lines.flatMap((one) => Object.keys(one)))];
-    const rows = [names, ...this.lines.map((one) => names.map((name) => one[name] ?? ""))];
-    const text = rows.map((row) => row.map(quoted).join(",")).join("\r\n") + "\r\n";
-    const address = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-    make("a", { href: address, download: `${device.toLowerCase()}.csv` }).click();
-    URL.revokeObjectURL(address);
   }
 }
 
@@ -152,11 +149,6 @@ function worded(name, value) {
   if (value === null) return "–";
   const whole = typeof value !== "number" || (Number.isInteger(value) && !name.endsWith("_deg"));
   return whole ? String(value) : value.toFixed(5);
-}
-
-function quoted(value) {
-  const text = String(value);
-  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
 function line(pen, fromX, fromY, toX, toY) {

@@ -3,6 +3,11 @@
 const AGAIN_MS = 1000;
 
 export async function ask(path, body = null) {
+  return (await fetched(path, body)).json();
+}
+
+// The answer as it is, such as a file; throws what the server says against it.
+export async function fetched(path, body = null) {
   const call = body === null ? {} : { method: "POST", body: JSON.stringify(body) };
   let answer;
   try {
@@ -10,9 +15,8 @@ export async function ask(path, body = null) {
   } catch {
     throw new Error("the program behind this page does not answer");
   }
-  const told = await answer.json();
-  if (!answer.ok) throw new Error(told.error);
-  return told;
+  if (!answer.ok) throw new Error((await answer.json()).error);
+  return answer;
 }
 
 // A WebSocket that comes back; `hear` gets each message, `gone` is told of a lost one.

@@ -1,6 +1,6 @@
 // Telemetry frames as they come in, and any number in them over time.
 
-import { choose, labelled, make } from "./dom.js";
+import { atNextFrame, choose, labelled, make } from "./dom.js";
 import { named } from "./fields.js";
 import uPlot from "./vendor/uPlot.esm.js";
 
@@ -18,6 +18,7 @@ export class Telemetry {
     this.cells = new Map();
     this.plotted = [];
     this.times = [];
+    this.drawSoon = atNextFrame(() => this.draw(true));
     this.name = choose([...this.byName.keys()], { id: "frame", onchange: () => this.show() });
     this.meaning = make("p", { className: "quiet" });
     this.table = make("tbody");
@@ -93,7 +94,7 @@ export class Telemetry {
       this.times.shift();
       for (const p of this.plotted) p.values.shift();
     }
-    this.draw(true);
+    this.drawSoon();
   }
 
   draw(more = false) {

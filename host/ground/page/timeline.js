@@ -1,11 +1,11 @@
 // Words that a device answers, task, mode or state, as bands over time: those of its results, and
 // any field of telemetry whose values have names.
 
-import { choose, labelled, make } from "./dom.js";
+import { atNextFrame, choose, labelled, make } from "./dom.js";
 import { hasNames, named } from "./fields.js";
 
 const SPANS_S = [60, 300, 1800];
-const KEPT = 20_000; // changes of a word
+const KEPT = 20_000; // changes of a word, within the longest span
 const ROW = 42;
 const TEXT = 20; // above the band
 const FOOT = 22;
@@ -17,6 +17,7 @@ export class Timeline {
   // `want(names)` says which frames are to be read again and again.
   constructor(place, about, want) {
     this.want = want;
+    this.drawSoon = atNextFrame(() => this.draw());
     this.bands = new Map();
     this.looks = new Map();
     this.chosen = new Map(); // frame and field by the name of the band
@@ -97,9 +98,10 @@ export class Timeline {
       const last = changes.at(-1);
       if (last) last.until = time;
       if (last?.word !== word) changes.push({ from: time, until: time, word });
-      if (changes.length > KEPT) changes.shift();
+      const begin = time - SPANS_S.at(-1);
+      while (changes[0].until < begin || changes.length > KEPT) changes.shift();
     }
-    this.draw();
+    this.drawSoon();
   }
 
   // Colour, and whether it is striped.

@@ -1,6 +1,6 @@
 // A span of an emulation's past as a waveform: to save, and the FPGA's pins around their last change.
 
-import { labelled, make } from "./dom.js";
+import { labelled, make, save } from "./dom.js";
 import { readVcd } from "./vcd.js";
 
 const SPAN_S = 2; // before now, unless another one is wanted
@@ -72,9 +72,7 @@ export class Waveform {
   async save(device) {
     const text = await this.fetched();
     if (text === null) return;
-    const address = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
-    make("a", { href: address, download: `${device.toLowerCase()}.vcd` }).click();
-    URL.revokeObjectURL(address);
+    save(new Blob([text], { type: "text/plain" }), `${device.toLowerCase()}.vcd`);
   }
 
   async show() {

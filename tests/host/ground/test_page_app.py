@@ -159,7 +159,7 @@ def test_what_a_tab_shows_is_read_again_and_again(served: Serving) -> None:
         while "values" not in (told := json.loads(socket.recv(SOON_S))):
             pass
         assert list(told["values"]) == ["Identification", "TaskStatus"]
-        assert json.loads(socket.recv(SOON_S))["link"]["requests"] > told["link"]["requests"]
+        assert json.loads(socket.recv(SOON_S))["link"]["sent"] > told["link"]["sent"]
 
 
 @pytest.mark.parametrize("nonsense", ["[]", "{", '{"every_s": "often"}', '{"show": 3}'])

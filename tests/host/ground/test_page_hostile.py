@@ -89,7 +89,7 @@ def test_no_live_failure_is_markup(chromium: Any, address: str) -> None:
     def change(told: dict[str, Any]) -> dict[str, Any]:
         carried = {"what": HOSTILE, "done": 1, "total": 2, "held": False, "ended": HOSTILE}
         return {
-            "link": told["link"] | {"failed": 1, "error": HOSTILE},
+            "link": told["link"] | {"failed": 1, "broken": True, "error": HOSTILE},
             "carried": carried | {"saved": False},
             "played": None,
             "values": {frame: {"error": HOSTILE} for frame in told.get("values", {})},

@@ -118,3 +118,15 @@ def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> No
     assert page.locator("#upload").is_disabled()
     assert "takes no picture" in page.inner_text("#transfer-told")
     assert page.locator("#source option").all_inner_texts() == ["sram1", "sram2"]
+
+
+def test_pictures_come_as_often_as_one_likes(page: Any) -> None:
+    """Up to five a second."""
+    page.evaluate(
+        "() => { window.asked = []; const send = WebSocket.prototype.send;"
+        "WebSocket.prototype.send = function (text) {"
+        "  window.asked.push(JSON.parse(text).every_s); send.call(this, text) } }"
+    )
+    for rate, seconds in (("5", 0.2), ("2", 0.5)):
+        page.select_option("#rate", rate)
+        assert page.evaluate("window.asked.at(-1)") == seconds

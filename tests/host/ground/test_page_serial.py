@@ -84,6 +84,7 @@ def test_a_cable_is_pulled_and_put_back(chromium: Any, tmp_path: Path, recorded:
         recorded.node.told["Configuration"] |= {"Threshold1": value - 5}
         with cable(*ends, recorded):
             shows.filter(has_text=str(value - 5)).wait_for()
+            page.wait_for_selector("#link:not(.bad)")
             assert page.evaluate("window.here")
     finally:
         recorded.node.told["Configuration"] |= {"Threshold1": value}

@@ -1,0 +1,111 @@
+"""A target's results, one after the other, kept for whoever saves them."""
+
+import csv
+import json
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from datetime import UTC, datetime
+from io import StringIO
+from tempfile import mkstemp
+
+from cubestack.host.clients.contract import Columns
+from cubestack.host.devices.log import ANGLE
+from cubestack.host.export.parquet import parquet_file
+
+MOST = 1_000_000
+"""Lines that are kept: eleven days at one a second."""
+
+
+ALPHA, BETA = "_alpha_deg", "_beta_deg"
+"""Ends of the names of a direction's angles, along and across the picture."""
+
+Vector = tuple[float, float, float]
+
+
+class ResultLog:
+    """Lines in a file without a name, as those of a day would fill memory.
+
+    Attributes:
+        count: lines by now.
+    """
+
+    def __init__(self) -> None:
+        """Without a line."""
+        self._file, path = mkstemp(prefix="cubestack-")
+        os.unlink(path)
+        self.count = 0
+
+    def add(self, results: Columns, truth: Mapping[str, float | None]) -> None:
+        """Keep results as of now; ``truth`` by the same names gives the errors of the angles."""
+        if "error" in results or not results or self.count >= MOST:
+            return
+        utc = datetime.now(UTC).isoformat(timespec="milliseconds")
+        line = {"utc": utc, **results, **_errors(results, truth)}
+        os.write(self._file, json.dumps(line).encode() + b"\n")
+        self.count += 1
+
+    def csv(self) -> bytes:
+        """All lines as a CSV file, a column for each name that came up."""
+        text, names = StringIO(newline=""), self._names()
+        writer = csv.DictWriter(text, names)
+        writer.writeheader()
+        writer.writerows(self._lines())
+        return text.getvalue().encode()
+
+    def parquet(self) -> bytes:
+        """The same as a Parquet file; ValueError without pyarrow."""
+        columns: dict[str, list[bool | int | float | str | None]] = {n: [] for n in self._names()}
+        for line in self._lines():
+            for name, column in columns.items():
+                column.append(line.get(name))
+        return parquet_file(columns)
+
+    def close(self) -> None:
+        """Forget them."""
+        os.close(self._file)
+
+    def _names(self) -> list[str]:
+        return list(dict.fromkeys(name for line in self._lines() for name in line)) or ["utc"]
+
+    def _lines(self) -> Iterator[Columns]:
+        rest, at, end = b"", 0, os.fstat(self._file).st_size
+        while at < end:
+            part = os.pread(self._file, min(1 << 20, end - at), at)  # lines come meanwhile
+            at += len(part)
+            *lines, rest = (rest + part).split(b"\n")
+            yield from map(json.loads, lines)
+
+
+def _errors(results: Columns, truth: Mapping[str, float | None]) -> Columns:
+    found: Columns = {}
+    for name, value in results.items():
+        true = truth.get(name) if name.endswith(ANGLE) else None
+        if true is not None and isinstance(value, int | float):
+            found[f"{name.removesuffix(ANGLE)}_error{ANGLE}"] = (value - true + 180) % 360 - 180
+    for name in (one.removesuffix(ALPHA) for one in results if one.endswith(ALPHA)):
+        answer, true_ = (_direction(told, name) for told in (results, truth))
+        if answer is not None and true_ is not None:
+            found[f"{name}_error{ANGLE}"] = _apart_deg(answer, true_)
+    return found
+
+
+def _direction(told: Mapping[str, object], name: str) -> Vector | None:
+    """Unit vector of the two angles of a direction; None where one is missing."""
+    alpha, beta = told.get(name + ALPHA), told.get(name + BETA)
+    if not isinstance(alpha, int | float) or not isinstance(beta, int | float):
+        return None
+    away, around = math.radians(math.hypot(alpha, beta)), math.atan2(beta, alpha)
+    across = math.sin(away)
+    return across * math.cos(around), across * math.sin(around), math.cos(away)
+
+
+def _apart_deg(one: Vector, other: Vector) -> float:
+    return math.degrees(2 * math.asin(min(math.dist(one, other) / 2, 1.0)))
+
+
+FORMS: dict[str, Callable[[ResultLog], bytes]] = {
+    "csv": ResultLog.csv,
+    "parquet": ResultLog.parquet,
+}
+"""By what the name of a file ends with."""

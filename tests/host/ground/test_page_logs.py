@@ -1,0 +1,102 @@
+"""What a page saves, read back: recordings, and tables of all that was said and of results."""
+
+import csv
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet
+import pytest
+
+from cubestack.host.cli.main import main
+from cubestack.host.devices.emulating import emulating
+from cubestack.host.recording.said import COLUMNS
+
+from .browser import line, shown, station
+
+pytestmark = pytest.mark.xdist_group("page logs")
+
+SERVES = re.compile(r" serves on (tcp://\S+?),? ")
+
+
+def saved(page: Any, button: str, path: Path) -> Path:
+    with page.expect_download() as saving:
+        page.click(button)
+    saving.value.save_as(path)
+    return path
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def same(cell: Any, text: str) -> bool:
+    """Whether a cell of a Parquet file is what a CSV file has."""
+    if cell is None or text == "":
+        return cell in (None, "") and text == ""
+    return float(text) == cell if isinstance(cell, float) else str(cell) == text
+
+
+def test_tables_are_the_same_in_both_forms(chromium: Any, tmp_path: Path) -> None:
+    """Of results, of all that was said, and what `cubestack decode` makes of the recording."""
+    with station("emulated:cubestar", "--seed", "5") as address, shown(chromium, address) as page:
+        line(page, "write setDetectionThresholds 33 34")
+        line(page, "write CaptureAndProcess")
+        page.locator("#attitude-told").filter(has_text="answer").wait_for()
+        page.uncheck("#results-on")
+        for name, buttons in (
+            ("results", ("#save", "#save-parquet")),
+            ("said", ("#said-csv", "#said-parquet")),
+        ):
+            rows = rows_of(saved(page, buttons[0], tmp_path / f"{name}.csv"))
+            path = saved(page, buttons[1], tmp_path / f"{name}.parquet")
+            table = pyarrow.parquet.read_table(path).to_pylist()
+            assert len(rows) > 1
+            for row, cells in zip(rows, table, strict=False):
+                assert row.keys() == cells.keys()
+                assert all(same(cells[key], row[key]) for key in row), (row, cells)
+        recording = saved(page, "#recording", tmp_path / "a.rec")
+    results = pyarrow.parquet.read_table(tmp_path / "results.parquet")
+    assert str(results.schema.field("ra_deg").type) == "double"
+    said = rows_of(tmp_path / "said.csv")
+    assert tuple(said[0]) == COLUMNS
+    assert ("setDetectionThresholds", "33.0") in {(one["message"], one["value"]) for one in said}
+    assert main(["decode", str(recording), "--out", str(tmp_path / "by-command.csv")]) == 0
+    assert rows_of(tmp_path / "by-command.csv")[: len(said)] == said
+
+
+def test_a_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
+    """With a device that is emulated elsewhere, as with a real one."""
+    kept = tmp_path / "session.rec"
+    with emulating(["cubesense", "--tcp", "0"]) as said:
+        port = next(found[1] for one in said if (found := SERVES.search(one)))
+        words = [port, "--device", "cubesense", "--record", str(kept)]
+        with station(*words) as address, shown(chromium, address) as page:
+            line(page, "write DetectionThreshold1 77")
+            line(page, "read Configuration")
+            path = saved(page, "#recording", tmp_path / "saved.rec")
+            assert kept.read_bytes().startswith(path.read_bytes())
+    with station(str(path)) as address, shown(chromium, address) as page:
+        page.select_option("#frame", "Configuration")
+        page.press("#played-to", "End")
+        page.locator("#telemetry td.value").first.filter(has_text="77").wait_for()
+        assert saved(page, "#recording", tmp_path / "again.rec").read_bytes() == path.read_bytes()
+        rows = rows_of(saved(page, "#said-csv", tmp_path / "said.csv"))
+    assert "DetectionThreshold1" in {row["message"] for row in rows}
+
+
+def test_what_can_not_be_saved_is_greyed(chromium: Any, tmp_path: Path) -> None:
+    """Without a recording, and without the library that writes such files."""
+    (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['pyarrow'] = None\n")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    with emulating(["cubesense", "--tcp", "0"]) as said:
+        port = next(found[1] for one in said if (found := SERVES.search(one)))
+        words = [port, "--device", "cubesense"]
+        with station(*words, environment=environment) as address, shown(chromium, address) as page:
+            page.wait_for_selector("#said >> text=begin with --record FILE")
+            for button in ("#recording", "#said-csv", "#said-parquet", "#save-parquet"):
+                assert page.locator(button).is_disabled()
+            assert "pip install" in page.locator("#save-parquet").get_attribute("title")
+            assert page.locator("#save").is_enabled()
