@@ -34,6 +34,10 @@ if TYPE_CHECKING:
     from cubestack.host.ground.desk import Desk
 
 
+LOOK_S = 0.5
+"""Wall time from one look at whether it is to end to the next."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("targets", nargs="+", metavar="TARGET", help=FORMS)
@@ -78,7 +82,8 @@ def run(args: argparse.Namespace) -> int:
         for desk in desks:
             desk.result()  # whatever does not open ends this
         say("Ctrl-C ends it")
-        ended.wait()
+        while not ended.wait(LOOK_S):  # a signal that comes just before a wait does not end it
+            pass
     return 0
 
 

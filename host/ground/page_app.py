@@ -220,8 +220,10 @@ async def _live(desk: Desk, socket: WebSocket) -> None:
     await socket.accept()
     wanted, logged, begun = Wanted(), 0, desk.begun
     hears = asyncio.create_task(socket.receive_json())
+    clock = asyncio.get_running_loop().time
     try:
         while True:
+            begin_s = clock()
             if hears.done():
                 wanted = _wanted(hears.result(), desk)
                 hears = asyncio.create_task(socket.receive_json())
@@ -243,7 +245,8 @@ async def _live(desk: Desk, socket: WebSocket) -> None:
                 desk.log.add(told["results"], told.get("emulation", {}).get("truth", {}))
             told["kept"] = desk.log.count
             await socket.send_json(told)
-            await asyncio.wait([hears], timeout=wanted.every_s)
+            rest_s = begin_s + wanted.every_s - clock()
+            await asyncio.wait([hears], timeout=max(rest_s, 0.0))
     except (WebSocketDisconnect, RuntimeError):
         pass  # it is gone
     except ValueError:
