@@ -138,8 +138,8 @@ def test_no_answer_is_markup(chromium: Any, address: str) -> None:
 def test_a_scene_s_name_and_a_snapshot_s_are_text(chromium: Any, address: str) -> None:
     """What a user writes comes back from the emulation, in a refusal and in a list."""
     with shown(chromium, address) as page:
-        page.click("#emulation summary")
-        page.fill("#scene", f"kind = '{HOSTILE}'")
+        page.click("#scene summary >> text=a whole scene file")
+        page.fill("#scene-text", f"kind = '{HOSTILE}'")
         page.click("#show-scene")
         page.locator("#lines li.bad").filter(has_text=HOSTILE).wait_for()
         path = "/targets/0/snapshot"
