@@ -119,3 +119,17 @@ def test_loop(profile: str) -> None:
     unit.command("StartLoop", Period=700, Mode=1)
     unit.run(until_us=5_000_000)
     as_recorded(unit, f"AraMiS loop, {profile}", [])
+
+
+NEED_IT = "GetAttitude", "GetAttitudeNearPoint", "StartLoop", "ReloadCatalogue", "RefreshCatalogue"
+
+
+@pytest.mark.parametrize("name", NEED_IT)
+def test_what_needs_an_active_sensor_says_so(name: str) -> None:
+    unit = Unit(AramisSwitches.of("extended"))
+    before = unit.telemetry("CatalogueStatus"), unit.telemetry("LoopStatus")
+    unit.command(name)
+    assert [flag for flag, up in unit.telemetry("ErrorFlags").items() if up] == ["NotActive"]
+    assert (unit.telemetry("CatalogueStatus"), unit.telemetry("LoopStatus")) == before
+    unit.command("Activate", "ClearErrorFlags", name)
+    assert not unit.telemetry("ErrorFlags")["NotActive"]

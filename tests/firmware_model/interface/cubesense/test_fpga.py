@@ -1,5 +1,6 @@
 """The command table against table 6.4 as printed, and the published read-outs."""
 
+from dataclasses import replace
 from itertools import product
 
 import pytest
@@ -131,3 +132,13 @@ def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int
 def test_impossible_read_outs_are_refused(change: dict[str, int], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         fpga.ReadOut(**change)
+
+
+def test_as_flown_the_scan_ends_at_an_address_that_there_is() -> None:
+    """The column behind the last one, modulo what the counter holds."""
+    flown = replace(fpga.FULL_SIZE, as_flown=True)
+    assert [*flown.scan()][-1] == (703, 0)
+    small = fpga.ReadOut(
+        columns=32, rows=20, scan_step=8, first_row=3, first_column=7, window=7, as_flown=True
+    )
+    assert [*small.scan()][-1] == (7, 0)  # 39 of a counter of 5 bits
