@@ -179,3 +179,16 @@ def test_phases_add_up() -> None:
     assert set(spent.phases) >= {"faces", "triangles", "search", "verification", "attitude"}
     assert 0.9 * spent.total < sum(spent.phases.values()) <= spent.total
     assert spent.table.seconds(spent.total) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("smear_px", "skew_px", "refused"),
+    [(4.1, 4.1, True), (4.1, 3.9, False), (3.9, 4.1, False), (3.9, 3.9, False)],
+)
+def test_stars_drawn_out_and_skewed_too_far_are_refused(
+    smear_px: float, skew_px: float, refused: bool
+) -> None:
+    (made,) = pictures(1)
+    found = named(replace(made.stars, smear_px=smear_px, skew_px=skew_px), VERIFIED.profile)
+    assert (found.reason is Reason.SMEAR) == refused
+    assert (found.triples == 0) == refused
