@@ -43,3 +43,11 @@ def test_ranges_that_a_field_depends_on_cover_all_values() -> None:
 def test_limits_are_written_as_c() -> None:
     assert [tables._bound(None, "-"), tables._bound(5, "")] == ["-INFINITY", "5.0f"]
     assert re.fullmatch(r"0\.1f", tables._bound(0.1, "-"))
+
+
+def test_a_field_that_may_have_any_value_has_no_rule() -> None:
+    ranges: list[str] = []
+    assert list(tables._rules(INTERFACE.telecommand("Exposure"), ranges)) == []
+    (rule,) = tables._rules(INTERFACE.telecommand("WriteTo_IS_Register"), ranges)
+    assert rule.startswith("{RULE_U8, 1, 0, 0, 255, FLAG_ISSetupError,")  # DataH, alone
+    assert ranges == ["    {0, 0},"]
