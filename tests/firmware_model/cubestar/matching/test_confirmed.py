@@ -142,6 +142,16 @@ def test_the_order_of_the_centroids_does_not_matter(name: Name, shoot: Shoot) ->
         assert other.false_alarm == pytest.approx(plain.false_alarm, nan_ok=True)
 
 
+def test_stars_that_were_tried_in_vain_have_votes(name: Name) -> None:
+    """Six false stars: each was one of a triangle of the catalogue, and none is believed."""
+    rng = np.random.default_rng(11)
+    plane = np.column_stack([rng.uniform([-0.4, -0.2], [0.4, 0.2], (6, 2)), np.ones(6)])
+    rays = (plane / np.linalg.norm(plane, axis=1)[:, None]).astype(np.float32)
+    found = name(rays)
+    assert found.outcome is not MatchOutcome.IDENTIFIED
+    assert found.votes.any()
+
+
 def test_false_stars_never_turn_right_into_wrong(name: Name, shoot: Shoot) -> None:
     rng = np.random.default_rng(82)
     for _ in range(30):
