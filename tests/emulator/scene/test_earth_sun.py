@@ -3,6 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Target
+from cubestack.emulator.scene.file import SceneError
 
 SUN, NADIR = Target.SUN, Target.NADIR
 S = 10**12
@@ -79,3 +80,9 @@ def test_sun_behind_the_earth_is_not_seen() -> None:
 def test_earth_is_seen_while_any_of_it_is_in_the_field() -> None:
     for theta, visible in ((158.0, True), (159.0, False)):
         assert EarthSunScene.facing(nadir_deg=(theta, 0)).truth(NADIR, 0, 95).visible is visible
+
+
+def test_seeds_are_not_negative() -> None:
+    assert EarthSunScene(seed=0).seed == 0
+    with pytest.raises(SceneError, match="seed must not be negative, not -1"):
+        EarthSunScene(seed=-1)

@@ -49,6 +49,8 @@ def test_false_lights_are_those_of_the_seed() -> None:
 def test_wrong_values_in_python() -> None:
     with pytest.raises(SceneError, match="false_stars must be 0 to 10000, not -1"):
         SkyScene([0, 0, 0, 1], false_stars=-1)
+    with pytest.raises(SceneError, match="seed must not be negative, not -1"):
+        SkyScene([0, 0, 0, 1], seed=-1)
     with pytest.raises(SceneError, match="rate_deg_s must be 3 numbers"):
         SkyScene([0, 0, 0, 1], rate_deg_s=(0, np.nan, 0))
     with pytest.raises(SceneError, match="a quaternion has 4 numbers"):

@@ -7,11 +7,14 @@ import pytest
 
 from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.iss.image import Image, load_image
+from cubestack.emulator.iss.machine import Kind, Outgoing
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
+from cubestack.firmware_model.interface.cubestar import processor_pins as wired
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.efm32gg.pins import pin_number
 from tests.emulator.boards.cubestar.builds import build, needs_toolchain
 
 pytestmark = [
@@ -103,4 +106,19 @@ def test_upsets_of_code_are_executed(images: dict[str, Image]) -> None:
     board.faults.inject("processor-reset", target="reset-pin")
     board.kernel.advance_to(5 * PS_PER_MS)
     assert not results(board)
+    board.close()
+
+
+@pytest.mark.parametrize(("level", "on"), [(0, False), (1, True), (-1, True)])
+def test_what_is_soldered_to_a_switch_pulls_it_up(
+    images: dict[str, Image], level: int, on: bool
+) -> None:
+    """A pin that floats, -1, has the supply on, as before the program began."""
+    board = powered(images["toggle"])
+    for channel, pin in wired.SWITCHES.items():
+        board.power.switch(channel, not on)
+        board._pin(Outgoing(Kind.PIN, pin_number(pin), level, 0, board.kernel.now))
+        assert board.power.is_on(channel) is on
+    board._pin(Outgoing(Kind.PIN, pin_number(wired.CAMERA_RESET), level, 0, board.kernel.now))
+    assert board.camera.running is (on and board.power.is_on("imager"))
     board.close()

@@ -6,7 +6,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 
-from cubestack.emulator.camera.common.exposure import FAINTEST_V, star_light, star_pixels
+from cubestack.emulator.camera.common.exposure import (
+    FAINTEST_V,
+    looking_along,
+    star_light,
+    star_pixels,
+)
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mlx75412.imager import DN12_PER_DN8, ELECTRONS_PER_DN12, ideal_counts
@@ -258,3 +263,16 @@ def test_still_stars_do_not_streak_and_are_where_they_are_in_the_middle() -> Non
     y, x = np.unravel_index(still.argmax(), still.shape)
     assert (x, y) == (600, 200)
     assert still.max() > 10 * light(replace(scene, mag_limit=0.1)).max()
+
+
+def test_who_looks_knows_the_angles_between_the_picture_s_edges() -> None:
+    """Half a pixel beyond the outermost pixels' centres."""
+    now = looking_along([0, 0, 0, 1], LENS)
+    ends = {
+        "width_deg": [[-0.5, 255.5], [1023.5, 255.5]],
+        "height_deg": [[511.5, -0.5], [511.5, 511.5]],
+    }
+    for name, places in ends.items():
+        one, other = LENS.unproject(np.array(places))
+        assert getattr(now, name) == pytest.approx(np.degrees(np.arccos(one @ other)), abs=1e-9)
+    np.testing.assert_allclose(now.axes, np.eye(3), atol=1e-15)

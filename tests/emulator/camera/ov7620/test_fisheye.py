@@ -97,3 +97,16 @@ def test_pixel_angle_is_that_between_neighbours() -> None:
         area = np.linalg.norm(np.cross(right - here, down - here))
         at = np.searchsorted(field.index, y * 640 + x)
         assert field.pixel_rad[at] == pytest.approx(np.sqrt(area), rel=0.02)
+
+
+def test_pixels_on_the_rim_are_lit_by_their_share_of_it() -> None:
+    lens = fisheye.LENSES[Target.NADIR]
+    rim = float(fisheye.distorted(2.9 * 95))
+    fine = (np.arange(10) - 4.5) / 10
+    rows, columns = np.divmod(lens.field.index, 640)
+    x = (columns - lens.cx)[:, None, None] + fine[:, None]
+    y = (rows - lens.cy)[:, None, None] + fine
+    inside = np.mean(np.hypot(x, y) < rim, axis=(1, 2))
+    assert np.abs(lens.field.lit - inside).max() < 0.2  # a straight edge across, not askew
+    assert lens.field.lit.sum(dtype=float) == pytest.approx(inside.sum(), rel=1e-3)
+    assert 200 < np.sum((lens.field.lit > 0) & (lens.field.lit < 1)) < 2000
