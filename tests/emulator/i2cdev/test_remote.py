@@ -2,10 +2,13 @@
 
 import errno
 import os
+import select
+import socket
 from pathlib import Path
 
 import pytest
 
+from cubestack.emulator.i2cdev import remote as remote_module
 from cubestack.emulator.i2cdev.remote import RemoteBus
 from cubestack.emulator.ports.endpoint import PortError
 from cubestack.firmware_model.formats import linux_i2c as linux
@@ -103,3 +106,23 @@ def test_closing_leaves_no_descriptor_and_fails_what_waits(served):
     assert len(replies) == 2
     served.serve()  # whose ends are hung up now
     assert set(os.listdir("/proc/self/fd")) == before
+
+
+def test_writing_is_waited_for_while_the_other_side_does_not_read():
+    ours, theirs = socket.socketpair()
+    ours.setblocking(False)
+    watched: list[int] = []
+    file = remote_module._RemoteFile(ours, watched.append, lambda: None)
+    call = linux.pack_read(1)
+    file.perform(linux.Call.READ, call, lambda _reply: None)
+    assert watched == []
+    while not watched:
+        file.perform(linux.Call.WRITE, bytes(8192), lambda _reply: None)
+    assert watched == [select.EPOLLIN | select.EPOLLOUT]
+    theirs.setblocking(False)
+    while len(watched) == 1:
+        theirs.recv(1 << 20)
+        file.exchange()
+    assert watched[1:] == [select.EPOLLIN]
+    file.close()
+    theirs.close()
