@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.table import AckLate, AckLost, AckStuck
+from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.mcu.requests import AwaitPin
 
 ROSE_US, TIMEOUT_US = 40, 200
@@ -66,3 +67,41 @@ def waiting(desk_of):
 @given(FAULTS)
 def test_a_wait_ends(waiting, faults):
     assert waiting(faults) is sees(faults)
+
+
+class Engine:
+    """Takes note of what reaches it."""
+
+    now_ps, running, driver = 5, 0, "driver"
+
+    def __init__(self) -> None:
+        self.order: list[str] = []
+
+    def get_pin(self, name):
+        self.order.append(name)
+        return 1
+
+    def strobe_read(self, out, period, until_ps):
+        self.order.append("strobe")
+        return 3
+
+    def access(self, transactions, until_ps):
+        self.order.append("access")
+        return 4
+
+
+def test_what_acts_around_reads_does_so_before_and_after_each():
+    """A memory's stuck bits hold whenever the processor takes bytes, and at no other time."""
+    engine = Engine()
+    pins = PinFaults(Kernel(), lambda _time_ps, _injection, _text: None, engine, "DATA")
+    assert pins.driver == "driver"
+    pins.around_reads += [lambda: engine.order.append("a"), lambda: engine.order.append("b")]
+    assert pins.driver is None
+    assert pins.get_pin("DATA") == 1
+    assert engine.order[:3] == ["a", "b", "DATA"]
+    del engine.order[:]
+    pins.get_pin("ACK")
+    assert set(engine.order) == {"ACK"}
+    del engine.order[:]
+    assert (pins.strobe_read(None, None, 9), pins.access(None, 9)) == (3, 4)
+    assert engine.order == ["a", "b", "strobe", "a", "b", "a", "b", "access", "a", "b"]

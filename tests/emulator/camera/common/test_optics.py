@@ -118,6 +118,15 @@ def test_a_light_shade_lets_a_round_field_through(stop_deg: float) -> None:
     assert light.tolist() == [1, 1, beyond, beyond]
 
 
+@pytest.mark.parametrize(("cx", "cy"), [(450, 200), (450, 300), (600, 200), (600, 300)])
+def test_half_the_field_is_the_way_to_the_farthest_corner(cx: float, cy: float) -> None:
+    """Corners of the outermost pixels, not their centres."""
+    lens = replace(LENS, cx=cx, cy=cy)
+    corner = (1023.5 if cx < 511.5 else -0.5, 511.5 if cy < 255.5 else -0.5)
+    (vector,) = lens.unproject(np.array([corner]))
+    assert lens.half_field_deg == pytest.approx(np.degrees(np.arccos(vector[2])), abs=1e-9)
+
+
 def test_vignetting() -> None:
     vectors = np.array([[0, 0, 1.0], [np.sin(0.5), 0, np.cos(0.5)]])
     np.testing.assert_array_equal(LENS.transmission(vectors), [1, 1])
