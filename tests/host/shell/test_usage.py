@@ -147,6 +147,22 @@ def test_what_is_no_letter_is_told_with_those_that_are(known: Known, word: str) 
         known.shell.execute(f"bench {word}")
 
 
+@pytest.mark.parametrize(
+    ("words", "pauses"), [("", [1.0] * 9), (" 3", [1.0] * 2), (" 3 0.25", [0.25] * 2), (" 1 9", [])]
+)
+def test_a_watch_reads_so_often_and_waits_between(
+    known: Known, words: str, pauses: list[float]
+) -> None:
+    waited, shown = list[float](), list[Any]()
+    node: Any = known.target.node
+    node.pause = waited.append
+    known.shell.on_row = shown.append
+    found = known.shell.execute(f"watch Identification{words}")
+    assert found is not None
+    assert waited == pauses
+    assert len(found.data["readings"]) == len(shown) == len(pauses) + 1
+
+
 @pytest.mark.parametrize(("count", "good"), [(0, False), (1, True), (2, True), (3, False)])
 def test_counts_are_from_least_to_most(count: int, good: bool) -> None:
     if good:
