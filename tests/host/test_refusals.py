@@ -137,6 +137,18 @@ def test_a_bus_that_one_may_not_open_is_told(monkeypatch: pytest.MonkeyPatch) ->
         open_target("i2c:7:0x1a")
 
 
+@pytest.mark.parametrize("text", ["i2c:7:0x07", "i2c:7:0x78", "i2c:-1:0x1a", "i2c:x", "i2c:7:x"])
+def test_addresses_that_no_device_may_have(text: str) -> None:
+    with pytest.raises(TargetError, match=f"{text}: must be i2c:BUS:ADDR, as in i2c:7:0x1a"):
+        open_target(text, "cubestar")
+
+
+@pytest.mark.parametrize("address", ["0x08", "0x77"])
+def test_the_first_and_the_last_address_are_good(address: str) -> None:
+    with pytest.raises(PortOpenError, match="can not open /dev/i2c-250"):
+        open_target(f"i2c:250:{address}", "cubestar")
+
+
 def test_what_a_device_does_not_do_is_told_by_its_name(node: FakeCubeStar) -> None:
     client = DeviceClient(NodeClient(UartLink(node), INTERFACE))
     with pytest.raises(TargetError, match="CubeStar takes no picture by the wire"):
