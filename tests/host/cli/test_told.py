@@ -193,6 +193,10 @@ def test_json_is_a_line_each_with_what_ran_and_nothing_else(
     assert {json.loads(line)["profile"] for line in out.splitlines()} == {"published"}
 
 
+def test_an_experiment_has_no_sections_of_its_own_accord() -> None:
+    assert list(Counting().sections([{"number": 1}])) == []
+
+
 def test_what_is_no_success_is_told_by_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Counting, "good", False)
     assert counted(Counting(), 1) == 1

@@ -1,5 +1,6 @@
 """Faults that a node must not have, each of them alone: all are found and named."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -103,6 +104,37 @@ def test_a_refusal_that_changes_something(
     assert name.startswith("telecommand setIDMode: ")
     assert found[name].startswith("refused, but ")
     assert found[name].endswith(" changed what is read back")
+
+
+@pytest.mark.parametrize("optional", [False, True])
+def test_values_that_an_option_of_the_hardware_brings_may_be_refused(
+    good: Any, uart: Any, monkeypatch: pytest.MonkeyPatch, optional: bool
+) -> None:
+    answer, message = good.answer, CUBESTAR.telecommand("Exposure")
+    usual = message.pack(**message.reset_values())
+    refused = list[bytes]()
+
+    def poor(payload: bytes) -> bytes | None:
+        whole = len(payload) == 1 + message.length and payload[0] == message.id
+        if whole and payload[1:] != usual and not message.violations(message.unpack(payload[1:])):
+            refused.append(payload)
+            return b"\x03"
+        reply: bytes | None = answer(payload)
+        return reply
+
+    monkeypatch.setattr(good, "answer", poor)
+    run = suite(good, uart, allow_write=True)
+    if optional:
+        run.notes = replace(run.notes, optional=frozenset({"Exposure"}))
+    found = failures(run)
+    if not optional:
+        assert set(found) == {"telecommand Exposure"}
+        assert "refused: BAD_PARAMETER" in found["telecommand Exposure"]
+        return
+    assert found == {}
+    (one,) = (check for check in run.checks if check.name == "telecommand Exposure")
+    assert one.detail == f"read back, {len(refused)} values not there"
+    assert refused
 
 
 def test_switches_that_show_something_else(
