@@ -131,6 +131,18 @@ def test_several_devices_share_a_bus_and_have_ports_of_their_own(serving: Servin
     assert re.search(r"^CubeSense serves on tcp://\S+ at 57600 baud, .*\w+ on tcp://\S+ at", line)
 
 
+def test_what_faults_do_is_told(serving: Serving, tmp_path: Path) -> None:
+    plan, port = tmp_path / "plan.toml", tmp_path / "tty"
+    plan.write_text("[[fault]]\nkind = 'latch-up'\ntarget = 'imager'\nat = 0.01\n", "utf-8")
+
+    def beside() -> None:
+        asked(str(port), "cubestar")
+
+    words = ("cubestar", "--pty", port, "--pace", "fast", "--faults", plan)
+    assert serving(*words, last="CubeStar", beside=beside) == 0
+    assert any("latch-up imager" in line for line in serving.said)
+
+
 def test_it_is_steered_with_its_token_alone(
     serving: Serving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
