@@ -6,6 +6,8 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
+from cubestack.host.cli.conformance import _show_text
+from cubestack.host.conformance.contract import CheckResult, Verdict
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -17,6 +19,15 @@ def conformance(run):
         return outcome.code, [json.loads(line) for line in outcome.out.splitlines()]
 
     return call
+
+
+def test_details_are_whole_in_a_pipe_and_short_on_a_terminal(capsys, monkeypatch):
+    check = CheckResult("a name", Verdict.PASSED, "what was seen, " * 20)
+    _show_text(check)
+    assert check.detail.strip() in capsys.readouterr().out
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    _show_text(check)
+    assert capsys.readouterr().out.rstrip().endswith("...")
 
 
 @pytest.mark.parametrize("device", ["cubestar", "aramis"])
