@@ -65,6 +65,9 @@ def between(low: float, high: float, what: str) -> Kind[float]:
 
 ANGLE = between(0, 180, "an angle in 0..180 degrees")
 NUMBER = Kind("a number", float, math.isfinite)
+YEAR = between(1800, 2200, "a year in 1800..2200")
+"""Of proper motions: those of scenes."""
+
 POSITIVE = Kind("a number above 0", float, lambda value: 0 < value < math.inf)
 CORNER = Kind("X,Y, as in 0,256", _corner)
 """A pixel's column and row."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Lookup
-from cubestack.host.options import NUMBER, PATH, Options, option, whole
+from cubestack.host.options import NUMBER, PATH, YEAR, Options, option, whole
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
@@ -26,7 +26,7 @@ class CatalogueOptions(Options):
     mag_limit: float | None = option(
         None, "faintest star, included; default 6", NUMBER, metavar="V"
     )
-    epoch: float = option(2026.0, "default 2026", NUMBER, metavar="YEAR")
+    epoch: float = option(2026.0, "default 2026", YEAR, metavar="YEAR")
     fov: float | None = option(None, "diameter of the field, default 21.53", NUMBER, metavar="DEG")
     stars_per_field: int | None = option(
         None, "brightest kept, default 6", whole(3, 50), metavar="N"

@@ -16,7 +16,7 @@ from cubestack.host.devices.device import Shown
 from cubestack.host.devices.records import create_file
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.export.c_arrays import c_arrays
-from cubestack.host.options import NUMBER, PATH, Options, option
+from cubestack.host.options import NUMBER, PATH, YEAR, Options, option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class CatalogueOptions(Options):
     """What the catalogue is compiled for; None as it is flown."""
 
     mag_limit: float | None = option(None, "faintest star; default 3.8", NUMBER, metavar="V")
-    epoch: float = option(2026.0, "default 2026", NUMBER, metavar="YEAR")
+    epoch: float = option(2026.0, "default 2026", YEAR, metavar="YEAR")
     pair_limit: float | None = option(None, "default: as flown", NUMBER, metavar="DEG")
     c: Path | None = option(None, "write star list and pair list as C arrays", PATH, metavar="FILE")
 
