@@ -16,7 +16,8 @@ from cubestack.host.errors import PortClosedError, PortOpenError
 from cubestack.host.terminal import busy, head, say, tell
 from cubestack.host.transport.streams import open_transport
 
-ANSWER_TIMEOUT_S = 5.0
+ANSWER_TIMEOUT_S = 60.0
+"""Wall time: on a busy machine an emulator may stand for seconds; that it ends is told at once."""
 
 
 class Demo:

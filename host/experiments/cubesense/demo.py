@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PO
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.devices.device import Device
-from cubestack.host.experiments.demo import Demo, download, tell_times
+from cubestack.host.experiments.demo import ANSWER_TIMEOUT_S, Demo, download, tell_times
 from cubestack.host.pictures.cubesense import annotate_nadir, annotate_sun
 from cubestack.host.pictures.images import save_picture
 from cubestack.host.terminal import tell
@@ -44,7 +44,7 @@ def show(
     )
     with demo.client(device, scene, board) as (cubesense, port):
         line = open_transport(f"{port}.bench", SERVICE_PORT.baud)
-        bench = ServicePortClient(line)
+        bench = ServicePortClient(line, timeout_s=ANSWER_TIMEOUT_S)
         found = [
             _measure(cubesense, bench, camera, truth, out)
             for camera, truth in ((Camera.SUN, SUN_DEG), (Camera.NADIR, NADIR_DEG))
