@@ -48,9 +48,12 @@ def profile() -> str:
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Runs the command with arguments, as the shell would see it."""
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Runs the command with arguments, as the shell would see it on a machine that is quick."""
+    from cubestack.host import terminal
     from cubestack.host.cli.main import main
+
+    monkeypatch.setattr(terminal, "EVERY_S", 3600.0)  # else it tells how long something takes
 
     def call(*arguments: object) -> Outcome:
         capsys.readouterr()
