@@ -7,6 +7,9 @@ PHOTOGRAPHS ?= ../shared/data/sky
 # What `make mutants` tries, for instance MUTANTS="cubestar --all"; --help says what there is.
 MUTANTS ?=
 
+# One more process than cores: some tests wait for a browser or for a clock.
+TESTS := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadgroup
+
 # Of the gateware's tests: further random numbers, and the simulator, icarus or verilator.
 SEED ?= 0
 SIMULATOR ?= icarus
@@ -48,10 +51,10 @@ run: .venv/ready-run
 	@$(BIN)/cubestack demo --out out --photographs "$(PHOTOGRAPHS)"
 
 test: .venv/ready-dev
-	@$(BIN)/pytest -n auto --dist loadgroup
+	@$(BIN)/pytest $(TESTS)
 
 test-all: .venv/ready-dev
-	@$(BIN)/pytest -n auto --dist loadgroup -m "slow or not slow"
+	@$(BIN)/pytest $(TESTS) -m "slow or not slow"
 
 pasted:
 	@$(PYTHON) -m tests.system.pasted $(DOCUMENTS)

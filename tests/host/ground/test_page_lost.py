@@ -53,6 +53,7 @@ def test_another_program_in_its_place_is_told(chromium: Any, relayed: tuple[Rela
         page.locator("#link.bad").filter(has_text="open the address that was printed").wait_for()
 
 
+@pytest.mark.slow
 def test_two_pages_in_one_browser_know_their_programs(chromium: Any) -> None:
     """A browser has one set of cookies for all ports."""
     with (

@@ -14,6 +14,7 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.host.conformance.values import values_to_try
 from cubestack.host.devices.registry import BUILT_IN, device
 from tests.examples.conftest import ROOT, installed
+from tests.tiers import quick
 
 from .browser import shown, station
 
@@ -35,7 +36,7 @@ class Opened(NamedTuple):
     interface: Interface
 
 
-@pytest.fixture(scope="module", params=[*BUILT_IN, *PLUGGED_IN])
+@pytest.fixture(scope="module", params=quick([*PLUGGED_IN, *BUILT_IN], 1))
 def opened(
     request: pytest.FixtureRequest, chromium: Any, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Opened]:

@@ -91,6 +91,7 @@ def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
     page.wait_for_function(f"() => ({GREEN})() > {before}")
 
 
+@pytest.mark.slow
 def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> None:
     picture = np.random.default_rng(1).integers(0, 2, (512, 1024), np.uint8) * 200
     picture[40:] = 0  # black blocks are not sent

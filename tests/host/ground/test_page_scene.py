@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cubestack.host.devices.targets import open_target
+from tests.tiers import quick
 
 from .browser import await_devices, look, shown, station
 from .hostile import HOSTILE, hostile
@@ -198,7 +199,7 @@ def test_directions_are_answered_beside_the_truth(page: Any) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", quick(["dark", "light"], 1))
 def test_it_is_seen_whole(chromium: Any, address: str, width: int, scheme: str) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:

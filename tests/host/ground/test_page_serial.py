@@ -56,6 +56,7 @@ def test_live_values_come_over_the_line(chromium: Any, tmp_path: Path, recorded:
         assert "no control port" in page.locator("#pause").get_attribute("title")
 
 
+@pytest.mark.slow
 def test_a_wrong_baud_rate_is_told(chromium: Any, tmp_path: Path, recorded: Any) -> None:
     with (
         cable(tmp_path / "ours", tmp_path / "theirs", recorded),

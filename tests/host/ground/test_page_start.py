@@ -24,6 +24,7 @@ def runs(page: Any, text: str) -> None:
     page.wait_for_selector(f"#start-told >> text={text}", timeout=STARTED_MS)
 
 
+@pytest.mark.slow
 def test_profile_and_firmware_are_chosen(chromium: Any, address: str, tmp_path: Any) -> None:
     with shown(chromium, address) as page, shown(chromium, address) as other:
         runs(page, "runs now: seed 5, profile published")
