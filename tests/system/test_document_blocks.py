@@ -158,7 +158,9 @@ def test_it_runs(document: str, line: str, folder: Path, run: Run) -> None:
     if "--record" in words:
         words += ["-c", "read Power"]  # in place of the reader's typing
     elif RECORDED in words:
-        (made,) = (shlex.split(one) for _, one in OWN if f"--record {RECORDED}" in one)
+        (made,) = (
+            shlex.split(one) for at, one in OWN if f"--record {RECORDED}" in one and at == document
+        )
         assert run(*made, "-c", "read Power").code == 0
     outcome = run(*words)
     assert outcome.code == 0, f"{document}: {outcome.err}"

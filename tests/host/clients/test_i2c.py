@@ -46,10 +46,10 @@ def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any) -> None:
 
 def test_telemetry_is_asked_for_again(client: I2cClient, i2c: Any) -> None:
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}
-    assert client.repeated == 0
+    assert client.exchanges.repeated == 0
     i2c.failures = 2
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}
-    assert client.repeated == 2
+    assert client.exchanges.repeated == 2
 
 
 def test_a_telecommand_that_was_not_acknowledged_is_never_repeated(

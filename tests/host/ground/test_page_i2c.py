@@ -22,13 +22,16 @@ REGISTERS = device("cubesense").interface.registers
 @pytest.fixture(scope="module")
 def address(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Two devices on one bus, one of them twice: by its node's address, and its registers'."""
-    environment = {"XDG_RUNTIME_DIR": str(tmp_path_factory.mktemp("run"))}
+    folder = tmp_path_factory.mktemp("run")
+    environment = {"XDG_RUNTIME_DIR": str(folder)}
     words = ["cubesense", "cubestar", "--i2c", str(BUS), "--pace", "fast"]
-    with emulating(words, environment) as said:
-        assert any(re.match(rf"I2C bus {BUS}: ", one) for one in said)
-        targets = [f"i2c:{BUS}:{address:#04x}" for address in (0x1B, 0x1A)]
-        with station(*targets, environment={**os.environ, **environment}) as opened:
-            yield opened
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)  # links to serial ports are made there
+        with emulating(words, environment) as said:
+            assert any(re.match(rf"I2C bus {BUS}: ", one) for one in said)
+            targets = [f"i2c:{BUS}:{address:#04x}" for address in (0x1B, 0x1A)]
+            with station(*targets, environment={**os.environ, **environment}) as opened:
+                yield opened
 
 
 @pytest.fixture
