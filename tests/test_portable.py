@@ -65,6 +65,7 @@ def test_every_module_is_imported_and_a_device_runs() -> None:
     assert any(line.startswith("Current3V3") for line in said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("run", "--", "true"), ("emulate", "cubestar", "--i2c", "7")])
 def test_what_needs_linux_says_so(words: tuple[str, ...]) -> None:
     done = on_macos(*words)

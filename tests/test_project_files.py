@@ -76,6 +76,7 @@ def test_pytest_knows_the_options_of_the_workflows() -> None:
         assert option in known
 
 
+@pytest.mark.slow
 def test_the_measurement_of_the_workflows_passes(run: Any) -> None:
     (words,) = {
         one.partition("cubestack ")[2]

@@ -28,6 +28,7 @@ def test_it_is_kept_without_outputs() -> None:
         assert (cell.outputs, cell.execution_count) == ([], None)
 
 
+@pytest.mark.slow
 def test_its_cells_run_and_the_attitude_is_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -194,6 +194,7 @@ NEXT_VERSION = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("document", "row", "names"),
     [

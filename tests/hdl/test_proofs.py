@@ -32,7 +32,7 @@ FAST = [name for name in PROOFS if not name.startswith("nadir") and name not in 
 SHALLOW = [name for name in FAST if name not in ("sun-ack", "sun-scan", "sun-first-pixel")]
 
 
-@pytest.mark.parametrize("name", quick(FAST, 14))
+@pytest.mark.parametrize("name", quick(FAST, 8))
 def test_property_is_proved(name: str) -> None:
     assert prove(PROOFS[name])[:2] == (True, False)
 

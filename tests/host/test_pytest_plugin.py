@@ -120,6 +120,7 @@ def test_the_entry_point_leads_to_the_plugin() -> None:
     assert f'cubestack = "{PLUGIN}"' in project.read_text()
 
 
+@pytest.mark.slow
 def test_a_driver_that_sleeps_is_left_as_it_is(run: Run, tmp_path: Path) -> None:
     (tmp_path / "driver.py").write_text(
         "from time import monotonic, sleep\n"

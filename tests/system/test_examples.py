@@ -124,6 +124,7 @@ def test_without_a_target_each_says_how_it_is_called(name: str) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_the_attitude_loop_settles() -> None:
     done = subprocess.run(
         [sys.executable, HERE / "attitude_loop.py"], capture_output=True, text=True, check=True

@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.system.conftest import Frames, Measure
+from tests.tiers import quick
 
 KEYS = {
     "solved", "right", "centroids", "matched", "wrong", "mode", "error_cross_deg",
@@ -33,12 +34,15 @@ def p95(frames: Frames, key: str) -> float:
 
 @pytest.mark.parametrize(
     ("options", "mode", "percent"),
-    [
-        (("--seed", 11), "lis", 95),
-        (("--seed", 12, "--mode", "assisted", "--hint-error", 5), "assisted", 98),
-        (("--seed", 13, "--mode", "tracking", "--hint-error", 0.2), "tracking", 95),
-        (("--seed", 16, "--false-stars", 5), "lis", 72),  # published: 72 %
-    ],
+    quick(
+        [
+            (("--seed", 11), "lis", 95),
+            (("--seed", 12, "--mode", "assisted", "--hint-error", 5), "assisted", 98),
+            (("--seed", 13, "--mode", "tracking", "--hint-error", 0.2), "tracking", 95),
+            (("--seed", 16, "--false-stars", 5), "lis", 72),  # published: 72 %
+        ],
+        1,
+    ),
     ids=["lost in space", "within five degrees", "within its radius", "among false stars"],
 )
 def test_rates_of_identification(

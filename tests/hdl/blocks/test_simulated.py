@@ -19,7 +19,7 @@ CASES = [(name, *size) for name, (_, sizes) in BLOCKS.items() for size in sizes]
 
 
 @pytest.mark.parametrize("seed", quick([1, 2], 1))
-@pytest.mark.parametrize(("name", "columns", "rows"), CASES)
+@pytest.mark.parametrize(("name", "columns", "rows"), quick(CASES, 3))
 def test_block(icarus: Any, name: str, columns: int, rows: int, seed: int) -> None:
     block, _ = BLOCKS[name]
     icarus.run(block, columns, rows, f"tests.hdl.blocks.testbenches.{name}", seed=seed)

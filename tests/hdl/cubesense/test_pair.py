@@ -39,6 +39,7 @@ def test_addressing_at_full_size(simulate: Any) -> None:
     simulate(addressable, FULL_SIZE, "addressing", mcu_addressing=True, seed=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("initialised", quick([False, True], 1))
 def test_addressing_changes_nothing_else(simulate: Any, initialised: bool) -> None:
     options = {"mcu_addressing": True, "initialised": initialised}

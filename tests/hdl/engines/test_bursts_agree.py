@@ -15,6 +15,7 @@ from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import rtlil_text
 from tests.benchmarks.engines.workloads import WORKLOADS
+from tests.tiers import quick
 
 from .board_events import BOARDS
 
@@ -76,7 +77,7 @@ def suits(wiring: Wiring, at: dict[str, int], burst: tuple[tuple[str, int], ...]
     return all((wiring.initial | at)[pin] == level for pin, level in burst)
 
 
-@pytest.mark.parametrize("name", WORKLOADS)
+@pytest.mark.parametrize("name", quick(WORKLOADS, 2))
 def test_what_is_measured_runs_in_steps_of_one_clock(name: str) -> None:
     """The levels have a copy of their own, of which each camera's share of an edge is known."""
     wiring, load = BOARDS[name].wiring(False), WORKLOADS[name]

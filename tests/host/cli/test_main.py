@@ -309,6 +309,7 @@ def loudness(*words: str, environment: dict[str, str]) -> str:
     return done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 def test_verbose_tells_of_what_is_loaded_and_quiet_of_nothing(tmp_path: Path) -> None:
     environment = {"XDG_CACHE_HOME": str(tmp_path)}

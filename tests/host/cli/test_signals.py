@@ -75,6 +75,7 @@ def children(process: int) -> set[int]:
     return {int(one) for task in tasks for one in task.read_text("utf-8").split()}
 
 
+@pytest.mark.slow
 def test_what_was_measured_is_shown() -> None:
     with begun("measure", "cubestar", "--frames", "5000", "--threshold", "25") as process:
         assert process.stderr is not None

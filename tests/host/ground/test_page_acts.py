@@ -12,7 +12,7 @@ from tests.emulator.recording import vcd
 from .browser import line, look, shown, station
 from .hostile import HOSTILE
 
-pytestmark = pytest.mark.xdist_group("page acts")
+pytestmark = [pytest.mark.xdist_group("page acts"), pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

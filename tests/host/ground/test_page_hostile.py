@@ -11,7 +11,7 @@ from tests.tiers import quick
 from .browser import line, look, shown, station
 from .hostile import HOSTILE, hostile
 
-pytestmark = pytest.mark.xdist_group("page hostile")
+pytestmark = [pytest.mark.xdist_group("page hostile"), pytest.mark.slow]
 
 Change = Callable[[dict[str, Any]], dict[str, Any]]
 

@@ -20,7 +20,7 @@ from tests.tiers import quick
 from .browser import shown
 from .conftest import SOON_S
 
-pytestmark = pytest.mark.xdist_group("page hours")
+pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow]
 
 EIGHT_HOURS_S = 8 * 3600
 TABS = 8

@@ -12,7 +12,7 @@ from cubestack.host.devices.registry import device
 
 from .browser import line, shown, station
 
-pytestmark = pytest.mark.xdist_group("page i2c")
+pytestmark = [pytest.mark.xdist_group("page i2c"), pytest.mark.slow]
 
 BUS = 16 + os.getpid() % 200
 

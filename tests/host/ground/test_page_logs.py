@@ -15,7 +15,7 @@ from cubestack.host.recording.said import COLUMNS
 
 from .browser import line, shown, station
 
-pytestmark = pytest.mark.xdist_group("page logs")
+pytestmark = [pytest.mark.xdist_group("page logs"), pytest.mark.slow]
 
 SERVES = re.compile(r" serves on (tcp://\S+?),? ")
 

@@ -80,6 +80,7 @@ def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
     assert page.evaluate(wide) == before
 
 
+@pytest.mark.slow
 def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
     page.check("#marks")
     line(page, "write CaptureAndProcess")
@@ -121,6 +122,7 @@ def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> No
     assert page.locator("#source option").all_inner_texts() == ["sram1", "sram2"]
 
 
+@pytest.mark.slow
 def test_pictures_come_as_often_as_one_likes(page: Any) -> None:
     """Up to five a second."""
     page.evaluate(

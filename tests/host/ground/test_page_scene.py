@@ -214,6 +214,7 @@ def test_it_is_seen_whole(chromium: Any, address: str, width: int, scheme: str) 
             assert page.evaluate(INK) > 50  # grid, stars or discs, names, outlines
 
 
+@pytest.mark.slow
 def test_no_key_is_markup(chromium: Any, address: str) -> None:
     with shown(chromium, address) as page:
 
@@ -242,6 +243,7 @@ def test_no_key_is_markup(chromium: Any, address: str) -> None:
         assert page.evaluate("document.hacked") is None
 
 
+@pytest.mark.slow
 def test_what_is_not_emulated_has_no_scene(chromium: Any, tmp_path: Any) -> None:
     path = tmp_path / "run.rec"
     target = open_target("emulated:cubesense", record=path)

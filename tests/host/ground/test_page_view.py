@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+from tests.tiers import quick
+
 from .browser import look, shown
 from .looks import COVERED, PALE
 
@@ -57,7 +59,7 @@ def test_the_keyboard_is_enough(page: Any) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", quick(["dark", "light"], 1))
 def test_nothing_is_cut_off_covered_or_pale(
     chromium: Any, address: str, width: int, scheme: str
 ) -> None:

@@ -81,6 +81,7 @@ def test_node_protocol_on_the_same_device_and_its_escapes(served: Path) -> None:
         assert answer == wanted
 
 
+@pytest.mark.slow
 def test_registers_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
     """Plain pyserial, then the client."""
     tty = tmp_path / "tty"

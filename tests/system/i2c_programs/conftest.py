@@ -17,6 +17,7 @@ from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.i2cdev.scheduler import open_scheduler
 from cubestack.emulator.i2cdev.server import I2cServer
 from cubestack.host.devices.emulated import open_device
+from tests.tiers import quick
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")
 ENVIRONMENT = os.environ | {"PATH": f"{os.environ['PATH']}:/usr/sbin:/sbin"}
@@ -80,7 +81,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             thread.join(TIMEOUT_S)
 
 
-@pytest.fixture(scope="session", params=ROUTES)
+@pytest.fixture(scope="session", params=quick(ROUTES, 1))
 def route(request: pytest.FixtureRequest, served: Path) -> str:
     """A route that works here."""
     name = str(request.param)

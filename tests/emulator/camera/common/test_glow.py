@@ -12,6 +12,7 @@ from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.hazards import SKY_HAZARDS, Moon, SkyHazard, SunGlare
 from cubestack.emulator.scene.sky import SkyScene
 from tests.emulator.scene.hazards.looks import ORION, SHUTTER
+from tests.tiers import quick
 
 LENSES = [LENS, double_gauss()]
 GLOWING = ["moon", "earth-limb", "sun-glare", "sky-glow"]
@@ -23,7 +24,7 @@ def placed(name: str, optics: Optics, seed: int) -> SkyHazard:
     return kind.placed(kind.strength.usual, now, np.random.default_rng(seed))
 
 
-@pytest.mark.parametrize("optics", LENSES, ids=["cubestar", "aramis"])
+@pytest.mark.parametrize("optics", quick(LENSES, 1), ids=["cubestar", "aramis"])
 @pytest.mark.parametrize("name", GLOWING)
 def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> None:
     generator = np.random.default_rng(2)

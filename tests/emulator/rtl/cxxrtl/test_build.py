@@ -60,6 +60,7 @@ def test_damaged_library_is_built_again(quick_compiler, cache, damage):
     assert list(cache.glob("*.so")) == [again]
 
 
+@pytest.mark.slow
 def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypatch):
     libraries = [build.library_for(wiring()), build.library_for(cubestar_wiring(CubeStarTop(2, 3)))]
     monkeypatch.setattr(compiler, "FLAGS", (*compiler.FLAGS, "-g"))

@@ -48,6 +48,7 @@ def test_its_errors_are_what_it_claims(noise_px: float) -> None:
     assert 0.55 < np.mean(inside) < 0.85
 
 
+@pytest.mark.slow
 def test_mirrored_stars_are_not_believed() -> None:
     for made in pictures(15, 8):
         mirrored = (made.stars.centroids * [-1, 1] + [FIELD.columns - 1, 0]).astype(np.float32)

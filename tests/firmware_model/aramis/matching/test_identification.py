@@ -78,6 +78,7 @@ def test_verification_is_right(
     assert found["right"] >= right
 
 
+@pytest.mark.slow
 def test_false_stars_alone_give_no_attitude() -> None:
     for solution in map(run, pictures(20, 2, NOTHING)):
         assert (solution.outcome, solution.quaternion) == (MeasurementOutcome.NONE, None)
