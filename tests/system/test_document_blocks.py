@@ -68,7 +68,11 @@ OTHERS = {"pip", "python", "python3", "pytest", "curl", "dask", "echo", "exec", 
 OTHERS |= {"", "gdb-multiarch"}  # the first one is `.`
 
 #: Commands that are parsed and not run here, and why.
-NOT_HERE = LEFT | {SERVES: "serves until Ctrl-C", LONG: "minutes to hours"}
+NOT_HERE = LEFT | {
+    SERVES: "serves until Ctrl-C",
+    LONG: "minutes to hours",
+    "--image out/": "a picture of make run: tests/system/pasted.py",
+}
 
 #: Commands that take a moment; all others that are run are slow.
 QUICK = r"^registers|^export|^catalogue|^picture|--list$|^shell|^decode|^replay|^log .*--each"
