@@ -116,7 +116,7 @@ def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "D
     from cubestack.host.ground.desk import Desk
     from cubestack.host.ground.emulators import Emulator
     from cubestack.host.ground.played import is_recording, open_recording
-    from cubestack.host.transport.streams import SerialTransport, port_of
+    from cubestack.host.transport.streams import Reopening, port_of
 
     if text.startswith(EMULATED):
         emulator = Emulator(text.removeprefix(EMULATED), options)
@@ -134,7 +134,7 @@ def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "D
             record=args.record,
         )
     port = None if target.line is None else port_of(target.line)
-    if isinstance(port, SerialTransport):
+    if isinstance(port, Reopening):
         port.reopens = True
     return Desk(target)
 

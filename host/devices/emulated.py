@@ -49,12 +49,14 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         board: the emulated board, with all its parts.
         seed: of everything random.
         chosen: its profile, and the switches that differ, as keywords of ``open_device``.
+        follows: what moves its scene, with what is moved; empty when it stays as it was put.
     """
 
     device: Device[BoardT_co, ClientT_co]
     board: BoardT_co
     seed: int
     chosen: Mapping[str, str] = field(default_factory=dict)
+    follows: str = field(default="", init=False)
     _client: ClientT_co | None = field(default=None, init=False, repr=False)
 
     @property

@@ -26,6 +26,8 @@ def follow(orbit: "Orbit", devices: "Sequence[AnyEmulated]") -> None:
         if name not in names:
             raise ValueError(f"mountings: {name!r} is not on board; there are {', '.join(names)}")
     _look(orbit, devices)
+    for one in devices:
+        one.follows = "an orbit moves its pointing, Earth, Sun and Moon; the rest is as it was put"
     kernel = devices[0].board.kernel
     kernel.process(_following(orbit, devices, kernel))
 

@@ -31,11 +31,13 @@ def keys(device: AnyDevice) -> JsonObject:
 
 
 def present(emulated: AnyEmulated) -> JsonObject:
-    """What its cameras see, as the table of a scene file, and where that is on the sky."""
+    """What its cameras see, as the table of a scene file, and where that is on the sky; and what
+    moves it, in words.
+    """
     form = _form(emulated.device)
     view = form.view(emulated.board)
     sight = form.sight(view, emulated.board.kernel.now).as_dict()
-    return {"table": form.table(view), "sight": sight}
+    return {"table": form.table(view), "sight": sight, "follows": emulated.follows}
 
 
 def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:

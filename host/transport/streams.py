@@ -7,7 +7,9 @@ emulator's in-process link does.
 import select
 import socket
 import termios
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Protocol
 from urllib.parse import urlsplit
 
@@ -49,16 +51,38 @@ def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
     return bytes(answer)
 
 
-class SerialTransport:
-    """A serial port, or any URL that pyserial knows.
+class Reopening(ABC):
+    """A line that can be opened again.
 
     Attributes:
-        reopens: whether a port that has gone is opened again when it is used next: a cable that
-            was pulled and put back.
+        name: the port's, in messages.
+        reopens: whether a line that has gone is opened again when it is used next: a cable that
+            was pulled and put back, a server that was started again.
     """
 
+    name: str
     reopens = False
     _gone = False
+
+    @contextmanager
+    def _used(self) -> Iterator[None]:
+        """Around what touches the line: PortClosedError for a failure."""
+        try:
+            if self._gone and self.reopens:
+                self._open_again()
+                self._gone = False
+            yield
+        except (serial.SerialException, OSError) as error:
+            self._gone = True
+            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
+
+    @abstractmethod
+    def _open_again(self) -> None:
+        """Raises SerialException or OSError."""
+
+
+class SerialTransport(Reopening):
+    """A serial port, or any URL that pyserial knows."""
 
     def __init__(self, port: str, baud: int) -> None:
         """Open ``port`` at ``baud``, 8N1; raises PortOpenError."""
@@ -85,36 +109,26 @@ class SerialTransport:
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``; raises PortClosedError."""
-        try:
-            self._come_back()
+        with self._used():
             self._port.write(data)
-        except (serial.SerialException, OSError) as error:
-            self._gone = True
-            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """What is there, once a byte has come; raises PortClosedError."""
-        try:
-            self._come_back()
+        with self._used():
             self._set_timeout(timeout_s)
             first: bytes = self._port.read(1)
             if not first:
                 return b""
             rest: bytes = self._port.read(min(max_bytes - 1, self._port.in_waiting))
-        except (serial.SerialException, OSError) as error:
-            self._gone = True
-            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
-        return first + rest
+            return first + rest
 
     def close(self) -> None:
         """Close the port."""
         self._port.close()
 
-    def _come_back(self) -> None:
-        if self._gone and self.reopens:
-            self._port.close()
-            self._port.open()
-            self._gone = False
+    def _open_again(self) -> None:
+        self._port.close()
+        self._port.open()
 
     def _set_timeout(self, timeout_s: float) -> None:
         if self._port.timeout != timeout_s:  # setting it touches the port
@@ -129,7 +143,7 @@ class Rfc2217Transport(SerialTransport):
         self._port._timeout = timeout_s
 
 
-class TcpTransport:
+class TcpTransport(Reopening):
     """A TCP connection that carries the bytes of a serial line.
 
     Not pyserial's ``socket://``: that one never says that more than one byte is waiting, so an
@@ -139,34 +153,39 @@ class TcpTransport:
     def __init__(self, host: str, port: int) -> None:
         """Connect; raises PortOpenError."""
         self.name = f"tcp://{host}:{port}"
+        self._address = host, port
         try:
-            self._socket = socket.create_connection((host, port), CONNECT_TIMEOUT_S)
+            self._socket = self._connected()
         except OSError as error:
             raise PortOpenError(f"can not open {self.name}: {_reason(error)}") from error
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``; raises PortClosedError."""
-        try:
+        with self._used():
             self._socket.sendall(data)
-        except OSError as error:
-            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         """What is there, once a byte has come; PortClosedError, also when the other side ends."""
-        try:
+        with self._used():
             if not select.select([self._socket], [], [], timeout_s)[0]:
                 return b""
             data = self._socket.recv(max_bytes)
-        except OSError as error:
-            raise PortClosedError(f"{self.name}: {_reason(error)}") from error
-        if not data:
-            raise PortClosedError(f"{self.name}: the other side closed the connection")
-        return data
+            if not data:
+                raise ConnectionResetError("the other side closed the connection")
+            return data
 
     def close(self) -> None:
         """Close the connection."""
         self._socket.close()
+
+    def _open_again(self) -> None:
+        self._socket.close()
+        self._socket = self._connected()
+
+    def _connected(self) -> socket.socket:
+        opened = socket.create_connection(self._address, CONNECT_TIMEOUT_S)
+        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return opened
 
 
 def _open_tcp(target: str, _baud: int) -> Transport:

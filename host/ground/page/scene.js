@@ -81,7 +81,8 @@ export class Scene {
   // Fills the form with what is seen now.
   async present() {
     try {
-      const { table, sight } = await ask(`${this.path}/scene`);
+      const { table, sight, follows } = await ask(`${this.path}/scene`);
+      this.follows = follows;
       this.kind.value = table.kind;
       this.choose(table.kind, table);
       this.tell("");
@@ -188,7 +189,7 @@ export class Scene {
       ...fields.map(({ name, axes }) => at(name, axes[2])),
       ...bodies.map(({ name, direction }) => at(name, direction)),
     ];
-    this.told.textContent = this.error || [title, ...words].filter(Boolean).join("; ");
+    this.told.textContent = this.error || [title, ...words, this.follows].filter(Boolean).join("; ");
     const keys = "a click or arrow keys, with shift faster, put what is chosen above";
     this.canvas.setAttribute("aria-label", `map of the sky: ${words.join("; ")}; ${keys}`);
   }

@@ -44,6 +44,7 @@ def scene_of(device: Any) -> Any:
 
 def test_what_they_see_goes_on_with_virtual_time(satellite: tuple[Any, Any, Any]) -> None:
     orbit, star, sense = satellite
+    assert "an orbit moves" in star.follows
     # Between whole seconds the rate of the last holds on, and the orbit bends.
     for until in (0.0, 1.55, 10.0, 100.2):
         star.wait(until - star.time_s)

@@ -43,6 +43,12 @@ def test_the_present_scene_is_one_that_can_be_shown_again(controlled: Controlled
     assert controlled.ask("GET", SCENE)[1]["table"] == told["table"]
 
 
+def test_what_moves_a_scene_is_told(controlled: Controlled) -> None:
+    assert controlled.ask("GET", SCENE)[1]["follows"] == ""
+    controlled.emulated.follows = "an orbit"
+    assert controlled.ask("GET", SCENE)[1]["follows"] == "an orbit"
+
+
 def test_another_scene_is_looked_at_and_not_shown(controlled: Controlled) -> None:
     before = controlled.emulated.scene
     table = {"kind": "sky", "ra_deg": 10.0, "dec_deg": 20.0, "roll_deg": 30.0}

@@ -67,6 +67,30 @@ def test_a_closed_connection_is_told(tcp_line: Ends) -> None:
         transport.read(10, 5.0)
 
 
+@pytest.mark.parametrize("reopens", [True, False])
+def test_a_server_that_is_started_again_is_found_again(tcp_line: Ends, reopens: bool) -> None:
+    transport, peer = tcp_line
+    assert isinstance(transport, streams.TcpTransport)
+    transport.reopens = reopens
+    port = int(transport.name.rpartition(":")[2])
+    peer.close()
+    with pytest.raises(PortClosedError, match="the other side closed"):
+        transport.read(10, 5.0)
+    for _ in range(2):
+        with pytest.raises(PortClosedError, match="refused" if reopens else transport.name):
+            transport.read(10, 5.0)
+    with socket.create_server(("127.0.0.1", port)) as server:
+        if not reopens:
+            with pytest.raises(PortClosedError):
+                transport.read(10, 5.0)
+            return
+        transport.write(b"here")
+        with server.accept()[0] as connection:
+            assert connection.recv(10) == b"here"
+            connection.sendall(b"again")
+            assert transport.read(10, 5.0) == b"again"
+
+
 @pytest.mark.parametrize(
     ("target", "message"),
     [
