@@ -10,6 +10,10 @@ MUTANTS ?=
 # One more process than cores: some tests wait for a browser or for a clock.
 TESTS := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadgroup
 
+# Tests start hundreds of Python processes: let them keep what they have compiled, also where that is
+# not usual.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest
+
 # Of the gateware's tests: further random numbers, and the simulator, icarus or verilator.
 SEED ?= 0
 SIMULATOR ?= icarus
@@ -51,10 +55,10 @@ run: .venv/ready-run
 	@$(BIN)/cubestack demo --out out --photographs "$(PHOTOGRAPHS)"
 
 test: .venv/ready-dev
-	@$(BIN)/pytest $(TESTS)
+	@$(PYTEST) $(TESTS)
 
 test-all: .venv/ready-dev
-	@$(BIN)/pytest $(TESTS) -m "slow or not slow"
+	@$(PYTEST) $(TESTS) -m "slow or not slow"
 
 pasted:
 	@$(PYTHON) -m tests.system.pasted $(DOCUMENTS)

@@ -51,7 +51,7 @@ def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
     return bytes(answer)
 
 
-class Reopening(ABC):
+class Reopening(Transport, ABC):
     """A line that can be opened again.
 
     Attributes:

@@ -1,5 +1,8 @@
 """What can be wrong with how a page looks, as functions of the browser's language."""
 
+LOOKS = [("dark", 390), ("dark", 1280), ("light", 1280), ("light", 390)]
+"""Colour schemes, and widths in pixels of a telephone and of a screen."""
+
 COVERED = """() => {
   const all = [...document.querySelectorAll("button, input, select, canvas, p, h1, h2, li, td")];
   const seen = all.filter((one) => one.checkVisibility() && !one.closest("#lines, .under"));

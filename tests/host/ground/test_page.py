@@ -108,6 +108,7 @@ def test_it_goes_back_to_a_snapshot(page: Any) -> None:
     assert "Threshold1: 7" in told
 
 
+@pytest.mark.slow
 def test_the_recording_can_be_saved_and_replayed(page: Any, tmp_path: Path) -> None:
     look(page, "CubeSense")
     line(page, "read Identification")

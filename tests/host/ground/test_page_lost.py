@@ -42,6 +42,7 @@ def test_a_connection_is_lost_and_comes_back(chromium: Any, relayed: tuple[Relay
         assert page.evaluate("window.here")
 
 
+@pytest.mark.slow
 def test_another_program_in_its_place_is_told(chromium: Any, relayed: tuple[Relay, str]) -> None:
     """Its token is another one: who does not open its address waits for ever."""
     relay, address = relayed

@@ -50,6 +50,7 @@ def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
     assert page.locator("#found-legend").is_visible()
 
 
+@pytest.mark.slow
 def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
     """By keys alone, by the wheel once it is chosen, and by the pointer."""
     picture = page.locator("#frame-of-picture")

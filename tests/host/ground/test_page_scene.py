@@ -12,7 +12,7 @@ from tests.tiers import quick
 
 from .browser import await_devices, look, shown, station
 from .hostile import HOSTILE, hostile
-from .looks import COVERED, PALE
+from .looks import COVERED, LOOKS, PALE
 
 pytestmark = pytest.mark.xdist_group("page scene")
 
@@ -198,9 +198,8 @@ def test_directions_are_answered_beside_the_truth(page: Any) -> None:
     assert {"nadir_error_deg", "sun_error_deg", "sun_alpha_error_deg"} <= set(header)
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("scheme", quick(["dark", "light"], 1))
-def test_it_is_seen_whole(chromium: Any, address: str, width: int, scheme: str) -> None:
+@pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 1))
+def test_it_is_seen_whole(chromium: Any, address: str, scheme: str, width: int) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
         for device in ("CubeStar", "CubeSense"):

@@ -7,7 +7,7 @@ import pytest
 from tests.tiers import quick
 
 from .browser import look, shown
-from .looks import COVERED, PALE
+from .looks import COVERED, LOOKS, PALE
 
 pytestmark = pytest.mark.xdist_group("page view")  # so that its emulations are started once
 
@@ -58,10 +58,9 @@ def test_the_keyboard_is_enough(page: Any) -> None:
     page.wait_for_selector("#pause[aria-pressed=false]")
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("scheme", quick(["dark", "light"], 1))
+@pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 2))
 def test_nothing_is_cut_off_covered_or_pale(
-    chromium: Any, address: str, width: int, scheme: str
+    chromium: Any, address: str, scheme: str, width: int
 ) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
