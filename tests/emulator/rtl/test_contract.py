@@ -9,6 +9,7 @@ from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.contract import PinEvent, RtlEngine
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.flow.generate import rtlil_text
 
 from .cameras import plain_camera
 
@@ -16,7 +17,9 @@ PERIOD = 100_000
 LINE = 12
 BLANK = 30
 ROWS, COLUMNS = 4, 8
-OUTPUT_PINS = cubestar_wiring().output_pins
+BOARD = cubestar_wiring()
+rtlil_text(BOARD.component)  # a design must be used, Amaranth says
+OUTPUT_PINS = BOARD.output_pins
 # The last pixel is taken by the rising edge of its own clock, stored during that clock, and
 # acknowledged by the next rising edge.
 FIRST_ACK = (BLANK + (ROWS - 1) * LINE + COLUMNS) * PERIOD
