@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from typing import Any
 
 import pytest
-from _pytest.mark import ParameterSet
+
+PARAM = type(pytest.param())
 
 
 def quick(cases: Iterable[Any], count: int) -> list[Any]:
@@ -17,7 +18,7 @@ def quick(cases: Iterable[Any], count: int) -> list[Any]:
     return [case if place in kept else _slow(case) for place, case in enumerate(found)]
 
 
-def _slow(case: Any) -> ParameterSet:
-    if isinstance(case, ParameterSet):
+def _slow(case: Any) -> Any:
+    if isinstance(case, PARAM):
         return pytest.param(*case.values, id=case.id, marks=[*case.marks, pytest.mark.slow])
     return pytest.param(*(case if isinstance(case, tuple) else [case]), marks=pytest.mark.slow)
