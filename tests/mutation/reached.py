@@ -18,7 +18,8 @@ from tests.mutation.plugin import COLLECTED, DURATIONS, KNOWN, PLUGIN, without_g
 FOLDER = Path("out/mutation")
 DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
 BUDGET_S, MOST_TESTS = 25.0, 150
-"""What a mutant has to face: so many seconds of tests at most, and so many tests."""
+"""What a mutant has to face: so many seconds of tests at most, and so many tests; those of
+`DOCUMENTS` besides."""
 
 SITE = """
 import os
@@ -121,17 +122,18 @@ class Reached:
         found = _names(contexts)
         if "" not in contexts:  # it does not run when it is imported, as all processes do
             found |= _names_of_processes(contexts)
-        spent, taken = 0.0, []
+        documents: list[str] = []
         if not found:
             found = _names(context for each in by_line.values() for context in each)
             found |= {test for test in self.durations if test.partition("::")[0] in files}
-            taken = [test for test in self.durations if test.partition("::")[0] in DOCUMENTS]
-        for test in self._in_turn(mutant.path, (found & self.durations.keys()) - {*taken}):
+            documents = [test for test in self.durations if test.partition("::")[0] in DOCUMENTS]
+        spent, taken = 0.0, []
+        for test in self._in_turn(mutant.path, (found & self.durations.keys()) - {*documents}):
             spent += self.durations[test]
             if taken and (spent > BUDGET_S or len(taken) == MOST_TESTS):
                 break
             taken.append(test)
-        return taken
+        return taken + documents
 
     def _in_turn(self, path: Path, tests: set[str]) -> list[str]:
         by_file: dict[str, list[str]] = defaultdict(list)

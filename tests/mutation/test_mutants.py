@@ -9,7 +9,7 @@ from coverage import CoverageData
 
 from tests.mutation.__main__ import chosen
 from tests.mutation.mutants import Mutant, modules, mutants
-from tests.mutation.reached import DATA, DOCUMENTS, FOLDER, TIMES, Reached
+from tests.mutation.reached import DATA, DOCUMENTS, FOLDER, MOST_TESTS, TIMES, Reached
 from tests.mutation.suite import ROOT, files_for, near
 
 HERE = Path("a.py")
@@ -88,8 +88,9 @@ def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_besid
 
 def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) -> None:
     (tmp_path / FOLDER).mkdir(parents=True)
-    of_documents = f"{DOCUMENTS[0]}::test_defaults"
-    names = "tests/test_a.py::test_f", "test_b.py::test_g", "test_c.py::test_h", of_documents
+    # However many they are, the others are faced as well.
+    of_documents = [f"{DOCUMENTS[0]}::test_defaults[{number}]" for number in range(MOST_TESTS)]
+    names = "tests/test_a.py::test_f", "test_b.py::test_g", "test_c.py::test_h", *of_documents
     recorded = dict.fromkeys(names, 1.0)
     (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
     data = CoverageData(str(tmp_path / FOLDER / DATA))
@@ -106,5 +107,5 @@ def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) 
         assert reached.tests(Mutant(HERE, line, line, line, 0, 1, "a", "b"), set()) == expected
     at_import = Mutant(HERE, 1, 1, 1, 0, 1, "a", "b")
     run, beside = ["tests/test_a.py::test_f", "test_b.py::test_g"], "test_c.py::test_h"
-    assert reached.tests(at_import, set()) == [of_documents, *run]
-    assert reached.tests(at_import, {"test_c.py"}) == [of_documents, *run, beside]
+    assert reached.tests(at_import, set()) == [*run, *of_documents]
+    assert reached.tests(at_import, {"test_c.py"}) == [*run, beside, *of_documents]

@@ -8,6 +8,10 @@ from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533, CORE_HZ, black
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3, cortex_m3
 from cubestack.firmware_model.mcu.costs import Cost, CostError, CostTable, Meter
 
+from ..operations import as_on_record
+
+TABLES = [CORTEX_M3, BLACKFIN_BF533, pic18.PIC18F45K20]
+
 SIMPLE = CostTable(
     "simple part",
     1000,
@@ -21,6 +25,14 @@ def test_charges_add_up_by_count_and_cost() -> None:
     meter.charge(add=1)
     assert meter.total == 3 * 3 + 10 * 5
     assert meter.counts == {"add": 3, "loop": 10}
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
+def test_no_price_changes_unnoticed(table: CostTable) -> None:
+    """Each operation as often as it takes cycles."""
+    meter = Meter(table)
+    meter.charge(**table.cycles)
+    as_on_record(f"prices: {table.name}", meter)
 
 
 def test_take_gives_the_cycles_since_the_last_take() -> None:

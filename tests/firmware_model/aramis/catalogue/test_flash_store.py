@@ -101,6 +101,7 @@ def test_contents_that_are_no_catalogue_are_refused(content: bytes) -> None:
     desk = Desk(content)
     assert not desk.load()
     assert desk.store.state in (CatalogueState.DAMAGED, CatalogueState.MISSING)
+    assert (desk.store.loads, desk.store.failures) == (1, 1)
 
 
 def test_a_catalogue_longer_than_the_flash_is_refused() -> None:

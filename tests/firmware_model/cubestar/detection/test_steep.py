@@ -5,7 +5,9 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, SearchEnd, detect_stars
+from cubestack.firmware_model.cubestar.detection.background import UNIT, Background
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN
+from cubestack.firmware_model.cubestar.detection.steep import REACH, along_rows
 
 from ..sky import meter
 from .pictures import Places, spots, taken
@@ -36,6 +38,17 @@ def noisy(image: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
     rng = np.random.default_rng(seed)
     light: NDArray[np.float64] = rng.poisson(image * ELECTRONS_PER_DN) / ELECTRONS_PER_DN
     return light + rng.normal(0, 0.3, image.shape)
+
+
+@pytest.mark.parametrize("other", range(10, 15))
+def test_a_level_between_two_pixels_is_rounded_half_up(other: int) -> None:
+    picture = np.zeros((9, 32), np.uint8)
+    picture[4, [16 - REACH, 16, 16 + REACH]] = 10, 200, other
+    marks = np.zeros(picture.shape, np.bool_)
+    marks[4, 16] = True
+    dark = Background(np.zeros((2, 2), np.int64), np.zeros((2, 2), np.int64), 0.0)
+    places = along_rows(picture, marks, dark, UNIT, meter())
+    assert places.levels.tolist() == [UNIT * (10 + (other - 10 + 1) // 2)]
 
 
 @pytest.mark.parametrize("angle_deg", [0, 30, 45, 90, 140, 200, 270, 300])

@@ -11,7 +11,9 @@ from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import InterfaceError, bool1, i16, u8, u16, u32
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import node_telemetry
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
 MIXED = Message(200, "Mixed", "").of(
     u8("a", ""), bool1("b", ""), bool1("c", "", gap=6), i16("d", "", scale=100), u32("e", "")
@@ -22,6 +24,12 @@ WINDOW = Message(20, "Window", "").of(
     u8("high", "", maximum=9, range_flag="HighError", reset=9),
     ordered=(("low", "high"),),
 )
+
+
+def test_a_node_of_any_kind_is_identified_by_the_same_numbers() -> None:
+    """As CubeStar's: frames of an unknown node can be asked who it is."""
+    assert [message.id for message in node_telemetry(9, {})] == [128, 129, 130, 131]
+    assert CUBESTAR.telemetry("Identification").id == 128
 
 
 def test_fields_stand_one_behind_the_other_and_begin_with_a_byte_unless_they_are_bits() -> None:
