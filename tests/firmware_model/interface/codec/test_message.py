@@ -28,7 +28,7 @@ WINDOW = Message(20, "Window", "").of(
 
 def test_a_node_of_any_kind_is_identified_by_the_same_numbers() -> None:
     """As CubeStar's: frames of an unknown node can be asked who it is."""
-    assert [message.id for message in node_telemetry(9, {})] == [128, 129, 130, 131]
+    assert [message.id for message in node_telemetry(9, {})] == [128, 130, 131]
     assert CUBESTAR.telemetry("Identification").id == 128
 
 
