@@ -134,6 +134,16 @@ def hollow() -> NDArray[np.uint8]:
     return data
 
 
+def steps(apart: int) -> NDArray[np.uint8]:
+    """Two squares one below the other, the lower one ``apart`` columns to the right, at a corner of
+    the window, by which nothing is round.
+    """
+    data = squares(0, 0)
+    pixels = data[4:].reshape(15, 15)
+    pixels[:5, :5] = pixels[5:10, apart : apart + 5] = 255
+    return data
+
+
 def nowhere() -> NDArray[np.uint8]:
     data = squares(9, 9)
     data[:4] = (0xFF, 3, 0xFF, 1)  # SUN_NOT_FOUND
@@ -151,6 +161,8 @@ def nowhere() -> NDArray[np.uint8]:
         (squares(5, 10), Reason.NOT_ROUND),  # sides that differ by 5
         (squares(5, 9), Reason.SHARP),  # by 4
         (hollow(), Reason.NOT_ROUND),
+        (steps(5), Reason.NOT_ROUND),  # no column in common
+        (steps(4), Reason.SHARP),
     ],
 )
 def test_each_reason_has_its_light(
