@@ -217,6 +217,7 @@ def test_each_flag_is_shown_alone(node: Links, flag: str) -> None:
 
 
 def test_after_start_up(node: Links) -> None:
+    assert [len(result.edges) for result in node.state.results.values()] == [0, 0]
     for number in (1, 2):
         values = node.telemetry(f"Result{number}")
         assert values == {"Alpha": 0, "Beta": 0, "Capture": 0, "Detect": 0}

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, SearchEnd, detect_stars
 from cubestack.firmware_model.cubestar.detection.background import UNIT, Background
-from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN
-from cubestack.firmware_model.cubestar.detection.steep import REACH, along_rows
+from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF
+from cubestack.firmware_model.cubestar.detection.steep import along_rows
 
 from ..sky import meter
 from .pictures import Places, spots, taken
@@ -41,9 +41,10 @@ def noisy(image: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("other", range(10, 15))
-def test_a_level_between_two_pixels_is_rounded_half_up(other: int) -> None:
+def test_a_level_is_that_just_beyond_a_spot_on_both_sides_rounded_half_up(other: int) -> None:
+    away = HALF + 1
     picture = np.zeros((9, 32), np.uint8)
-    picture[4, [16 - REACH, 16, 16 + REACH]] = 10, 200, other
+    picture[4, [16 - away, 16, 16 + away]] = 10, 200, other
     marks = np.zeros(picture.shape, np.bool_)
     marks[4, 16] = True
     dark = Background(np.zeros((2, 2), np.int64), np.zeros((2, 2), np.int64), 0.0)
