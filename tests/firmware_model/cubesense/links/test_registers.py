@@ -190,6 +190,17 @@ def test_what_is_read_ahead_is_bounded(node: Links) -> None:
     assert 1 <= node.read <= READ_AHEAD_BYTES + 1
 
 
+def test_more_is_read_as_soon_as_half_of_what_was_read_ahead_is_left(node: Links) -> None:
+    node.write_register(IMAGE)
+    node.registers.i2c_start(True)
+    assert node.registers.i2c_read() is None
+    node.run()
+    handed_out = []
+    while not node.queue:
+        handed_out.append(node.registers.i2c_read())
+    assert len(handed_out) == READ_AHEAD_BYTES // 2 + 1  # the last one finds a half
+
+
 def test_the_clock_is_stretched_until_the_first_bytes_are_there(node: Links) -> None:
     node.write_register(IMAGE)
     node.registers.i2c_start(True)
