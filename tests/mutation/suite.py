@@ -47,7 +47,8 @@ def near(path: Path, tests: list[str]) -> list[str]:
 
 
 def files_for(path: Path) -> list[Path]:
-    """Test files for a module: its mirror image first, then who imports it, the nearest first."""
+    """Test files for a module: its mirror image first, then the nearest of those that stand beside
+    it or import it."""
     return _ranked(path)[:MOST_FILES]
 
 
@@ -64,7 +65,7 @@ def _ranked(path: Path) -> list[Path]:
         beside = file.parent == folder
         if mirror or beside or f"from {imported} import" in text or f"import {imported}" in text:
             shared = len(os.path.commonpath([file.parent, folder]).split(os.sep))
-            ranked.append((not mirror, f"{imported} import" not in text, -shared, file))
+            ranked.append((not mirror, -shared, f"{imported} import" not in text, file))
     while not ranked and folder != Path("tests"):
         folder = folder.parent
         ranked = [(True, True, 0, file) for file, _ in _test_texts() if file.parent == folder]

@@ -65,9 +65,14 @@ def test_the_seed_decides() -> None:
 def test_the_mirror_image_comes_first() -> None:
     found = files_for(Path("firmware_model/attitude/quest.py"))
     assert found[0] == Path("tests/firmware_model/attitude/test_quest.py")
-    others = [(ROOT / file).read_text("utf-8") for file in found[1:]]
-    assert others
-    assert all("attitude.quest import" in text for text in others)
+    assert {file.parent for file in found} == {Path("tests/firmware_model/attitude")}
+
+
+def test_who_imports_it_comes_before_who_only_stands_beside_it() -> None:
+    found = files_for(Path("firmware_model/attitude/quest.py"))[1:]
+    imports = ["attitude.quest import" in (ROOT / file).read_text("utf-8") for file in found]
+    assert any(imports)
+    assert imports == sorted(imports, reverse=True)
 
 
 def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_beside(

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubestar.detection import DetectionConfig, SearchEnd, detect_stars
+from cubestack.firmware_model.cubestar.detection import (
+    DetectionConfig,
+    SearchEnd,
+    detect_stars,
+    steep,
+)
 from cubestack.firmware_model.cubestar.detection.background import UNIT, Background
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF
-from cubestack.firmware_model.cubestar.detection.steep import along_rows
+from cubestack.firmware_model.cubestar.detection.steep import along_rows, beside
 
 from ..sky import meter
 from .pictures import Places, spots, taken
@@ -50,6 +55,17 @@ def test_a_level_is_that_just_beyond_a_spot_on_both_sides_rounded_half_up(other:
     dark = Background(np.zeros((2, 2), np.int64), np.zeros((2, 2), np.int64), 0.0)
     places = along_rows(picture, marks, dark, UNIT, meter())
     assert places.levels.tolist() == [UNIT * (10 + (other - 10 + 1) // 2)]
+
+
+def test_other_ways_end_at_the_last_pixels_of_the_picture() -> None:
+    at = np.array([0, 4, 8])
+    none = np.zeros(3, np.int64)
+    rows, columns = beside(steep.Places(at, at * 4, none, none), 9, 33)
+    assert rows.shape == columns.shape == (6, 3)
+    away = HALF + 1
+    assert [*rows.min(axis=0), *rows.max(axis=0)] == [0, 0, 8 - away, away, 8, 8]
+    assert [*columns.min(axis=0)] == [0, 16 - away, 32 - away]
+    assert [*columns.max(axis=0)] == [away, 16 + away, 32]
 
 
 @pytest.mark.parametrize("angle_deg", [0, 30, 45, 90, 140, 200, 270, 300])
