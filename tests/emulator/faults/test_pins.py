@@ -90,6 +90,19 @@ class Engine:
         return 4
 
 
+def test_a_lost_acknowledge_is_told_once_however_often_it_is_looked_at():
+    told = []
+
+    def report(_time_ps, injection, text):
+        injection.hits += 1  # as the injector counts
+        told.append(text)
+
+    pins = PinFaults(Kernel(), report, Engine())
+    pins.begin(Injection(0, AckLost(), "ACK", 0, None, 0))
+    assert [pins.get_pin("ACK") for _ in range(3)] == [0, 0, 0]
+    assert told == ["begins with the pin at 1", "ACK rise not seen"]
+
+
 def test_what_acts_around_reads_does_so_before_and_after_each():
     """A memory's stuck bits hold whenever the processor takes bytes, and at no other time."""
     engine = Engine()

@@ -1,7 +1,9 @@
 """Registers that are turned over from outside."""
 
 from collections.abc import Iterator
+from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
@@ -47,6 +49,21 @@ def test_every_bit_of_a_running_reader_moves_the_address(engine: CompiledEngine)
             assert engine.get_pin("SRAM_A") == before ^ 1 << bit + shift
             engine.flip(register, bit)
             assert engine.get_pin("SRAM_A") == before
+
+
+def test_a_bit_turns_over_in_the_middle_of_a_transfer(engine: CompiledEngine) -> None:
+    memory = next(iter(engine.memories.values())).reshape(-1)
+    memory[:] = np.random.default_rng(1).integers(0, 256, memory.size)
+    engine.set_pin("RNW", 1)
+    engine.set_pin("ENABLE", 1)
+    sent = np.zeros(40, np.uint8)
+    period = Fraction(100_000)
+    engine.flip("reader.counter.column", 8, engine.now_ps + 20 * int(period))
+    assert engine.strobe_read(sent, period, engine.now_ps + 10**9) == 40
+    away = [int(index) for index in range(40) if sent[index] != memory[index]]
+    assert away
+    assert min(away) in (19, 20, 21)  # all before are those of the addresses before
+    assert [*sent[22:]] == [*memory[256 + 22 : 256 + 40]]
 
 
 def test_registers_in_reset_have_their_reset_value_at_once(engine: CompiledEngine) -> None:

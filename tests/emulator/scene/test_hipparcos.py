@@ -81,6 +81,14 @@ def test_motion_is_that_of_the_angles() -> None:
     assert 120 < moved.max() < 140
 
 
+def test_two_stars_of_a_pair_move_alike() -> None:
+    """94 Aqr A and B; the catalogue has no solution of B."""
+    catalogue = hipparcos._catalogue()
+    both = np.searchsorted(catalogue.hip, [115126, 115125])
+    a, b = np.linalg.norm(catalogue.motions[both], axis=1)
+    assert a == pytest.approx(b, rel=1e-6)
+
+
 def test_vectors_are_unit_and_arrays_read_only() -> None:
     sky = load_sky(2026.0)
     assert len(sky) == 117_958  # 117 955 records and the three absent stars

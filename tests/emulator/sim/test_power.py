@@ -57,6 +57,16 @@ def test_charge_of_a_published_iteration(kernel, power):
     assert power.charge_mas() * 3.3 == pytest.approx(396.2, abs=0.1)
 
 
+def test_charge_is_that_of_the_time_before_a_channel_was_switched(kernel, power):
+    before = power.current_ma()
+    kernel.advance_to(1000 * PS_PER_MS)
+    power.switch("memory", False)
+    after = power.current_ma()
+    assert after < before
+    kernel.advance_to(3000 * PS_PER_MS)
+    assert power.charge_mas() == pytest.approx(before + 2 * after)
+
+
 def test_channels_and_unswitched_parts_add_up(power):
     enter(power, MODES[3][2])
     always_on = PARTS["leds"].ma["on"] + PARTS["processor"].ma["run"]

@@ -175,5 +175,8 @@ def test_lines_are_open_drain(board: CubeSenseBoard) -> None:
     assert all(pin in lines for pin in (scl, sda, *pins.SRAM_POWER.values()))
     assert "SUNEN" not in lines
     assert lines.get_pin(sda) == 1
+    assert {lines.get_pin(pin) for pin in pins.CAMERA_SDA.values()} == {1}
     lines.set_pin(sda, 0)
     assert (lines.get_pin(sda), lines.get_pin(scl)) == (0, 1)
+    lines.release()
+    assert (lines.get_pin(sda), lines.get_pin(scl)) == (1, 1)

@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 
+from cubestack.emulator.camera.common import exposure
 from cubestack.emulator.camera.common.exposure import (
     FAINTEST_V,
     looking_along,
@@ -26,6 +27,12 @@ LONG = RollingShutter(10**12, LINE, 2917, 2917)
 VEGA = 91262
 SKY = load_sky(2026.0)
 ORION = replace(SkyScene.pointing(83.8, -1.0), mag_limit=3.8)
+
+
+def test_an_exposure_goes_on_from_its_beginning_to_its_end() -> None:
+    begin, middle, end = (exposure._time_ps(LENS, LONG, phase) for phase in (0.0, 0.5, 1.0))
+    assert middle == LONG.mid_exposure_ps((LENS.rows - 1) / 2)
+    assert end - middle == middle - begin == pytest.approx(LONG.exposure_s * 1e12 / 2)
 
 
 def light(scene: SkyScene, shutter: RollingShutter = LONG, lens: Optics = LENS) -> np.ndarray:

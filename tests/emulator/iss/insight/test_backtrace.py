@@ -100,6 +100,12 @@ def test_an_even_word_or_one_outside_of_the_program_is_none(scene: Scene) -> Non
     assert [frame.address for frame in scene.frames()] == [0x110, 0x340]
 
 
+def test_calls_that_saved_nothing_but_where_they_return_are_all_found(scene: Scene) -> None:
+    scene.push(scene.call(0x240), scene.call(0x340), scene.call(0x420))
+    found = [scene.symbols.function_at(frame.place) for frame in scene.frames()]
+    assert [one.name for one in found if one] == ["f1", "f2", "f3", "f4"]
+
+
 def test_only_so_much_of_the_stack_is_searched(scene: Scene) -> None:
     for depth, found in ((255, 2), (256, 1)):
         scene.words.clear()

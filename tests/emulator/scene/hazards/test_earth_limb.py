@@ -141,3 +141,11 @@ def test_refuses_what_can_not_be() -> None:
         EarthLimb(altitude_km=100)
     with pytest.raises(SceneError, match="sun must be 3 numbers"):
         EarthLimb(sun=(0.0, 0.0, 0.0))
+
+
+def test_light_is_looked_for_two_coarse_pixels_beyond_the_disc() -> None:
+    """Where a pixel is wider than all that shines above the limb."""
+    coarse = replace(NOW, pixel_rad=np.radians(5.0))
+    (ring,) = limb(5.0).rings(coarse)
+    assert np.degrees(ring.inner_rad) == pytest.approx(RADIUS_DEG - 10)
+    assert np.degrees(ring.outer_rad) == pytest.approx(RADIUS_DEG + 10)

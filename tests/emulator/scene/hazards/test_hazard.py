@@ -28,6 +28,7 @@ class Fog(Hazard):
         ({"depth_m": -1.0}, "depth_m of the hazard fog must be in 0..50, not -1"),
         ({"depth_m": float("nan")}, "depth_m of the hazard fog must be in 0..50, not nan"),
         ({"seed": -1}, "seed of the hazard fog must be in 0.."),
+        ({"seed": 2**63}, "seed of the hazard fog must be in 0.."),  # more than TOML has
     ],
 )
 def test_what_is_out_of_range_is_refused(values: dict[str, float], refused: str) -> None:
