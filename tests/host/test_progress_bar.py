@@ -10,7 +10,8 @@ from cubestack.host import terminal
 
 @pytest.fixture
 def screen(monkeypatch: pytest.MonkeyPatch) -> StringIO:
-    """What stands on a terminal."""
+    """What stands on a terminal that draws, whichever the tests run on."""
+    monkeypatch.setenv("TERM", "xterm")
     file = StringIO()
     console = Console(file=file, force_terminal=True, width=100, color_system=None)
     monkeypatch.setattr(terminal, "_errors", console)
