@@ -87,15 +87,15 @@ def test_a_long_line_of_a_result_is_not_broken(
     assert file.getvalue().splitlines() == [long, f"== {long} =="]
 
 
-def test_a_title_is_ruled_where_it_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("title", ["a title", "as long as a row of thirty"])
+def test_a_title_is_ruled_where_it_has_room(monkeypatch: pytest.MonkeyPatch, title: str) -> None:
     file = StringIO()
     console = Console(
         file=file, width=30, force_terminal=True, color_system=None, _environ=TERMINAL
     )
     monkeypatch.setattr(terminal, "console", console)
-    terminal.head("a title")
-    assert " a title " in file.getvalue()
-    assert "──" in file.getvalue()
+    terminal.head(title)
+    assert f"─ {title} ─" in file.getvalue()
 
 
 def test_quick_or_quiet_work_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:

@@ -208,6 +208,13 @@ def test_the_sun_is_measured_up_to_the_very_side() -> None:
     assert found["worst_rest"] == 0.05
     assert found["worst_30"] == 0.01
     assert np.isnan(found["mean_60"])
+    behind = one | {"truth_alpha_deg": 90.5, "truth_beta_deg": 0.0} | times
+    found = cubesense._sensor(
+        [SimpleNamespace(**behind), SimpleNamespace(**inner)]  # type: ignore[list-item]
+    )
+    assert found["worst"] == 0.05
+    assert np.isnan(found["worst_90"])
+    assert np.isnan(found["worst_rest"])
 
 
 # --- a few frames of what is measured -------------------------------------------------------------

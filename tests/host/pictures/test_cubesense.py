@@ -13,6 +13,7 @@ from cubestack.host.clients.cubesense.client import direction
 from cubestack.host.pictures.cubesense import (
     EDGE,
     FITTED,
+    _inset,
     annotate_nadir,
     annotate_sun,
     limb,
@@ -84,6 +85,14 @@ def test_sun_picture_shows_its_window_twice(tmp_path: Path, at: tuple[int, int])
     drawn = np.asarray(Image.open(tmp_path / "sun.png"))
     white = np.all(drawn == 255, axis=2)
     assert white.sum() > 16 * 16 / 2  # the pixel of the enlarged one, its marks left out
+
+
+@pytest.mark.parametrize("at", [(100, 100), (500, 100), (100, 400), (500, 400)])
+def test_the_place_of_the_enlarged_window_is_told_whole(at: tuple[int, int]) -> None:
+    """So that no label is written over it."""
+    image = Image.new("RGB", (1280, 960))
+    box = _inset(image, np.full((480, 640), 255, np.uint8), at, np.array(at, float), None)
+    assert (box.left, box.top, box.right, box.bottom) == image.getbbox()
 
 
 def test_sun_that_was_not_found_has_no_window(tmp_path: Path) -> None:

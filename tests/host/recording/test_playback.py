@@ -85,3 +85,12 @@ def test_i2c_client_runs_on_a_recording():
 def test_other_transfer_is_named(messages, text):
     with pytest.raises(RecordingMismatchError, match=text):
         bus((b"\x80", IDENTIFICATION, 0)).i2c_rdwr(*messages)
+
+
+def test_the_first_byte_that_differs_in_a_transfer_is_named():
+    recorded = BusTransfer(0, "i2c", 0, (BusMessage(0x1B, b"\x28\x09", False),), 0)
+    target = RecordedI2c(Recording("a.rec", "cubesense", {}, (recorded,)), INTERFACE)
+    with pytest.raises(
+        RecordingMismatchError, match="DetectionThreshold1, field Threshold: 280a, recorded 2809"
+    ):
+        target.i2c_rdwr(i2c_msg.write(0x1B, [0x28, 0x0A]))

@@ -1,6 +1,8 @@
 """An emulated bus whose process goes away, and which of several is meant."""
 
+import os
 import socket
+import stat
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,6 +39,22 @@ def test_an_emulation_that_ends_within_an_answer(
     with pytest.raises(PortClosedError, match="the emulation has gone"):
         CubeSMBus(str(tmp_path / "bus"))
     serving.join()
+
+
+def test_an_open_bus_has_a_descriptor_as_smbus2_s(server: socket.socket, tmp_path: Path) -> None:
+    def answer() -> None:
+        with server.accept()[0] as connection:
+            connection.recv(1 << 12)
+            functions = linux_i2c.reply(0, bytes(8))
+            connection.sendall(linux_i2c.LENGTH.pack(len(functions)) + functions)
+
+    serving = threading.Thread(target=answer)
+    serving.start()
+    bus = CubeSMBus(str(tmp_path / "bus"))
+    serving.join()
+    assert stat.S_ISSOCK(os.fstat(bus.fd).st_mode)
+    bus.close()
+    assert bus.fd is None
 
 
 def test_a_bus_that_nobody_serves(tmp_path: Path) -> None:
