@@ -28,16 +28,29 @@ CHEAP = [
 ]
 
 
-def told(device: str) -> Iterator[tuple[Row, str, str]]:
-    """Rows, and what the page has of them in each profile."""
+def cells_of(device: str) -> Iterator[tuple[Row, *tuple[str, ...]]]:
+    """Rows, and the page's cells of each."""
     wanted = fidelity_of(device)
     page = (DOCS / wanted.page).read_text(encoding="utf-8")
     for table, rows in wanted.tables.items():
         begin, end = fidelity.marks(table)
         lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
         for row, line in zip(rows, lines, strict=True):
-            cells = line.removeprefix("| ").removesuffix(" |").split(" | ")
-            yield row, cells[3], cells[4]
+            yield row, *line.removeprefix("| ").removesuffix(" |").split(" | ")
+
+
+def told(device: str) -> Iterator[tuple[Row, str, str]]:
+    """Rows, and what the page has of them in each profile."""
+    for row, _figure, _source, _published, *ours, _word, _command in cells_of(device):
+        yield row, ours[0], ours[1]
+
+
+@pytest.mark.parametrize("device", BUILT_IN)
+def test_a_page_names_the_command_that_measures_the_row(device: str) -> None:
+    """Were another magnitude or number of frames measured, the page would tell the old one."""
+    declared = fidelity_of(device)
+    for row, *_, word, command in cells_of(device):
+        assert (word, command) == (row.word, f"`{declared.command(device, row)}`"), row.key
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")

@@ -5,7 +5,7 @@ import json
 import socket
 
 import pytest
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
 
 from cubestack.host.errors import PortOpenError
@@ -64,6 +64,17 @@ def test_a_page_s_address_with_the_token_gives_a_cookie(controlled: Controlled) 
 def test_a_websocket_is_guarded_too(controlled: Controlled, headers: dict[str, str]) -> None:
     with pytest.raises(InvalidStatus, match="403"):
         connect(controlled.events, additional_headers=headers, open_timeout=SOON_S)
+
+
+def test_a_message_of_a_mebibyte_is_the_longest_that_is_taken(controlled: Controlled) -> None:
+    allowed = {"Authorization": BEARER}
+    with connect(controlled.events, additional_headers=allowed, open_timeout=SOON_S) as opened:
+        opened.send(bytes(1 << 20))
+        assert opened.ping().wait(SOON_S)
+        opened.send(bytes((1 << 20) + 1))
+        with pytest.raises(ConnectionClosedError, match="1009"):
+            [opened.recv(SOON_S) for _ in range(20)]
+    assert controlled.ask("GET", "/state")[0] == 200
 
 
 def test_a_huge_body_is_refused(controlled: Controlled) -> None:
