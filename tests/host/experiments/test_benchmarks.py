@@ -15,6 +15,7 @@ from cubestack.host.cli import bench
 from cubestack.host.devices.device import Benchmark
 from cubestack.host.devices.registry import BUILT_IN, device
 from cubestack.host.experiments import benchmark
+from cubestack.host.experiments.aramis import benchmark as aramis
 from cubestack.host.experiments.cubesense import benchmark as cubesense
 from cubestack.host.experiments.cubestar import benchmark as cubestar
 from tests.conftest import Run
@@ -228,6 +229,15 @@ def test_all_of_cubesense_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPa
     stored = {f"pair_{way}_ms": len(way) + 0.1 for way in board.STORES}
     assert found == {**stored, "sensors_ratio": 4.0, "pair_scan_ms": 1.4, "pair_build_s": 9.0}
     assert set(found) == set(cubesense.BENCHMARK.figures)
+
+
+def test_aramis_is_measured_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes pictures in its loop, where one that is not active would only refuse to."""
+    monkeypatch.setattr(benchmark, "ROUNDS", 1)
+    monkeypatch.setattr(aramis, "LOOP_S", 1)
+    found = aramis.BENCHMARK.run(device("aramis"))
+    assert set(found) == set(aramis.BENCHMARK.figures)
+    assert min(found.values()) > 0
 
 
 @pytest.fixture

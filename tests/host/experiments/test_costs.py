@@ -1,17 +1,19 @@
 """Costs of compiled code: what was measured once is what the page says, and how it is chosen."""
 
 import json
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.emulator.boards.cubestar.compiled.build import COMPILER, compiler_version
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli import costs as command
 from cubestack.host.devices.costs import CostReport, Measurement
 from cubestack.host.devices.registry import device
-from cubestack.host.experiments.cubestar.costs import COLUMNS, _cases, costs
+from cubestack.host.experiments.cubestar.costs import COLUMNS, _cases, costs, measure
 from tests.conftest import Run
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -47,6 +49,18 @@ def test_each_build_is_tried_and_two_with_other_memories() -> None:
     assert sorted(set(others)) == ["-O0 double", "-O2 own"]
     assert others.count("-O2 own") == others.count("-O0 double") == 4
     assert [str(case.build) for case in _cases(["Os"], ["float"])] == ["-Os float"]
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+@pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
+def test_a_build_with_doubles_costs_what_was_recorded() -> None:
+    """Operands are doubles as well: a float that is converted has shorter functions."""
+    (found,) = measure(["Os"], ["double"])
+    if json.loads(costs().file.read_text("utf-8"))["compiler"] != compiler_version():
+        pytest.skip("recorded of another compiler")
+    told = {(one.build, one.timing): one for one in recorded()}[found.build, found.timing]
+    assert found.phases == told.phases
+    assert found.operations == pytest.approx(told.operations, rel=0.1, abs=2)
 
 
 BUILDS = [
