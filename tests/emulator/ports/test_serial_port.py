@@ -1,10 +1,11 @@
 """What a serial port releases, on one whose client is a byte string."""
 
+import select
 from dataclasses import dataclass, field
 
 import pytest
 
-from cubestack.emulator.ports.serial_port import MAX_UNREAD, SerialPort
+from cubestack.emulator.ports.serial_port import MAX_UNREAD, MAX_UNSENT, SerialPort
 
 
 @dataclass(eq=False)
@@ -50,6 +51,14 @@ def test_bytes_are_released_when_they_have_arrived(port, device):
         port.exchange(device.kernel.now)
         assert client.read == arrived
         device.advance(1)
+
+
+def test_a_client_is_waited_for_while_there_is_room_for_what_it_writes(port, device):
+    connect(port, device, Client())
+    assert port._events(reading=True) == select.POLLIN
+    assert port._events(reading=False) == 0
+    device.uart.host_writes(bytes(MAX_UNSENT))
+    assert port._events(reading=True) == 0
 
 
 def test_releases_are_announced(port, device):

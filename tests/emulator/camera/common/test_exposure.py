@@ -1,12 +1,13 @@
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 
-from cubestack.emulator.camera.common import exposure
+from cubestack.emulator.camera.common import exposure, imager
 from cubestack.emulator.camera.common.exposure import (
     FAINTEST_V,
     looking_along,
@@ -20,7 +21,9 @@ from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.picture import PictureScene
 from cubestack.emulator.scene.sky import Pose, SkyScene
+from cubestack.host.pictures.images import save_picture
 
 LINE = Fraction(132_200_000)
 LONG = RollingShutter(10**12, LINE, 2917, 2917)
@@ -283,3 +286,13 @@ def test_who_looks_knows_the_angles_between_the_picture_s_edges() -> None:
         one, other = LENS.unproject(np.array(places))
         assert getattr(now, name) == pytest.approx(np.degrees(np.arccos(one @ other)), abs=1e-9)
     np.testing.assert_allclose(now.axes, np.eye(3), atol=1e-15)
+
+
+def test_a_photograph_twice_as_long_is_twice_as_bright_up_to_the_end_of_the_scale(
+    tmp_path: Path,
+) -> None:
+    pixels = np.array([[0, 1, 100, 127, 128, 255]], np.uint8)
+    save_picture(pixels, tmp_path / "sky.png")
+    scene = PictureScene(tmp_path / "sky.png", exposure_ms=500 * LONG.exposure_s)
+    found = imager._photograph(scene, pixels, LONG)
+    assert found.tolist() == [[0, 2, 200, 254, 255, 255]]
