@@ -42,6 +42,7 @@ def test_frequency_must_be_positive(hz):
 def test_horizon_is_the_next_event():
     kernel = Kernel()
     assert kernel.horizon() is None
+    assert kernel.held_ns == 0  # nobody held it
     kernel.timeout(7)
     kernel.timeout(5)
     assert kernel.horizon() == 5

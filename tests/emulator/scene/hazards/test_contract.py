@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import (
     EARTH_RADIANCE,
+    Depth,
     Looking,
     SkyHazard,
     angles_rad,
@@ -117,3 +118,9 @@ def test_a_hazard_by_itself_is_nothing() -> None:
 def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
     """0.3 of the Sun's light on a Lambert surface, by pi; the Sun is V -26.74."""
     assert np.pi * EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
+
+
+def test_nothing_stands_as_far_as_anything_else() -> None:
+    """The sky behind the planets, they behind the Moon, and all behind the lens's own light."""
+    assert [*map(int, Depth)] == [0, 1, 2, 3, 4, 5]
+    assert (min(Depth), max(Depth)) == (Depth.SKY, Depth.LENS)
