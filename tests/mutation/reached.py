@@ -35,7 +35,7 @@ if test := os.environ.get("PYTEST_CURRENT_TEST"):
 """
 """Makes interpreters that a test starts record what they run, in its name."""
 
-AT_ONCE = 8
+AT_ONCE = 40
 """Tests of a module's own file for each one of the others: what is declared in it, all commands
 run, and few look at.
 """
