@@ -297,10 +297,7 @@ def test_the_commands_say_what_can_not_be_built(measure: Measure, emulate: Emula
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (
-            "measure cubestar --layout 4",
-            "invalid choice: '4' (choose from '1', '2', '3', 'two-boards')",
-        ),
+        ("measure cubestar --layout 4", "invalid choice: 4 (choose from 1, 2, 3, two-boards)"),
         ("emulate cubesense --tcp 0 --layout 2", "option of cubestar, not of"),
     ],
 )
@@ -310,7 +307,7 @@ def test_other_layouts_are_refused_in_one_line(
     with pytest.raises(SystemExit, match="2"):
         sys.exit(main(arguments.split()))
     (error,) = capsys.readouterr().err.splitlines()
-    assert text in error
+    assert text in error.replace("'", "")  # Python 3.12 quotes fewer words
 
 
 @pytest.mark.parametrize(("layout", "code"), [("two-boards", 0), ("9", 2)])

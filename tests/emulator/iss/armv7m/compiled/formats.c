@@ -1,6 +1,7 @@
 /* printf, scanf and the conversions behind them. */
 #include "report.h"
 #include <inttypes.h>
+#include <inttypes.h>
 #include <stdlib.h>
 
 int main(void) {
