@@ -36,7 +36,7 @@ if test := os.environ.get("PYTEST_CURRENT_TEST"):
 """Makes interpreters that a test starts record what they run, in its name."""
 
 AT_ONCE = 40
-"""Tests of a module's own file for each one of the others: what is declared in it, all commands
+"""Tests of a file beside a module's own for each one of the others: what is declared in it, all commands
 run, and few look at.
 """
 
@@ -110,7 +110,7 @@ class Reached:
         return data
 
     def tests(self, mutant: Mutant, files: Set[str]) -> list[str]:
-        """Those that run its line: of each file the quickest, of its own some, the nearest file
+        """Those that run its line: of each file the quickest, of those beside it some, the nearest file
         first, then the next of each. Where it runs when it is imported, those of `DOCUMENTS`, and
         those of its module and of the ``files`` that are about it."""
         if mutant.path not in self._lines:
@@ -146,8 +146,9 @@ class Reached:
             return Path(file) != mirror, -shared, self.durations[by_file[file][0]], file
 
         order = {file: place for place, file in enumerate(sorted(by_file, key=distance))}
+        own = Path("tests") / path.parent
         turns = [
-            (turn if distance(file)[0] else turn // AT_ONCE, order[file], turn, test)
+            (turn // AT_ONCE if Path(file).parent == own else turn, order[file], turn, test)
             for file, found in by_file.items()
             for turn, test in enumerate(found)
         ]

@@ -14,7 +14,7 @@ int main(void) {
     for (int i = 0; i < 12; i++) {
         const uint32_t a = draw();
         const uint64_t b = (uint64_t)draw() << 32 | draw();
-        printf("%" PRId32 " %" PRIu32 " %08" PRIx32 " %#o %+d %5d|%-8x|%llu %lld\n", (int32_t)a, a, a,
+        printf("%ld %lu %08lx %#o %+d %5d|%-8x|%llu %lld\n", (long)(int32_t)a, (unsigned long)a, (unsigned long)a,
                (unsigned)(a >> 20), (int)(a >> 16), (int)(a & 0xFFF), (unsigned)(a & 0xFFFF), b, (int64_t)b);
         snprintf(text, sizeof text, "%lu %x", (unsigned long)a, (unsigned)(a >> 8));
         unsigned long first;
