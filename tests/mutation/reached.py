@@ -36,8 +36,8 @@ if test := os.environ.get("PYTEST_CURRENT_TEST"):
 """Makes interpreters that a test starts record what they run, in its name."""
 
 AT_ONCE = 40
-"""Tests of a file beside a module's own for each one of the others: what is declared in it, all commands
-run, and few look at.
+"""Tests of a file beside a module's own for each one of the others: what is declared in it, all
+commands run, and few look at.
 """
 
 DOCUMENTS = (
@@ -110,9 +110,9 @@ class Reached:
         return data
 
     def tests(self, mutant: Mutant, files: Set[str]) -> list[str]:
-        """Those that run its line: of each file the quickest, of those beside it some, the nearest file
-        first, then the next of each. Where it runs when it is imported, those of `DOCUMENTS`, and
-        those of its module and of the ``files`` that are about it."""
+        """Those that run its line: of each file the quickest, of those beside it some, the nearest
+        file first, then the next of each. Where it runs when it is imported, those of `DOCUMENTS`,
+        and those of its module and of the ``files`` that are about it."""
         if mutant.path not in self._lines:
             self._lines[mutant.path] = self._data.contexts_by_lineno(str(mutant.path))
         by_line = self._lines[mutant.path]
