@@ -120,10 +120,10 @@ class Reached:
         lines = range(mutant.statement, mutant.end + 1)
         contexts = {context for line in lines for context in by_line.get(line, ())}
         found = _names(contexts)
-        if "" not in contexts:  # it does not run when it is imported, as all processes do
-            found |= _names_of_processes(contexts)
         documents: list[str] = []
-        if not found:
+        if "" not in contexts:
+            found |= _names_of_processes(contexts)
+        if "" in contexts or not found:  # when it is imported, as all processes do
             found = _names(context for each in by_line.values() for context in each)
             found |= {test for test in self.durations if test.partition("::")[0] in files}
             documents = [test for test in self.durations if test.partition("::")[0] in DOCUMENTS]
