@@ -124,3 +124,12 @@ def test_glint_is_of_bars_with_sizes_by_the_half_field(seed: int) -> None:
     soft = Glint(seed=seed, count=1, surface=1.0).glow(wide, rays) / SUN_SURFACE
     assert soft.sum() == pytest.approx(share.sum(), rel=0.05)
     assert ((soft > 0.05) & (soft < 0.95)).sum() > ((share > 0.05) & (share < 0.95)).sum()
+
+
+def test_glint_is_on_any_side_alike() -> None:
+    centres = [
+        ring.centre for seed in range(20) for ring in Glint(seed=seed, count=50).rings(FISHEYE)
+    ]
+    across = np.array(centres)[:, :2]
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    assert np.abs(across.mean(axis=0)).max() < 0.08  # 3.5 standard deviations

@@ -98,6 +98,16 @@ def test_a_call_that_faults_or_is_none_is_told(fast: Calls) -> None:
         fast.call("read_words", 1, 0x6000_0000)
 
 
+@needs_compiler
+def test_a_fault_takes_no_stack_from_the_calls_after_it(fast: Calls) -> None:
+    fast.call("read_words", 1, 0)
+    before = fast.machine.register("sp")
+    with pytest.raises(CallError):
+        fast.call("read_words", 1, 0x6000_0000)
+    fast.call("read_words", 1, 0)
+    assert fast.machine.register("sp") == before
+
+
 def test_sources_are_rewritten_as_a_careless_programmer_has_them() -> None:
     line = "float y = 0.5f * sqrtf(x) + 0x1.8p+1f; // pair_2.0f"
     assert rewritten(line, "own") == line
