@@ -31,6 +31,7 @@ def test_attitude_words_and_flags_are_shown(page: Any) -> None:
     assert "imager" in page.inner_text("#supplies")
 
 
+@pytest.mark.slow
 def test_any_word_of_telemetry_is_a_band(page: Any) -> None:
     """Chosen and removed by keys; what it is now, and what its colours mean, are in words."""
     fields = page.locator("#band option").all_inner_texts()

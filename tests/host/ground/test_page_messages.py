@@ -14,11 +14,10 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.host.conformance.values import values_to_try
 from cubestack.host.devices.registry import BUILT_IN, device
 from tests.examples.conftest import ROOT, installed
-from tests.tiers import quick
 
 from .browser import shown, station
 
-pytestmark = pytest.mark.xdist_group("page messages")
+pytestmark = [pytest.mark.xdist_group("page messages"), pytest.mark.slow]
 
 PLUGGED_IN = {"sunslit": ROOT / "examples" / "linear_sun_sensor"}
 
@@ -36,7 +35,7 @@ class Opened(NamedTuple):
     interface: Interface
 
 
-@pytest.fixture(scope="module", params=quick([*PLUGGED_IN, *BUILT_IN], 1))
+@pytest.fixture(scope="module", params=[*PLUGGED_IN, *BUILT_IN])
 def opened(
     request: pytest.FixtureRequest, chromium: Any, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Opened]:

@@ -59,33 +59,38 @@ def told(page: Any, text: str) -> None:
     page.wait_for_selector(f"#scene-told >> text={text}")
 
 
-def place(page: Any, right: float, down: float) -> tuple[float, float]:
-    """Of the screen, by shares of half of the map's width and height."""
-    page.locator("#sky-map").scroll_into_view_if_needed()
+def place(page: Any, right: float, down: float) -> dict[str, float]:
+    """In the map, by shares of half of its width and height."""
     box = page.locator("#sky-map").bounding_box()
     half = (box["width"] - 16) / 2
-    return (
-        box["x"] + box["width"] / 2 + right * half,
-        box["y"] + box["height"] / 2 + down * half / 2,
-    )
+    return {"x": box["width"] / 2 + right * half, "y": box["height"] / 2 + down * half / 2}
+
+
+def click(page: Any, right: float, down: float) -> None:
+    """On the map, once it stands still: what comes in above moves it."""
+    page.click("#sky-map", position=place(page, right, down))
+
+
+def point(page: Any, right: float, down: float) -> None:
+    page.hover("#sky-map", position=place(page, right, down))
 
 
 def test_a_click_and_a_drag_put_the_pointing(page: Any) -> None:
-    page.mouse.click(*place(page, 0, 0))
+    click(page, 0, 0)
     told(page, "/camera (0.0|360.0)° -?0.0°/")
     assert min(value(page, "ra_deg"), 360 - value(page, "ra_deg")) < 0.5
-    page.mouse.move(*place(page, -0.5, 0))
+    point(page, -0.5, 0)
     page.mouse.down()  # east is left; on the equator a place is at 2 sqrt(2) sin(ra / 4)
     assert value(page, "ra_deg") == pytest.approx(4 * math.degrees(math.asin(8**-0.5)), abs=0.6)
-    page.mouse.move(*place(page, -0.4, -0.5))
-    page.mouse.move(*place(page, 0, -0.5))
+    point(page, -0.4, -0.5)
+    point(page, 0, -0.5)
     page.mouse.up()
     # Hammer's projection: half way up the middle is where sqrt(2) sin(dec / 2) is a half of 1.
     expected = 2 * math.degrees(math.asin(0.5 / math.sqrt(2)))
     told(page, "/camera .* 4[012][.]/")
     assert value(page, "dec_deg") == pytest.approx(expected, abs=0.6)
     before = value(page, "ra_deg")
-    page.mouse.click(*place(page, -0.95, -0.95))  # beside the map
+    click(page, -0.95, -0.95)  # beside the map
     assert value(page, "ra_deg") == before
 
 
@@ -105,6 +110,7 @@ def test_keys_alone_put_the_pointing_and_the_emulation_sees_it(page: Any) -> Non
     page.wait_for_selector("#attitude-told >> text=/truth 101.0000° .*0.0000° 45.0000°/")
 
 
+@pytest.mark.slow
 def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
     fill(page, "ra_deg", "400")
     told(page, "scene: ra_deg must be -360 to 360, not 400")
@@ -117,6 +123,7 @@ def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
     assert field.get_attribute("aria-invalid") is None
 
 
+@pytest.mark.slow
 def test_fields_are_those_of_the_readers(page: Any) -> None:
     """Limits, defaults and meanings; none of them is in the page's scripts."""
     epoch = page.locator(f"#scene-keys {VALUE.format('epoch')}")
@@ -131,6 +138,7 @@ def test_fields_are_those_of_the_readers(page: Any) -> None:
     assert page.locator("#scene-keys label:has-text('exposure_ms')").count() == 1
 
 
+@pytest.mark.slow
 def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
     page.click("#scene-keys summary >> text=hazards")
     page.select_option("[aria-label='kind of hazards']", "moon")
@@ -139,7 +147,7 @@ def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
     things = page.locator("#scene-what option").all_inner_texts()
     assert things == ["pointing", "moon.direction", "moon.sun"]
     page.select_option("#scene-what", "moon.direction")
-    page.mouse.click(*place(page, 0, 0))
+    click(page, 0, 0)
     told(page, "/Moon (0.0|360.0)°/")
     page.click("#scene-apply")
     page.wait_for_selector("#lines li.good >> text=scene")
@@ -151,6 +159,7 @@ def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
     page.wait_for_function("() => document.querySelectorAll('#lines li.good').length >= 2")
 
 
+@pytest.mark.slow
 def test_a_whole_file_is_shown(page: Any) -> None:
     page.click("#scene summary >> text=a whole scene file")
     page.fill("#scene-text", 'kind = "sky"\nra_deg = 200.0\ndec_deg = -40.0\n')
@@ -162,13 +171,14 @@ def test_a_whole_file_is_shown(page: Any) -> None:
     page.wait_for_selector("#lines li.bad >> text=scene: ")
 
 
+@pytest.mark.slow
 def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
     stage(page, "CubeSense")
     assert page.locator("#scene-what option").all_inner_texts() == ["nadir", "sun", "moon"]
-    page.mouse.click(*place(page, 0, 0))  # +z, where the nadir camera looks
+    click(page, 0, 0)  # +z, where the nadir camera looks
     told(page, "/Earth -?0.00 -?0.00 1.00/")
     page.select_option("#scene-what", "moon")
-    page.mouse.click(*place(page, 0.2, 0))
+    click(page, 0.2, 0)
     told(page, "/Moon/")
     page.click("#scene-apply")
     page.wait_for_selector("#lines li.good >> text=scene")
@@ -176,6 +186,7 @@ def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
     told(page, "/Earth -?0.00 -?0.00 1.00.*Moon/")
 
 
+@pytest.mark.slow
 def test_directions_are_answered_beside_the_truth(page: Any) -> None:
     """Of the limb's and the Sun's measurement; the error is the angle between the vectors."""
     stage(page, "CubeSense")
