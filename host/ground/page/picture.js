@@ -3,7 +3,7 @@
 import { choose, labelled, make } from "./dom.js";
 import { Enlarged } from "./enlarged.js";
 import { drawFound } from "./overlay.js";
-import { ask } from "./server.js";
+import { ask, fetched } from "./server.js";
 
 export class Pictures {
   // `path` leads to the target, `every(seconds)` says how often it is looked for another one.
@@ -107,9 +107,15 @@ export class Pictures {
 
   async fetch() {
     const name = this.name.value;
-    const answer = await fetch(`${this.path}/pictures/${encodeURIComponent(name)}`);
-    if (!answer.ok) return;
-    const bitmap = await createImageBitmap(await answer.blob());
+    let bitmap;
+    try {
+      const answer = await fetched(`${this.path}/pictures/${encodeURIComponent(name)}`);
+      bitmap = await createImageBitmap(await answer.blob());
+    } catch (error) {
+      this.value.textContent = error.message;
+      delete this.known[name]; // to be asked for again
+      return;
+    }
     const from = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
     from.drawImage(bitmap, 0, 0);
     this.pixels = from.getImageData(0, 0, bitmap.width, bitmap.height);

@@ -39,7 +39,7 @@ def shown(chromium: Any, address: str, **options: Any) -> Iterator[Any]:
     page.wait_for_selector("#line")
     yield page
     page.context.close()
-    assert not wrong
+    assert not wrong, wrong
 
 
 def await_devices(chromium: Any, address: str) -> None:
