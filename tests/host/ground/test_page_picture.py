@@ -67,7 +67,7 @@ def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
     assert page.evaluate(wide) == before
     picture.hover()
     page.mouse.wheel(0, -100)
-    assert page.evaluate(wide) > before
+    page.wait_for_function(f"() => {wide} > {before}")
     page.keyboard.press("0")
     page.keyboard.press("+")
     at = page.evaluate(shifted)
