@@ -54,7 +54,6 @@ def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-@pytest.mark.slow
 def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     look(page, "CubeStar")
     line(page, "write CaptureAndProcess")

@@ -6,8 +6,6 @@ from typing import Any
 
 import pytest
 
-from tests.tiers import quick
-
 from .browser import line, look, shown, station
 from .hostile import HOSTILE, hostile
 
@@ -39,7 +37,7 @@ def lives(page: Any, change: Change) -> None:
     page.wait_for_selector("#line")
 
 
-@pytest.mark.parametrize("missing", quick([True, False], 1))
+@pytest.mark.parametrize("missing", [True, False])
 def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: bool) -> None:
     with shown(chromium, address) as page:
 

@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 import pytest
 from websockets.sync.client import connect
 
-from tests.tiers import quick
-
 from .browser import shown
 from .conftest import SOON_S
 
@@ -27,7 +25,7 @@ TABS = 8
 FRAMES = ["AttitudeQuaternion", "TaskStatus", "PerformanceParameters"]
 
 HOURS = pytest.mark.parametrize(
-    ("begin_s", "end_s"), quick([(600, 1000), (EIGHT_HOURS_S // 10, EIGHT_HOURS_S)], 1)
+    ("begin_s", "end_s"), [(600, 1000), (EIGHT_HOURS_S // 10, EIGHT_HOURS_S)]
 )
 
 MOST_GROWTH = 1 << 20

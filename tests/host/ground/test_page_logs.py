@@ -67,7 +67,6 @@ def test_tables_are_the_same_in_both_forms(chromium: Any, tmp_path: Path) -> Non
     assert rows_of(tmp_path / "by-command.csv")[: len(said)] == said
 
 
-@pytest.mark.slow
 def test_a_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
     """With a device that is emulated elsewhere, as with a real one."""
     kept = tmp_path / "session.rec"
