@@ -11,8 +11,8 @@ MUTANTS ?=
 TESTS := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadgroup
 
 # Tests start hundreds of Python processes: let them keep what they have compiled, also where that is
-# not usual.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/pytest
+# not usual. Matrices are small: threads of the linear algebra would only wait for one another.
+PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 
 # Of the gateware's tests: further random numbers, and the simulator, icarus or verilator.
 SEED ?= 0

@@ -14,7 +14,6 @@ from importlib.metadata import version
 from io import TextIOWrapper
 
 from cubestack.host.cli.arguments import Parser
-from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
 from cubestack.host.terminal import hush, say
 
@@ -50,8 +49,8 @@ COMMANDS = {
 }
 
 
-def make_parser() -> Parser:
-    """Parser with every subcommand."""
+def make_parser(asked: str | None = None) -> Parser:
+    """Parser with every subcommand; if ``asked`` is one, with that alone, which loads less."""
     parser = Parser(
         prog="cubestack",
         description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
@@ -66,13 +65,18 @@ def make_parser() -> Parser:
         "-q", "--quiet", action="store_true", help="nothing but results and errors: no progress"
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, summary in COMMANDS.items():
+    for name in [asked] if asked in COMMANDS else COMMANDS:
         module = import_module(f"cubestack.host.cli.{name}")
         command = commands.add_parser(
-            name, help=summary, description=_with_names(module.__doc__ or "")
+            name, help=COMMANDS[name], description=_with_names(module.__doc__ or "")
         )
         module.add_arguments(command)
         command.set_defaults(run=module.run)
+    if asked in COMMANDS:
+        return parser
+
+    from cubestack.host.cli.reports import reports
+
     for name, report in reports().items():
         command = commands.add_parser(name, help=report.summary, description=report.description)
         report.add_arguments(command)
@@ -120,7 +124,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         _end_in_order()
         _write_anywhere()
-    args = make_parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    asked = next((word for word in given if not word.startswith("-")), None)
+    args = make_parser(asked).parse_args(given)
     _set_loudness(args.verbose, quiet=args.quiet)
     try:
         with warnings.catch_warnings():
