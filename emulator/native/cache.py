@@ -2,10 +2,11 @@
 
 The key covers everything that a library depends on: what its builder says, the compiler and its
 flags; not the compiler where the library came along ready-made. A library's file name carries the
-hash of its own bytes, so that a damaged one is noticed, and it appears by renaming, so that two
-processes may build at once.
+hash of its own bytes, so that a damaged one is noticed. Of processes that want the same one at
+once, one builds it and the others wait; it appears by renaming, as not every file system has locks.
 """
 
+import fcntl
 import hashlib
 import logging
 import os
@@ -127,11 +128,17 @@ def _found(folder: Path, key: str) -> Path | None:
 
 def _built(folder: Path, key: str, compiler: Compiler, build: Build) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
-    _log.info("compiling into %s with %s", folder, " ".join(compiler.command))
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        built = build(compiler, Path(scratch), folder / f"{key}.log")
-        library = folder / f"{key}-{hash_of(built.read_bytes())}.so"
-        built.replace(library)
+    log = folder / f"{key}.log"
+    with log.open("a") as turn:
+        with suppress(OSError):
+            fcntl.flock(turn, fcntl.LOCK_EX)
+        if (library := _found(folder, key)) is not None:  # while waiting
+            return library
+        _log.info("compiling into %s with %s", folder, " ".join(compiler.command))
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            built = build(compiler, Path(scratch), log)
+            library = folder / f"{key}-{hash_of(built.read_bytes())}.so"
+            built.replace(library)
     _prune(folder)
     return library
 

@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -74,3 +75,35 @@ def test_what_nobody_uses_makes_room(tmp_path: Path) -> None:
     assert library("used") == used  # which is noted
     new = library("new")
     assert set(tmp_path.glob("*.so")) == {used, new}
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_who_comes_second_waits_for_what_is_being_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    builds, looked = list[Path](), threading.Event()
+    find = cache._found
+
+    def found(folder: Path, key: str) -> Path | None:
+        library = find(folder, key)
+        if threading.current_thread() is second:
+            looked.set()
+        return library
+
+    def build(_compiler: Compiler, scratch: Path, _log: Path) -> Path:
+        builds.append(scratch)
+        if len(builds) == 1:
+            second.start()
+            assert looked.wait(30.0)
+        library = scratch / "a.so"
+        library.write_bytes(b"library")
+        return library
+
+    def ask() -> Path:
+        return cache.cached_library("wanted", [], build, tmp_path)
+
+    second = threading.Thread(target=ask)
+    monkeypatch.setattr(cache, "_found", found)
+    ask()
+    second.join(30.0)
+    assert len(builds) == 1
