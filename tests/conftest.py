@@ -1,5 +1,6 @@
 """The command as a shell sees it; properties are tested with the same examples everywhere."""
 
+import gc
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -39,6 +40,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         of_module = any(fixtures[-1].scope == "module" for fixtures in found)
         if of_module and item.get_closest_marker("xdist_group") is None:
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
+def pytest_collection_finish() -> None:
+    """What was collected stays: no need to look through it for garbage again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

@@ -32,12 +32,12 @@ FAST = [name for name in PROOFS if not name.startswith("nadir") and name not in 
 SHALLOW = [name for name in FAST if name not in ("sun-ack", "sun-scan", "sun-first-pixel")]
 
 
-@pytest.mark.parametrize("name", quick(FAST, 8))
+@pytest.mark.parametrize("name", quick(FAST, 4))
 def test_property_is_proved(name: str) -> None:
     assert prove(PROOFS[name])[:2] == (True, False)
 
 
-@pytest.mark.parametrize("name", quick(SHALLOW, 6))
+@pytest.mark.parametrize("name", quick(SHALLOW, 3))
 def test_planted_bug_is_found(name: str) -> None:
     assert prove(PROOFS[name], planted=True)[:2] == (False, True)
 

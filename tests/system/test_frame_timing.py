@@ -65,6 +65,7 @@ def test_too_short_a_delay_splits_the_picture(
     assert np.abs(rows[:seam] - factor * upper).max() <= 2
 
 
+@pytest.mark.slow
 def test_the_published_delay_does_not(session: Any, striped: PictureScene) -> None:
     with session(striped) as opened:
         capture_ms(opened.client, 70)

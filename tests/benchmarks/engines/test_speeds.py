@@ -17,6 +17,7 @@ from tests.benchmarks.engines.verilated import verilator_root
 from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
 
 
+@pytest.mark.slow
 def test_every_top_that_has_a_wiring_is_measured():
     for name, workload in WORKLOADS.items():
         wiring = workload.wiring()

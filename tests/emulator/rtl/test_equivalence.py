@@ -58,7 +58,7 @@ def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("seed", quick(range(15), 8))
+@pytest.mark.parametrize("seed", quick(range(15), 5))
 def test_random_life_of_a_board(size, seed):
     rng = np.random.default_rng([seed, *size])
     camera = random_camera(rng, *size)
@@ -70,7 +70,7 @@ def test_random_life_of_a_board(size, seed):
         assert_same(all_engines, step, step.__qualname__)
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", quick(range(16), 8))
 def test_captures_and_reads_back(seed):
     """Long enough for whole frames to be stored, in either bank, with ENABLE at any moment."""
     size = SIZES[seed % len(SIZES)]
@@ -114,7 +114,7 @@ def random_events(rng: np.random.Generator, count: int) -> list[PinEvent]:
     return events
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", quick(range(6), 3))
 def test_pin_by_pin(seed):
     all_engines = engines(wiring(SIZES[seed % len(SIZES)]))
     outputs = assert_same_outputs(all_engines, random_events(np.random.default_rng(seed), 3000))

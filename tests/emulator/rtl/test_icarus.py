@@ -12,6 +12,7 @@ from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
+from tests.tiers import quick
 
 from .cameras import ListCamera, plain_camera, random_camera
 from .commanded import Command, CommandedIcarus, Outcome, run_engine
@@ -65,7 +66,7 @@ def random_commands(rng: np.random.Generator, camera, count: int) -> list[Comman
     return [*commands, (max(time_ps, camera.end_ps) + STROBE_PERIOD, "ENABLE", levels["ENABLE"])]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", quick(range(12), 6))
 def test_random_commands(seed, tmp_path):
     rng = np.random.default_rng(seed)
     top = CubeStarTop(*((8, 4), (5, 3))[seed % 2])

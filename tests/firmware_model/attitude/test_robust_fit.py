@@ -81,7 +81,7 @@ def test_sigmas_hold_with_displaced_stars() -> None:
 
 
 @pytest.mark.parametrize("factor", quick([0.99, 0.999, 1.003, 1.0, 1.02], 2))
-@pytest.mark.parametrize("side", [0.0, 0.3])
+@pytest.mark.parametrize("side", quick([0.3, 0.0], 1))
 def test_another_focal_length_is_found_where_there_is_one(factor: float, side: float) -> None:
     def draw(rng: np.random.Generator) -> tuple[Floats, Floats, Rotation]:
         measured, reference, truth = seen(rng, side=side)

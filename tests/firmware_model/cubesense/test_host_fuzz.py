@@ -9,6 +9,7 @@ from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult, ImageSize, Sram
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
+from tests.tiers import quick
 
 from .harness import Harness
 from .scenery import earth, thumbnail
@@ -129,7 +130,7 @@ def test_nonsense_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) -> N
     stays_sane(unit)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", quick(range(2), 1))
 def test_nonsense_in_the_middle_of_anything(seed: int) -> None:
     """Interrupts come at every request of the program, not only where it sleeps."""
     unit = Harness()

@@ -37,6 +37,7 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.host.experiments.cubestar.reference_catalogue import catalogue_tables
+from tests.tiers import quick
 
 from ..cubestar.sky import Sky, take
 from .algorithms import Algorithms, Found, Identified
@@ -139,7 +140,7 @@ def test_pictures_give_the_same_bits_from_centroid_to_attitude(
     assert named > 20
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", quick(range(12), 4))
 def test_random_blobs_meet_every_limit_alike(program: Algorithms, seed: int) -> None:
     rng = np.random.default_rng(seed)
     picture = rng.integers(0, rng.integers(6, 40), (512, 1024)).astype(np.uint8)

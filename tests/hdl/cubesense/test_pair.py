@@ -21,6 +21,7 @@ def test_pair(simulate: Any, read_out: ReadOut, name: str, seed: int) -> None:
     simulate(CubeSensePair, read_out, name, seed=seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
     """Standby alone makes the state: the parts' flip-flops come up as they like."""

@@ -66,7 +66,7 @@ def with_board(wrapper: AsPublished, name: str) -> str:
 
 
 @pytest.mark.parametrize(("columns", "rows", "seed"), quick([(5, 3, 1), (8, 4, 2)], 1))
-@pytest.mark.parametrize("wrapper", [SharedAsPublished, DoubleAsPublished])
+@pytest.mark.parametrize("wrapper", quick([SharedAsPublished, DoubleAsPublished], 1))
 def test_next_version_stores_as_the_published_board(
     icarus: Any, wrapper: type[AsPublished], columns: int, rows: int, seed: int
 ) -> None:

@@ -21,6 +21,7 @@ from cubestack.host.devices.targets import open_target
 from cubestack.host.errors import NoAnswerError
 from cubestack.host.shell.language import Shell
 from cubestack.host.transport.streams import SerialTransport, open_transport
+from tests.tiers import quick
 
 from ..conftest import UartLink
 
@@ -71,7 +72,7 @@ def test_lines_that_are_no_port_are_not_asked(sense: object) -> None:
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's
-@pytest.mark.parametrize("how", ["--rfc2217 0", "--strict-line --pty"])
+@pytest.mark.parametrize("how", quick(["--strict-line --pty", "--rfc2217 0"], 1))
 def test_the_right_baud_rate_is_found(how: str, tmp_path: Path) -> None:
     words = how.split() + ([str(tmp_path / "tty")] if "pty" in how else [])
     with emulating(["cubesense", "--baud", "38400", *words]) as said:

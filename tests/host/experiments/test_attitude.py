@@ -46,6 +46,7 @@ def test_what_is_not_known_is_none() -> None:
     assert (blind["solved"], blind["right"], blind["error_cross_deg"]) == (True, None, None)
 
 
+@pytest.mark.slow
 def test_hints_fill_their_cap_evenly() -> None:
     rng = np.random.default_rng(3)
     boresight = matrix_from_quaternion(TRUTH)[2]

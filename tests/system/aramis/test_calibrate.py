@@ -18,6 +18,7 @@ cy = 505.0
 """
 
 
+@pytest.mark.slow
 def test_an_emulated_unit_s_lens_is_found(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -40,6 +40,7 @@ def test_the_published_profile_believes_a_unique_triangle_after_a_pivot(measure:
     assert found == {("unique", 1, 3)}
 
 
+@pytest.mark.slow
 def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Measure) -> None:
     for frame in measure("--frames", 2, "--seed", 23, "--roll-rate", 10, *EXTENDED):
         assert frame["right"]

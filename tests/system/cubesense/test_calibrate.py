@@ -30,6 +30,7 @@ def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[st
     np.testing.assert_allclose(found["boresight_px"], centre, atol=0.15)
 
 
+@pytest.mark.slow
 def test_a_lens_of_a_scene_is_found(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     scene, out = tmp_path / "unit.toml", tmp_path / "unit.json"
     scene.write_text('kind = "earth-sun"\n' + LENS.format("sun"), encoding="utf-8")

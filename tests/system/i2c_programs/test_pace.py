@@ -34,7 +34,7 @@ CASES = [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYT
 @pytest.mark.parametrize(
     ("hz", "calls", "bits"),
     quick(
-        [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYTES, BYTES_BITS)], 2
+        [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYTES, BYTES_BITS)], 1
     ),
     ids=["bytes-100k", "long-400k", "bytes-400k"],
 )

@@ -111,6 +111,7 @@ def test_what_a_solution_tells() -> None:
     assert solution.measured is made.stars
 
 
+@pytest.mark.slow
 def test_the_order_of_brightness_is_not_needed() -> None:
     """Verification tells stars apart by their sides when their brightness misleads."""
     rng = np.random.default_rng(5)

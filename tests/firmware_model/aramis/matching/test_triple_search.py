@@ -41,6 +41,7 @@ def test_the_first_attitudes_are_right_and_turn_the_stars_where_they_are() -> No
         assert (database().numbers[found.stars] == made.hip[found.measured]).all()
 
 
+@pytest.mark.slow
 def test_mirrored_stars_suggest_hardly_anything() -> None:
     agreeing = 0
     for made in pictures(10, 2):

@@ -94,6 +94,7 @@ def test_the_true_triangle_is_nearly_always_a_candidate() -> None:
     assert found >= 0.985 * listed
 
 
+@pytest.mark.slow
 def test_pivots_leave_the_true_triangle() -> None:
     ends = []
     for made in pictures(100, seed=3):

@@ -38,6 +38,7 @@ def counters() -> list[UpsetResult]:
     return measured("cubestar", cubestar.EXPERIMENT, registers="*er.counter.row", memory_bits=1)
 
 
+@pytest.mark.slow
 def test_every_bit_is_hit_in_every_phase(counters: list[UpsetResult]) -> None:
     hit = [(r.target, r.bit, r.phase) for r in counters if not r.memory]
     registers = [f"{part}.counter.row" for part in ("writer", "reader")]
