@@ -8,7 +8,8 @@ import logging
 import signal
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import version
 from io import TextIOWrapper
@@ -109,14 +110,21 @@ def _write_anywhere() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _set_loudness(verbose: int, *, quiet: bool) -> None:
+@contextmanager
+def _loudness(verbose: int, *, quiet: bool) -> Iterator[None]:
     """What goes to standard error beside errors: warnings, with ``verbose`` more, or nothing."""
+    own, handler = logging.getLogger("cubestack"), logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+    before = own.level
     hush(quiet)
-    own = logging.getLogger("cubestack")
     own.setLevel(logging.ERROR if quiet else LEVELS[min(verbose, len(LEVELS) - 1)])
-    if not own.handlers:
-        own.addHandler(handler := logging.StreamHandler())
-        handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
+    own.addHandler(handler)
+    try:
+        yield
+    finally:
+        own.removeHandler(handler)
+        own.setLevel(before)
+        hush(False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -127,9 +135,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
     args = make_parser(asked).parse_args(given)
-    _set_loudness(args.verbose, quiet=args.quiet)
     try:
-        with warnings.catch_warnings():
+        with _loudness(args.verbose, quiet=args.quiet), warnings.catch_warnings():
             warnings.showwarning = lambda text, *_, **__: say(f"cubestack {args.command}: {text}")
             return int(args.run(args) or DONE)
     except KeyboardInterrupt:

@@ -87,6 +87,8 @@ class Shell:
             text=True,
             errors="replace",
             env=environment | {"PATH": ":".join(path)},
+            # As in a terminal, also where this process was started to run in the background.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         self._said = SimpleQueue[str | None]()
         self._listener = Thread(target=self._listen, daemon=True)

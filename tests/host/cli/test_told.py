@@ -77,17 +77,21 @@ def test_what_is_a_mistake_of_ours_is_shown_whole(run: Run, ending: list[Any]) -
         (("-q",), logging.ERROR),
     ],
 )
-def test_loudness(run: Run, ending: list[Any], words: Sequence[str], level: int) -> None:
+def test_loudness(
+    run: Run, monkeypatch: pytest.MonkeyPatch, words: Sequence[str], level: int
+) -> None:
+    """While a command runs; who calls it as a function has what was before."""
     from cubestack.host import terminal
 
-    ending.append(0)
+    def state() -> tuple[int, int, bool]:
+        return own.level, len(own.handlers), terminal._errors.quiet
+
+    own, during = logging.getLogger("cubestack"), list[tuple[int, int, bool]]()
+    monkeypatch.setattr("cubestack.host.cli.bench.run", lambda _: during.append(state()))
+    before = state()
     assert run(*words, "bench").code == 0
-    own = logging.getLogger("cubestack")
-    assert own.level == level
-    assert len(own.handlers) == 1
-    assert terminal._errors.quiet == ("-q" in words)
-    run("bench")
-    assert len(own.handlers) == 1
+    assert during == [(level, before[1] + 1, "-q" in words)]
+    assert state() == before
 
 
 def test_signals_end_in_order_unless_somebody_else_takes_them(
