@@ -246,7 +246,7 @@ def test_nothing_upsets_a_board_for_good(name: str) -> None:
     [
         ({"noise": 1.0}, 100_000),
         ({"telemetry": 0.5, "command": 0.5}, 300),
-        ({"i2c_noise": 1.0}, 10_000),
+        pytest.param({"i2c_noise": 1.0}, 10_000, marks=pytest.mark.slow),
     ],
     ids=["bytes", "frames", "i2c"],
 )

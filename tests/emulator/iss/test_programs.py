@@ -11,6 +11,7 @@ import pytest
 from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.machine import Kind, Machine, Stop, StopReason
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US
+from tests.tiers import quick
 
 PROGRAMS = Path(__file__).parent / "programs"
 COMPILER = shutil.which("arm-none-eabi-gcc")
@@ -52,7 +53,7 @@ class Bench:
 Start = Callable[[str], Bench]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with all programs, each compiled for size and for speed."""
     folder = tmp_path_factory.mktemp("programs")
@@ -66,7 +67,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(params=["-O0", "-Os", "-O2"])
+@pytest.fixture(params=quick(["-O0", "-Os", "-O2"], 2))
 def start(request: pytest.FixtureRequest, built: Path) -> Start:
     """Starts a program by its name."""
     return lambda name: Bench(built / f"{name}{request.param}.elf")

@@ -34,7 +34,7 @@ def levels(engine: RtlEngine) -> dict[str, object]:
     return {**pins, **memories, "now": engine.now_ps, "broken": engine.violations}
 
 
-QUICK = ("cubestar", "cubesense-pair")
+QUICK = ("cubestar",)
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

@@ -15,7 +15,7 @@ from cubestack.host.pictures.images import png, save_picture
 
 from .browser import line, shown, station
 
-pytestmark = pytest.mark.xdist_group("page carried")
+pytestmark = pytest.mark.xdist_group("other pages")
 
 SERVES = re.compile(r" serves on (tcp://\S+?),? ")
 

@@ -9,7 +9,7 @@ import pytest
 from .browser import line, shown, station
 from .relay import Relay
 
-pytestmark = pytest.mark.xdist_group("page serial")
+pytestmark = pytest.mark.xdist_group("other pages")
 
 
 @pytest.fixture

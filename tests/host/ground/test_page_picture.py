@@ -19,7 +19,7 @@ GREEN = (
 )
 """Pixels of what is drawn over the picture that are green."""
 
-pytestmark = pytest.mark.xdist_group("page picture")  # so that its emulations are started once
+pytestmark = pytest.mark.xdist_group("page")  # beside others: one browser
 
 
 def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:

@@ -14,7 +14,7 @@ from .browser import await_devices, look, shown, station
 from .hostile import HOSTILE, hostile
 from .looks import COVERED, LOOKS, PALE
 
-pytestmark = pytest.mark.xdist_group("page scene")
+pytestmark = pytest.mark.xdist_group("other pages")
 
 INK = (
     "() => { const c = document.querySelector('#sky-map'); const n = new Set();"

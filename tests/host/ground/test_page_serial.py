@@ -12,7 +12,7 @@ from .browser import line, shown, station
 from .cable import BAUD, cable, recorded_uart
 
 pytestmark = [
-    pytest.mark.xdist_group("page serial"),
+    pytest.mark.xdist_group("other pages"),
     pytest.mark.skipif(shutil.which("socat") is None, reason="socat is not installed"),
 ]
 

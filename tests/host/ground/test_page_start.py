@@ -10,7 +10,7 @@ from cubestack.firmware_model.reference.image import reference_image
 from .browser import STARTED_MS, await_devices, shown, station
 from .test_page_scene import fill
 
-pytestmark = pytest.mark.xdist_group("page start")
+pytestmark = pytest.mark.xdist_group("other pages")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from tests.tiers import quick
 from .browser import look, shown
 from .looks import COVERED, LOOKS, PALE
 
-pytestmark = pytest.mark.xdist_group("page view")  # so that its emulations are started once
+pytestmark = pytest.mark.xdist_group("page")  # beside others: one browser
 
 
 def test_two_tabs_see_the_same(chromium: Any, address: str, page: Any) -> None:
