@@ -15,7 +15,7 @@ from cubestack.emulator.rtl.repeated_frame import RepeatedFrame
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import rtlil_text
 from tests.benchmarks.engines.workloads import WORKLOADS
-from tests.tiers import quick
+from tests.tiers import quick, quick_ones
 
 from .board_events import BOARDS
 
@@ -34,13 +34,8 @@ def levels(engine: RtlEngine) -> dict[str, object]:
     return {**pins, **memories, "now": engine.now_ps, "broken": engine.violations}
 
 
-QUICK = ("cubestar",)
-
-
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in BOARDS]
-)
+@pytest.mark.parametrize("name", quick_ones(BOARDS, "cubestar"))
 def test_bursts_settle_as_single_edges_do(name: str) -> None:
     board = BOARDS[name]
     wiring = board.wiring(False)

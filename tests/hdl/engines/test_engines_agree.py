@@ -21,7 +21,7 @@ from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import verilog_text
 from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
 from tests.hdl.regression import FULL
-from tests.tiers import quick
+from tests.tiers import quick, quick_ones
 
 from .board_events import BOARDS, random_events
 from .icarus_board import IcarusBoard, Played
@@ -50,7 +50,7 @@ class Case(NamedTuple):
         return self.events(0, END_PS // 3)
 
 
-@pytest.fixture(scope="module", params=quick(BOARDS, 3))
+@pytest.fixture(scope="module", params=quick_ones(BOARDS, "cubestar", "cubesense-pair"))
 def case(request, tmp_path_factory) -> Case:
     wiring = BOARDS[request.param].wiring(False)
     icarus = IcarusBoard(tmp_path_factory.mktemp("top"), wiring, verilog_text(wiring.component))

@@ -50,6 +50,7 @@ def test_every_bit_is_hit_in_every_phase(counters: list[UpsetResult]) -> None:
     assert times == sorted(times)
 
 
+@pytest.mark.slow
 def test_a_counter_matters_only_where_it_counts(counters: list[UpsetResult]) -> None:
     for result in counters:
         matters = {"writer.counter.row": "storing", "reader.counter.row": "reading"}
