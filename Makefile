@@ -7,8 +7,8 @@ PHOTOGRAPHS ?= ../shared/data/sky
 # What `make mutants` tries, for instance MUTANTS="cubestar --all"; --help says what there is.
 MUTANTS ?=
 
-# Two more processes than cores: some tests wait for a browser or for a clock.
-TESTS := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2) --dist loadgroup
+# One more process than cores: some tests wait for a browser or for a clock.
+TESTS := -n $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1) --dist loadgroup
 
 # Tests start hundreds of Python processes: let them keep what they have compiled, also where that is
 # not usual. Matrices are small: threads of the linear algebra would only wait for one another.

@@ -5,12 +5,15 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
+from tests.tiers import quick
 
 from .harness import Harness
 
 UART_BYTES = 100_000
-I2C_MESSAGES = 10_000
 STREAM = INTERFACE.telecommand("StreamDownImage").id
+
+short_and_long = pytest.mark.parametrize("count", quick([2_000, 10_000], 1))
+"""Of frames, messages or transitions."""
 
 
 def stays_sane(unit: Harness) -> None:
@@ -41,10 +44,11 @@ def test_random_bytes_on_the_uart(lit: Harness, seed: int) -> None:
     stays_sane(lit)
 
 
-def test_random_frames_on_the_uart(lit: Harness) -> None:
+@short_and_long
+def test_random_frames_on_the_uart(lit: Harness, count: int) -> None:
     """Frames as they should be, with random IDs, lengths and parameters."""
     rng = np.random.default_rng(11)
-    for _ in range(3000):
+    for _ in range(count):
         identifier = int(rng.integers(0, 256))
         message = INTERFACE.find(identifier)
         right = message.length if message is not None and identifier < 128 else 0
@@ -64,9 +68,10 @@ def test_random_frames_on_the_uart(lit: Harness) -> None:
     stays_sane(lit)
 
 
-def test_random_messages_on_i2c(lit: Harness) -> None:
+@short_and_long
+def test_random_messages_on_i2c(lit: Harness, count: int) -> None:
     rng = np.random.default_rng(12)
-    for _ in range(I2C_MESSAGES):
+    for _ in range(count):
         identifier = int(rng.integers(0, 256))
         if identifier == STREAM:
             continue
@@ -90,10 +95,11 @@ def test_random_messages_on_i2c(lit: Harness) -> None:
     stays_sane(lit)
 
 
-def test_random_transitions_on_i2c(lit: Harness) -> None:
+@short_and_long
+def test_random_transitions_on_i2c(lit: Harness, count: int) -> None:
     """Starts, bytes and stops in any order, as a disturbed bus may bring them."""
     rng = np.random.default_rng(13)
-    for _ in range(I2C_MESSAGES):
+    for _ in range(count):
         link = lit.program.link
         match rng.integers(0, 5):
             case 0:
@@ -113,7 +119,7 @@ def test_random_transitions_on_i2c(lit: Harness) -> None:
 def test_a_flood_of_good_frames_whose_answers_find_no_room(lit: Harness) -> None:
     flood = encode_frame(bytes([143])) + encode_frame(b"\x10") + encode_frame(b"\x80")
     answers = 0
-    for _ in range(3000):
+    for _ in range(count):
         answers += len(lit.uart(flood))  # none of them is cut short
         lit.backlog = min(lit.backlog + 120, 2048)
         lit.run(until_us=lit.now_us + 2_600)

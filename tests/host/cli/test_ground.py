@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from cubestack.host.cli.main import main
+from tests.tiers import quick
 
 CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
 
@@ -37,7 +38,7 @@ def test_a_port_that_there_is_not() -> None:
     assert "/dev/nothing" in line
 
 
-@pytest.mark.parametrize("missing", ["starlette", "uvicorn", "websockets"])
+@pytest.mark.parametrize("missing", quick(["starlette", "uvicorn", "websockets"], 1))
 @pytest.mark.parametrize("words", [["ground", "emulated:cubestar"], CONTROLLED])
 def test_what_must_be_installed_is_told(words: list[str], missing: str) -> None:
     text = (

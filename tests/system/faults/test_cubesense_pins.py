@@ -13,6 +13,7 @@ from cubestack.firmware_model.interface.cubesense.codes import (
     Reason,
 )
 from tests.system.cubesense.conftest import check_right
+from tests.tiers import quick
 
 from .bench import TIMED_OUT, Sense, line_s
 
@@ -101,7 +102,7 @@ def test_with_an_acknowledge_that_is_always_there_the_sun_is_an_old_one_or_none(
 
 
 @pytest.mark.parametrize("pin", PINS)
-@pytest.mark.parametrize("line", [BEFORE, 240])
+@pytest.mark.parametrize("line", quick([240, BEFORE], 1))
 @pytest.mark.fault("control-glitch")
 def test_a_glitch_while_storing_costs_the_frame(ready: Sense, line: int, pin: str) -> None:
     ready.faults.inject("control-glitch", target=pin, at_s=line_s(ready.await_frame(), line))

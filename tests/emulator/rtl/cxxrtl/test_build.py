@@ -17,6 +17,7 @@ from cubestack.emulator.rtl.simulated import SimulatedEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
 from tests.emulator.fake_compiler import make_compiler
+from tests.tiers import quick
 
 TIMEOUT_S = 300
 
@@ -50,7 +51,7 @@ def test_built_once_then_taken_from_the_cache(quick_compiler, cache, monkeypatch
     assert sorted(path.suffix for path in cache.iterdir()) == [".log", ".so"]
 
 
-@pytest.mark.parametrize("damage", ["cut", "changed"])
+@pytest.mark.parametrize("damage", quick(["changed", "cut"], 1))
 def test_damaged_library_is_built_again(quick_compiler, cache, damage):
     library = build.library_for(wiring())
     content = library.read_bytes()
