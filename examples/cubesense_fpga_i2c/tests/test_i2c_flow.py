@@ -34,6 +34,7 @@ def test_verilog_file(name: str, tmp_path: Path) -> None:
     flow_checks.every_clock_pin_is_constrained(top, tmp_path)
 
 
+@pytest.mark.slow
 @need_yosys
 @pytest.mark.parametrize("name", quick(counted(TOPS), 1))
 def test_area(name: str) -> None:

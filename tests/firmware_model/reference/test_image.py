@@ -35,6 +35,7 @@ def test_another_image_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         reference_image()
 
 
+@pytest.mark.slow
 def test_the_sources_make_the_image(tmp_path: Path) -> None:
     compiler = shutil.which("arm-none-eabi-gcc")
     if compiler is None or shutil.which("make") is None:

@@ -70,6 +70,7 @@ def test_wrong_calls_are_one_line(
     assert all(word in outcome.line for word in words)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 def test_proofs_as_text_and_as_json(run: Run) -> None:
     names = ["cubestar-drivers", "cubestar-read"]

@@ -79,6 +79,7 @@ def test_a_search_looks_at_less_than_a_hundredth_of_the_database() -> None:
             assert places.looked_at < 0.01 * len(onboard)
 
 
+@pytest.mark.slow
 def test_the_true_triangle_is_nearly_always_a_candidate() -> None:
     """Two bounds of three sigma that are not independent: at least 99 % with the right noise."""
     onboard, found, listed = database(), 0, 0

@@ -14,7 +14,6 @@ from cubestack.host.experiments.campaigns.folder import PLAN, ROWS, Folder
 from cubestack.host.experiments.campaigns.plan import Plan
 from cubestack.host.experiments.campaigns.run import count, replayed, run
 from cubestack.host.experiments.campaigns.statistics import rates
-from tests.tiers import quick
 
 from ..cluster import dask_cluster
 
@@ -41,6 +40,7 @@ def content(folder: Path) -> bytes:
     return (folder / ROWS).read_bytes()
 
 
+@pytest.mark.slow
 def test_two_workers_make_the_same_file(alone: Folder, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "two", alone.plan, resume=False)
     assert len(list(run(folder, 2))) == 4
@@ -77,18 +77,21 @@ def test_kills_lose_only_blocks_in_flight(
     assert content(out) == content(alone.path)
 
 
-@pytest.mark.parametrize("number", quick([3, 0], 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [3, 0])
 def test_a_row_is_replayed(alone: Folder, number: int) -> None:
     row = list(alone.rows())[number]
     again = replayed(alone, number)
     assert blocks._plain(again) == row.result
 
 
+@pytest.mark.slow
 def test_what_cannot_be_replayed_is_told(alone: Folder) -> None:
     with pytest.raises(ValueError, match="has rows 0 to 3, not 4"):
         replayed(alone, 4)
 
 
+@pytest.mark.slow
 def test_rates_are_counted_by_point(alone: Folder) -> None:
     found = rates(alone)
     assert list(found) == [(("false_stars", 0),), (("false_stars", 10),)]

@@ -57,6 +57,7 @@ def test_as_many_hits_as_rate_area_and_exposure_say() -> None:
     assert hit / 400 == pytest.approx(1 - np.exp(-0.0634), abs=0.04)
 
 
+@pytest.mark.slow
 def test_tracks_are_as_long_as_isotropic_incidence_says() -> None:
     # Squared cosines of the angle of incidence are even: half of the tracks go more than as far
     # across as the layer is deep, a tenth three times that.
