@@ -13,12 +13,13 @@ change nothing that can be seen. Exit code 1 when fewer than 90 % are killed.
 """
 
 import argparse
-import random
+import hashlib
+import math
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
 from pathlib import Path
 from queue import Queue
 
@@ -30,15 +31,24 @@ from tests.mutation.trial import Copy
 ENOUGH = 0.9
 
 
-def chosen(folder: Path, seed: int) -> Iterator[Mutant]:
-    """Without an end: a module by its number of lines, then one of its mutants, each once."""
-    random_ = random.Random(seed)
-    texts = {p: (ROOT / p).read_text("utf-8") for p in modules(ROOT) if p.is_relative_to(folder)}
-    left = {path: mutants(path, text) for path, text in texts.items()}
-    while left := {path: found for path, found in left.items() if found}:
-        paths = list(left)
-        (path,) = random_.choices(paths, [texts[p].count("\n") for p in paths])
-        yield left[path].pop(random_.randrange(len(left[path])))
+def chosen(folder: Path, seed: int) -> list[Mutant]:
+    """All, in the order of the lots that they draw: modules weigh as much as they have lines.
+
+    A lot is drawn by the seed, the module's name and the mutant's text, so that the first ones stay
+    the first ones while other code changes.
+    """
+    drawn = list[tuple[float, Mutant]]()
+    for path in modules(ROOT):
+        if path.is_relative_to(folder):
+            text, alike = (ROOT / path).read_text("utf-8"), Counter[str]()
+            found = mutants(path, text)
+            for mutant in found:
+                change = f"{mutant.before} -> {mutant.after}"
+                alike[change] += 1
+                lot = hashlib.sha256(f"{seed} {path} {change} {alike[change]}".encode()).digest()
+                share = (int.from_bytes(lot[:8]) + 1) / 2**64  # (Efraimidis and Spirakis)
+                drawn.append((-math.log(share) * len(found) / text.count("\n"), mutant))
+    return [mutant for _, mutant in sorted(drawn, key=lambda one: one[0])]
 
 
 def results(tried: list[Mutant], jobs: int) -> Iterator[tuple[Mutant, bool]]:
@@ -79,7 +89,7 @@ def main() -> int:
         parser.error(f"{args.folder} has no module; it is below {', '.join(PARTS)}")
     if args.record or args.record_new:
         return record(ROOT, new=args.record_new)
-    facing = list(islice(chosen(args.folder, args.seed), args.count))
+    facing = chosen(args.folder, args.seed)[: args.count]
     tried = survived = 0
     for mutant, killed in results(facing, args.jobs):
         tried, survived = tried + 1, survived + (not killed)

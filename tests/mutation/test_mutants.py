@@ -62,6 +62,27 @@ def test_the_seed_decides() -> None:
     assert sorted(one) == sorted(other)
 
 
+def test_what_changes_elsewhere_leaves_the_choice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tests.mutation.__main__.ROOT", tmp_path)
+    code = "\n".join(f"x{n} = a < {n} + b" for n in range(20)) + "\n"
+    for name in ("one", "other"):
+        (tmp_path / "host" / name).mkdir(parents=True)
+        (tmp_path / "host" / name / "made.py").write_text(code)
+
+    def changes() -> list[tuple[Path, str, str]]:
+        all_ = chosen(Path(), 1)
+        return [(m.path, m.before, m.after) for m in all_ if "one" in m.path.parts]
+
+    before = changes()
+    (tmp_path / "host" / "other" / "made.py").write_text(code + code)
+    (tmp_path / "host" / "one" / "made.py").write_text("# a comment\n" + code)
+    assert changes() == before
+    first = [m.path for m in chosen(Path(), 1)[:60]]
+    assert 5 < sum("one" in path.parts for path in first) < 30  # of a third of all lines
+
+
 def test_the_mirror_image_comes_first() -> None:
     found = files_for(Path("firmware_model/attitude/quest.py"))
     assert found[0] == Path("tests/firmware_model/attitude/test_quest.py")
