@@ -36,7 +36,7 @@ if [ "$kind" = dev ]; then
     command -v iverilog >/dev/null 2>&1 || need "Icarus Verilog, for the HDL tests" iverilog
     # Programs of others that tests point at the emulator; without them those tests are skipped.
     missing=""
-    for program in i2cget:i2c-tools socat:socat picocom:picocom gdb-multiarch:gdb-multiarch chromium:chromium \
+    for program in i2cget:i2c-tools socat:socat picocom:picocom gdb-multiarch:gdb-multiarch chromium:chromium\ libatomic1 \
         arm-none-eabi-gcc:gcc-arm-none-eabi\ libnewlib-arm-none-eabi; do
         PATH=$PATH:/usr/sbin command -v "${program%%:*}" >/dev/null 2>&1 ||
             missing="$missing ${program#*:}"

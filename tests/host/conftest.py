@@ -24,11 +24,15 @@ def chromium() -> Iterator[Any]:
     if program is None:
         pytest.skip("chromium is not installed")
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with api.sync_playwright() as playwright:
-        # In a container there is no sandbox to be had, and only our own pages are opened.
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield browser
-        browser.close()
+    try:
+        playwright = api.sync_playwright().start()
+    except Exception as error:  # its own program lacks a library of the system: libatomic1
+        pytest.skip(f"playwright does not start: {error}")
+    # In a container there is no sandbox to be had, and only our own pages are opened.
+    browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+    yield browser
+    browser.close()
+    playwright.stop()
 
 
 class FakeNode:

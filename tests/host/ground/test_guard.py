@@ -2,7 +2,9 @@
 
 import http.client
 import json
+import resource
 import socket
+from collections.abc import Iterator
 
 import pytest
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
@@ -102,6 +104,17 @@ def test_noise_is_no_request(controlled: Controlled) -> None:
     assert controlled.ask("GET", "/state")[0] == 200
 
 
+@pytest.fixture
+def many_files() -> Iterator[None]:
+    """Open in this process: both ends of each connection are its own."""
+    usual, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    enough = 65_536
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most if 0 < most < enough else enough, most))
+    yield
+    resource.setrlimit(resource.RLIMIT_NOFILE, (usual, most))
+
+
+@pytest.mark.usefixtures("many_files")
 @pytest.mark.parametrize("count", quick([1_000, 10_000], 1))
 def test_many_connections_do_not_stop_the_emulation(controlled: Controlled, count: int) -> None:
     kept = []
