@@ -1,12 +1,16 @@
-"""Upsets of a memory: how many, where, and when, for rates at which they come one by one or not."""
+"""Upsets of a memory: how many, where, and when, for rates at which they come one by one or not.
+
+And a bit of a processor's register.
+"""
 
 import numpy as np
 import pytest
 
+from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.injection import Injection
-from cubestack.emulator.faults.parts import BATCH_S, MOST_UPSETS_PER_S, MemoryFaults
+from cubestack.emulator.faults.parts import BATCH_S, MOST_UPSETS_PER_S, CoreFaults, MemoryFaults
 from cubestack.emulator.faults.seu import flip_bit, flip_bits
-from cubestack.emulator.faults.table import MemoryUpsets
+from cubestack.emulator.faults.table import CoreFlip, MemoryUpsets
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 BITS = 1 << 20
@@ -85,3 +89,48 @@ def test_the_rate_is_that_of_each_bit_and_the_seed_decides() -> None:
 def test_what_is_no_probability_is_refused(rate: float) -> None:
     with pytest.raises(ValueError, match="0 to 1 per bit"):
         flip_bits(np.zeros(1, np.uint8), rate, np.random.default_rng(1))
+
+
+class Core:
+    """A processor's registers, and which bits were turned over."""
+
+    def __init__(self) -> None:
+        self.registers = {"r0": 32, "pc": 32, "primask": 1}
+        self.flipped: list[tuple[str, int]] = []
+        self.told: list[str] = []
+        self.faults = CoreFaults(Kernel(), lambda _time, _of, text: self.told.append(text), self)
+
+    def flip(self, register: str, bit: int) -> None:
+        self.flipped.append((register, bit))
+
+    def hit(self, fault: CoreFlip, seed: int = 1) -> None:
+        injection = Injection(0, fault, "core", 0, None, seed)
+        self.faults.prepare(injection)
+        self.faults.begin(injection)
+
+
+def test_a_core_s_bit_is_the_one_that_was_named() -> None:
+    core = Core()
+    core.hit(CoreFlip(register="pc", bit=20))
+    core.hit(CoreFlip(register="primask", bit=20))  # which has only one
+    assert core.flipped == [("pc", 20), ("primask", 0)]
+    assert core.told == ["pc[20]", "primask[0]"]
+
+
+def test_a_core_s_bit_is_drawn_from_all_that_there_are() -> None:
+    core, again = Core(), Core()
+    for seed in range(100):
+        core.hit(CoreFlip(), seed)
+        again.hit(CoreFlip(), seed)
+    assert core.flipped == again.flipped
+    assert {name for name, _ in core.flipped} == set(core.registers)
+    assert {bit for name, bit in core.flipped if name == "primask"} == {0}
+    assert len({bit for _, bit in core.flipped}) > 20
+
+
+def test_a_register_that_a_core_has_not_is_refused_ahead() -> None:
+    core = Core()
+    injection = Injection(0, CoreFlip(register="r99"), "core", 0, None, 1)
+    with pytest.raises(FaultError, match="no register 'r99', only r0, pc, primask"):
+        core.faults.prepare(injection)
+    assert core.flipped == []
