@@ -1,12 +1,13 @@
 """Traces against an independent reader of VCD files, and a receiver on the drawn levels."""
 
 import io
+import re
 
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cubestack.emulator.bus.i2c import I2cBus, I2cMessage
-from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.bus.uart import LineFormat, Uart
 from cubestack.emulator.recording.trace import VcdTrace
 from cubestack.emulator.sim.virtual_time import Kernel
 
@@ -46,6 +47,21 @@ def test_drawn_levels_are_the_bytes(writes):
     changes = read(io.BytesIO(stream.getvalue().encode()))
     assert received(changes["uart.rx"]) == sent
     assert received(changes["uart.tx"]) == bytes(byte ^ 0xFF for byte in sent)
+
+
+def test_characters_of_another_form_are_counted_in_a_word():
+    kernel, stream = Kernel(), io.StringIO()
+    uart = Uart(kernel, BAUD, lambda _byte: None, lambda: None, silence_bytes=10)
+    trace = VcdTrace(stream, "board", kernel, {"uart": uart})
+    uart.host_form = LineFormat(BAUD, parity="S")
+    uart.host_writes(b"bc")
+    kernel.run()
+    trace.close()
+    text = stream.getvalue()
+    changes = read(io.BytesIO(text.encode()))
+    assert [int(value) for _, value in changes["uart.framing_errors"]] == [0, 1, 2]
+    bits = {name: int(size) for size, name in re.findall(r"\$var wire (\d+) \S+ (\w+)", text)}
+    assert bits == {"rx": 1, "tx": 1, "rx_byte": 8, "tx_byte": 8, "framing_errors": 32}
 
 
 def test_probes_and_transfers():
