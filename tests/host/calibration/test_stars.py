@@ -57,6 +57,14 @@ def test_wrong_stars_are_left_out() -> None:
     assert fit.camera.f_px == pytest.approx(TRUE.f_px, abs=0.3)
 
 
+def test_what_was_left_out_leaves_no_trace_in_the_camera() -> None:
+    given = sights(4)
+    given[0].pixels[7] += 3  # near enough to be taken at first
+    fit = fit_camera(given, GUESS)
+    assert fit.rejected == 1
+    assert asdict(fit.camera) == pytest.approx(asdict(TRUE), rel=1e-6, abs=1e-8)
+
+
 def test_pairs_near_the_middle_give_the_focal_length() -> None:
     fit = fit_camera(sights(10, stars=30), TRUE)
     assert fit.pairs_f_px == pytest.approx(TRUE.f_px, rel=0.01)
