@@ -49,6 +49,8 @@ def quality(unit: Harness, picture: np.ndarray) -> dict[str, float]:
         ({"saturated": 0.01}, Reason.SATURATED),
         ({"background_range": 30.0}, Reason.STRAY_LIGHT),
         ({"background": 120.0}, Reason.STRAY_LIGHT),
+        ({"background": 40.0}, Reason.UNCONFIRMED),
+        ({"background": 40.5}, Reason.STRAY_LIGHT),
         ({"background_range": 30.0, "spikes": 500}, Reason.STRAY_LIGHT),
         ({"spikes": 500}, Reason.RADIATION),
         ({"spikes": 100, "noise": 4.0}, Reason.UNCONFIRMED),
