@@ -141,7 +141,9 @@ def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_only_the_tables_of_a_page_are_rewritten(run: Run, page: Path) -> None:
-    assert run("fidelity", "aramis", "--write", page.parent, "--workers", "1").code == 0
+    done = run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
+    assert done.code == 0
+    assert f"wrote 1 rows to {page}\n" in done.err
     once = page.read_text()
     assert once.startswith("above\n")
     assert once.endswith("below\n")
