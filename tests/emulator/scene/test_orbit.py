@@ -117,6 +117,18 @@ def test_the_moons_terms_are_the_greatest_of_the_long_series() -> None:
         assert np.sqrt(np.mean(off**2)) < rms
 
 
+def test_the_moons_distance_swings_in_step_with_its_arguments() -> None:
+    """By the angles of the long series, which are rounded to 0.1 deg here."""
+    dates = 2451545.0 + np.linspace(-18_000, 18_000, 400)
+    t = (dates - 2451545.0) / 36525
+    elongation, anomaly = 297.8501921 + 445267.1114034 * t, 134.9633964 + 477198.8675055 * t
+    window = np.hanning(len(dates))  # keeps the terms apart
+    nearness = window / [np.linalg.norm(moon(date)) for date in dates]
+    for angle in (anomaly, 2 * elongation - anomaly, 2 * elongation, 2 * anomaly):
+        late_deg = np.degrees(np.angle(nearness @ np.exp(1j * np.radians(angle))))
+        assert late_deg == pytest.approx(0.0, abs=0.06)
+
+
 def test_the_moon_is_where_the_text_book_has_it() -> None:
     """Meeus, Astronomical Algorithms, example 47.a: 1992 April 12, 0 h TD."""
     tilt = np.radians(23.440636)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.scene.angles import vector_from_angles
+from cubestack.emulator.scene.form import bodies_of
 from cubestack.emulator.scene.hazards import Ghosts, Glint, Looking
 from cubestack.emulator.scene.hazards.contract import SUN_V
 from cubestack.emulator.scene.hazards.glare import aureole
@@ -39,6 +40,14 @@ def test_a_sun_outside_of_the_field_makes_none() -> None:
     assert not Ghosts(sun=tuple(vector_from_angles(96, 0))).glow(FISHEYE, vectors).any()
     assert not Ghosts().glow(FISHEYE, vectors).any()
     assert Ghosts(sun=tuple(vector_from_angles(94, 0))).glow(FISHEYE, vectors).any()
+
+
+def test_a_map_has_the_sun_whose_ghosts_they_are() -> None:
+    sun = vector_from_angles(30, 40)
+    (body,) = bodies_of((Ghosts(), Ghosts(sun=tuple(3 * sun))))
+    assert (body.name, body.radius_deg) == ("Sun", pytest.approx(0.27, abs=0.01))
+    np.testing.assert_allclose(body.direction, sun)
+    assert bodies_of((Ghosts(),)) == ()
 
 
 @pytest.mark.parametrize("seed", range(5))
