@@ -6,10 +6,14 @@ import pytest
 
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
-from cubestack.host.devices.targets import open_target
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.targets import Target, open_target
 from cubestack.host.errors import NoAnswerError, TargetError
 from cubestack.host.ground.desk import Desk
+from cubestack.host.ground.logs import recording
 from cubestack.host.ground.played import PlayedClient, is_recording, open_recording
+
+from ..conftest import LetterLine
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +56,7 @@ def test_a_page_has_it_as_a_target(made: Path) -> None:
     assert not is_recording("/dev/ttyUSB0")
     desk = Desk(open_recording(str(made)))
     assert {"send", "controls", "raw", "download"} <= desk.about["missing"].keys()
+    assert "recording" not in desk.about["missing"]
     assert desk.played is not None
     desk.played.play(desk.played.end_s, runs=False)
     values = desk.read(["Configuration", "Result1"]).result()
@@ -61,4 +66,11 @@ def test_a_page_has_it_as_a_target(made: Path) -> None:
         desk.do("write DetectionThreshold1 7").result()
     with pytest.raises(ValueError, match="is a recording"):
         desk.transfer("download")
+    desk.close()
+
+
+def test_what_is_not_recorded_says_how_it_would_be() -> None:
+    desk = Desk(Target("fake", INTERFACE, NodeClient(LetterLine(), INTERFACE)))
+    with pytest.raises(ValueError, match="fake is not recorded: begin with --record FILE"):
+        recording(desk)
     desk.close()

@@ -50,6 +50,7 @@ def known(sense: Any) -> Known:
     "line",
     [
         *("peek", "peek a b", "time 1 2", "scene", "scene a b", "dump x", "list a b"),
+        *("read", "read a b c"),
         *("bench", "bench q s", "image", "image a.png b c", "watch", "watch a 1 2 3"),
     ],
 )
