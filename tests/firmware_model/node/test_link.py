@@ -15,7 +15,6 @@ from cubestack.firmware_model.aramis.link import SEND_BUFFER_BYTES as ARAMIS_BUF
 from cubestack.firmware_model.aramis.link import AramisLink
 from cubestack.firmware_model.aramis.state import State as AramisState
 from cubestack.firmware_model.cubesense.links.node import SEND_BYTES as CUBESENSE_BUFFER
-from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES as CUBESTAR_BUFFER
 from cubestack.firmware_model.cubestar.link import CubeStarLink
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
 from cubestack.firmware_model.cubestar.state import State as CubeStarState
@@ -122,7 +121,7 @@ NODES = {
     "cubestar": Node(
         lambda: Canned(CUBESTAR, CORTEX_M3),
         CUBESTAR,
-        CUBESTAR_BUFFER,
+        2048,
         ("ImageBlockSet", {"BlockNumber": 4096}),
         flags_of(0),
     ),
