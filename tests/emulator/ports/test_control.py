@@ -1,14 +1,18 @@
 """Acts of other threads on a running emulation: when they happen, and what time does then."""
 
+import itertools
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from cubestack.emulator.ports import control
 from cubestack.emulator.ports.control import MOST_EVENTS, ControlPort
+from cubestack.emulator.ports.endpoint import poll_now
 from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, Kernel
@@ -98,6 +102,23 @@ def test_it_runs_to_a_time_and_stands_there(running: Running) -> None:
     assert running.ticks[-1] == goal_ps - PS_PER_MS  # what happens at that time comes after it
     with pytest.raises(ValueError, match=r"it is 30\.000000 s already, after 1\.000000 s"):
         running.ask(lambda: running.port.run_to(PS_PER_S))
+
+
+def test_on_its_way_it_lets_the_other_ports_in_every_20_ms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a wall clock that goes on by 6 ms with each event; nobody serves but the test."""
+    wall_ns = itertools.count(0, 6_000_000)
+    monkeypatch.setattr(control, "time", SimpleNamespace(monotonic_ns=lambda: next(wall_ns)))
+    running = Running()
+    port, kernel = running.port, running.kernel
+    arrived = port.run_to(10 * PS_PER_MS)
+    ticks = []
+    while not arrived.done():
+        assert [poll_now(fd, events) for fd, events in port.watched()] == [True]
+        port.exchange(kernel.now)
+        ticks.append(len(running.ticks))
+        assert port.held
+    assert ticks == [4, 8, 10]  # four take 24 ms; a tick at the end would come after it
+    port.close()
 
 
 def test_another_wish_ends_a_run(running: Running) -> None:
