@@ -101,3 +101,17 @@ def test_sun_that_was_not_found_has_no_window(tmp_path: Path) -> None:
     drawn = np.asarray(Image.open(tmp_path / "s.png"))
     assert not np.any(np.all(drawn == EDGE, axis=2))
     assert not np.any(np.all(drawn == FITTED, axis=2))
+
+
+@pytest.mark.parametrize("camera", Camera)
+def test_half_as_bright_is_drawn_half_as_bright(tmp_path: Path, camera: Camera) -> None:
+    """Black and white are the darkest and the brightest: no gamma hides how steep an edge is."""
+    picture = np.zeros((480, 640), np.uint8)
+    picture[300:340, 200:240], picture[300:340, 300:340] = 100, 200
+    if camera is Camera.NADIR:
+        annotate_nadir(picture, np.zeros((0, 2)), None, tmp_path / "drawn.png")
+    else:
+        annotate_sun(picture, (0x3FF, 0x1FF), None, tmp_path / "drawn.png")
+    drawn = np.asarray(Image.open(tmp_path / "drawn.png"))[600:680]
+    levels = [np.median(drawn[:, 2 * left : 2 * left + 80]) for left in (100, 200, 300)]
+    assert levels == pytest.approx([0, 127.5, 255], abs=1)
