@@ -1,5 +1,6 @@
 """Figures of the fidelity pages: those that cost little are measured anew, the sums are checked."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.scene.earth_sun import Target
 from cubestack.host.devices.fidelity import Row
 from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.experiments import fidelity
@@ -228,6 +230,27 @@ def test_the_sun_is_measured_up_to_the_very_side() -> None:
     assert found["worst"] == 0.05
     assert np.isnan(found["worst_90"])
     assert np.isnan(found["worst_rest"])
+
+
+def test_the_sun_stands_still_at_the_angles_that_the_row_names(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Results there scatter by a part of the angle: the largest is told."""
+    seen: list[float] = []
+
+    def found_at(_device: str, *, frames: int, scene: Any, **_: Any) -> list[SimpleNamespace]:
+        angle = scene.truth(Target.SUN, 0, 100.0).alpha_deg
+        seen.append(angle)
+        off = angle / 1000 * np.resize([1, -1], frames)
+        return [SimpleNamespace(alpha_deg=angle, beta_deg=one) for one in off]
+
+    monkeypatch.setattr(cubesense, "measure", found_at)
+    wanted = fidelity_of("cubesense")
+    (row,) = [one for one in wanted.rows if one.trial == "sun-still"]
+    found = wanted.trials["sun-still"].run(SimpleNamespace(board={}), 6)
+    named = [float(number) for number in re.findall(r"\d+", row.figure)]
+    assert seen == pytest.approx(named, abs=1e-6)
+    assert found == {"sigma": pytest.approx(max(named) / 1000)}
 
 
 # --- a few frames of what is measured -------------------------------------------------------------
