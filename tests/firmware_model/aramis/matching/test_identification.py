@@ -194,3 +194,12 @@ def test_stars_drawn_out_and_skewed_too_far_are_refused(
     found = named(replace(made.stars, smear_px=smear_px, skew_px=skew_px), VERIFIED.profile)
     assert (found.reason is Reason.SMEAR) == refused
     assert (found.triples == 0) == refused
+
+
+def test_stars_drawn_out_while_all_rows_were_exposed_at_once_are_not_set_straight() -> None:
+    """None moved from row to row: a list that says nothing of it gives the same attitude."""
+    (made,) = pictures(1)
+    smeared = StarList(made.stars.centroids, made.stars.brightness, smear_px=9.0)
+    still, drawn_out = (named(one, VERIFIED.profile) for one in (made.stars, smeared))
+    assert drawn_out.outcome is MeasurementOutcome.CONCLUSIVE
+    np.testing.assert_array_equal(drawn_out.quaternion, still.quaternion)
