@@ -110,6 +110,20 @@ def test_a_dead_camera_has_no_clock_and_answers_nothing(board: CubeSenseBoard) -
     assert not camera.running
 
 
+@pytest.mark.parametrize("camera", Camera)
+def test_a_camera_s_frames_begin_when_it_is_switched_on(
+    board: CubeSenseBoard, camera: Camera
+) -> None:
+    """Its first row comes after 45 blank lines of 858 clocks, whatever the FPGAs did before."""
+    supply = f"{camera.name.lower()}_camera"
+    board.power.switch(supply, False)
+    let_pass(board, 7.3)
+    board.power.switch(supply, True)
+    first = board.cameras[camera].frame_from(board.kernel.now)
+    blank_ms = 45 * 858 / 13.5e6 * 1e3
+    assert (first.readout_ps - board.kernel.now) / PS_PER_MS == pytest.approx(blank_ms)
+
+
 def test_a_failed_memory_draws_too_much_each_time_it_is_switched_on(board: CubeSenseBoard) -> None:
     board.faults.inject("latch-up", target="SRAM1", lasting=True)
     assert board.power.current_ma("SRAM1") > 100
