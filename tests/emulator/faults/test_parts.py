@@ -10,7 +10,7 @@ from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.injection import Injection
 from cubestack.emulator.faults.parts import BATCH_S, MOST_UPSETS_PER_S, CoreFaults, MemoryFaults
 from cubestack.emulator.faults.seu import flip_bit, flip_bits
-from cubestack.emulator.faults.table import CoreFlip, MemoryUpsets
+from cubestack.emulator.faults.table import CoreFlip, CoreUpsets, MemoryUpsets
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 BITS = 1 << 20
@@ -98,7 +98,8 @@ class Core:
         self.registers = {"r0": 32, "pc": 32, "primask": 1}
         self.flipped: list[tuple[str, int]] = []
         self.told: list[str] = []
-        self.faults = CoreFaults(Kernel(), lambda _time, _of, text: self.told.append(text), self)
+        self.kernel = Kernel()
+        self.faults = CoreFaults(self.kernel, lambda _time, _of, text: self.told.append(text), self)
 
     def flip(self, register: str, bit: int) -> None:
         self.flipped.append((register, bit))
@@ -126,6 +127,21 @@ def test_a_core_s_bit_is_drawn_from_all_that_there_are() -> None:
     assert {name for name, _ in core.flipped} == set(core.registers)
     assert {bit for name, bit in core.flipped if name == "primask"} == {0}
     assert len({bit for _, bit in core.flipped}) > 20
+
+
+def test_a_core_s_upsets_come_at_the_rate_of_its_bits_until_they_end() -> None:
+    core = Core()
+    injection = Injection(0, CoreUpsets(rate=10.0), "core", 0, None, 1)
+    core.faults.begin(injection)
+    core.kernel.advance_to(PS_PER_S)
+    expected = 10 * sum(core.registers.values())
+    assert abs(len(core.flipped) - expected) < 5 * np.sqrt(expected)
+    assert {name for name, _ in core.flipped} == set(core.registers)
+    assert core.told == [f"{name}[{bit}]" for name, bit in core.flipped]
+    core.faults.end(injection)
+    core.kernel.advance_to(2 * PS_PER_S)
+    assert len(core.flipped) == len(core.told)
+    assert abs(len(core.flipped) - expected) < 5 * np.sqrt(expected)
 
 
 def test_a_register_that_a_core_has_not_is_refused_ahead() -> None:
