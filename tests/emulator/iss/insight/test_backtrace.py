@@ -81,6 +81,15 @@ def test_a_leaf_returns_by_lr_and_its_callers_are_on_the_stack(scene: Scene) -> 
     ]
 
 
+@pytest.mark.parametrize("upper", [0x000, 0x001, 0x200, 0x7FF])
+@pytest.mark.parametrize("lower", [0x000, 0x001, 0x7FF])
+def test_a_bl_is_a_call_however_far_it_goes(scene: Scene, upper: int, lower: int) -> None:
+    """Both halves hold eleven bits of the distance (ARMv7-M ARM, A7.7.18, encoding T1)."""
+    code = (0xF800 | lower) << 16 | 0xF000 | upper
+    scene.push(scene.call(0x340, code))
+    assert scene.frames() == [Frame(0x110, 0x110), Frame(0x340, 0x33E, SCAN)]
+
+
 @pytest.mark.parametrize(
     "code",
     [
