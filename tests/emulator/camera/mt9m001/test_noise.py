@@ -1,6 +1,7 @@
 """Each term of the noise alone, against its formula in section 3.4 of the AraMiS thesis."""
 
 from dataclasses import replace
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -105,6 +106,18 @@ def test_quantisation_follows_its_formula() -> None:
     assert wired.std() == pytest.approx(quantisation_sigma(), rel=0.02)
     assert wired.mean() == pytest.approx(1.5 * LSB8 / 4, rel=0.05)
     assert error(only()).mean() == pytest.approx(0, abs=0.02 * LSB8)
+
+
+@pytest.mark.parametrize(("quantisation", "least_of_one"), [(True, 3.5 / 4), (False, 0.5)])
+def test_the_wires_values_end_at_0_and_255(quantisation: bool, least_of_one: float) -> None:
+    """At this gain the noise of a dark pixel often goes below what is 1, of 8 bits."""
+    gain = 15.0
+    light = np.zeros(SHAPE)
+    light[SHAPE[0] // 2 :] = 2 * noise.FULL_WELL_ELECTRONS
+    dark, bright = np.split(frame(light, only(readout=True, quantisation=quantisation), gain), 2)
+    counts = NormalDist(noise.BLACK_LEVEL / 4, noise.READ_NOISE_ELECTRONS * gain / LSB8)
+    assert (dark == 0).mean() == pytest.approx(counts.cdf(least_of_one), abs=0.01)
+    assert (bright == 255).all()
 
 
 def test_the_terms_add_up_as_variances() -> None:
