@@ -179,6 +179,23 @@ def test_another_focal_length_is_found_out(name: Name, shoot: Shoot, per_cent: f
     assert solved >= 22
 
 
+@pytest.mark.parametrize("per_cent", [-3.0, -0.85, -0.35, 0.35, 0.85, 3.0])
+def test_five_stars_are_enough_for_a_lens_up_to_3_per_cent_off(
+    name: Name, shoot: Shoot, per_cent: float
+) -> None:
+    """So few are only found where one of the focal lengths that are tried is nearly right."""
+    rng = np.random.default_rng(86)
+    scale, solved, tries = 1 + per_cent / 100, 0, 0
+    while tries < 25:
+        shot = shoot(rng, noise_rad=0, most=5)
+        x, y, z = np.abs(shot.directions.T)
+        # Stars at the border would leave the picture.
+        if len(shot.stars) == 5 and (x < 0.44 * z).all() and (y < 0.22 * z).all():
+            solved += right(name(scaled(shot.directions, scale, meter())), shot.stars)
+            tries += 1
+    assert solved >= 24
+
+
 def test_what_the_result_says(name: Name, shoot: Shoot) -> None:
     rng = np.random.default_rng(94)
     shot = next(s for s in (shoot(rng) for _ in range(20)) if 8 <= len(s.stars) <= 19)
