@@ -89,6 +89,19 @@ def test_a_quick_run_is_of_one_field(asked: list[Any], frames: int) -> None:
     assert [(one.count, one.interval_s) for one in asked_for] == [(3 + SETTLING, 1.0)]
 
 
+def test_an_attitude_that_names_no_star_rests_on_none(
+    asked: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = module.log_lines
+
+    def unnamed(*of: Any, **how: Any) -> Iterator[Any]:
+        for number, line in enumerate(lines(*of, **how)):
+            yield line | {"matched": None if number == SETTLING else line["matched"]}
+
+    monkeypatch.setattr(module, "log_lines", unnamed)
+    assert night(opener(asked), 1)["fewest"] == 0
+
+
 def test_without_a_field_there_is_nothing(
     asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
