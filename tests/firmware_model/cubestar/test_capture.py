@@ -123,16 +123,19 @@ def test_a_frame_that_never_comes(lit: Harness) -> None:
     assert lit.status() is TaskStatus.CALCULATED
 
 
-def test_the_times_of_a_capture(unit: Harness) -> None:
+@pytest.mark.parametrize(("delay_ms", "frame_us"), [(70, FRAME_US), (1000, 1_900_000)])
+def test_the_times_of_a_capture(unit: Harness, delay_ms: int, frame_us: int) -> None:
+    unit.frame_us = frame_us
+    unit.command("SetDiscardDelay", Delay=delay_ms)
     unit.command("CaptureImage")
     phases = unit.telemetry("PhaseTimes")
-    assert phases["Discard"] == pytest.approx(70_000, abs=10)
-    assert phases["Capture"] == pytest.approx(FRAME_US, abs=10)
+    assert phases["Discard"] == pytest.approx(1000 * delay_ms, abs=10)
+    assert phases["Capture"] == pytest.approx(frame_us, abs=10)
     assert phases["Transfer"] == pytest.approx(IMAGE_BYTES * 37 / 48, abs=10)
     camera = unit.telemetry("CameraTiming")
-    assert camera["CaptureTime"] == pytest.approx((70_000 + FRAME_US) / 1000, abs=1)
+    assert camera["CaptureTime"] == pytest.approx(delay_ms + frame_us / 1000, abs=1)
     summary = unit.telemetry("TimingSummary")
-    assert summary["ImageCaptureTime"] == pytest.approx(860, abs=2)
+    assert summary["ImageCaptureTime"] == pytest.approx(delay_ms + frame_us / 1000 + 404, abs=2)
 
 
 @pytest.mark.parametrize(("rate", "exposure"), [(7, 0), (7, 500), (7, 60_000), (30, 0), (6, 10)])

@@ -140,6 +140,16 @@ def test_a_base_contradicts_nothing_after_half_a_turn(
     assert "IDModeError" in tracking.flags()
 
 
+def test_a_base_has_its_age_after_a_reset_on_the_fiftieth_day(
+    tracking: Harness, pose: Rotation
+) -> None:
+    """In flash a picture's time has 32 bits, in ms."""
+    tracking.run(until_us=1000 << 32)
+    seen(tracking, pose, wait_s=1.0)
+    tracking.command("MCUReset")
+    assert seen(tracking, turned(pose, 0.2)) == (TRACKING, Reason.SOLVED)
+
+
 def test_commanded_lost_in_space_judges_each_picture_alone(
     tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
