@@ -169,11 +169,14 @@ def test_only_what_fits_is_made(shared: RtlEngine) -> None:
     assert shared.access(read.first(0), 10**9) == 0
 
 
-def test_a_search_ends_with_the_first_byte_above(shared: RtlEngine) -> None:
+@pytest.mark.parametrize("bulk", [True, False])
+def test_a_search_ends_with_the_first_byte_above(shared: RtlEngine, bulk: bool) -> None:
     opened(shared).sram[:] = 6
     shared.sram[[17, 20]] = 7
     read = transactions(np.arange(64), above=6)
-    assert shared.access(read, 10**9) == 18
+    way = type(shared)._access if bulk else RtlEngine._access
+    with patch.object(type(shared), "_access", way):
+        assert shared.access(read, 10**9) == 18
     assert read.data[17] == 7
     assert not read.data[18:].any()
     assert shared.now_ps == int(18 * read.period)

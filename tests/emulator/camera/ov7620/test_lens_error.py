@@ -31,6 +31,12 @@ def test_a_radial_error_is_that_of_its_nodes_and_none_on_axis_and_rim() -> None:
     assert np.all(np.diff(between) > 0)
 
 
+def test_between_nodes_of_one_error_there_is_no_other() -> None:
+    lens = LensError(radial_deg=((30.0, 0.5), (60.0, 0.5)))
+    for theta in (33.0, 45.0, 57.0):
+        np.testing.assert_allclose(lens.displaced(polar(theta, 0)), (theta + 0.5, 0), atol=1e-12)
+
+
 def test_decentring_is_brown_s_near_the_axis_and_none_at_the_rim() -> None:
     p1, p2 = 0.3, -0.2
     x, y = 0.02, 0.05
