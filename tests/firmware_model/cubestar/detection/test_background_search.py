@@ -229,6 +229,14 @@ def test_only_the_region_is_searched() -> None:
     assert own.counts["ebi_read"] < 0.33 * 524_288
 
 
+@pytest.mark.parametrize("light", [300.0, 900.0])
+def test_stars_a_pixel_from_a_border_are_where_they_are(light: float) -> None:
+    places = np.array([(300, 1), (1, 250), (700, 510), (1022, 255)], np.float64)
+    found = search(taken(spots(places, np.full(4, light))))
+    assert len(found.centroids) == 4
+    assert np.abs(errors(found, places)).max() < 0.02
+
+
 def test_faint_and_small_stars_fill_the_list_only_where_there_is_room() -> None:
     rng = np.random.default_rng(13)
     bright, places = sky(13, 45, 600.0)
