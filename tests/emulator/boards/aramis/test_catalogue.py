@@ -130,6 +130,23 @@ def test_a_folder_that_can_not_be_made_costs_nothing_else(tmp_path: Path, small:
     assert cached(tmp_path / "file" / "x") == small.pack()
 
 
+def test_the_databases_of_the_last_two_lenses_are_kept(
+    small: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[float] = []
+
+    def make(parameters: CatalogueParameters, _progress: object) -> Database:
+        made.append(parameters.fov_deg)
+        return replace(small, fov_deg=parameters.fov_deg)
+
+    monkeypatch.setattr(aramis_catalogue, "_kept", {})
+    monkeypatch.setattr(aramis_catalogue, "cached_database", make)
+    asked = [10.0, 12.0, 10.0, 12.0, 14.0, 12.0, 14.0, 10.0]
+    given = [aramis_catalogue.onboard_database(field_deg).fov_deg for field_deg in asked]
+    assert given == asked
+    assert made == [10.0, 12.0, 14.0, 10.0]
+
+
 def test_progress_is_told() -> None:
     seen: dict[str, int] = {}
 
