@@ -31,9 +31,12 @@ def test_a_hazard_is_a_name_and_perhaps_a_strength() -> None:
         ("gradient=-1", "hazard: gradient goes from 0 to .*, not -1"),
     ],
 )
-def test_what_is_no_hazard_is_refused(given: str, message: str) -> None:
+@pytest.mark.parametrize("options", [CubeStarOptions, CubeSenseOptions])
+def test_what_is_no_hazard_is_refused(
+    options: type[CubeStarOptions | CubeSenseOptions], given: str, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
-        CubeStarOptions(hazard=(given,))
+        options(hazard=(given,))
 
 
 @pytest.mark.parametrize("name", sorted(set(known()) - set(EARTH_HAZARDS)))
