@@ -65,6 +65,7 @@ def test_a_profile_is_chosen_and_scene_and_seed_stay(desk: Desk, served: Serving
     assert (status, told["rows"]) == (200, [["seed", "7"], ["profile", "extended"]])
     assert desk.controls.client.url != before
     assert desk.begun == begun + 1
+    assert "recording" not in desk.about["missing"]  # the emulation records itself
     assert scene(desk) == shown
     now = {row["name"]: row["now"] for row in desk.about["options"]}
     assert (now["profile"], now["firmware"]) == ("extended", "")

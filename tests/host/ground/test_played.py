@@ -73,4 +73,5 @@ def test_what_is_not_recorded_says_how_it_would_be() -> None:
     desk = Desk(Target("fake", INTERFACE, NodeClient(LetterLine(), INTERFACE)))
     with pytest.raises(ValueError, match="fake is not recorded: begin with --record FILE"):
         recording(desk)
+    assert desk.about["missing"]["recording"] == "fake is not recorded: begin with --record FILE"
     desk.close()
