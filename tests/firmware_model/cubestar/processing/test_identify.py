@@ -1,0 +1,33 @@
+"""Which stars of the catalogue count where the boresight is about known."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+
+from ..harness import Harness
+from ..sky import attitude_of, draw, error_deg
+
+
+def test_stars_in_the_far_corner_count_though_the_hint_is_off(catalogue: StarCatalogue) -> None:
+    """A corner is up to 29 deg from the boresight, and a hint may be 5 deg off (section 4.3.4)."""
+    pose = Rotation.random(rng=np.random.default_rng(13))
+    hinted = Rotation.from_euler("y", -4.8, degrees=True) * pose
+    x, y, z = boresight = hinted.inv().as_matrix()[:, 2]
+    far = catalogue.vectors @ boresight < np.cos(np.radians(25))
+    seen = draw(catalogue.vectors[far], pose)
+    unit = Harness(catalogue, CubeStarSwitches.of("extended"))
+    unit.command("setIDMode", IdMode=IdMode.TRACKING)
+    unit.command(
+        "setTrackingMode",
+        RightAscension=np.arctan2(y, x),
+        Declination=np.arctan2(z, np.hypot(x, y)),
+    )
+    unit.picture = seen.picture
+    unit.command("CaptureAndProcess")
+    values = unit.telemetry("AttitudeQuaternion")
+    assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
+    assert values["Matched"] == len(seen.stars) == 7
+    assert error_deg(attitude_of(values), pose) < 0.02
