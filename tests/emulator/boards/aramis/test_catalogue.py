@@ -12,6 +12,7 @@ from cubestack.emulator.boards.aramis import catalogue as aramis_catalogue
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.aramis.catalogue.database import Database
+from cubestack.firmware_model.aramis.field import FOV_DEG
 
 SMALL = CatalogueParameters(fov_deg=20, stars_per_field=3, mag_limit=3, step_deg=5)
 
@@ -145,6 +146,26 @@ def test_the_databases_of_the_last_two_lenses_are_kept(
     given = [aramis_catalogue.onboard_database(field_deg).fov_deg for field_deg in asked]
     assert given == asked
     assert made == [10.0, 12.0, 14.0, 10.0]
+
+
+@pytest.mark.parametrize(
+    ("off_deg", "made_for_deg"),
+    [(0.0, FOV_DEG), (5e-4, FOV_DEG), (-5e-4, FOV_DEG), (2.0, FOV_DEG + 2)],
+)
+def test_a_lens_of_nearly_the_usual_field_has_the_usual_catalogue(
+    monkeypatch: pytest.MonkeyPatch, small: Database, off_deg: float, made_for_deg: float
+) -> None:
+    """A lens file's rounded field is no reason to build another one."""
+    asked = list[CatalogueParameters]()
+
+    def made(parameters: CatalogueParameters, _progress: object) -> Database:
+        asked.append(parameters)
+        return small
+
+    monkeypatch.setattr(aramis_catalogue, "_kept", {})
+    monkeypatch.setattr(aramis_catalogue, "cached_database", made)
+    assert aramis_catalogue.onboard_database(FOV_DEG + off_deg) is small
+    assert asked == [CatalogueParameters(fov_deg=made_for_deg)]
 
 
 def test_progress_is_told() -> None:
