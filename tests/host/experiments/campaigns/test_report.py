@@ -2,7 +2,7 @@
 
 import re
 from base64 import b64decode
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
@@ -26,7 +26,9 @@ FRAMES = 120
 def make(tmp_path: Path) -> Make:
     """Folders with the outcomes of rows that are not right, by block and row as a text."""
 
-    def begun(name: str, others: dict[str, str], seed: int = 5) -> Folder:
+    def begun(
+        name: str, others: dict[str, str], seed: int = 5, errors: Sequence[str] = ("error_deg",)
+    ) -> Folder:
         grid = {"false_stars": [0, 9], "hazard": [["moon"]]}
         plan = Plan(device="cubestar", frames=FRAMES, seed=seed, block=FRAMES, grid=grid)
         folder = Folder.begun(tmp_path / name, plan, resume=False)
@@ -35,7 +37,8 @@ def make(tmp_path: Path) -> Make:
             for row in range(FRAMES):
                 outcome = others.get(f"{block.number}.{row}", "right")
                 size = -0.01 * (row + 1)
-                result = {"error_deg": size, "centroids": 8} if outcome != "failed" else {}
+                measured = dict.fromkeys(errors, size) | {"centroids": 8}
+                result = measured if outcome != "failed" else {}
                 reason = "<b>broken</b>" if outcome == "failed" else ""
                 key = (block.number, row, block.seed, row)
                 rows.append(Row(*key, block.swept, outcome, reason, result))
@@ -128,6 +131,26 @@ def test_the_page_holds_all_and_asks_for_nothing(make: Make) -> None:
     limits = binomtest(100, FRAMES).proportion_ci(0.95, "wilson")
     assert f"100 ({100 * limits.low:.2f} to {100 * limits.high:.2f} %)" in told.cells
     assert "false_stars = 9, hazard = ('moon',)" in told.cells
+
+
+def test_a_published_error_is_drawn_beside_errors_of_its_kind(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CubeStar's are across the boresight and about it; none is of the whole."""
+    drawn = dict[str, list[float]]()
+
+    def curves(name: str, _errors: object, marks: Sequence[tuple[float, str]]) -> bytes:
+        drawn[name] = [value for value, _text in marks]
+        return b""
+
+    monkeypatch.setattr(report, "error_curves", curves)
+    monkeypatch.setattr(report, "rate_curves", lambda *_drawn: b"")
+    report.write(make("a", {}, errors=("error_deg", "error_cross_deg", "error_roll_deg")))
+    assert drawn == {
+        "error_deg": [],
+        "error_cross_deg": [0.0083, 0.004],
+        "error_roll_deg": [0.0203],
+    }
 
 
 def test_a_browser_shows_it_and_asks_for_nothing_else(make: Make, chromium: Any) -> None:
