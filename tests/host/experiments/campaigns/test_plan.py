@@ -54,6 +54,15 @@ def test_all_points_see_the_same_skies(tmp_path: Path) -> None:
     assert len(set(first)) == len(first)
 
 
+def test_a_plan_that_tells_no_seed_is_that_of_seed_0() -> None:
+    """As with every command's --seed."""
+    untold, zero, one = (
+        [block.seed for block in Plan(device="cubestar", frames=3, block=1, **seed).blocks()]
+        for seed in ({}, {"seed": 0}, {"seed": 1})
+    )
+    assert untold == zero != one
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 200), st.integers(1, 40))
 def test_blocks_hold_all_frames(frames: int, size: int) -> None:
