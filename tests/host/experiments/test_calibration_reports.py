@@ -1,16 +1,23 @@
 """Calibrations: pictures of lights, what a reader is told, and what is refused."""
 
+from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
+from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
+from cubestack.host.calibration.camera import Camera
 from cubestack.host.calibration.fisheye import Fisheye
 from cubestack.host.devices.registry import device
+from cubestack.host.experiments import calibrate
 from cubestack.host.experiments.calibrate import CalibrateOptions, CalibrateResult
 from cubestack.host.experiments.cubesense import calibrate as cubesense
 from cubestack.host.experiments.cubestar.calibrate import EXPERIMENT as CUBESTAR
@@ -128,6 +135,47 @@ def test_a_reader_sees_the_parameters_of_the_telecommands() -> None:
 def test_what_does_not_go_together_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         cubesense.CalibrateOptions(**options)
+
+
+class _Named(type(CUBESTAR)):  # type: ignore[misc]
+    """A unit that names every star before its lens exactly; each picture is of another sky."""
+
+    lens = Camera(1120.0, 530.0, 240.0)
+
+    def load(self, client: Iterator[Rotation], camera: Camera, light: Path | None) -> None:
+        pass
+
+    def identify(self, client: Iterator[Rotation]) -> list[SimpleNamespace]:
+        sky = load_sky()
+        seen = sky.vectors @ next(client).as_matrix()
+        ahead = np.flatnonzero((seen[:, 2] > 0.9) & (sky.v_mag < 4))
+        places = self.lens.directions(seen[ahead])
+        inside = ((places > 0) & (places < self.size)).all(axis=1)
+        return [
+            SimpleNamespace(x_px=x, y_px=y, hipparcos=number)
+            for (x, y), number in zip(places[inside], sky.hip[ahead][inside].tolist(), strict=True)
+        ]
+
+
+class _Powered:
+    """What an experiment gets of a unit."""
+
+    def __call__(self, scene: object, **_options: object) -> nullcontext[SimpleNamespace]:
+        client = iter(Rotation.random(20, random_state=3))
+        return nullcontext(SimpleNamespace(scene=scene, client=client))
+
+    def shown(self, items: Iterator[Any], _total: int, _label: str) -> Iterator[Any]:
+        return items
+
+
+def test_an_emulated_unit_s_principal_point_counts_from_the_sensor_s_corner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(calibrate, "GRID", (9, 5))  # quicker
+    unit = _Named()
+    (found,) = unit.run(_Powered(), CalibrateOptions(emulated=4, rounds=1))  # type: ignore[arg-type]
+    assert found.after_px < 1e-6
+    assert (found.camera["cx_px"], found.camera["cy_px"]) == pytest.approx((530, 240), abs=1e-3)
 
 
 STARS = CalibrateResult(
