@@ -81,6 +81,18 @@ def test_a_dip_between_the_tried_radii_is_found() -> None:
     assert invertible(factors, Meter(PIC18F45K20)) is tables_exist(factors) is False
 
 
+@pytest.mark.parametrize(("ratio", "expected"), [(2.99, True), (3.01, False)])
+def test_slopes_are_compared_from_the_picture_s_middle_to_its_rim(
+    ratio: float, expected: bool
+) -> None:
+    """A parabola's slope squared rises with the distorted radius: 4 b for a pixel."""
+    offset, slope = 8, 0.5
+    bend = slope**2 * (ratio**2 - 1) / 4 / (226 - offset + ratio**2 * offset)
+    middle, rim = (np.sqrt(slope**2 + 4 * bend * (radius - offset)) for radius in (0, 226))
+    assert rim / middle == pytest.approx(ratio)
+    assert invertible((offset, slope, bend, 0, 0), Meter(PIC18F45K20)) is expected
+
+
 def test_it_is_quick() -> None:
     meter, table = Meter(PIC18F45K20), Meter(PIC18F45K20)
     assert invertible(DISTORTION, meter)
