@@ -208,6 +208,7 @@ def test_the_clock_is_stretched_until_the_first_bytes_are_there(node: Links) -> 
     assert [node.registers.i2c_read() for _ in range(5)] == [None] * 5
     assert node.meter.counts["i2c_interrupt"] == before
     assert len(node.queue) == 1
+    assert node.woken == 1  # or a program that sleeps would never fetch them
     node.run()
     assert node.registers.i2c_read() == node.pictures[0, 0]
 
