@@ -65,3 +65,9 @@ def test_timing_is_that_of_ccir_601() -> None:
     line_s = ov7620.CLOCKS_PER_LINE / ov7620.PIXEL_CLOCK_HZ
     assert ov7620.LINES_PER_FRAME * line_s == pytest.approx(33.37e-3, rel=1e-3)
     assert ov7620.EXPOSURE_LINES * line_s == pytest.approx(127e-6, rel=1e-3)
+
+
+def test_after_a_reset_nothing_slows_the_frames_down() -> None:
+    """The timing above is that of registers as they are then: clock undivided, rate unadjusted."""
+    names = ("CLOCK_DIVIDER", "FRAME_RATE_HIGH", "FRAME_RATE_LOW")
+    assert [ov7620.REGISTERS[name].reset for name in names] == [0, 0, 0]
