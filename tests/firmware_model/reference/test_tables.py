@@ -62,3 +62,18 @@ def test_fields_that_stand_in_order_have_a_rule_with_their_places() -> None:
             assert list(map(int, re.findall(r" (\d+),", rule)))[:2] == places
             ordered += 1
     assert ordered == 3  # a region along both axes, and the sizes of an area
+
+
+def test_every_rule_finds_its_ranges_in_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rules of a list point at the rows of one table, one behind the other up to its end."""
+    monkeypatch.setattr(tables, "_ranges", lambda last, _allowed: [(0, 5), (7, last)])
+    text = tables.source()
+    table = text.split("static const struct range ranges[] = {\n")[1].split("};")[0]
+    rows = re.findall(r"\{(\d+), (\d+)\},\n", table)
+    lists = re.findall(r"\{ranges \+ (\d+), (\d+)\}", text)
+    assert [int(first) for first, _ in lists] == [*range(0, 2 * len(lists), 2)]
+    assert {count for _, count in lists} == {"2"}
+    assert lists
+    assert rows[::2] == [("0", "5")] * len(lists)
+    assert {low for low, _ in rows[1::2]} == {"7"}
+    assert len(rows) == 2 * len(lists)
