@@ -24,6 +24,7 @@ from cubestack.host.experiments.cubestar import measure as cubestar
 from cubestack.host.experiments.cubestar.layouts import EXPERIMENT as LAYOUTS
 from cubestack.host.experiments.cubestar.layouts import LayoutResult
 from cubestack.host.experiments.cubestar.measure import CubeStarResult
+from cubestack.host.experiments.rates import outcome
 
 RIGHT = AttitudeResult(
     solved=True,
@@ -270,6 +271,12 @@ def test_a_direction_is_told_in_a_row() -> None:
 )
 def test_an_ending_says_why(more: dict[str, Any], ending: str) -> None:
     assert cubesense.EXPERIMENT.row(0, replace(SUN, **more))[-1] == ending
+
+
+def test_a_wrong_direction_is_no_refused_one() -> None:
+    assert outcome(SUN) == "right"
+    assert outcome(replace(SUN, right=False)) == "wrong"
+    assert outcome(replace(SUN, **NOTHING)) == "refused"
 
 
 def test_sensors_are_summed_each_for_itself() -> None:
