@@ -103,7 +103,7 @@ def test_limits_of_hazards_and_scenes_are_told() -> None:
 
 
 def test_defaults_are_what_a_file_without_them_gives(tmp_path: Path) -> None:
-    for kind in ("sky", "earth-sun"):
+    for kind in BASE:
         view = load(tmp_path, kind, {})
         for name, told in KINDS[kind].items():
             owner = next((one for one in (view.scene, view.condition) if hasattr(one, name)), None)
