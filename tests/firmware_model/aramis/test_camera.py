@@ -79,6 +79,13 @@ def test_pictures_alternate_between_two_places(desk: Desk) -> None:
     assert np.shares_memory(one, desk.camera.picture(0))
 
 
+@pytest.mark.parametrize(("place", "start"), [(0, 0), (1, 0x20_0000)])
+def test_pictures_begin_at_whole_rows_of_the_sdram(desk: Desk, place: int, start: int) -> None:
+    """The first one at its very beginning; a row of the MT48LC16M16 has 512 words of 16 bits."""
+    desk.camera.picture(place)[0, :3] = 1, 2, 3
+    assert np.flatnonzero(desk.unit.sdram).tolist() == [start, start + 1, start + 2]
+
+
 def test_the_image_s_time_is_that_of_the_middle_row(desk: Desk) -> None:
     desk.state.settings.put("SetExposure", {"Rows": 3000})
     desk.start()

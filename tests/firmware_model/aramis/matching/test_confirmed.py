@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cubestack.firmware_model.aramis.matching import confirmed
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import VERIFIED
 from cubestack.firmware_model.aramis.solution import Solution, StarList
+from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.interface.aramis import Reason
 from tests.tiers import quick
 
@@ -103,4 +105,16 @@ def test_a_turn_that_is_in_doubt_is_refused() -> None:
     made = pictures(1, 14)[0]
     strict = replace(PROFILE, largest_sigma_rad=1e-6)
     solution = identify(made.stars, FIELD, strict, database(), meter())
+    assert (solution.quaternion, solution.reason) == (None, Reason.UNCONFIRMED)
+
+
+def test_stars_that_determine_no_attitude_confirm_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    (made,) = pictures(1, 15, Light(most=6))
+
+    def undetermined(*_given: object, **_more: object) -> None:
+        raise AttitudeError("the vectors all point the same way")
+
+    assert found(made).reason is Reason.CONFIRMED
+    monkeypatch.setattr(confirmed, "quest", undetermined)
+    solution = found(made)
     assert (solution.quaternion, solution.reason) == (None, Reason.UNCONFIRMED)
