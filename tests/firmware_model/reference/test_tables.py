@@ -53,12 +53,13 @@ def test_a_field_that_may_have_any_value_has_no_rule() -> None:
     assert ranges == ["    {0, 0},"]
 
 
-def test_fields_that_stand_in_order_have_a_rule_with_their_places() -> None:
+def test_fields_that_stand_in_order_have_a_rule_with_their_size_and_places() -> None:
     ordered = 0
     for message in INTERFACE.telecommands:
         rules = [rule for rule in tables._rules(message, []) if rule.startswith("{RULE_ORDER")]
         for rule, pair in zip(rules, message.ordered, strict=True):
             places = [message.field(name).bit_offset // 8 for name in pair]
+            assert rule.startswith(f"{{RULE_ORDER_U{message.field(pair[0]).bits},")
             assert list(map(int, re.findall(r" (\d+),", rule)))[:2] == places
             ordered += 1
     assert ordered == 3  # a region along both axes, and the sizes of an area
