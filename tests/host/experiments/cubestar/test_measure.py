@@ -1,10 +1,15 @@
 """Frames of random skies, beside what their device did."""
 
+import json
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import ROWS
+from cubestack.host.errors import CameraFileError
+from cubestack.host.experiments.cubestar.measure import _picture_truth
 from cubestack.host.experiments.measure import measure
 
 
@@ -15,3 +20,26 @@ def test_what_crosses_a_later_frame_is_there_while_it_is_exposed() -> None:
     (debris,) = emulated.scene.hazards
     exposed_s = emulated.board.stored[-1].mid_exposure_ps(ROWS / 2) / 1e12
     assert debris.time_s == pytest.approx(exposed_s, abs=0.1)
+
+
+def camera_file(folder: Path, quaternion: list[float]) -> Path:
+    """One that knows the attitude of sky.png."""
+    path = folder / "camera.json"
+    known = {"sky.png": {"quaternion_xyzw_inertial_to_camera": quaternion}}
+    path.write_text(json.dumps({"images": known}), encoding="utf-8")
+    return path
+
+
+def test_the_truth_of_a_picture_is_that_of_its_camera_file(tmp_path: Path) -> None:
+    camera = camera_file(tmp_path, [0.5, -0.5, 0.1, 0.7])
+    truth = _picture_truth(Path("elsewhere/sky.png"), camera)
+    np.testing.assert_array_equal(truth, [0.5, -0.5, 0.1, 0.7])
+    assert _picture_truth(Path("other.png"), camera) is None
+
+
+@pytest.mark.parametrize("quaternion", [[0, 0, 1], [0, 0, 0, 0, 1], [0, 0, 0.1, 1], [1, 0, 0, 1]])
+def test_a_truth_that_is_no_unit_quaternion_is_refused(
+    quaternion: list[float], tmp_path: Path
+) -> None:
+    with pytest.raises(CameraFileError, match=r"sky\.png's quaternion must be four of unit"):
+        _picture_truth(Path("sky.png"), camera_file(tmp_path, quaternion))
