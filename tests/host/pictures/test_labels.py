@@ -65,6 +65,9 @@ def test_a_label_without_room_is_left_out_and_the_first_ones_stay() -> None:
     assert None in boxes
 
 
-def test_boxes_that_touch_do_not_overlap() -> None:
-    assert not Box(0, 0, 10, 10).overlaps(Box(10, 0, 20, 10))
-    assert Box(0, 0, 10, 10).overlaps(Box(9, 9, 20, 20))
+@pytest.mark.parametrize("beside", [(10, 0), (-10, 0), (0, 10), (0, -10)])
+def test_boxes_that_touch_do_not_overlap(beside: tuple[int, int]) -> None:
+    across, down = beside
+    assert not Box(0, 0, 10, 10).overlaps(Box(across, down, across + 10, down + 10))
+    across, down = 0.9 * across, 0.9 * down
+    assert Box(0, 0, 10, 10).overlaps(Box(across, down, across + 10, down + 10))
