@@ -40,6 +40,10 @@ def test_the_layout_fits_the_retention_registers(memories: Memories) -> None:
     assert not any(memories.retention[State.RETENTION_SIZE :])
 
 
+def test_everything_is_zero_at_power_up(memories: Memories) -> None:
+    assert {name for name in COUNTERS if getattr(state(memories).retained, name)} == set()
+
+
 def test_settings_flags_and_counters_come_back(memories: Memories) -> None:
     before = state(memories)
     before.save_config()
