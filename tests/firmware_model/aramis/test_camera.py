@@ -7,6 +7,7 @@ from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.hardware import FrameEnd
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.interface.aramis import Reason
+from cubestack.firmware_model.mcu.requests import CameraTransfer
 
 from .harness import Harness
 
@@ -66,6 +67,20 @@ def test_a_silent_or_a_strange_camera(desk: Desk) -> None:
     registers[0x00] = 0x8421  # the colour version
     assert desk.start() is Reason.CAMERA_SILENT
     assert desk.state.flags == {"CameraSilent"}
+
+
+def test_a_camera_that_tells_its_version_and_takes_no_value_is_silent(desk: Desk) -> None:
+    def read_only(request: CameraTransfer) -> bytes | None:
+        return transfer(request) if len(request.data) == 1 else None
+
+    desk.state.settings.put("SetExposure", {"Rows": 2000})
+    transfer, desk.unit.transfer = desk.unit.transfer, read_only  # type: ignore[method-assign]
+    assert desk.start() is Reason.CAMERA_SILENT
+    assert desk.state.flags == {"CameraSilent"}
+    desk.unit.transfer = transfer  # type: ignore[method-assign]
+    assert desk.start() is None
+    assert desk.unit.registers is not None
+    assert desk.unit.registers[0x09] == 2000  # what was not taken then is written now
 
 
 def test_pictures_alternate_between_two_places(desk: Desk) -> None:
