@@ -14,7 +14,7 @@ from cubestack.emulator.iss.insight.history import History
 from cubestack.emulator.iss.insight.lcov import write_lcov
 from cubestack.emulator.iss.insight.observer import Edge, Observer
 from cubestack.emulator.iss.insight.symbols import Symbols
-from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.machine import RAM_BASE, Machine
 
 PS_PER_MS = 10**9
 MOST_RUNS = 10_000
@@ -74,6 +74,18 @@ def test_calls_are_counted(observer: Observer) -> None:
     assert squares.count == 5 * works.count == observer.count_of(address(observer, "square"))
     assert squares.cycles == self_cycles(observer, "square")
     assert works.cycles == self_cycles(observer, "work") + squares.cycles
+
+
+def test_instructions_at_the_start_of_the_ram_are_counted(
+    machine: Machine, symbols: Symbols
+) -> None:
+    observer = Observer(machine, symbols)
+    machine.poke(RAM_BASE, bytes.fromhex("00bf fde7"))  # nop, and back to it
+    machine.set_register("pc", RAM_BASE)
+    for _ in range(5):
+        machine.step()
+    counts = [observer.count_of(RAM_BASE + offset) for offset in (-2, 0, 2, 4)]
+    assert counts == [0, 3, 2, 0]
 
 
 def test_an_exception_is_not_part_of_what_it_interrupts(observer: Observer) -> None:
