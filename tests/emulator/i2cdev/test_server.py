@@ -139,6 +139,19 @@ def test_a_flood_waits_in_the_operating_system(served, registers):
         served.serve()
 
 
+def test_half_a_call_behind_a_whole_one_is_waited_for_at_rest(served):
+    client, call = served.connect(), packed(linux.Call.IOCTL, SLAVE)
+    client.socket.sendall(call + call[:5])
+    for _ in range(3):
+        served.server.exchange(0)
+    assert client.receive() == (0, b"")
+    watched = [fileno for fileno, _ in served.server.watched()]
+    assert not select.select(watched, [], [], 0)[0]
+    client.socket.sendall(call[5:])
+    served.serve()
+    assert client.receive() == (0, b"")
+
+
 @pytest.mark.parametrize("cut", [1, 4, 5, 12])
 def test_a_client_that_dies_in_a_message(served, cut):
     client, other = served.connect(), served.connect()
