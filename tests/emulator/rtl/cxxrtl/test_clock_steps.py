@@ -4,12 +4,18 @@ import re
 
 import pytest
 
-from cubestack.emulator.boards.cubestar.wiring import cubestar_double_wiring, cubestar_wiring
+from cubestack.emulator.boards.cubestar.wiring import (
+    cubestar_double_wiring,
+    cubestar_two_boards_wiring,
+    cubestar_wiring,
+)
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps
 from cubestack.emulator.rtl.cxxrtl.variants import held, members, variant_text
 from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, RNW
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
 from cubestack.hdl.cubestar.top import CubeStarTop
+from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from cubestack.hdl.flow.generate import rtlil_text
 
 
@@ -62,6 +68,15 @@ def test_memories_are_followed_where_they_can_move():
     wiring = cubestar_double_wiring(CubeStarDouble(5, 3))
     # INTO is held, not known: either memory may be the one.
     assert "return 3u >> memory & 1;" in steps(wiring, variant(wiring))
+
+
+def test_the_memory_of_the_board_that_does_not_store_stays_as_it_is():
+    wiring = cubestar_two_boards_wiring(CubeStarTwoBoards(5, 3))
+    text = rtlil_text(wiring.component)
+    for levels in wiring.burst_levels[::2]:
+        (own,) = [n for n, p in enumerate(BOARD_PREFIXES) if {*levels} >= {(p + RNW, 0)}]
+        made = steps(wiring, variant_text(text, levels))
+        assert f"return {1 << own}u >> memory & 1;" in made, levels
 
 
 def test_registers_that_nothing_clocks_are_inputs():
