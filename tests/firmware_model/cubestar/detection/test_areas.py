@@ -45,6 +45,16 @@ def test_a_long_run_makes_its_area_large() -> None:
     assert found.sizes.tolist() == [areas.LONGEST_RUN, 1]
 
 
+def test_where_all_runs_are_long_the_places_are_in_the_areas() -> None:
+    mask = np.zeros((8, 100), np.bool_)
+    mask[2, 3:90] = mask[5:7, 20:80] = True
+    runs = areas.runs_of(mask)
+    found = areas.measure(runs, areas.join(runs, 100), np.empty(0, np.int64), 100)
+    assert found.large.tolist() == [True, True]
+    labels, _ = ndimage.label(mask)
+    assert labels.reshape(-1)[found.peaks].tolist() == [1, 2]
+
+
 def test_runs_lose_their_spikes() -> None:
     mask = np.zeros((3, 20), np.bool_)
     mask[1, 2:9] = mask[2, 4] = True
