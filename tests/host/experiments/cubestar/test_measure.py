@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import ROWS
 from cubestack.host.errors import CameraFileError
-from cubestack.host.experiments.cubestar.measure import _picture_truth
+from cubestack.host.experiments.cubestar.measure import CubeStarOptions, _picture_truth, _views
 from cubestack.host.experiments.measure import measure
 
 
@@ -43,3 +44,12 @@ def test_a_truth_that_is_no_unit_quaternion_is_refused(
 ) -> None:
     with pytest.raises(CameraFileError, match=r"sky\.png's quaternion must be four of unit"):
         _picture_truth(Path("sky.png"), camera_file(tmp_path, quaternion))
+
+
+def test_a_threshold_is_searched_over_five_skies_and_the_camera_looks_back() -> None:
+    own = object()
+    emulated: Any = SimpleNamespace(scene=own)
+    seen = [emulated.scene for _ in _views(emulated, CubeStarOptions(seed=4))]
+    assert len(seen) == 5
+    assert len(np.unique([view.scene.quaternion for view in seen], axis=0)) == 5
+    assert emulated.scene is own
