@@ -145,6 +145,8 @@ def test_the_sky_has_each_result_in_the_cell_where_it_was(figures: list[Any]) ->
     assert {panel.get_yticks()[0], panel.get_yticks()[-1]} == {-1, 1}
     assert list(panel.get_xticks()) == [0, 60, 120, 180, 240, 300, 360]
     assert image.get_clim() == (0, 100)
+    wide, high = figures[0].get_size_inches()
+    assert wide / high == pytest.approx(360 / 180, rel=0.05)
 
 
 def test_half_right_is_told_in_ink_that_can_be_read(figures: list[Any]) -> None:
