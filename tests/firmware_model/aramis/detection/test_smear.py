@@ -64,6 +64,13 @@ def test_streaks_around_the_boresight_are_motion() -> None:
     assert (len(kept), smear) == (5, pytest.approx(12))
 
 
+@pytest.mark.parametrize(("count", "length"), [(3, 12), (2, 0)])
+def test_three_parallel_streaks_tell_a_motion_and_two_do_not(count: int, length: float) -> None:
+    places = FIELD.centre + np.array([[100, 50], [-200, 80], [30, -250]][:count])
+    kept, smear = without_tracks(long_spots(places, np.full(count, 0.7)), FIELD, meter())
+    assert (len(kept), smear) == (count if length else 0, pytest.approx(length))
+
+
 def test_tracks_in_all_directions_are_left_out() -> None:
     rng = np.random.default_rng(1)
     spots = long_spots(FIELD.centre + rng.uniform(-300, 300, (20, 2)), rng.uniform(0, np.pi, 20))
