@@ -1,5 +1,7 @@
 """The program's buffers fit the part."""
 
+import struct
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,12 @@ def test_sizes_that_other_sources_give(buffers: tuple[Buffer, ...]) -> None:
 def test_visited_pixels_fit_at_the_limits_of_all_settings(buffers: tuple[Buffer, ...]) -> None:
     # 20 stars and 51 invalid areas of 100 pixels, 256 noise areas of 99, four bytes each
     assert size(buffers, "visited pixels") == 4 * (71 * 100 + 256 * 99)
+
+
+def test_stars_beyond_the_published_list_are_kept_whole(buffers: tuple[Buffer, ...]) -> None:
+    # 20 more: centroid, undistorted point, vector; size, intensity. The expected error of all 40.
+    more = 20 * struct.calcsize("<2f 2f 3f B H") + 40 * struct.calcsize("<f")
+    assert size(buffers, "stars beyond the published list") == more
 
 
 def test_the_reduced_list_s_size(buffers: tuple[Buffer, ...], catalogue: StarCatalogue) -> None:
