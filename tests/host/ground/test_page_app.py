@@ -146,6 +146,21 @@ def test_without_a_control_port_there_is_no_scene(served: Serving, what: str) ->
     assert json.loads(told)["error"] == "emulated:cubestar has no control port"
 
 
+def test_a_table_of_results_is_saved_as_a_file(served: Serving) -> None:
+    """Its first row names the columns."""
+    connection = http.client.HTTPConnection(*served.address, timeout=SOON_S)
+    try:
+        connection.request("GET", "/targets/0/results/csv", headers=HEADERS)
+        answer = connection.getresponse()
+        first = answer.read().decode().splitlines()[0]
+    finally:
+        connection.close()
+    assert answer.status == 200
+    assert answer.headers.get_content_type() == "text/csv"
+    assert answer.headers.get_filename() == "cubestar.csv"
+    assert first.split(",")[0] == "utc"
+
+
 def test_commands_from_a_page_touch_no_file() -> None:
     assert not {"image", "scene", "watch"} & set(FROM_A_PAGE)
 
