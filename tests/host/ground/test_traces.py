@@ -56,6 +56,14 @@ def test_spans_that_are_none(controlled: Controlled, span: str, error: str) -> N
     assert error in told["error"]
 
 
+def test_a_waveform_has_a_minute_at_most(controlled: Controlled) -> None:
+    controlled.ask("POST", "/run", {"to_s": 60.6})
+    assert controlled.emulation.trace("cubestar", 0.5, 60.5).to_s == 60.5
+    status, told = controlled.ask("GET", f"{TRACE}?from_s=0&to_s=60.5")
+    assert status == 400
+    assert "at most 60 s" in told["error"]
+
+
 def test_one_at_a_time(controlled: Controlled) -> None:
     controlled.ask("POST", "/run", {"to_s": 0.6})
     with controlled.emulation.bench._free:
