@@ -115,6 +115,8 @@ int64_t Part::run(int64_t until) {
             // A lock-up is seen as it is, before the reset that it leads to.
             if (exits && (!wanted_reset || exits & armv7m::ExitLockup))
                 break;
+            if (cpu.system->stopped_by() != armv7m::System::DebugStop::None)
+                break;
         }
     }
     return now();

@@ -1,7 +1,5 @@
 """A debugged machine: it stands while time is held, and at its program's own breakpoints."""
 
-from typing import Any
-
 import pytest
 
 from cubestack.emulator.iss.machine import Stop, StopReason
@@ -9,10 +7,14 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.sim.debugger import Debugger
 from cubestack.emulator.sim.virtual_time import Kernel
 
-from ..iss.efm32gg.bench import MS, Bench
+from ..iss.efm32gg.bench import LOOP, MS, Bench
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+CODE = 0x100
+BKPT, MOVS_R1_5, MOVS_R1_6 = 0xBE00, 0x2105, 0x2106
 
 
-@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.parametrize("attached", [False, True])
 def test_a_machine_stands_where_it_is_while_the_kernel_is_held(attached: bool) -> None:
     bench, kernel = Bench(), Kernel()
@@ -28,73 +30,43 @@ def test_a_machine_stands_where_it_is_while_the_kernel_is_held(attached: bool) -
     assert debugger.run(standing_ps + MS).now_ps >= standing_ps + MS
 
 
-class Halting:
-    """A machine whose every instruction is two bytes long; it stands at those that are BKPT."""
-
-    asleep = False
-    now_ps = 0
-
-    def __init__(self, *breakpoints: int) -> None:
-        self._own = breakpoints
-        self.breakpoints = set[int]()
-        self.pc = 0x100
-
-    def attach_debugger(self, attached: bool, catches: int = 0) -> None: ...
-
-    def register(self, _name: str) -> int:
-        return self.pc
-
-    def set_register(self, _name: str, value: int) -> None:
-        self.pc = value
-
-    def run(self, _until_ps: int) -> Stop:
-        for _ in range(8):
-            if self.pc in self._own:
-                return Stop(StopReason.HALTED, 0)
-            self.pc += 2
-        return Stop(StopReason.TIME, 0)
-
-    def step(self, _until_ps: int, _within: tuple[int, int]) -> Stop:
-        if self.pc in self._own:
-            return Stop(StopReason.HALTED, 0)
-        self.pc += 2
-        return Stop(StopReason.STEPPED, 0)
-
-
 @pytest.fixture
 def debugger() -> Debugger:
-    """At the first breakpoint of a program that has another one behind it."""
-    machine: Any = Halting(0x104, 0x10A)
-    debugger = Debugger(Kernel(), machine, lambda: None, ())
+    """Attached to a program of two BKPT, a MOVS behind each."""
+    bench = Bench()
+    debugger = Debugger(Kernel(), bench.machine, bench.reset, ())
+    program = (BKPT, MOVS_R1_5, BKPT, MOVS_R1_6, LOOP)
     debugger.attach()
-    assert run_on(debugger) == (0x104, True)
+    debugger.write(CODE, b"".join(half.to_bytes(2, "little") for half in program))
     return debugger
 
 
-def run_on(debugger: Debugger) -> tuple[int, bool]:
-    """Where it is after it was let go, and whether it stands."""
+def run_on(debugger: Debugger) -> tuple[int, int, bool]:
+    """Where it is a millisecond after it was let go at the latest, R1, and whether it stands."""
     debugger.resume()
-    debugger.run(1)
-    return debugger.register("pc"), debugger.halted is not None
+    debugger.run(debugger.machine.now_ps + MS)
+    return debugger.register("pc"), debugger.register("r1"), debugger.halted is not None
 
 
 def test_each_breakpoint_of_the_program_stops_it_once(debugger: Debugger) -> None:
-    assert debugger.kernel.paused
-    assert run_on(debugger) == (0x10A, True)
-    assert run_on(debugger) == (0x10C + 16, False)
-    assert not debugger.kernel.paused
+    debugger.set_register("r1", 0)
+    debugger.set_register("pc", CODE)
+    assert run_on(debugger) == (CODE, 0, True)
+    assert run_on(debugger) == (CODE + 4, 5, True)
+    assert run_on(debugger) == (CODE + 8, 6, False)
 
 
-def test_a_step_at_a_breakpoint_of_the_program_is_the_one_behind_it(debugger: Debugger) -> None:
+def test_a_step_at_a_breakpoint_of_the_program_is_that_behind_it(debugger: Debugger) -> None:
+    debugger.set_register("pc", CODE)
+    run_on(debugger)
     debugger.step(0, 0)
-    debugger.run(1)
-    assert (debugger.register("pc"), debugger.halted is not None) == (0x108, True)
+    debugger.run(debugger.machine.now_ps + MS)
+    assert (debugger.register("pc"), debugger.register("r1")) == (CODE + 4, 5)
+    assert debugger.halted is not None
 
 
-@pytest.mark.parametrize("chosen", [0x102, 0x106])
-def test_from_a_place_that_the_debugger_has_chosen_it_goes_on_there(
-    debugger: Debugger, chosen: int
-) -> None:
-    debugger.set_register("pc", chosen)
-    debugger.resume()
-    assert debugger.register("pc") == chosen
+def test_from_a_place_that_the_debugger_has_chosen_it_goes_on_there(debugger: Debugger) -> None:
+    debugger.set_register("pc", CODE)
+    run_on(debugger)
+    debugger.set_register("pc", CODE + 6)
+    assert run_on(debugger) == (CODE + 8, 6, False)
