@@ -1,6 +1,8 @@
 """Nodes in memory, driven by the interface tables: what host code talks to in these tests."""
 
 import shutil
+import subprocess
+import sys
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator
 from itertools import cycle
@@ -24,15 +26,16 @@ def chromium() -> Iterator[Any]:
     if program is None:
         pytest.skip("chromium is not installed")
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    try:
-        playwright = api.sync_playwright().start()
-    except Exception as error:  # its own program lacks a library of the system: libatomic1
-        pytest.skip(f"playwright does not start: {error}")
-    # In a container there is no sandbox to be had, and only our own pages are opened.
-    browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-    yield browser
-    browser.close()
-    playwright.stop()
+    # Its own program may lack a library of the system, such as libatomic1.
+    call = [sys.executable, "-m", "playwright", "--version"]
+    tried = subprocess.run(call, capture_output=True, text=True)
+    if tried.returncode != 0:
+        pytest.skip(f"playwright does not start: {tried.stderr.strip()}")
+    with api.sync_playwright() as playwright:
+        # In a container there is no sandbox to be had, and only our own pages are opened.
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()
 
 
 class FakeNode:

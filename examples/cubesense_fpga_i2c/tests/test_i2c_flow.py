@@ -36,7 +36,7 @@ def test_verilog_file(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @need_yosys
-@pytest.mark.parametrize("name", quick(counted(TOPS), 1))
+@pytest.mark.parametrize("name", counted(TOPS))
 def test_area(name: str) -> None:
     assert list(recorded_areas(AREA_FILE)) == list(counted(TOPS))
     design = counted(TOPS)[name]

@@ -1,7 +1,4 @@
-"""Upsets of a memory: how many, where, and when, for rates at which they come one by one or not.
-
-And a bit of a processor's register.
-"""
+"""Upsets of memories and of a processor's registers: how many, where, and when."""
 
 import numpy as np
 import pytest

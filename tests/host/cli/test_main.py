@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.cli import main as entry
 from cubestack.host.cli.main import COMMANDS
 from cubestack.host.cli.measure import _are_right
 from cubestack.host.cli.reports import reports
@@ -35,6 +36,16 @@ def dark_picture(path: Path, size: tuple[int, int] = (1024, 512)) -> Path:
     """A picture file, columns x rows."""
     Image.fromarray(np.zeros(size[::-1], np.uint8)).save(path)
     return path
+
+
+def test_a_command_loads_itself_alone(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = list[str]()
+    load = entry.import_module
+    monkeypatch.setattr(entry, "import_module", lambda name: loaded.append(name) or load(name))
+    assert run("-q", "registers", "cubestar").code == DONE
+    assert loaded == ["cubestack.host.cli.registers"]
+    assert run("--help").code == DONE
+    assert len(loaded) == 1 + len(COMMANDS)
 
 
 @pytest.mark.parametrize("command", [None, *COMMANDS, *reports()])

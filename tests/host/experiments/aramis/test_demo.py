@@ -98,7 +98,7 @@ def test_it_measures_lost_in_space_and_near_a_direction(
         assert (tmp_path / name).exists()
 
 
-def test_an_attitude_that_is_an_older_one_has_no_error(
+def test_a_refused_attitude_has_no_error(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     refused = replace(
