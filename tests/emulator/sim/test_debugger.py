@@ -12,7 +12,7 @@ from ..iss.efm32gg.bench import LOOP, MS, Bench
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 CODE = 0x100
-BKPT, MOVS_R1_5, MOVS_R1_6 = 0xBE00, 0x2105, 0x2106
+BKPT, MOVS_R1_5, MOVS_R1_6, UNDEFINED = 0xBE00, 0x2105, 0x2106, 0xDE00
 
 
 @pytest.mark.parametrize("attached", [False, True])
@@ -70,3 +70,14 @@ def test_from_a_place_that_the_debugger_has_chosen_it_goes_on_there(debugger: De
     run_on(debugger)
     debugger.set_register("pc", CODE + 6)
     assert run_on(debugger) == (CODE + 8, 6, False)
+
+
+def test_a_caught_fault_stops_at_its_handler_s_first_instruction() -> None:
+    bench = Bench(MOVS_R1_5, LOOP)  # of every vector
+    debugger = Debugger(Kernel(), bench.machine, bench.reset, ())
+    debugger.attach()
+    debugger.monitor("catch on")
+    debugger.write(CODE + 0x100, UNDEFINED.to_bytes(2, "little"))
+    debugger.set_register("r1", 0)
+    debugger.set_register("pc", CODE + 0x100)
+    assert run_on(debugger) == (CODE, 0, True)
