@@ -1,4 +1,4 @@
-"""Cycle costs of AraMiS' ADSP-BF533: fixed point, 600 MHz, floats in software.
+"""Cycle costs of the ADSP-BF533: fixed point, 600 MHz, floats in software.
 
 AraMiS thesis, sections 2.3.1 and 2.5.1 (the part), 7.3 and 8 (programs in MATLAB: no time on the
 part is published, so no entry can be fitted and every duration is a prediction). Clocks are those

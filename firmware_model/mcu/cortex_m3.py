@@ -1,4 +1,4 @@
-"""Cycle costs of CubeStar's EFM32GG: Cortex-M3, no floating point unit, 48 MHz.
+"""Cycle costs of the EFM32GG: Cortex-M3, no floating point unit, 48 MHz.
 
 CubeStar thesis, section 3.2 (the part). Operations cost what they take as compiled code on the
 simulated part, see ``compiled``; nothing is published about the thesis' compiler and its options.
@@ -56,4 +56,4 @@ def cortex_m3(*, clock_hz: int = 48_000_000, build: str = BUILD, timing: str = T
 
 
 CORTEX_M3 = cortex_m3()
-"""The processor of CubeStar as the thesis runs it (section 3.2): 48 MHz."""
+"""As the CubeStar thesis runs it (section 3.2): 48 MHz."""

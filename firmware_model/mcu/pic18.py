@@ -1,4 +1,4 @@
-"""Cycle costs of CubeSense's PIC18F45K20: 5 million instructions a second.
+"""Cycle costs of the PIC18F45K20: 5 million instructions a second.
 
 CubeSense thesis, section 3.2.2 (the part), 6.1.1 (Microchip's C18 compiler, an int takes twice a
 char) and 7.4 (the timer's formula, hence the instruction clock). No figures of C18's library are
@@ -94,4 +94,4 @@ def pic18f45k20() -> CostTable:
 
 
 PIC18F45K20 = pic18f45k20()
-"""The processor of CubeSense as the thesis runs it."""
+"""As the CubeSense thesis runs it."""

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "link.h"
+#include "queue.h"
 
 extern volatile bool command_running; /* the reset that it asked for included */
 extern uint8_t memory_test;           /* result of the last TestSRAM */

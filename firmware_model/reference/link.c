@@ -8,6 +8,7 @@
 #include "drivers/i2c_slave.h"
 #include "drivers/uart.h"
 #include "frames.h"
+#include "queue.h"
 #include "state.h"
 #include "telemetry.h"
 
@@ -24,9 +25,6 @@ static const struct bus_flags uart_flags = {
 static const struct bus_flags i2c_flags = {
     FLAG_I2C_TcmdBufOFError, FLAG_I2C_TCMD_TooFewParm, FLAG_I2C_TCMD_TooManyparm};
 
-static struct queued_command queue[QUEUE_DEPTH];
-static volatile unsigned put_count, taken_count;
-
 static struct frame_decoder decoder;
 static uint8_t frame[LONGEST_FRAME];
 
@@ -37,24 +35,9 @@ static struct {
     uint8_t answer[LONGEST_TELEMETRY];
 } i2c;
 
-bool link_waiting(void)
-{
-    return put_count != taken_count;
-}
-
-const struct queued_command *link_first(void)
-{
-    return &queue[taken_count % QUEUE_DEPTH];
-}
-
-void link_taken(void)
-{
-    taken_count++;
-}
-
 bool link_idle(void)
 {
-    return !frame_unfinished(&decoder) && !i2c.addressed && !link_waiting() && !uart_backlog();
+    return !frame_unfinished(&decoder) && !i2c.addressed && !queue_waiting() && !uart_backlog();
 }
 
 /* --- both buses ------------------------------------------------------------------------------- */
@@ -103,14 +86,10 @@ static uint8_t checked(uint8_t id, const uint8_t *parameters, int length,
     }
     if (!switches_allowed(id, parameters))
         return CUBESTAR_ACK_ERROR_BAD_PARAMETER;
-    if (put_count - taken_count == QUEUE_DEPTH) {
+    if (!queue_put(command, parameters)) {
         raise_flag(flags->overflow);
         return CUBESTAR_ACK_ERROR_BUFFER_FULL;
     }
-    struct queued_command *place = &queue[put_count % QUEUE_DEPTH];
-    place->command = command;
-    memcpy(place->parameters, parameters, (size_t)length);
-    put_count++;
     retained.telecommands++;
     wake();
     return CUBESTAR_ACK_ERROR_OK;

@@ -22,6 +22,7 @@
 #include "link.h"
 #include "pins.h"
 #include "processing.h"
+#include "queue.h"
 #include "state.h"
 #include "supply_monitor.h"
 
@@ -44,14 +45,14 @@ static bool serve(void)
     timer_retain();
     state_retain();
     supply_sample();
-    bool waiting = supply_cut() || link_waiting();
+    bool waiting = supply_cut() || queue_waiting();
     if (supply_cut() && supply_restore())
         sensor_power_up();
-    if (link_waiting()) {
+    if (queue_waiting()) {
         static struct queued_command command;
-        command = *link_first();
+        command = *queue_first();
         command_running = true;
-        link_taken();
+        queue_taken();
         bool ends = command_execute(&command);
         if (ends) {
             while (uart_backlog()) /* the acknowledge */
@@ -76,7 +77,7 @@ static void wait_until(uint64_t due_us)
 {
     while (retained.looping) {
         bool served = serve();
-        if (time_us() >= due_us && !link_waiting())
+        if (time_us() >= due_us && !queue_waiting())
             return;
         if (!served)
             idle(due_us);

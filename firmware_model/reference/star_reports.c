@@ -2,9 +2,11 @@
  *
  * SPDX-License-Identifier: BSD-2-Clause
  */
+#include "star_reports.h"
+
 #include "algorithms/catalogue.h"
+#include "cubestar_tables.h"
 #include "processing.h"
-#include "telemetry.h"
 
 #define NOT_IDENTIFIED 0xFFFF
 #define NO_STAR 0xFF

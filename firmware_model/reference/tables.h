@@ -22,6 +22,9 @@ struct field {
  * zero, and held within the type; not-a-number is 0 in an integer. */
 void put(uint8_t *data, struct field field, double value);
 
+/* The same, by the names of the interface, into `data`. */
+#define PUT(message, name, value) put(data, F_##message##_##name, value)
+
 #define NO_FLAG 255
 
 /* What a parameter must satisfy, if the byte at `other` is within `low` and `high`. The two orders

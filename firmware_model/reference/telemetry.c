@@ -10,9 +10,10 @@
 #include "commands.h"
 #include "drivers/clock.h"
 #include "image_sensor.h"
-#include "link.h"
 #include "phases.h"
 #include "processing.h"
+#include "queue.h"
+#include "star_reports.h"
 #include "state.h"
 #include "supply_monitor.h"
 
@@ -351,7 +352,7 @@ void telemetry_fill(const struct telemetry *message, uint8_t *data)
         memcpy(data, retained.flags, FLAG_BYTES);
         return;
     case CUBESTAR_TLM_TcmdProcessed:
-        PUT(TcmdProcessed, Processed, !link_waiting() && !command_running);
+        PUT(TcmdProcessed, Processed, !queue_waiting() && !command_running);
         return;
     case CUBESTAR_TLM_TaskStatus:
         PUT(TaskStatus, taskStatus, task_status);

@@ -10,9 +10,4 @@
 /* Fills a message that is all zero; interrupt context, so nothing here waits. */
 void telemetry_fill(const struct telemetry *message, uint8_t *data);
 
-/* The part of it about single stars, in star_reports.c; does nothing for other messages. */
-void star_report_fill(uint8_t id, uint8_t *data);
-
-#define PUT(message, name, value) put(data, F_##message##_##name, value)
-
 #endif

@@ -7,7 +7,7 @@ from cubestack.host.pictures.images import TrueStar
 from cubestack.host.pictures.sheet import Lens
 
 BRIGHT = 3.8
-"""Magnitude V below which stars are marked: CubeStar's published star list ends there."""
+"""Magnitude V below which stars are marked: where the CubeStar thesis' list ends, section 4.3.2."""
 
 
 def true_stars(

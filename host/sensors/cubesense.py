@@ -56,7 +56,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
         ),
     ),
     benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
-    overlay=call("cubestack.host.pictures.cubesense:overlay"),
+    overlay=call(f"{EXPERIMENTS}.pictures:overlay"),
     demo=get(f"{EXPERIMENTS}.demo:show"),
     fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
     campaigns=EXPERIMENTS,

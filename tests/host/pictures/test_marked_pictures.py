@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.host.clients.cubesense.client import direction
-from cubestack.host.pictures.cubesense import (
+from cubestack.host.experiments.cubesense.pictures import (
     EDGE,
     FITTED,
     annotate_nadir,

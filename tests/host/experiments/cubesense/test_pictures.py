@@ -10,7 +10,7 @@ from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.scene.earth_sun import Target
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import direction
-from cubestack.host.pictures.cubesense import (
+from cubestack.host.experiments.cubesense.pictures import (
     EDGE,
     FITTED,
     _inset,
