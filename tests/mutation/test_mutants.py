@@ -135,3 +135,20 @@ def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) 
     run, beside = ["tests/test_a.py::test_f", "test_b.py::test_g"], "test_c.py::test_h"
     assert reached.tests(at_import, set()) == [*run, *of_documents]
     assert reached.tests(at_import, {"test_c.py"}) == [*run, beside, *of_documents]
+
+
+def test_a_module_s_own_tests_are_faced_first(tmp_path: Path) -> None:
+    own = [f"tests/mutation/test_mutants.py::test_a[{number}]" for number in range(99)]
+    beside = [f"tests/mutation/test_other.py::test_b[{number}]" for number in range(99)]
+    slow, far = "tests/mutation/test_mutants.py::test_slow", "tests/test_far.py::test_c"
+    recorded = {slow: 11.0, far: 0.001} | dict.fromkeys(beside, 0.01) | dict.fromkeys(own, 0.02)
+    (tmp_path / FOLDER).mkdir(parents=True)
+    (tmp_path / FOLDER / TIMES).write_text(json.dumps(recorded), "utf-8")
+    path, data = Path("mutation/mutants.py"), CoverageData(str(tmp_path / FOLDER / DATA))
+    for test in recorded:
+        data.set_context(f"{test}|run")
+        data.add_lines({str(path): [1]})
+    data.write()
+    faced = Reached(tmp_path).tests(Mutant(path, 1, 1, 1, 0, 1, "a", "b"), set())
+    assert set(faced[:99]) == set(own)
+    assert 98 < faced.index(beside[0]) < faced.index(slow) < faced.index(far)
