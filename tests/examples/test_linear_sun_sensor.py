@@ -17,6 +17,7 @@ import pytest
 import cubestack as library
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import device
+from cubestack.host.ground import scenes
 
 from ..conftest import Run
 from .conftest import ROOT, TIMEOUT_S, Installed, installed
@@ -25,7 +26,7 @@ PROJECT = ROOT / "examples" / "linear_sun_sensor"
 SCENE = PROJECT / "scene.toml"
 TRUTH_DEG = -23.5
 TOLERANCE_DEG = 0.05
-MOST_LINES = 800
+MOST_LINES = 810
 PLUGIN = "cubestack.host.pytest_plugin"
 
 Command = Callable[..., str]
@@ -124,6 +125,22 @@ def test_a_wrong_scene_is_told(text: str, message: str, tmp_path: Path, run: Run
     outcome = run("measure", "sunslit", "--scene", tmp_path / "scene.toml")
     assert outcome.code == 2
     assert message in outcome.line
+
+
+def test_its_scenes_have_a_form_and_are_on_the_map(tmp_path: Path) -> None:
+    form = scenes.keys(device("sunslit"))
+    assert {name: key["default"] for name, key in form["kinds"]["sun-slit"].items()} == {
+        **{"sun_deg": 12.0, "brightness": 1.0},
+        **{"noise": True, "seed": 0},
+    }
+    with library.open_device("sunslit", SCENE) as emulated:
+        told = scenes.present(emulated)
+    assert told["table"]["sun_deg"] == TRUTH_DEG
+    (sun,), (array,) = told["sight"]["bodies"], told["sight"]["fields"]
+    across, _, ahead = sun["direction"]
+    assert np.degrees(np.arctan2(across, ahead)) == pytest.approx(TRUTH_DEG)
+    ends = [np.degrees(np.arctan2(one[0], one[2])) for one in array["outline"]]
+    assert (min(ends), max(ends)) == pytest.approx((-45, 45))
 
 
 def test_shell(cubestack: Command, tmp_path: Path) -> None:

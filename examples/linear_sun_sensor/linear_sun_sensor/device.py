@@ -20,6 +20,7 @@ DEVICE: Device[SunSlitBoard, SunSlit] = Device(
     client=call("linear_sun_sensor.client:SunSlit"),
     open_board=call("linear_sun_sensor.board:SunSlitBoard"),
     load_scene=call("linear_sun_sensor.scene:load_scene"),
+    scene_form=call("linear_sun_sensor.scene:scene_form"),
     default_scene=call("linear_sun_sensor.scene:SlitScene"),
     default_scene_title="the Sun at 12 degrees",
     experiment=get("linear_sun_sensor.experiment:EXPERIMENT"),
