@@ -1,14 +1,16 @@
-"""Reading another process's memory, here this process's own."""
+"""Reading another process's memory, here this process's own; answers, to a kernel of the test's."""
 
 import ctypes
 import errno
+import fcntl
 import mmap
 import os
+import struct
 from collections.abc import Iterator
 
 import pytest
 
-from cubestack.emulator.i2cdev.seccomp.notify import read_text
+from cubestack.emulator.i2cdev.seccomp.notify import Listener, Notification, read_text
 
 PROT_NONE = 0
 
@@ -42,3 +44,21 @@ def test_a_text_that_runs_into_forbidden_memory(end_of_page: int) -> None:
     with pytest.raises(OSError, match="process") as caught:
         read_text(os.getpid(), end_of_page - 9, 8192)
     assert caught.value.errno == errno.EFAULT
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EBADF])
+def test_a_call_whose_descriptor_can_not_be_put_in_ends_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    answers: list[tuple[int, ...]] = []
+
+    def ioctl(_fd: int, request: int, argument: object) -> None:
+        if request & 0xFF == 3:  # SECCOMP_IOCTL_NOTIF_ADDFD
+            raise OSError(number, os.strerror(number))
+        if isinstance(argument, bytes):  # struct seccomp_notif_resp: id, val, error, flags
+            answers.append(struct.unpack("=QqiI", argument))
+
+    monkeypatch.setattr(fcntl, "ioctl", ioctl)
+    call = Notification(7, os.getpid(), 257, (0,) * 6)
+    Listener(-1).answer_with_descriptor(call, 4, 960, close_on_exec=False)
+    assert answers == [(7, 0, -number, 0)]
