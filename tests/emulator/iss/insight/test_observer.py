@@ -117,11 +117,12 @@ def test_an_observed_machine_does_the_same(machine: Machine, observer: Observer)
     other.close()
 
 
-def test_the_profile_has_all_cycles_by_function_and_line(observer: Observer) -> None:
+def test_the_profile_has_all_cycles_by_function_and_line(observer: Observer, program: Path) -> None:
     stream = io.StringIO()
     write_callgrind(observer, stream)
     text = stream.getvalue()
     counted = sum(int(code.cycles.sum()) for code in observer.codes)
+    assert f"\ncmd: {program}\n" in text
     assert f"totals: {counted}\n" in text
     inside = re.sub(r"calls=.*\n.*\n", "", text)
     assert sum(int(cost) for cost in re.findall(r"^\d+ (\d+)$", inside, re.M)) == counted
