@@ -90,6 +90,18 @@ def test_times_are_those_of_the_wire(tmp_path):
     assert recording.transfers[0].messages[1].data == b"\x81\x82\x83"
 
 
+def test_bytes_without_a_gap_are_one_event(tmp_path):
+    device, path = Device(), tmp_path / "a.rec"
+    device.uart.on_byte = lambda _byte: None
+    with recorded(path, device):
+        device.uart.host_writes(b"abc")
+        device.kernel.run()
+        device.kernel.advance_to(device.kernel.now + 5)
+        device.uart.host_writes(b"de")
+        device.kernel.run()
+    assert [event.data for event in load_recording(path).line("uart")] == [b"abc", b"de"]
+
+
 def test_other_answers_are_named(tmp_path):
     recording = record(tmp_path / "a.rec", [(0, b"\x1f\x7f\x80\x1f\xff")])
     differences = Device(answer=2).replay(recording)
