@@ -73,7 +73,7 @@ def test_address_moving_inside_a_pulse_writes_both():
     assert sram.memory[5] == sram.memory[6] == 0xA5
 
 
-@pytest.mark.parametrize(("early", "broken"), [(T.data_setup_ps, False), (5_999, True)])
+@pytest.mark.parametrize(("early", "broken"), [(6_000, False), (5_999, True)])
 def test_data_setup(early, broken):
     sram = make(
         (START, writing(5, 0x11)),
@@ -91,11 +91,7 @@ def test_writing_a_floating_bus():
 
 @pytest.mark.parametrize(
     ("before", "limit"),
-    [
-        (reading(4), T.access_ps),
-        (SramPins(7, ce_n=1, oe_n=0), T.access_ps),
-        (idle(7), T.output_enable_ps),
-    ],
+    [(reading(4), 12_000), (SramPins(7, ce_n=1, oe_n=0), 12_000), (idle(7), 6_000)],
     ids=["address", "chip enable", "output enable"],
 )
 @pytest.mark.parametrize("late", [0, 1])
@@ -119,7 +115,7 @@ def test_bus_contention_is_reported_once(first):
     assert found(sram) == [("bus-contention", START, 7)]
 
 
-@pytest.mark.parametrize(("pause", "broken"), [(T.output_disable_ps, False), (5_999, True)])
+@pytest.mark.parametrize(("pause", "broken"), [(6_000, False), (5_999, True)])
 def test_turnaround(pause, broken):
     sram = make((0, reading(7)), (START, idle(7)), (START + pause, idle(7, 0x33)))
     assert found(sram) == [("turnaround", START + pause, 7)] * broken
