@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.aramis.detection.regions import find_regions
+from cubestack.firmware_model.aramis.detection.spots import find_spots
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, detect_locally
 from cubestack.firmware_model.aramis.solution import StarList
 
@@ -102,6 +104,23 @@ def test_a_disc_counts_once_at_most() -> None:
     false = np.abs(apart(stars, places)).max(axis=1) > 1
     assert false.sum() <= 1
     assert len(stars) > 30
+
+
+def test_the_angle_is_that_of_the_streak() -> None:
+    """Turned by less and by more than the diagonal, to either side."""
+    angles = np.radians([20, 70, 110, 160])
+    ahead = np.linspace(-8, 8, 17)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], -1)
+    middles = np.column_stack([[400, 500, 600, 700], np.full(4, 500)])
+    image = spots((middles + ahead).reshape(-1, 2), 400.0)
+    streaks = find_spots(image, find_regions(image > 15, meter()), NOISE, (20, 400), meter())
+    order = np.argsort(streaks.centroids[:, 0])
+    np.testing.assert_allclose(streaks.angle[order], angles, atol=0.03)
+
+
+def test_a_picture_of_more_stripes_than_can_be_listed_has_no_regions() -> None:
+    stars = found(np.where(X % 30 < 3, 200, 6).astype(np.uint8))
+    assert stars.light is not None
+    assert (len(stars), stars.light.rejected, stars.light.widest) == (0, 0, 0)
 
 
 def test_a_full_picture_has_no_stars() -> None:
