@@ -74,6 +74,7 @@ def test_what_speaks_for_an_attitude_and_what_against() -> None:
     more_missing = [false_alarm(1.0, 2 + m, 2, 1e-3, meter()) for m in range(10)]
     assert all(b > a for a, b in pairwise(more_missing))
     assert by_chance(20, 0.001, 0.4) == pytest.approx(20 * np.pi * 1e-6 / 0.4)
+    assert by_chance(20, 0.1, 0.4) == 0.5  # 20 circles of 0.03 sr more than fill the picture
 
 
 @pytest.mark.parametrize("with_scale", [False, True])

@@ -35,6 +35,18 @@ def test_it_is_that_of_the_lens(factor: float) -> None:
     assert 500 < np.count_nonzero(inside) < 3500
 
 
+def test_it_ends_at_the_outer_edges_of_the_pixels() -> None:
+    focal_px, middle = 1000.0, np.array([COLUMNS / 2, ROWS / 2]) - 0.5
+    camera = CameraParameters(6.0, focal_px, focal_px, *middle, 0, 0, 0, 0, pitch_mm=0.006)
+    field = field_of(camera, COLUMNS, ROWS)
+    for corner in ([-0.5, -0.5], [COLUMNS - 0.5, ROWS - 0.5]):
+        inwards = np.sign(middle - corner)
+        for axis in ([1, 0], [0, 1]):
+            pixels = corner + 9 * inwards + np.outer([-8.8, -9.2], inwards) * axis
+            rays = np.column_stack([(pixels - middle) / focal_px, np.ones(2)]).astype(np.float32)
+            assert field.contains(rays, Meter(CORTEX_M3)).tolist() == [True, False]
+
+
 def test_its_solid_angle_is_the_part_of_the_sphere() -> None:
     rng = np.random.default_rng(2)
     rays = rng.normal(size=(400_000, 3))
