@@ -23,14 +23,14 @@ def circle(count: int, noise_px: float = 0.0, arc_deg: float = 360.0) -> Points:
     return np.array(TRUE[:2]) + radius[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
-def found(points: Points, moved: int = 0) -> Limb:
+def found(points: Points, moved: int = 0, allowed: Tolerances = ALLOWED) -> Limb:
     """The limb among points, of which the last ``moved`` are far off."""
     points = points.copy()
     points[len(points) - moved :] += np.array([[30, 5], [-40, 20], [10, -50]])[:moved]
     inwards = np.sign(np.array(TRUE[:2]) - points)
     sides = np.where(np.arange(2) == (np.arange(len(points)) % 2)[:, None], inwards, 0)
     limb = find_limb(
-        points.astype(np.float32), sides.astype(np.int8), ALLOWED, TANGENTS, Meter(PIC18F45K20)
+        points.astype(np.float32), sides.astype(np.int8), allowed, TANGENTS, Meter(PIC18F45K20)
     )
     assert limb is not None
     return limb
@@ -91,3 +91,11 @@ def test_edges_left_out_and_residuals_make_it_less_sure() -> None:
     expected = (0.09 + 4 * (posterior - 0.09)) * (1 + 40 / 289) * np.linalg.inv(jac.T @ jac)
     assert limb.rms_px == pytest.approx(1.0, abs=0.01)
     assert limb.covariance == pytest.approx(expected, rel=0.02, abs=1e-4)
+
+
+def test_residuals_are_those_after_the_last_step() -> None:
+    points = circle(28)
+    points[0] += 0.2 * (points[0] - TRUE[:2]) / TRUE[2]
+    limb = found(points, allowed=Tolerances(on_px=0.1, good_rms_px=1.0, usual_px=0.3))
+    assert limb.on.tolist() == [False] + [True] * 27  # one step brings the circle onto these
+    assert limb.rms_px < 0.001

@@ -91,6 +91,15 @@ def test_edges_on_a_line_are_a_bad_fit(published: NadirConfig) -> None:
     assert measure(picture, published, no_columns).detect is DetectResult.BAD_FIT
 
 
+def test_without_a_circle_all_edges_are_dropped(ours: NadirConfig, meter: Meter) -> None:
+    picture = np.zeros((ROWS, COLUMNS), np.uint8)
+    picture[:, 371:] = 200
+    edges = edges_in(picture, meter)
+    result = find_nadir(edges, ours, meter)
+    assert (result.detect, result.reason) == (DetectResult.BAD_FIT, Reason.NO_CIRCLE)
+    assert (result.edges, result.dropped) == (0, len(edges))
+
+
 def test_a_few_false_edges_are_dropped(ours: NadirConfig) -> None:
     picture = earth(10, 5)
     clean = measure(picture, ours)
