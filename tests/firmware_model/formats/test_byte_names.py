@@ -8,6 +8,7 @@ from cubestack.firmware_model.formats import byte_names
 from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubesense import INTERFACE
+from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
 
 def recording(*exchanges: tuple[bytes, bytes], port: str = "uart") -> Recording:
@@ -33,15 +34,16 @@ def test_offset_of_every_payload_byte(payload, before):
     assert byte_names.payload_offset(wire, len(before)) is None
 
 
-def test_every_telemetry_field_is_found():
-    for message in INTERFACE.telemetries:
+@pytest.mark.parametrize("interface", [INTERFACE, CUBESTAR], ids=lambda one: one.name)
+def test_every_telemetry_field_is_found(interface):
+    for message in interface.telemetries:
         if not message.supported:
             continue
         answer = encode_frame(bytes(message.length))
         whole = recording((encode_frame(bytes([message.id])), answer))
         for field in message.fields:
             index = 2 + field.bit_offset // 8
-            name = byte_names.name_answer_byte(INTERFACE, whole, "uart", index)
+            name = byte_names.name_answer_byte(interface, whole, "uart", index)
             assert f"telemetry {message.name}, field" in name
             assert field.name in name
 

@@ -24,6 +24,7 @@ def test_numbers_are_those_of_smbus2():
     for size in set(table.SmbusSize) - {table.SmbusSize.I2C_BLOCK_BROKEN}:
         assert size == getattr(smbus2, f"I2C_SMBUS_{size.name}".replace("PROCESS", "PROC"))
     assert table.MessageFlag.READ == smbus2.I2C_M_RD
+    assert table.MessageFlag.TEN_BIT == 0x0010  # I2C_M_TEN in Linux's uapi/linux/i2c.h
     assert table.MAX_BLOCK_BYTES == smbus2.I2C_SMBUS_BLOCK_MAX
     assert ctypes.sizeof(smbus2.union_i2c_smbus_data) == table.SMBUS_DATA_BYTES
 
