@@ -36,6 +36,29 @@ def test_every_published_register_is_declared_where_it_is() -> None:
     assert all(r.unit_bits == 16 and r.width == 1 for r in mt9m001.REGISTERS)
 
 
+# The same, bits of the registers of read options.
+PUBLISHED_BITS = {
+    "READ_OPTIONS_1": {
+        "COLUMN_SKIP_4": 2,
+        "ROW_SKIP_4": 3,
+        "COLUMN_SKIP_8": 4,
+        "ROW_SKIP_8": 5,
+        "SNAPSHOT": 8,
+        "STROBE": 9,
+        "STROBE_WIDTH": 10,
+        "STROBE_OVERRIDE": 11,
+    },
+    "READ_OPTIONS_2": {"BAD_FRAMES": 0, "COLUMN_SKIP_2": 3, "ROW_SKIP_2": 4},
+}
+
+
+@pytest.mark.parametrize("name", list(PUBLISHED_BITS))
+def test_published_switches_are_one_bit_each(name: str) -> None:
+    masks = {field.name: field.mask for field in mt9m001.REGISTERS[name].fields}
+    for field, bit in PUBLISHED_BITS[name].items():
+        assert masks[field] == 1 << bit
+
+
 def test_published_frame_time() -> None:
     line = mt9m001.COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
     assert line / mt9m001.PIXEL_CLOCK_HZ == pytest.approx(31.75e-6)
