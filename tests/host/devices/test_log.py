@@ -3,6 +3,7 @@
 import csv
 import io
 from itertools import islice
+from types import SimpleNamespace as Namespace
 
 import numpy as np
 import pytest
@@ -87,6 +88,26 @@ def test_the_command(run: Run) -> None:
     assert {line["nadir_alpha_deg"] for line in lines} == {""}
     assert "sun_alpha_deg: 0.0" in err
     assert "4 of 4 lines" in err
+
+
+def test_lines_before_the_first_result_are_written_with_it(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    errors = ["no answer", "busy", None, "late", None]
+    lines: list[Columns] = [
+        {"time_s": float(number), "error": error} for number, error in enumerate(errors)
+    ]
+    lines[2]["alpha_deg"] = lines[4]["alpha_deg"] = 1.5
+    device = Namespace(client=lambda _node: None)
+    target = Namespace(device=device, node=None, controls=None, close=lambda: None)
+    shell = Namespace(execute=lambda _command: None)
+    for name, it in (("open_any_target", target), ("Shell", shell), ("log_lines", iter(lines))):
+        monkeypatch.setattr(f"cubestack.host.cli.log.{name}", lambda *_, _it=it, **_options: _it)
+    code, out, _ = run("log", "emulated:cubesense", "--count", "5")
+    written = list(csv.DictReader(io.StringIO(out)))
+    assert code == 1
+    assert [line["error"] or None for line in written] == errors
+    assert [line["alpha_deg"] for line in written] == ["", "", "1.5", "", "1.5"]
 
 
 @pytest.mark.parametrize(

@@ -196,3 +196,15 @@ def test_a_file_that_makes_no_device_any_more_leaves_all_as_it_is(make, tmp_path
         past.begin_again(0)
     assert devices == [device]
     assert not past.again
+
+
+def test_a_record_that_was_ended_has_all_that_was_said_and_nothing_later(make):
+    devices, past = make("cubesense")
+    path = past.file(0)
+    talk(devices[0], 7)
+    past.close()
+    ended = path.read_bytes()
+    said, _ = load_recording(path).sent("uart", "device")
+    assert said.endswith(bytes([0x1F, 0xFF]))  # the last answer is whole
+    talk(devices[0], 8)
+    assert path.read_bytes() == ended
