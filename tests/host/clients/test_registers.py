@@ -98,6 +98,7 @@ class Line:
 
     def __init__(self, answer: bytes, failures: int = 0) -> None:
         self.answer, self.failures, self.written = answer, failures, b""
+        self.waited_s = 0.0
         self._coming = b""
 
     def write(self, data: bytes) -> None:
@@ -106,6 +107,7 @@ class Line:
         self._coming = self.answer if self.failures < 0 else self.answer[:1]
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        self.waited_s += 0 if self._coming else timeout_s
         count = min(max_bytes, 5000) if timeout_s else 0
         data, self._coming = self._coming[:count], self._coming[count:]
         return data
@@ -124,6 +126,7 @@ def test_registers_on_a_serial_line() -> None:
     assert client.read("nadir_x") == -12.34
     client.write("SUN_THRESHOLD", 85)
     assert line.written[4:] == bytes([0x39, REGISTERS["NADIR_X"].address, 0x38, 0, 85])
+    assert line.waited_s == 1.0  # for the rest of the answer that failed; never before a request
     line.answer = b""
     with pytest.raises(NoAnswerError, match="register SUN_X not acknowledged at I2C address 0x1c"):
         client.read("SUN_X")
