@@ -117,6 +117,17 @@ def test_stars_in_noise_are_as_far_off_as_expected() -> None:
     assert np.mean(sizes < 3) > 0.97
 
 
+@pytest.mark.parametrize(("sigmas", "fewest", "most"), [(3.0, 0, 2), (4.5, 15, 18)])
+def test_areas_count_from_four_sigmas_on(sigmas: float, fewest: int, most: int) -> None:
+    image = np.random.default_rng(14).normal(60, 4, (512, 1024))
+    _, places = sky(14)
+    for x, y in places.astype(int):
+        image[y - 3 : y + 4, x - 3 : x + 4] = 60  # no noise here
+        image[y - 1 : y + 2, x - 1 : x + 2] = 60 + 4 * sigmas
+    # The noise, measured in each cell, is 4 DN and a tenth more or less.
+    assert fewest <= len(places) - missing(search(taken(image)), places, 1.0) <= most
+
+
 def test_twenty_thousand_hot_pixels_hide_no_bright_star_and_make_few() -> None:
     image, places = sky(5)
     rng = np.random.default_rng(5)

@@ -260,3 +260,14 @@ def test_the_longest_time_is_kept(lit: Harness) -> None:
     lit.command("DetectStars")
     times = lit.telemetry("DetectionTimingTwo")
     assert 0 < times["StarDetectionTime"] < times["MaxStarDetectionTime"]
+
+
+def test_each_phase_took_as_long_as_its_cycles(lit: Harness) -> None:
+    lit.command("CaptureAndProcess")
+    processing = lit.program.commands.processing
+    measured = lit.meter.phases.keys() & processing.latest_ms.keys()
+    assert {"distances", "verification"} <= measured
+    for phase in measured:
+        spent_ms = 1000 * lit.meter.phases[phase] / lit.meter.table.clock_hz
+        assert processing.latest_ms[phase] == pytest.approx(spent_ms, abs=0.001)
+        assert processing.longest_ms[phase] == processing.latest_ms[phase]
