@@ -1,6 +1,7 @@
 """Texts that name targets: what opens, and what is said of those that do not."""
 
 import os
+from unittest.mock import Mock
 
 import pytest
 
@@ -8,8 +9,10 @@ from cubestack.firmware_model.formats import recording
 from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, LineBytes
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.devices import targets
 from cubestack.host.devices.targets import open_target
 from cubestack.host.errors import PortOpenError, RecordingMismatchError, TargetError
+from cubestack.host.transport.streams import Transport
 
 
 @pytest.mark.parametrize(
@@ -96,3 +99,20 @@ def test_service_port_of_a_device_without_one():
         open_target(os.ttyname(slave), "cubestar", service_port="x")
     os.close(slave)
     os.close(master)
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_both_lines_are_opened_and_recorded_until_they_are_closed(tmp_path, monkeypatch, recorded):
+    ports = {"a": Mock(Transport), "b": Mock(Transport)}
+    monkeypatch.setattr(targets, "open_transport", lambda text, _baud: ports[text])
+    path = tmp_path / "a.rec" if recorded else None
+    target = open_target("a", "cubesense", service_port="b", record=path)
+    target.service_port.write(b"q")
+    ports["b"].write.assert_called_once_with(b"q")
+    ports["a"].close.side_effect = lambda: target.line.write(b"bye")
+    target.close()
+    ports["b"].close.assert_called_once_with()
+    if path is not None:
+        tape = recording.load_recording(path)
+        said = [tape.sent(port, "host")[0] for port in ("uart", "bench_uart")]
+        assert said == [b"bye", b"q"]
