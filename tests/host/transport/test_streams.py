@@ -91,6 +91,20 @@ def test_a_server_that_is_started_again_is_found_again(tcp_line: Ends, reopens: 
             assert transport.read(10, 5.0) == b"again"
 
 
+def test_the_old_connection_ends_before_a_new_one_is_tried(tcp_line: Ends) -> None:
+    """Or a server that takes one client at a time would never take the next."""
+    transport, peer = tcp_line
+    assert isinstance(transport, streams.TcpTransport)
+    transport.reopens = True
+    with socket.socket(fileno=os.dup(peer.fileno())) as server_side:
+        server_side.settimeout(5.0)
+        server_side.shutdown(socket.SHUT_WR)
+        for error in ("the other side closed", "refused"):
+            with pytest.raises(PortClosedError, match=error):
+                transport.read(10, 5.0)
+        assert server_side.recv(10) == b""
+
+
 @pytest.mark.parametrize(
     ("target", "message"),
     [
