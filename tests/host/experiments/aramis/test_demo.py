@@ -19,6 +19,8 @@ from cubestack.firmware_model.interface.aramis import (
     MeasurementOutcome,
     Reason,
 )
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
+from cubestack.firmware_model.interface.codec.switches import Switches
 from cubestack.host.clients.aramis.client import Attitude
 from cubestack.host.experiments.aramis import demo
 
@@ -44,6 +46,7 @@ class Tracker:
     def __init__(self, *attitudes: Attitude) -> None:
         self.near = list[NDArray[np.float64] | None]()
         self._attitudes = iter(attitudes)
+        self.switches: Switches | None = None
 
     def activate(self) -> CatalogueState:
         return CatalogueState.GOOD
@@ -58,7 +61,8 @@ class Tracker:
     def stars(self) -> list[Any]:
         return []
 
-    def profile(self) -> None: ...
+    def profile(self) -> Switches | None:
+        return self.switches
 
     def image(self, _progress: object) -> NDArray[np.uint8]:
         return np.zeros((8, 10), np.uint8)
@@ -107,3 +111,22 @@ def test_a_refused_attitude_has_no_error(
     assert show(monkeypatch, tmp_path, Tracker(FOUND, refused)) is False
     told = capsys.readouterr().out.splitlines()
     assert "with a direction 2° off: ambiguous: several" in told
+
+
+@pytest.mark.parametrize(
+    ("switches", "left_out"),
+    [
+        (AramisSwitches(belief="unique"), ["names of stars outside the triangle that was unique"]),
+        (AramisSwitches(belief="confirmed"), []),
+        (None, []),
+    ],
+)
+def test_the_picture_tells_that_only_a_triangle_has_names(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, switches: Switches | None, left_out: list[str]
+) -> None:
+    told = list[Any]()
+    monkeypatch.setattr(demo, "annotate", lambda *given: told.append(given[4]))
+    tracker = Tracker(FOUND, FOUND)
+    tracker.switches = switches
+    show(monkeypatch, tmp_path, tracker)
+    assert told == [left_out]
