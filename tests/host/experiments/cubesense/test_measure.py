@@ -1,0 +1,15 @@
+"""One measurement beside the truth: what is told of each sensor."""
+
+import pytest
+
+from cubestack.host.experiments.measure import measure
+
+
+@pytest.mark.parametrize(
+    ("sensor", "told", "other"), [("sun", "sun_pixels", "edges"), ("nadir", "edges", "sun_pixels")]
+)
+def test_what_was_found_is_told_under_its_own_name(sensor: str, told: str, other: str) -> None:
+    (result,) = measure("cubesense", frames=1, sensor=sensor)
+    assert result.sensor == sensor
+    assert getattr(result, told) > 0
+    assert getattr(result, other) is None
