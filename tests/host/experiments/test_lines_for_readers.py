@@ -179,6 +179,7 @@ def test_the_longest_step_is_told_beside_its_limit() -> None:
 def test_advice_goes_by_how_many_stars_were_found(stars: int, advice: str) -> None:
     results = [star_tracker(centroids=count) for count in (0, stars, 99)]
     assert cubestar.EXPERIMENT.advice(results).startswith(advice)
+    assert cubestar.EXPERIMENT.advice([star_tracker(centroids=stars)]).startswith(advice)
 
 
 LAYOUT = LayoutResult(
