@@ -100,12 +100,14 @@ def test_each_layout_has_its_registers(layout: str) -> None:
     results = measured(
         *("cubestar", cubestar.EXPERIMENT),
         **{"layout": layout, "registers": "*store", "memory_bits": 1},
+        **{"flux": 4.0, "cross_section": 0.25},
     )
     assert {result.phase for result in results} == {"storing", "between", "reading"}
     assert len({one.target for one in results if one.memory}) == (1 if layout == "2" else 2)
     assert {one.effect for one in results if one.phase == "storing"} - {"nothing"}
     for result in results:
         assert sum(result.phases_s.values()) == pytest.approx(result.period_s)
+        assert result.hits_a_day == 24 * 60 * 60
 
 
 @pytest.mark.parametrize("gateware", quick(["as-flown", "corrected"], 1))

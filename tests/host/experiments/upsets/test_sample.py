@@ -16,6 +16,7 @@ from cubestack.host.experiments.upsets.sample import (
     Running,
     Target,
     Upset,
+    UpsetResult,
     effect_of,
     followed,
 )
@@ -58,6 +59,19 @@ def changed(*places: int) -> Snapshot:
 )
 def test_the_gravest_is_told(found: Snapshot, effect: Effect) -> None:
     assert effect_of(found, CLEAN, ROW) == effect
+
+
+@pytest.mark.parametrize(
+    ("answer", "right", "solved"),
+    [("right", True, True), ("wrong", False, True), ("refused", False, False)],
+)
+def test_a_wrong_answer_is_one_and_a_refusal_is_none(
+    answer: Answer, right: bool, solved: bool
+) -> None:
+    one = UpsetResult(
+        *("row", 0, False, "idle", 1.0, "nothing", answer, "", 0), *({"idle": 1.0}, 1.0, 9, 2.0)
+    )
+    assert (one.right, one.solved) == (right, solved)
 
 
 class Device:
