@@ -1,0 +1,47 @@
+"""What pages learn of the link: an answer that is a refusal is an answer."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.targets import Target
+from cubestack.host.errors import CommandRefusedError, NoAnswerError
+from cubestack.host.ground.desk import Desk, Link
+
+from ..conftest import FakeCubeStar, UartLink
+
+
+class Behind:
+    """A desk, and the node at the far end of its line."""
+
+    def __init__(self) -> None:
+        self.node = FakeCubeStar()
+        line = UartLink(self.node)
+        self.desk = Desk(Target("fake", INTERFACE, NodeClient(line, INTERFACE), line))
+
+
+@pytest.fixture
+def behind() -> Iterator[Behind]:
+    one = Behind()
+    yield one
+    one.desk.close()
+
+
+def test_a_refusal_is_told_and_the_link_is_whole(behind: Behind) -> None:
+    behind.node.refusals.append(AckError.BAD_PARAMETER)
+    with pytest.raises(CommandRefusedError, match="CaptureAndProcess refused: BAD_PARAMETER"):
+        behind.desk.do("write CaptureAndProcess").result()
+    assert behind.desk.link == Link()
+
+
+def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) -> None:
+    behind.node.lost = 100
+    with pytest.raises(NoAnswerError):
+        behind.desk.do("read TaskStatus").result()
+    link = behind.desk.link
+    assert (link.failed, link.broken) == (1, True)
+    behind.node.lost = 0
+    behind.desk.do("read TaskStatus").result()
+    assert (link.failed, link.broken) == (1, False)
