@@ -36,7 +36,7 @@ def test_every_published_register_is_declared_where_it_is() -> None:
     assert all(r.unit_bits == 16 and r.width == 1 for r in mt9m001.REGISTERS)
 
 
-# The same, bits of the registers of read options.
+# MT9M001 data sheet, bits of the registers of read options.
 PUBLISHED_BITS = {
     "READ_OPTIONS_1": {
         "COLUMN_SKIP_4": 2,
