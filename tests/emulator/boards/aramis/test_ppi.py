@@ -116,7 +116,9 @@ def test_starting_again_gives_up_the_frame_before() -> None:
     bench.ppi.start(bench.target)
     bench.run(BLANK + 2 * LINE)
     bench.ppi.start(other)
+    assert bench.ppi.busy
     assert [end for _, end in bench.run(3 * FRAME)] == [FrameEnd.STORED]
+    assert not bench.ppi.busy
     assert (bench.target == 99).all()
     assert (other == 2).all()
 

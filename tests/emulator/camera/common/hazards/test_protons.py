@@ -7,6 +7,7 @@ from cubestack.emulator.camera.common.hazards.contract import Exposure
 from cubestack.emulator.camera.common.hazards.protons import (
     PAIR_EV,
     Protons,
+    _tracks,
     lost_kev,
     mean_loss_kev,
 )
@@ -41,6 +42,17 @@ def test_least_ionising_protons_free_some_fifty_electrons_a_um_in_thin_layers() 
     assert thick * 1000 / PAIR_EV == pytest.approx(80, rel=0.1)
 
 
+def test_the_most_probable_loss_is_below_the_mean_by_landaus_curve() -> None:
+    # Its peak is at -0.223: loss - mean = xi (-0.223 + 0.423 + beta^2 + ln(xi / largest)), keV.
+    gamma = 1 + 1000 / 938.27
+    beta2 = 1 - gamma**-2
+    xi, largest = 0.01783 * 8 / beta2, 1022 * (gamma**2 - 1) / 1.0023
+    peak = 1.77 * 0.2329 * 8 + xi * (0.2 + beta2 + np.log(xi / largest))
+    lost = lost_kev(1000 * np.ones(40_000), 8 * np.ones(40_000), drawn(4))
+    # Half of Moyal's curve, which stands in for it, is beyond 0.787 xi above the peak.
+    assert np.median(lost) - 0.787 * xi == pytest.approx(peak, abs=0.1)
+
+
 def test_slow_protons_free_thousands() -> None:
     many = np.ones(20_000)
     electrons = lost_kev(20 * many, 8 * many, drawn(3)) * 1000 / PAIR_EV
@@ -50,8 +62,11 @@ def test_slow_protons_free_thousands() -> None:
 
 
 def test_as_many_hits_as_rate_area_and_exposure_say() -> None:
-    # 0.1644 cm2 for 0.3856 s at 500 / (cm2 s).
+    # 0.1644 cm2 for 0.3856 s at 500 / (cm2 s), and at 3000 over a pole.
     assert Protons().mean_hits(CUBESTAR) == pytest.approx(31.7, rel=0.01)
+    area = 512 * 1024 * 5.6e-4**2
+    solar = Protons(orbit="solar").mean_hits(CUBESTAR)
+    assert solar == pytest.approx(3000 * area * 0.3856, rel=1e-5)
     quiet = Protons(orbit="quiet")
     hit = sum(bool(charge(quiet, seed).any()) for seed in range(400))
     assert hit / 400 == pytest.approx(1 - np.exp(-0.0634), abs=0.04)
@@ -82,6 +97,13 @@ def test_charge_of_all_tracks_is_what_they_lost() -> None:
     near = (lost_kev(energies, paths, generator) * 1000 / PAIR_EV).sum()
     # Delta rays leave a few percent more; some charge falls beside the sensor.
     assert 0.9 * near < total < 1.2 * near
+
+
+def test_a_track_has_its_charge_evenly_about_its_middle() -> None:
+    starts, along = np.array([[60.0, 20.0]]), np.array([[900.0, 450.0]])
+    image = _tracks(starts, along, 1e6 * ONE, CUBESTAR, drawn(5))
+    middle = [np.average(axis, weights=image) for axis in np.indices(image.shape)[::-1]]
+    np.testing.assert_allclose(middle, [510, 245], atol=0.006)
 
 
 def test_the_same_frame_has_the_same_tracks_and_another_has_others() -> None:
