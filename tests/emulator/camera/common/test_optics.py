@@ -150,6 +150,26 @@ def test_impossible_lenses_are_refused(changes: dict[str, Any], complaint: str) 
         replace(LENS, **changes)
 
 
+@pytest.mark.parametrize(("cx", "cy"), [(24, 20), (24, 28), (40, 20), (40, 28)])
+def test_a_picture_may_fold_right_outside_of_the_outermost_pixel(cx: float, cy: float) -> None:
+    """r + k1 r^3 turns back where 3 k1 r^2 = -1; the farthest corner may be as near as that."""
+    across, down = max(cx + 0.5, 63.5 - cx), max(cy + 0.5, 47.5 - cy)
+    turn = -(LENS.fx**2) / (3 * (across**2 + down**2))
+    small = {
+        "columns": 64,
+        "rows": 48,
+        "cx": cx,
+        "cy": cy,
+        "fy": LENS.fx,
+        "k2": 0,
+        "p1": 0,
+        "p2": 0,
+    }
+    replace(LENS, k1=0.99 * turn, **small)
+    with pytest.raises(ValueError, match="folds the picture within the sensor"):
+        replace(LENS, k1=1.01 * turn, **small)
+
+
 def test_the_firmware_is_calibrated_to_the_lens() -> None:
     commands = "FocalLength FocalLengthComponents PrincipalPoint RadialDistortionGains"
     reset = {

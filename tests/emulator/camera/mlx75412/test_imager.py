@@ -180,3 +180,5 @@ def test_photograph_is_light_as_it_is_but_scales_in_the_undefined_frame(
 def test_photograph_with_a_known_exposure_scales(striped: PictureScene) -> None:
     known = replace(striped, exposure_ms=LONG.exposure_s * 2000)
     np.testing.assert_allclose(picture(known), striped.pixels // 2, atol=1)
+    longer = replace(striped, exposure_ms=LONG.exposure_s * 8000 / 7)
+    np.testing.assert_array_equal(picture(longer), striped.pixels * 7.0 // 8)

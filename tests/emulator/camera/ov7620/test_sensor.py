@@ -174,6 +174,19 @@ def test_colour_mode_has_less_detail_from_row_to_row() -> None:
 def test_automatic_functions_after_reset_bring_the_mean_to_their_level() -> None:
     assert 85 < picture(quiet(EarthSunScene())).mean() < 110  # the brightest pixels may saturate
     assert quiet(EarthSunScene(sun=(0, 0, 1))).frame_from(100 * MS).exposure_lines == 510
+    # Of 100 the black level makes 34; in steps of two of the eight lines that are usual.
+    lines = quiet(EarthSunScene()).frame_from(100 * MS).exposure_lines
+    assert lines == pytest.approx(8 * 66 / light(make(EarthSunScene())).mean(), abs=1)
+
+
+def test_automatic_exposure_of_a_frame_is_the_same_whenever_somebody_asks() -> None:
+    """Before its first row too, and though nobody asked for the frame before."""
+    turning = EarthSunScene(rate_deg_s=(0, 900, 0), unevenness=0)
+    followed = quiet(turning)
+    frames = [followed.frame_from(int((k - Fraction(1, 2)) * FRAME_PS)) for k in range(1, 4)]
+    assert len({frame.exposure_lines for frame in frames}) == 3
+    for number, frame in enumerate(frames, 1):
+        assert quiet(turning).frame_from(int(number * FRAME_PS + 10 * LINE_PS)) == frame
 
 
 def test_automatic_gain_acts_on_a_fixed_exposure(scene: EarthSunScene) -> None:
