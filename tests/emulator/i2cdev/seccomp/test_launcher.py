@@ -2,6 +2,8 @@
 
 import ctypes
 import errno
+import os
+import socket
 from typing import Any
 
 import pytest
@@ -57,3 +59,26 @@ def test_what_the_kernel_refuses_is_told() -> None:
     zero = Libc()
     zero.syscall = lambda *_arguments: 0  # type: ignore[method-assign]
     assert install(zero) == 0
+
+
+def test_the_program_starts_when_the_listener_was_handed_over(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The filter comes over the socket; what goes back leads to the same pipe."""
+    link, theirs = socket.socketpair()
+    reader, listener = os.pipe()
+    libc, started = Libc(), []
+    libc.syscall = lambda *_arguments: listener  # type: ignore[method-assign]
+    monkeypatch.setattr(launcher.socket, "socket", lambda fileno: theirs)
+    monkeypatch.setattr(launcher.ctypes, "CDLL", lambda *_arguments, **_options: libc)
+    monkeypatch.setattr(launcher.signal, "signal", lambda *_arguments: None)
+    monkeypatch.setattr(launcher.os, "execvp", lambda *command: started.append(command))
+    monkeypatch.setattr(launcher.os, "_exit", lambda _code: None)
+    with link, theirs, open(reader, "rb") as pipe:
+        link.send(STEPS)
+        launcher.main(str(theirs.fileno()), str(CALL), "program", "argument")
+        link.setblocking(False)
+        text, given, *_ = socket.recv_fds(link, 10, 1)
+        with open(given[0], "wb") as end:
+            end.write(b"x")
+        assert (text, pipe.read(), started) == (b"+", b"x", [("program", ("program", "argument"))])
