@@ -1,6 +1,7 @@
 """The board's own knowledge; what it does as a whole is tested in tests/system."""
 
 from collections.abc import Generator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ from cubestack.emulator.boards.cubestar import board as cubestar
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.attitude import attitude_error_deg
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.mcu.requests import CameraTransfer, SetPin, Sleep
 
 ENABLE_SENSOR = CameraTransfer(b"\x81\x00\x21")
@@ -52,3 +54,30 @@ def test_truth_is_that_of_the_stored_frame(monkeypatch: pytest.MonkeyPatch) -> N
     np.testing.assert_array_equal(late, first)
     # The reset value of the rate register gives 11.11 frames a second.
     assert attitude_error_deg(next_one, first)[0] == pytest.approx(1 / 11.11, rel=1e-3)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="full frames take minutes in the simulator")
+def test_what_came_before_the_imager_lost_its_supply_is_stored(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By the shared memory, which keeps its own supply; the sky is dark, the rest was random."""
+
+    def storing() -> Generator[Any, Any, None]:
+        yield ENABLE_SENSOR
+        yield SetPin("ENABLE", 1)
+        yield Sleep(None)
+
+    monkeypatch.setattr(
+        cubestar, "CubeStarProgram", lambda *_hardware: SimpleNamespace(main=storing)
+    )
+    dark = SkyScene([0, 0, 0, 1], mag_limit=-2)
+    board = cubestar.CubeStarBoard(dark, None, layout=Layout.SHARED)  # type: ignore[arg-type]
+    board.kernel.advance_to(40 * PS_PER_MS)
+    frame = board.camera.frame_from(0)
+    board.power.switch("imager", False)
+    dark_rows = board.engine.sram[: 512 * 1024].reshape(512, 1024).mean(axis=1) < 20
+    board.close()
+    sent = int((40 * PS_PER_MS - frame.readout_ps) / frame.line_ps)
+    assert 200 < sent < 400
+    # The first line is joined in its middle, so it is not there.
+    assert dark_rows.tolist() == [row < sent - 1 for row in range(512)]

@@ -122,3 +122,17 @@ def test_what_is_soldered_to_a_switch_pulls_it_up(
     board._pin(Outgoing(Kind.PIN, pin_number(wired.CAMERA_RESET), level, 0, board.kernel.now))
     assert board.camera.running is (on and board.power.is_on("imager"))
     board.close()
+
+
+def test_a_reset_of_the_camera_cuts_the_picture_where_it_comes(images: dict[str, Image]) -> None:
+    """What was sent before is stored; the sky is dark, the rest of the memory was random."""
+    board = powered(images["toggle"], engine="compiled")
+    frame = board.camera.frame_from(0)
+    board.engine.set_pin("ENABLE", 1)
+    board._pin(Outgoing(Kind.PIN, pin_number(wired.CAMERA_RESET), 0, 0, 20 * PS_PER_MS))
+    board.engine.run(30 * PS_PER_MS)
+    dark_rows = board.engine.sram[: 512 * 1024].reshape(512, 1024).mean(axis=1) < 20
+    board.close()
+    sent = int((20 * PS_PER_MS - frame.readout_ps) / frame.line_ps)
+    # The first line is joined in its middle, so it is not there.
+    assert dark_rows.tolist() == [row < sent - 1 for row in range(512)]
