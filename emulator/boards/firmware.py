@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat, Parity
 from cubestack.emulator.bus.uart import Uart, UartTap
 from cubestack.emulator.camera.common.star_sensor import StarSensor
-from cubestack.emulator.iss.machine import REGISTERS, Kind, Machine, Outgoing
+from cubestack.emulator.iss.machine import REGISTERS, Machine
+from cubestack.emulator.iss.outcome import Kind, Outgoing
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.efm32gg.serial import LEUART, USART

@@ -13,7 +13,8 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from cubestack.emulator.iss.image import Image
-from cubestack.emulator.iss.machine import Machine, StopReason
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import StopReason
 
 LONGEST_PS = 100_000_000_000_000
 """A call that takes longer than 100 s is an error."""

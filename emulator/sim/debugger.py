@@ -26,7 +26,8 @@ from cubestack.emulator.iss.gdb.target import (
     WatchKind,
 )
 from cubestack.emulator.iss.gdb.target import Stop as Reason
-from cubestack.emulator.iss.machine import Machine, Stop, StopReason, Watch, WatchHit
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import Stop, StopReason, Watch, WatchHit
 from cubestack.emulator.sim.virtual_time import Kernel
 
 WATCHES: Mapping[WatchKind, str] = {"write": "w", "read": "r", "access": "a"}

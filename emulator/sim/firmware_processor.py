@@ -15,7 +15,8 @@ import simpy
 
 from cubestack.emulator.iss.insight.fault_report import fault_report, last_fault, unhandled
 from cubestack.emulator.iss.insight.symbols import Symbols
-from cubestack.emulator.iss.machine import NEVER, Kind, Machine, Outgoing, Stop, StopReason
+from cubestack.emulator.iss.machine import NEVER, Machine
+from cubestack.emulator.iss.outcome import Kind, Outgoing, Stop, StopReason
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling
 from cubestack.emulator.sim.fpga_port import FpgaPort
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel

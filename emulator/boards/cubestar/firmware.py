@@ -17,7 +17,8 @@ from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.iss.image import Image
-from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Kind, Machine, Outgoing
+from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Machine
+from cubestack.emulator.iss.outcome import Kind, Outgoing
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling, FpgaPin

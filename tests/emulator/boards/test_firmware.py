@@ -8,7 +8,7 @@ from cubestack.emulator.boards.firmware import FRAMES, CameraWire, Core, SerialW
 from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
-from cubestack.emulator.iss.machine import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Kind, Outgoing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 

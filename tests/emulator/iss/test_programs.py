@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.iss.image import load_image
-from cubestack.emulator.iss.machine import Kind, Machine, Stop, StopReason
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import Kind, Stop, StopReason
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US
 from tests.tiers import quick
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from cubestack.emulator.iss.insight.fault_report import last_fault
-from cubestack.emulator.iss.machine import EXTERNAL_BASE, RAM_BASE, Kind, Machine, StopReason
+from cubestack.emulator.iss.machine import EXTERNAL_BASE, RAM_BASE, Machine
+from cubestack.emulator.iss.outcome import Kind, StopReason
 
 from .wild_images import KINDS, START, make
 

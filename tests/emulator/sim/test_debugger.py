@@ -2,7 +2,7 @@
 
 import pytest
 
-from cubestack.emulator.iss.machine import Stop, StopReason
+from cubestack.emulator.iss.outcome import Stop, StopReason
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.sim.debugger import Debugger
 from cubestack.emulator.sim.virtual_time import Kernel

@@ -7,7 +7,7 @@ import pytest
 
 from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.iss.image import Image, load_image
-from cubestack.emulator.iss.machine import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Kind, Outgoing
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S

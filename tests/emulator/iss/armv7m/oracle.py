@@ -3,7 +3,8 @@
 import unicorn
 from unicorn import arm_const
 
-from cubestack.emulator.iss.machine import Machine, StopReason
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import StopReason
 
 from .programs import END, RAM, RAM_BYTES, Slice
 

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.iss.image import load_image
-from cubestack.emulator.iss.machine import RAM_BYTES, Machine, StopReason
+from cubestack.emulator.iss.machine import RAM_BYTES, Machine
+from cubestack.emulator.iss.outcome import StopReason
 from cubestack.emulator.native.compiler import find_compiler
 
 unicorn = pytest.importorskip("unicorn", reason="unicorn is not installed")

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.iss.machine import Machine, StopReason, Watch
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import StopReason, Watch
 from cubestack.emulator.native.compiler import find_compiler
 
 ASSEMBLER = shutil.which("arm-none-eabi-gcc")

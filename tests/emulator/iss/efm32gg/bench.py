@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cubestack.emulator.iss.machine import Kind, Machine, Outgoing
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import Kind, Outgoing
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 

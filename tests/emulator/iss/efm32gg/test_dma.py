@@ -4,7 +4,8 @@ import struct
 
 import pytest
 
-from cubestack.emulator.iss.machine import Kind, Machine
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import US, Bench, S, asleep, mask_of
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import LOCK_UP, MS, PIN_RESET, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, WFI, Bench, S
 

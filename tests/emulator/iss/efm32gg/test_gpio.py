@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import US, WFI, Bench
 

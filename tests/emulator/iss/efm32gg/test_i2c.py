@@ -2,7 +2,7 @@
 
 import pytest
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import SYSTEM_REQUEST, Bench, S, asleep, mask_of
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import MS, US, Bench, compiled, needs_compiler
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import MS, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, Bench, S, asleep, mask_of
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import MS, US, Bench, compiled, needs_compiler
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import Bench, S, asleep, mask_of
 

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from cubestack.emulator.iss.machine import Kind
+from cubestack.emulator.iss.outcome import Kind
 
 from .bench import Bench, S, asleep, mask_of
 

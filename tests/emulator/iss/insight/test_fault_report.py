@@ -2,7 +2,8 @@ import pytest
 
 from cubestack.emulator.iss.insight.fault_report import fault_report, last_fault, reasons, unhandled
 from cubestack.emulator.iss.insight.symbols import Symbols
-from cubestack.emulator.iss.machine import Machine, StopReason
+from cubestack.emulator.iss.machine import Machine
+from cubestack.emulator.iss.outcome import StopReason
 
 PS_PER_MS = 10**9
 MOST_RUNS = 10_000
