@@ -6,6 +6,7 @@ import pytest
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.registry import device
 from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
 from cubestack.host.ground.desk import Desk, Link
@@ -45,3 +46,13 @@ def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) 
     behind.node.lost = 0
     behind.desk.do("read TaskStatus").result()
     assert (link.failed, link.broken) == (1, False)
+
+
+@pytest.mark.parametrize("client", ["cubestar", None])
+def test_what_can_not_be_asked_is_told_with_the_reason(client: str | None) -> None:
+    line = UartLink(FakeCubeStar())
+    known = None if client is None else device(client)
+    desk = Desk(Target("fake", INTERFACE, NodeClient(line, INTERFACE), line, device=known))
+    without = {"found", "results", "download", "upload", "scene_form", "sensor_registers"}
+    assert without & desk.about["missing"].keys() == (set() if client else without)
+    desk.close()
