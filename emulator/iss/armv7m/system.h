@@ -175,12 +175,17 @@ private:
         DEMCR_MON_EN = 1u << 16, DEMCR_TRCENA = 1u << 24,
     };
 
-    // exceptions.cpp
+    // pending.cpp
     void pend(int number);                         // asynchronous
     void pend_synchronous(int number, bool derived = false);
     bool escalates(int number) const;
     bool takeable() const;
     int boosted_priority(bool with_primask) const;
+    void priority_changed();
+    void lock_up();
+    void note_fault(int number, uint32_t exc_return);
+
+    // exceptions.cpp
     void enter();
     bool push_frame(uint32_t &exc_return);
     void take(uint32_t exc_return);
@@ -188,9 +193,8 @@ private:
     void deactivate(int number);
     bool pop_frame(uint32_t exc_return, uint32_t (&words)[8]);
     bool fetch_vector(int number, uint32_t &vector);
-    void lock_up();
-    void priority_changed();
-    void note_fault(int number, uint32_t exc_return);
+
+    // system.cpp
     void fall_asleep(Sleep how);
 
     // scs.cpp

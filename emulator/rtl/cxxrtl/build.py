@@ -14,14 +14,10 @@ from cubestack.emulator.rtl.cxxrtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.flow.generate import cxxrtl_headers, cxxrtl_text, design_hash, rtlil_text
 
-SOURCES = (
-    "driver.cpp",
-    "sram_model.h",
-    "pins_header.py",
-    "clock_steps.py",
-    "variants.py",
-    "strides.py",
-)
+_FOLDER = Path(__file__).parent
+
+SOURCES = ("*.cpp", "*.h", "pins_header.py", "clock_steps.py", "variants.py", "strides.py")
+"""Files here of which a library is made."""
 
 
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
@@ -37,7 +33,7 @@ def driver_library(
 
     See :func:`cubestack.emulator.native.cache.cached_library`.
     """
-    sources = [_source(name) for name in SOURCES]
+    sources = [path for name in SOURCES for path in sorted(_FOLDER.glob(name))]
     return cache.cached_library(
         design, [*sources, *sorted(cxxrtl_headers().glob("**/*.h"))], build, folder
     )
@@ -50,16 +46,12 @@ def compile_driver(
 
     CompilerError when the compiler fails; the message names the log.
     """
-    sources = f"-I{scratch}", f"-I{cxxrtl_headers()}", _source("driver.cpp")
+    sources = f"-I{scratch}", f"-I{cxxrtl_headers()}", _FOLDER / "driver.cpp"
     return compile_library(compiler, scratch / "library.so", log, [*sources, *options])
 
 
 # Kept, because a large design takes a good part of a second.
 _design_hash = lru_cache(maxsize=8)(design_hash)
-
-
-def _source(name: str) -> Path:
-    return Path(__file__).parent / name
 
 
 def _compile(wiring: Wiring, compiler: Compiler, scratch: Path, log: Path) -> Path:

@@ -1,0 +1,218 @@
+// Edges of the cameras' pixel clocks, many at a time.
+
+#pragma once
+
+#include "settled.h"
+#include "stream.h"
+
+namespace {
+
+// In the order of Outcome.
+enum Outcome : int32_t { TIME_REACHED, ACKNOWLEDGE_CHANGED, SEGMENT_OVER };
+
+class Bursts : public Settled {
+public:
+    Bursts(uint8_t *const *memories, const SramTiming &timing, int64_t keep, bool skipping)
+        : Settled(memories, timing, keep), skipping(skipping), strides(skipping) {}
+
+    void load(int camera, const Segment &next, int64_t edge) {
+        Stream &stream = streams[camera];
+        stream.segment = next;
+        stream.pixels = nullptr;
+        stream.times = Steps(next.half_numerator, next.half_denominator, 0);
+        stream.go_to(edge);
+        with(camera, [&](auto n) {
+            Camera<n()>::frame(top, next.vsync);
+            put_sample<n()>(top);
+        });
+    }
+
+    void use_pixels(int camera, const uint8_t *rendered) {
+        streams[camera].pixels = rendered;
+        with(camera, [&](auto n) { put_sample<n()>(top); });
+    }
+
+    // Makes the edges of the cameras in the mask `running` up to `until`, or up to the one that
+    // changes an acknowledge, or that is the last of a segment. `reached` is the time then,
+    // `camera` the one whose segment is over.
+    Outcome burst(int64_t until, uint32_t running, int64_t &reached, int32_t &camera) {
+#define VARIANT(number) \
+    if (suits_##number(top)) { \
+        copy_##number(top, variant_##number); \
+        hold_##number(top, variant_##number); \
+        variant_##number.eval(nullptr); \
+        if (same_##number(top, variant_##number)) { \
+            const Outcome outcome = burst_on(variant_##number, until, running, reached, camera); \
+            copy_##number(variant_##number, top); \
+            top.eval(nullptr); \
+            forget_derived_edges(top); \
+            return outcome; \
+        } \
+    }
+        VARIANTS
+#undef VARIANT
+        return burst_on(top, until, running, reached, camera);
+    }
+
+    const bool skipping;
+    bool strides;                // whether clocks may be made at once
+    int64_t clocks_at_once = 0;  // how many were
+
+protected:
+    template <class Model>
+    Outcome burst_on(Model &top, int64_t until, uint32_t running, int64_t &reached,
+                     int32_t &camera) {
+        Outcome outcome = TIME_REACHED;
+        if (running & (running - 1))
+            return burst_of_several(top, until, running, reached, camera);
+        for (camera = 0; running >> (camera + 1); camera++) {}
+        with(camera, [&](auto n) { outcome = burst_of_one<n()>(top, until, reached); });
+        return outcome;
+    }
+
+private:
+    Stream streams[CAMERA_COUNT];
+
+    // The design at some levels of its pins; variants.py says more.
+#define VARIANT(number) variant_##number##_steps variant_##number;
+    VARIANTS
+#undef VARIANT
+
+    // Calls `act` with the camera's number as a constant.
+    template <int N = 0, class Act> void with(int camera, Act act) {
+        if (camera == N)
+            act(std::integral_constant<int, N>());
+        else if constexpr (N + 1 < CAMERA_COUNT)
+            with<N + 1>(camera, act);
+    }
+
+    template <int N, class Model> void put_sample(Model &top) {
+        Camera<N>::line(top, streams[N].inside());
+        Camera<N>::data(top, streams[N].pixel());
+    }
+
+    template <int N, class Model> void make_edge(Model &top, int64_t time, int64_t until) {
+        Stream &stream = streams[N];
+        if (stream.edge % 2 == 0) {
+            const bool wrote = writes();
+            Camera<N>::clock(top, true);
+            const bool changed = settle_rise<N>(top, time);
+            stream.next_edge();
+            if (skipping && !changed && !wrote && !stream.inside())
+                stream.skip_low_samples(until);
+            return;
+        }
+        Camera<N>::clock(top, false);
+        if (stream.edge + 1 < stream.segment.edges) {
+            stream.next_sample();
+            put_sample<N>(top);
+        }
+        settle_fall<N>(top, time);
+        stream.next_edge();
+    }
+
+    // Makes at once the clocks of camera N that a stride describes, up to `until`. The row's last one,
+    // and one more, are left, so that an ordinary clock follows.
+    template <int N, class Model> void store_strides(Model &top, int64_t until) {
+        store_strides<N>(top, until, std::make_integer_sequence<int, STRIDE_COUNT>());
+    }
+    template <int N, class Model, int... K>
+    void store_strides(Model &top, int64_t until, std::integer_sequence<int, K...>) {
+        (void)top, (void)until;
+        (store_stride<N, K>(top, until), ...);
+    }
+    template <int N, int K, class Model> void store_stride(Model &top, int64_t until) {
+        if constexpr (Stride<K>::camera == N) {
+            constexpr std::integral_constant<int, K> stride;
+            Stream &stream = streams[N];
+            const Segment &segment = stream.segment;
+            Sram &sram = srams[Stride<K>::memory];
+            const int64_t half = segment.half_numerator / segment.half_denominator;
+            if (!stride_ready(stride, top) || !sram.stores_at(stream.time(), half, 2 * half))
+                return;
+            const int64_t counter = stride_counter(stride, top);
+            const int64_t edges = stream.times.last_within(until - segment.start) + 1 - stream.edge;
+            const int64_t clocks =
+                std::min({segment.active_columns - 1 - stream.column, Stride<K>::last - counter,
+                          edges / 2}) - 1;
+            if (clocks < SHORTEST_STRIDE)
+                return;
+            const uint8_t *next =
+                stream.pixels + stream.row * segment.active_columns + stream.column;
+            const int64_t end = stream.edge + 2 * clocks;
+            stream.go_to(end - 2);
+            const int64_t rose = stream.time();
+            stream.next_edge();
+            const int64_t fell = stream.time();
+            sram.store(next, clocks, rose, fell);
+            stride_to(stride, top, counter + clocks, next[clocks - 1]);
+            stream.go_to(end);
+            put_sample<N>(top);
+            clocks_at_once += clocks;
+        }
+    }
+
+    template <int N, class Model>
+    __attribute__((flatten)) Outcome burst_of_one(Model &top, int64_t until, int64_t &reached) {
+        const uint32_t before = acknowledges(top);
+        while (!streams[N].over()) {
+            if (strides && streams[N].in_row())
+                store_strides<N>(top, until);
+            const int64_t time = streams[N].time();
+            if (time > until) {
+                reached = until;
+                return TIME_REACHED;
+            }
+            reached = time;
+            make_edge<N>(top, time, until);
+            if (acknowledges(top) != before)
+                return ACKNOWLEDGE_CHANGED;
+        }
+        return SEGMENT_OVER;
+    }
+
+    // At one instant the first camera's edge comes first.
+    template <class Model>
+    Outcome burst_of_several(Model &top, int64_t until, uint32_t running, int64_t &reached,
+                             int32_t &camera) {
+        const uint32_t before = acknowledges(top);
+        Outcome outcome = TIME_REACHED;
+        for (;;) {
+            camera = -1;
+            for (int n = 0; n < CAMERA_COUNT; n++)
+                if (running >> n & 1 && (camera < 0 || streams[n].time() < streams[camera].time()))
+                    camera = n;
+            const int64_t time = streams[camera].time();
+            if (time > until) {
+                reached = until;
+                return TIME_REACHED;
+            }
+            reached = time;
+            with(camera, [&](auto n) { make_edge<n()>(top, time, until); });
+            if (acknowledges(top) != before)
+                outcome = ACKNOWLEDGE_CHANGED;
+            else if (streams[camera].over())
+                outcome = SEGMENT_OVER;
+            else
+                continue;
+            for (int n = 0; n < CAMERA_COUNT; n++)
+                if (running >> n & 1)
+                    with(n, [&](auto constant) { come_back<constant()>(top, time, n > camera); });
+            return outcome;
+        }
+    }
+
+    // Takes back what was skipped beyond `now`: the pins may change before that. An edge at this
+    // very instant may be `still_to_come`.
+    template <int N, class Model> void come_back(Model &top, int64_t now, bool still_to_come) {
+        Stream &stream = streams[N];
+        const int64_t next = stream.edge_after(now - still_to_come);
+        if (stream.edge <= next)
+            return;
+        stream.go_to(next);
+        Camera<N>::clock(top, next % 2);
+        settle(top, now);
+    }
+};
+
+}  // namespace

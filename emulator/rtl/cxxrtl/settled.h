@@ -1,0 +1,159 @@
+// The design and the SRAMs beside it, settled after each change of an input.
+//
+// design.cpp is CXXRTL's output. Its eval() computes outputs and the registers' next values,
+// commit() makes those current and tells whether any changed. Outputs lag a register change by
+// one eval(), and an asynchronous reset takes one more, hence settle(). Edges are found before
+// anything is computed, so one that eval() itself makes, on a clock that is no pin, needs another
+// eval() before the commit.
+
+#pragma once
+
+#include "lines.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace {
+
+class Settled {
+public:
+    Settled(uint8_t *const *memories, const SramTiming &timing, int64_t keep) : log(keep) {
+        for (int n = 0; n < MEMORY_COUNT; n++)
+            srams.emplace_back(memories[n], timing, log, n);
+        for (const Pin &pin : PIN_TABLE)
+            if (pin.set)
+                pin.set(top, pin.initial);
+        settle(0);
+    }
+
+    Top top;
+    ViolationLog log;
+
+    void set(const Pin &pin, uint32_t value, int64_t now) {
+        if (strcmp(pin.name, DATA_CLOCK_NAME) == 0 && value && !top.DATA_CLOCK.get<bool>())
+            sample(now);
+        pin.set(top, value);
+        settle(now);
+    }
+
+    void flip(const Register &target, int32_t bit, int64_t now) {
+        target.flip(top, bit);
+        settle(now);
+    }
+
+    void power(int memory, bool on, int64_t now) {
+        srams[memory].power(on);
+        settle(now);
+    }
+
+protected:
+    std::vector<Sram> srams;
+
+    bool settle(int64_t time) { return settle(top, time); }
+
+    // Lets everything follow the inputs, as of `time`; tells whether any register changed.
+    template <class Model> bool settle(Model &top, int64_t time) {
+        bool changed = false;
+        eval(top);
+        while (commit(top)) {
+            changed = true;
+            eval(top);
+        }
+        drive_memories(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
+        const uint32_t now_contended = CONTENTION;
+        if (now_contended & ~contention)
+            log.add({WIRE_CONTENTION, time, 0, now_contended, 0, -1});
+        contention = now_contended;
+        return changed;
+    }
+
+    template <class Model> void eval(Model &top) {
+        eval_once(top);
+        if (derived_edge(top))
+            eval_once(top);
+    }
+
+    // Once in the library: a large design would not stay in the processor's instruction cache, and
+    // take half a minute to compile.
+    template <class Model> __attribute__((noinline, flatten)) static void eval_once(Model &top) {
+        top.Model::eval(nullptr);
+    }
+    template <class Model> __attribute__((noinline, flatten)) static bool commit(Model &top) {
+        return top.Model::commit();
+    }
+
+    // Only registers listen to the memories, and the external bus: nothing else has to follow them.
+    template <class Model, int... N>
+    void drive_memories(Model &top, int64_t time, std::integer_sequence<int, N...>) {
+        (srams[N].drive(time, Memory<N>::pins(top)), ...);
+        (Memory<N>::offer(top, srams[N].bus()), ...);
+#ifdef BUS_HIGH
+        if ((srams[N].reads() || ...))
+            eval(top);
+#endif
+    }
+
+    void sample(int64_t time) {
+        for (Sram &sram : srams)
+            sram.sample(time);
+    }
+
+    bool writes() const {
+        return std::any_of(srams.begin(), srams.end(), [](auto &sram) { return sram.writes(); });
+    }
+
+    template <class Model> static uint32_t acknowledges(const Model &top) { return ACKNOWLEDGES; }
+
+    // Settling after an edge of camera N's clock. A copy makes this edge's share only, unless its
+    // registers are in reset; clock_steps.py says more.
+    template <int N> bool settle_rise(Top &top, int64_t time) { return settle(top, time); }
+    template <int N> void settle_fall(Top &top, int64_t time) { settle(top, time); }
+
+    template <int N, class Model> bool settle_rise(Model &top, int64_t time) {
+        constexpr std::integral_constant<int, N> camera;
+        if (top.in_reset(camera))
+            return settle_in_reset(top, time);
+        const bool changed = top.rise(camera);
+        if (top.in_reset(camera))
+            return settle_in_reset(top, time) | changed;
+        follow<N>(top, time);
+        return changed;
+    }
+
+    template <int N, class Model> void settle_fall(Model &top, int64_t time) {
+        constexpr std::integral_constant<int, N> camera;
+        if (top.in_reset(camera)) {
+            settle_in_reset(top, time);
+            return;
+        }
+        top.fall(camera);
+        follow<N>(top, time);
+    }
+
+    template <class Model>
+    __attribute__((noinline)) bool settle_in_reset(Model &top, int64_t time) {
+        return settle(top, time);
+    }
+
+    // Lets the memories follow that a camera's clock can move.
+    template <int N, class Model> void follow(Model &top, int64_t time) {
+        follow<N>(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
+    }
+    template <int N, class Model, int... M>
+    void follow(Model &top, int64_t time, std::integer_sequence<int, M...>) {
+        (follow_one<N, M>(top, time), ...);
+    }
+    template <int N, int M, class Model> void follow_one(Model &top, int64_t time) {
+        if constexpr (Model::may_move(std::integral_constant<int, N>(), M)) {
+            srams[M].drive(time, Memory<M>::pins(top));
+            Memory<M>::offer(top, srams[M].bus());
+        }
+    }
+
+private:
+    uint32_t contention = 0;
+};
+
+}  // namespace

@@ -1,0 +1,113 @@
+// What a camera sends, edge by edge of its pixel clock.
+
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+namespace {
+
+// The times of evenly spaced edges, one after the other without a division for each:
+// value() = floor((numerator * k + offset) / denominator).
+class Steps {
+public:
+    Steps(int64_t numerator, int64_t denominator, int64_t offset)
+        : numerator(numerator), denominator(denominator), offset(offset),
+          step(numerator / denominator), step_rest(numerator % denominator) { go_to(0); }
+
+    int64_t value() const { return whole; }
+
+    void go_to(int64_t k) {
+        const __int128 product = (__int128)numerator * k + offset;
+        whole = (int64_t)(product / denominator);
+        rest = (int64_t)(product % denominator);
+    }
+
+    void next() {
+        whole += step;
+        rest += step_rest;
+        if (rest >= denominator) {
+            rest -= denominator;
+            whole++;
+        }
+    }
+
+    // Largest k whose value is at most `limit`.
+    int64_t last_within(int64_t limit) const {
+        return (int64_t)((((__int128)limit + 1) * denominator - 1 - offset) / numerator);
+    }
+
+private:
+    int64_t numerator, denominator, offset;
+    int64_t step, step_rest;
+    int64_t whole, rest;
+};
+
+// A segment of a camera's stream as pixel_clock.py describes it; edge k is at
+// start + floor(k * half_numerator / half_denominator).
+struct Segment {
+    int64_t start, half_numerator, half_denominator, edges;
+    int64_t rows, line_clocks, active_columns, vsync;
+};
+
+// Clocks that are worth to be made at once.
+constexpr int64_t SHORTEST_STRIDE = 4;
+
+// What a camera sends, and how far it is.
+struct Stream {
+    Segment segment = {};
+    const uint8_t *pixels = nullptr;  // rows x active_columns, or null: all 0
+    int64_t edge = 0;                 // the next one to be made
+    Steps times{1, 1, 0};             // of that edge, from the segment's start
+    int64_t row = 0, column = 0;      // of the sample on the lines
+
+    int64_t time() const { return segment.start + times.value(); }
+
+    bool over() const { return edge >= segment.edges; }
+
+    void next_edge() {
+        edge++;
+        times.next();
+    }
+
+    // Continue with that edge; the sample on the lines is what the edges before it left there.
+    void go_to(int64_t next) {
+        edge = next;
+        times.go_to(edge);
+        row = edge / 2 / segment.line_clocks;
+        column = edge / 2 % segment.line_clocks;
+    }
+
+    void next_sample() {
+        if (++column == segment.line_clocks) {
+            column = 0;
+            row++;
+        }
+    }
+
+    bool inside() const { return segment.rows && column < segment.active_columns; }
+
+    // A clock is to rise that has many more behind it in its row.
+    bool in_row() const {
+        return edge % 2 == 0 && pixels && inside() &&
+               segment.active_columns - column > SHORTEST_STRIDE + 2;
+    }
+
+    uint8_t pixel() const {
+        return inside() && pixels ? pixels[row * segment.active_columns + column] : 0;
+    }
+
+    // First edge after `time`.
+    int64_t edge_after(int64_t time) const { return times.last_within(time - segment.start) + 1; }
+
+    // A clock that changed no register changes none the next time either, while its inputs stay:
+    // go on with the falling edge of the last such clock. The SRAMs see no pulse meanwhile.
+    void skip_low_samples(int64_t until) {
+        const int64_t end = segment.rows ? (row + 1) * segment.line_clocks : segment.edges / 2;
+        const int64_t last = std::min(end - 1, times.last_within(until - segment.start) / 2);
+        if (last > edge / 2)
+            go_to(2 * last + 1);
+    }
+};
+
+}  // namespace
