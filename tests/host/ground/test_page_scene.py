@@ -67,8 +67,13 @@ def place(page: Any, right: float, down: float) -> dict[str, float]:
 
 
 def click(page: Any, right: float, down: float) -> None:
-    """On the map, once it stands still: what comes in above moves it."""
-    page.click("#sky-map", position=place(page, right, down))
+    """On the map; again where what came in above it moved it meanwhile."""
+    sky_map = page.locator("#sky-map")
+    sky_map.scroll_into_view_if_needed()
+    before = None
+    while before != sky_map.bounding_box():
+        before = sky_map.bounding_box()
+        sky_map.click(position=place(page, right, down))
 
 
 def point(page: Any, right: float, down: float) -> None:
