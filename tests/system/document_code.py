@@ -16,10 +16,14 @@ ENVIRONMENT = re.compile(r"[A-Z_]+=\S*")
 #: Commands that serve until Ctrl-C.
 SERVES = r"^emulate\b|^ground\b"
 
+#: Of these, those that make a port of a name.
+MAKES_PORT = r"^emulate\b"
+
 #: Commands that need what a reader has to bring, or that wait for him; and what that is.
 LEFT = {
     r"\bglow\b": "a device of the text: tests/examples/test_adding_a_sensor.py",
     r"/dev/ttyUSB0|\./tty": "a port that somebody has to serve",
+    r"^ground run\.rec": "a recording of such a port",
     r"program\.elf|picture\.elf": "needs the firmware of tests/system/test_own_firmware.py",
     r"sky\.jpg|night/|bench/": "needs photographs",
     r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",

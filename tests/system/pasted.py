@@ -29,6 +29,7 @@ from typing import NamedTuple
 from .document_code import (
     LEFT,
     LONG,
+    MAKES_PORT,
     ROOT,
     SERVES,
     Code,
@@ -168,7 +169,7 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
     call = own_call(words)
     if call is not None:
         port = re.search(r"\./tty\S*", call)
-        if port is not None and (re.search(SERVES, call) or (folder / port[0]).exists()):
+        if port is not None and (re.search(MAKES_PORT, call) or (folder / port[0]).exists()):
             call = call.replace(port[0], "PORT")  # it is served, or will be
         for left, reason in LEFT.items():
             if re.search(left, call):
@@ -176,7 +177,8 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
         if not long and re.search(LONG, call):
             return "minutes to hours"
     typed = shlex.join(words)
-    if any(word in typed for word in ("PROGRAM", "my_script", "picture.elf", "./star", "dask")):
+    readers = "PROGRAM", "my_script", "picture.elf", "./star", "./glow_sensor", "dask"
+    if any(word in typed for word in readers):
         return "the reader's turn"
     return ""
 

@@ -104,11 +104,17 @@ def test_what_takes_too_long_is_interrupted_and_the_shell_goes_on(tmp_path: Path
     shell.close()
 
 
-def test_a_client_of_a_port_that_nobody_serves_is_left_out(tmp_path: Path) -> None:
-    line = "cubestack shell ./tty --device cubestar"
+@pytest.mark.parametrize("command", ["shell", "ground"])
+def test_a_client_of_a_port_that_nobody_serves_is_left_out(tmp_path: Path, command: str) -> None:
+    line = f"cubestack {command} ./tty --device cubestar"
     assert "somebody has to serve" in left_out(line, tmp_path, long=False)
     (tmp_path / "tty").touch()
     assert left_out(line, tmp_path, long=False) == ""
+
+
+@pytest.mark.parametrize("line", ["pip install ./glow_sensor", "cubestack ground run.rec"])
+def test_what_a_reader_has_to_bring_is_left_out(tmp_path: Path, line: str) -> None:
+    assert left_out(line, tmp_path, long=False)
 
 
 @pytest.mark.parametrize("long", [False, True])
