@@ -1,8 +1,8 @@
 """Which directions lie in the picture: its border, with the lens' distortion undone.
 
 A rectangle of pixels is a pincushion or a barrel of directions. Each of its sides is a parabola
-here, through its two corners and its middle, in tangents of field angles; for CubeStar's lens it
-stays within 2 px of the true one.
+here, through its two corners and its middle, in tangents of field angles; for the lens of the
+CubeStar thesis it stays within 2 px of the true one.
 """
 
 from dataclasses import dataclass, replace

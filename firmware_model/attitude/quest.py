@@ -51,9 +51,9 @@ def quest(
     Args:
         measured: (n, 3) unit vectors in camera axes, n at least 2.
         reference: (n, 3) unit vectors of the same stars in inertial axes.
-        weights: (n,) not negative, not all zero; verification votes on CubeStar.
+        weights: (n,) not negative, not all zero; in the thesis votes of the verification.
         meter: charged with every operation.
-        eigenvalue: finds the largest eigenvalue; None takes 1, as CubeStar does.
+        eigenvalue: finds the largest eigenvalue; None takes 1, as the thesis does.
 
     Raises:
         AttitudeError: for fewer than two vectors, weights without weight, or vectors that all point
