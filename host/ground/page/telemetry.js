@@ -2,7 +2,6 @@
 
 import { atNextFrame, choose, labelled, make } from "./dom.js";
 import { named } from "./fields.js";
-import uPlot from "./vendor/uPlot.esm.js";
 
 const KEPT = 3600; // points of a plot: an hour at one a second
 
@@ -118,7 +117,7 @@ export class Telemetry {
       dash: index < COLOURS.length ? [] : [6, 4],
       points: { size: 5 },
     }));
-    this.plot = new uPlot(
+    this.plot = new globalThis.uPlot(
       {
         width: this.figure.clientWidth || 300,
         height: 220,

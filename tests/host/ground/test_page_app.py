@@ -57,7 +57,7 @@ def test_the_page_and_its_parts_are_there(served: Serving) -> None:
         "main.js",
         "style.css",
         "scene.css",
-        "vendor/uPlot.esm.js",
+        "vendor/uPlot.iife.min.js",
         "vendor/uPlot.LICENSE",
     ):
         assert ask(served, "GET", f"/page/{part}")[0] == 200
