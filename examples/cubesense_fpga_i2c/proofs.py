@@ -13,7 +13,7 @@ from cubesense_fpga_i2c.top import CubeSenseI2cFpga
 from cubestack.firmware_model.interface.cubesense.fpga import Action
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
-from cubestack.hdl.proofs.cubesense.made import Make, made
+from cubestack.hdl.proofs.cubesense.designs import DesignMaker, proof_design
 from cubestack.hdl.proofs.properties import (
     ACKNOWLEDGES,
     acknowledges,
@@ -53,8 +53,8 @@ def _target_wires(fpga: str = "") -> dict[str, str]:
     return {before + name: wire for name, wire in wires.items()}
 
 
-def _fpga(side: Side) -> Make:
-    return made(partial(CubeSenseI2cFpga, side))
+def _fpga(side: Side) -> DesignMaker:
+    return proof_design(partial(CubeSenseI2cFpga, side))
 
 
 # Reset is idle, and so are the other pins in standby.
@@ -207,7 +207,7 @@ PROOFS = {
     "pair-drivers-i2c": Proof(
         "Both FPGAs have the same command, which turns on the drivers that it should, and no wire "
         "has two",
-        made(CubeSenseI2cPair),
+        proof_design(CubeSenseI2cPair),
         _one_driver,
         Fault("nadir.registers.target.group", 1),
         _PAIR_WIRES,

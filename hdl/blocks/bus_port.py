@@ -1,9 +1,9 @@
-"""The processor's external bus, as an FPGA sees it: 24 address and 8 data bits on 16 lines.
+"""FPGA side of the processor's external bus: 24 address bits and 8 data bits on 16 lines.
 
 CubeStar thesis, sections 3.3 (options 2 and 3) and C.4; the bus is the EFM32's EBI in its mode
-D8A24ALE. First the lines carry address bits 23 to 8, which ALE has latched, then address bits 7
-to 0 on the upper half and the data on the lower one. The FPGA holds the latch that is a part of its
-own (SN74LVCH16373A) on the processor board.
+D8A24ALE. First the lines carry address bits 23 to 8, which ALE latches, then address bits 7 to 0
+on the upper half and the data on the lower half. The latch, a separate part (SN74LVCH16373A) on the
+processor board, is inside the FPGA here.
 """
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, ResetSignal, Signal
@@ -13,22 +13,22 @@ from amaranth.lib.wiring import Component, In, Out
 class BusPort(Component):
     """Address latch and strobes.
 
-    The latch takes the lines at the falling edge of ``ale``, which must not come before they are
-    stable. The other ways are without a clock: the strobes of the processor are those of the SRAM.
+    The latch samples the lines at the falling edge of ``ale``, when they must be stable. All other
+    paths are combinational: the strobes of the processor are those of the SRAM.
 
     Ports:
-        on: while low the latch is in reset and every output 0.
-        high, low: the 16 lines' halves, as inputs.
-        ale: address latch enable, high active.
-        cs_n, re_n, we_n: chip select and strobes, low active. Reading wins over writing.
+        on: while low, the latch is in reset and every output is 0.
+        high, low: upper and lower half of the 16 lines, as inputs.
+        ale: address latch enable, active high.
+        cs_n, re_n, we_n: chip select and strobes, active low. Reading wins over writing.
         address: of the access; its low 8 bits follow ``high``.
-        selected: the chip select, high active.
-        reading, writing: an access is going on.
-        data: the byte to be written, else 0.
+        selected: the chip select, active high.
+        reading, writing: an access is in progress.
+        data: the byte to write, else 0.
     """
 
     def __init__(self, address_width: int) -> None:
-        """Make a port of an address of at most 24 bits; else ValueError."""
+        """Raise ValueError unless ``address_width`` is 1 to 24 bits."""
         if not 0 < address_width <= 24:
             raise ValueError(f"address_width must be in 1..24, not {address_width}")
         self._width = address_width
@@ -40,7 +40,6 @@ class BusPort(Component):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Build the latch and the gates."""
         m = Module()
         m.d.comb += [
             self.selected.eq(self.on & ~self.cs_n),

@@ -1,7 +1,7 @@
-"""Tells frames apart where the camera's VSYN is not wired: by the long pause between them.
+"""Derives VSYNC from the pauses between frames, for a camera whose VSYN is not wired.
 
-CubeSense thesis, table 3.4: of the camera's two control signals PCLK and HREF, none marks a frame.
-How a frame's start is found from them is not published: it is assumed.
+CubeSense thesis, table 3.4: of the camera's control signals only PCLK and HREF are wired, and
+neither marks a frame. The thesis does not say how a frame's start is found: this is assumed.
 """
 
 from amaranth.hdl import Module, Signal
@@ -9,19 +9,19 @@ from amaranth.lib.wiring import Component, In, Out
 
 
 class FrameGap(Component):
-    """Makes a VSync: low until the first frame starts, and low in each later gap.
+    """VSYNC: low until the first frame starts, and low in each later gap.
 
-    A frame starts with the first row after more than ``clocks`` clocks with HREF low. Clocks
-    count from the domain's reset on.
+    A frame starts with the first row after more than ``clocks`` clocks with HREF low, counted from
+    the domain's reset.
 
     Ports:
         href: high while pixels are sent; synchronous to the domain's clock.
-        vsync: low from reset on until the first frame's first row, later from the clock that
-            makes a pause a gap to the row that ends it. Follows ``href`` without a clock.
+        vsync: low from reset until the first frame's first row; later low from the clock at which
+            a pause counts as a gap until the row that ends it. Combinational in ``href``.
     """
 
     def __init__(self, clocks: int, *, domain: str = "pix") -> None:
-        """Make one for gaps of more than ``clocks`` clocks, at least 1; else ValueError."""
+        """Raise ValueError unless ``clocks`` is at least 1."""
         if clocks < 1:
             raise ValueError(f"clocks must be at least 1, not {clocks}")
         self._clocks = clocks
@@ -29,7 +29,6 @@ class FrameGap(Component):
         super().__init__({"href": In(1), "vsync": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the counter of clocks with HREF low."""
         m = Module()
         sync = m.d[self._domain]
         low_clocks = Signal(range(self._clocks + 1))

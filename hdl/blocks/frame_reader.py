@@ -1,7 +1,7 @@
 """SRAM to microcontroller: presents the stored frame byte by byte.
 
-CubeStar thesis, section 5.2.2 and appendix C. The microcontroller makes the clock, so it alone
-sets the rate, and reading works when the camera gives no pixel clock.
+CubeStar thesis, section 5.2.2 and appendix C. The microcontroller generates the clock, so it alone
+sets the rate, and reading works when the camera has no pixel clock.
 """
 
 from amaranth.hdl import Module
@@ -13,24 +13,22 @@ from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 class FrameReader(Component):
     """Presents the next byte at each rising edge of its domain's clock, the data clock.
 
-    In reset the address is that of the first pixel, so the SRAM already offers it when the first
-    edge comes. Past the last pixel comes the first one again.
+    In reset the address is that of the first pixel, so the SRAM already offers it at the first
+    edge. The last pixel is followed by the first one again.
 
     Ports:
         address: SRAM address of the byte that the next edge will present.
-        memory: what the SRAM offers at that address.
+        memory: the byte that the SRAM offers at that address.
         data: the byte presented to the microcontroller; 0 in reset.
     """
 
     def __init__(self, columns: int, rows: int, *, domain: str = "dclk") -> None:
-        """Make a reader for frames of ``columns`` x ``rows`` pixels."""
         self._counter = MatrixCounter(columns, rows, domain=domain)
         self._domain = domain
         width = MatrixCounter.address_width(columns, rows)
         super().__init__({"address": Out(width), "memory": In(8), "data": Out(8)})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the counter and the output register."""
         m = Module()
         m.submodules.counter = counter = self._counter
         m.d.comb += [counter.next_column.eq(1), self.address.eq(counter.address)]

@@ -1,6 +1,6 @@
 """Camera to SRAM: stores one whole frame, then raises ACK.
 
-CubeStar thesis, section 5.2.2 and appendix C. One pixel is taken at each rising edge of the pixel
+CubeStar thesis, section 5.2.2 and appendix C. One pixel is sampled at each rising edge of the pixel
 clock inside a row, and written during the low half of that clock period: the address, the data
 and ``store`` change after a rising edge only, so they are stable for the whole write pulse.
 """
@@ -14,29 +14,28 @@ from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 class FrameWriter(Component):
     """Stores the first whole frame after its domain leaves reset.
 
-    All camera inputs are synchronous to the domain's clock, which is the camera's pixel clock.
-    Being in reset is being idle: nothing is stored and ``ack`` is low.
+    All camera inputs are synchronous to the domain's clock, the camera's pixel clock. Reset is the
+    idle state: nothing is stored and ``ack`` is low.
 
-    - Storing starts at a row's start only: a low HSync must have been seen first.
-    - A low VSync goes back to the first row, so a frame that was joined in the middle is dropped.
+    - Storing starts only at the start of a row: a low HSYNC must come first.
+    - A low VSYNC returns to the first row, so a frame that was joined half-way is dropped.
     - Pixels beyond the last column, and rows beyond the last one, are not stored. A row that is
-      too short leaves its other pixels as they were; a frame whose last row is too short is not
-      acknowledged, and the next one is stored in its place.
-    - ``ack`` rises when the write pulse of the last pixel is over. It stays, and nothing more is
-      stored, until the next reset; VSync does not clear it.
+      too short leaves its other pixels unchanged; a frame whose last row is too short is not
+      acknowledged, and the next frame is stored in its place.
+    - ``ack`` rises when the write pulse of the last pixel ends. It stays high, and nothing more is
+      stored, until the next reset; VSYNC does not clear it.
 
     Ports:
         pixel: pixel data.
         hsync: low between rows.
         vsync: low between frames.
         address: SRAM address of the pixel in ``data``.
-        data: pixel to be written.
-        store: high for the clock period in which ``data`` is to be written.
+        data: pixel to write.
+        store: high for the clock period in which ``data`` is written.
         ack: a whole frame is stored.
     """
 
     def __init__(self, columns: int, rows: int, *, domain: str = "pix") -> None:
-        """Make a writer for frames of ``columns`` x ``rows`` pixels."""
         self._counter = MatrixCounter(columns, rows, domain=domain)
         self._domain = domain
         width = MatrixCounter.address_width(columns, rows)
@@ -45,12 +44,11 @@ class FrameWriter(Component):
         super().__init__({**camera, **memory, "ack": Out(1)})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the row and frame tracking around the position counter."""
         m = Module()
         m.submodules.counter = counter = self._counter
         sync = m.d[self._domain]
 
-        between_lines_seen = Signal()  # since reset or VSync: a row's start can be recognised
+        between_lines_seen = Signal()  # since reset or VSYNC: a row's start can be recognised
         line_open = Signal()  # at least one pixel of this row was taken
         line_full = Signal()  # the row is complete; surplus pixels are ignored
         frame_full = Signal()  # the last row is over, complete or not

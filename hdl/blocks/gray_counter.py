@@ -1,7 +1,7 @@
-"""Gray-code address counter: the studied alternative to matrix addressing.
+"""Gray-code address counter, the alternative to matrix addressing.
 
-CubeSense thesis, section 6.4.4 and appendix D.1. One address line changes at a step, but jumping
-to another row is not possible, and it takes more tiles.
+CubeSense thesis, section 6.4.4 and appendix D.1. One address line changes per step, but the counter
+cannot jump to another row, and it takes more tiles.
 """
 
 from amaranth.hdl import Cat, Module, Signal
@@ -10,21 +10,21 @@ from amaranth.utils import ceil_log2
 
 
 class GrayCounter(Component):
-    """Position in a picture that lies in the memory without gaps, in one clock domain.
+    """Position in an image that is stored without gaps, in one clock domain.
 
     Both commands are sampled at the domain's rising edge, and ``clear`` wins. Position n has the
-    address n ^ (n >> 1). After the last position comes the first one; more than one line may
-    change there, and with ``clear``.
+    address n ^ (n >> 1). The last position is followed by the first one; more than one line may
+    change there, and on ``clear``.
 
     Ports:
         step: go to the next position.
-        clear: go to the first one.
-        last: high on the last one.
+        clear: go to the first position.
+        last: high at the last position.
         address: Gray code of the position.
     """
 
     def __init__(self, positions: int, *, domain: str = "sync") -> None:
-        """Make a counter of ``positions``, at least 4; else ValueError."""
+        """Raise ValueError unless ``positions`` is at least 4."""
         if positions < 4:
             raise ValueError(f"positions must be at least 4, not {positions}")
         self._positions = positions
@@ -34,13 +34,13 @@ class GrayCounter(Component):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Build the chain: a bit flips when the one below is 1 and all further below are 0."""
         m = Module()
         width = len(self.address)
         even = Signal(init=1)  # the parity of the address; counts as the bit below the lowest
         address = Signal(width)
         last = self._positions - 1
 
+        # A bit flips when the bit below it is 1 and all bits below that one are 0.
         flips = []
         below = [even, *address]
         zeros = 1  # all bits below below[n] are 0

@@ -1,8 +1,8 @@
 """Matrix addressing: a column counter and a row counter side by side.
 
-CubeSense thesis, section 6.5: the SRAM address is row : column, so a row always starts at its
-own column 0 whatever happened in the row before. CubeStar's frame of 1024 x 512 is a power of two
-both ways, where the same address is also the linear one of the CubeStar thesis, section 5.2.2.
+CubeSense thesis, section 6.5: the SRAM address is row : column, so each row starts at its own
+column 0 whatever happened in the row before. CubeStar's frame of 1024 x 512 is a power of two in
+both directions, so the address equals the linear one of the CubeStar thesis, section 5.2.2.
 """
 
 from amaranth.hdl import Cat, Module, Signal
@@ -14,15 +14,15 @@ class MatrixCounter(Component):
     """Position inside a frame of ``columns`` x ``rows`` pixels, in one clock domain.
 
     The three commands are sampled at the domain's rising edge; ``clear`` wins over ``next_row``,
-    which wins over ``next_column``. The position never leaves the frame: past the last column
-    comes the next row, past the last row the first one. Only ``load`` can take it elsewhere; where
-    it steps to from there is not defined.
+    which wins over ``next_column``. The position never leaves the frame: the last column is
+    followed by the next row, the last row by the first one. Only ``load`` can set a position
+    outside of the frame; the steps from there are undefined.
 
     Ports:
         next_column: step to the next pixel.
         next_row: go to column 0 of the next row.
         clear: go to column 0 of row 0.
-        last_column, last_row: high on the last one.
+        last_column, last_row: high in the last column or row.
         address: row : column.
         load, position: go to this row : column; wins over the others. With ``loadable`` only.
     """
@@ -30,7 +30,7 @@ class MatrixCounter(Component):
     def __init__(
         self, columns: int, rows: int, *, domain: str = "sync", loadable: bool = False
     ) -> None:
-        """Make a counter; ``columns`` and ``rows`` are at least 2, else ValueError."""
+        """Raise ValueError unless ``columns`` and ``rows`` are at least 2."""
         for name, value in (("columns", columns), ("rows", rows)):
             if value < 2:
                 raise ValueError(f"{name} must be at least 2, not {value}")
@@ -46,11 +46,10 @@ class MatrixCounter(Component):
 
     @staticmethod
     def address_width(columns: int, rows: int) -> int:
-        """Bits of the address of a frame of ``columns`` x ``rows`` pixels."""
+        """Number of address bits of a frame of ``columns`` x ``rows`` pixels."""
         return ceil_log2(columns) + ceil_log2(rows)
 
     def elaborate(self, platform: object) -> Module:
-        """Build the two counters."""
         m = Module()
         column = Signal(range(self._columns))
         row = Signal(range(self._rows))

@@ -1,4 +1,4 @@
-"""Components whose ports are the pins of a board, and joining them to each other."""
+"""Components whose ports are the pins of a board, and connections between them."""
 
 from collections.abc import Iterable
 
@@ -10,14 +10,13 @@ from cubestack.hdl.blocks.stride import Stride
 
 
 class PinnedComponent(Component):
-    """A whole FPGA, or a model of several: its ports are those of a table of pins.
+    """A whole FPGA, or a model of several: its ports are those of a pin table.
 
     Attributes:
-        pins: the table, with the widths that this component has.
+        pins: the table, with the widths of this component.
     """
 
     def __init__(self, pins: Iterable[Pin]) -> None:
-        """Make the ports of ``pins``, in their order."""
         self.pins = tuple(pins)
         super().__init__(
             {
@@ -29,14 +28,14 @@ class PinnedComponent(Component):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """Clocks of which an engine may make many at once; none unless declared."""
+        """Sequences of clocks that an engine may run in one operation; none by default."""
         return ()
 
 
 def connect_ports(
     m: Module, inner: Component, outer: Component, names: Iterable[tuple[str, str]]
 ) -> None:
-    """Lead ports of ``inner`` to ports of ``outer``, given as pairs of their names."""
+    """Connect ports of ``inner`` to ports of ``outer``, given as pairs of names."""
     members = inner.signature.members
     for inside, outside in names:
         port, pin = getattr(inner, inside), getattr(outer, outside)

@@ -1,7 +1,7 @@
-"""What a design does, clock after clock, while nothing but a counter and a byte change.
+"""Sequences of clocks in which only a counter and a data byte of a design change.
 
-An engine makes many such clocks at once (docs/engines.md). That the design does just this, from
-every state with these levels, is proved: :mod:`cubestack.hdl.proofs.strides`.
+An engine runs such clocks in one operation (docs/engines.md). :mod:`cubestack.hdl.proofs.strides`
+proves that the design behaves so from every state with these levels.
 """
 
 from dataclasses import dataclass
@@ -9,26 +9,27 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Stride:
-    """Clocks that store a byte each, or read one: the n-th at the n-th of consecutive addresses.
+    """Clocks that each store or read a byte: the n-th clock at the n-th of consecutive addresses.
 
-    At each rising edge ``counter`` counts up by one and ``data`` takes what stands on ``source``.
-    No other register changes and, where no other input does, no other output but those that show
-    the two. The lower bits of the memory's address are ``counter``; the upper ones stay.
+    At each rising edge ``counter`` increments and ``data`` takes the value of ``source``. No other
+    register changes. While no other input changes, the only outputs that change are those that show
+    ``counter`` and ``data``. The low bits of the memory address are ``counter``; the high bits
+    stay.
 
-    - Storing, ``data`` is on the memory's data lines and is written while the clock is low.
-    - Reading, the memory offers the byte at its address, on ``source``, all the time.
+    - When storing, ``data`` is on the memory's data lines and is written while the clock is low.
+    - When reading, the memory presents the byte at its address on ``source`` all the time.
 
     Attributes:
-        name: unique in the design; small letters and dashes.
-        clock: the pin.
-        levels: of input pins.
-        state: of registers, by their paths in the design.
-        counter: register; the above is true while it is below ``last``.
+        name: unique in the design; lower-case letters and dashes.
+        clock: the clock pin.
+        levels: required levels of input pins.
+        state: required values of registers, by their paths in the design.
+        counter: register; the stride lasts while it is below ``last``.
         last: highest value of the counter.
         data: register of 8 bits.
         source: input pin of 8 bits.
-        memory: what its pins' names begin with.
-        stores: whether it stores, else it reads.
+        memory: prefix of the memory's pin names.
+        stores: True if the stride stores bytes, False if it reads them.
     """
 
     name: str

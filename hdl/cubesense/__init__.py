@@ -1,1 +1,1 @@
-"""CubeSense's FPGA designs: one of the two FPGAs, and both with their link."""
+"""CubeSense's FPGA designs: one of the two FPGAs, and a model of both with their link."""

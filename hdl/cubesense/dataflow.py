@@ -1,8 +1,8 @@
-"""Dataflow control: what one of CubeSense's FPGAs does at the levels of the control lines.
+"""Dataflow control: the action of one of CubeSense's FPGAs at each level of the control lines.
 
 CubeSense thesis, section 6.4.2 and table 6.4. The rows are those of the command table in
-:mod:`cubestack.firmware_model.interface.cubesense.fpga`; every other one is standby. The rows of
-its second table are an option.
+:mod:`cubestack.firmware_model.interface.cubesense.fpga`; every other combination is standby. The
+rows of its second table are optional.
 """
 
 from dataclasses import replace
@@ -19,13 +19,13 @@ SIDES: tuple[Side, ...] = get_args(Side)
 
 
 def checked(side: Side) -> Side:
-    """``side``; ValueError when it is none."""
+    """Return ``side``; raise ValueError if it is unknown."""
     if side not in SIDES:
         raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
     return side
 
 
-#: Output of each action; the last two with address control from the microcontroller only.
+#: Output of each action; the last two only with address control from the microcontroller.
 _OUTPUTS = {
     Action.STORE: "store",
     Action.READ: "read",
@@ -40,20 +40,19 @@ _OUTPUTS = {
 
 
 class DataflowControl(Component):
-    """Decodes the control lines; no clock.
+    """Decodes the control lines; combinational.
 
     Ports:
-        en_n: own enable, low active.
-        other_en_n: the other FPGA's, as the link shows it; not looked at when the link can not.
+        en_n: own enable, active low.
+        other_en_n: the other FPGA's enable, as the link shows it; ignored when the link cannot.
         rnw, edge, shift: the other control lines.
-        store, read, edge_data, send_picture, store_other, send_edge, pass_edge: one is high, the
-            one with the name of the action to be taken (``edge_data`` is EDGE); none in standby.
-        take_address, read_from: the same, with ``mcu_addressing`` only.
-        addressing: one of these two, without a glitch while SHIFT moves from one to the other.
+        store, read, edge_data, send_picture, store_other, send_edge, pass_edge: the output of the
+            selected action is high (``edge_data`` is EDGE); in standby none is.
+        take_address, read_from: likewise, with ``mcu_addressing`` only.
+        addressing: one of these two, without a glitch while SHIFT switches between them.
     """
 
     def __init__(self, side: Side, *, mcu_addressing: bool = False) -> None:
-        """Make the control of the sun sensor's or the nadir sensor's FPGA."""
         self._side = side
         self._mcu_addressing = mcu_addressing
         self._outputs = dict(_OUTPUTS if mcu_addressing else list(_OUTPUTS.items())[:-2])
@@ -62,7 +61,6 @@ class DataflowControl(Component):
         super().__init__({**dict.fromkeys(inputs, In(1)), **dict.fromkeys(names, Out(1))})
 
     def elaborate(self, platform: object) -> Module:
-        """Build one condition for each row that this FPGA acts on."""
         m = Module()
         if self._mcu_addressing:
             m.d.comb += self.addressing.eq(self._addressing())
@@ -74,11 +72,11 @@ class DataflowControl(Component):
         return m
 
     def _fits(self, command: FpgaCommand) -> Value:
-        """Whether the lines are at the levels of a row.
+        """Whether the lines have the levels of a row.
 
-        The other enable is no input at all where it makes no difference, so that it can not disturb
-        a picture that is being stored, nor where the link can not show it: there the line itself
-        depends on the result.
+        The other enable is not an input where it makes no difference, so that it cannot disturb an
+        image that is being stored, nor where the link cannot show it: there the line itself depends
+        on the result.
         """
         own, other = command.sunen, command.naden
         if self._side == "nadir":
@@ -93,13 +91,13 @@ class DataflowControl(Component):
         return Cat(line == level for line, level in levels if level is not None).all()
 
     def _addressing(self) -> Value:
-        """The rows of address control with SHIFT left out, which makes one condition of them."""
+        """The rows of address control without SHIFT, which merges them into one condition."""
         rows = [replace(command, shift=None) for command in table.ADDRESSING_COMMANDS]
         own = [row for row in rows if getattr(row.actions, self._side) is not Action.STANDBY]
         return Cat(self._fits(row) for row in own).any()
 
     def _other_matters(self, command: FpgaCommand) -> bool:
-        """Whether this FPGA sees the other enable, and would act otherwise at its other level."""
+        """Whether this FPGA sees the other enable and would act differently at its other level."""
         shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
         enables = [command.sunen, command.naden]
         enables[1 if self._side == "sun" else 0] ^= 1

@@ -1,8 +1,8 @@
 """Nadir scan: the addresses of every 64th row, then of every 64th column.
 
-CubeSense thesis, section 6.5.1 and figure 6.7: the k-th pixel of a line at the line's k-th clock.
-As flown (appendix D.3) the address has a register behind its counters, which start at column 1, and
-every pixel comes one clock early; that listing's program (appendix C.3) adds 1 to positions.
+CubeSense thesis, section 6.5.1 and figure 6.7: the k-th clock of a line presents its k-th pixel.
+As flown (appendix D.3) the address has a register after its counters, which start at column 1, and
+every pixel is one clock early; the program for that gateware (appendix C.3) adds 1 to positions.
 """
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
@@ -13,25 +13,23 @@ from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
 
 class NadirScan(Component):
-    """Steps at each rising edge of its domain's clock, through figure 6.7's states.
+    """Steps through figure 6.7's states at each rising edge of its domain's clock.
 
-    In reset, and in the two states that preset (the default one and B), the address is 0; the clock
-    that leaves such a state presents the byte there, which is no part of a line. States A (rows)
-    and C (columns) give the address that the next clock presents. C starts again when it is
-    through. As flown, state B leaves the address alone and C runs on beyond the picture.
+    In reset, and in the two states that preset (the default state and B), the address is 0; the
+    clock that leaves such a state presents the byte there, which belongs to no line. States A
+    (rows) and C (columns) address the pixel that the next clock presents. C repeats after its last
+    pixel. As flown, state B does not change the address, and C runs on beyond the image.
 
     Ports:
         address: row : column.
     """
 
     def __init__(self, read_out: ReadOut, *, domain: str = "scan") -> None:
-        """Make the scan that ``read_out`` describes."""
         self._read_out = read_out
         self._domain = domain
         super().__init__({"address": Out(read_out.address_bits)})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the states and counters."""
         m = Module()
         if self._read_out.as_flown:
             self._as_flown(m)
@@ -40,13 +38,13 @@ class NadirScan(Component):
         return m
 
     def _as_flown(self, m: Module) -> None:
-        """A column and a row counter, and the address behind them, as the listing has them."""
+        """A column counter, a row counter and the address register after them."""
         sync = m.d[self._domain]
         size = self._read_out
         column = Signal(size.column_bits, init=size.scan_start)
         row = Signal(size.row_bits, init=size.first_row)
         in_columns = Signal()  # state C
-        between = Signal()  # state B; without either A
+        between = Signal()  # state B; when neither is set: A
         with m.If(between):
             sync += [between.eq(0), in_columns.eq(1)]
         with m.Else():
@@ -63,13 +61,13 @@ class NadirScan(Component):
                     sync += [between.eq(1), column.eq(size.first_column), row.eq(0)]
 
     def _exact(self, m: Module) -> None:
-        """One counter along the line and one of lines, which swap roles for the columns."""
+        """One counter along the line and one of lines; they swap roles for the columns."""
         sync = m.d[self._domain]
         size = self._read_out
         column_bits, row_bits = size.column_bits, size.row_bits
         step_bits = ceil_log2(size.scan_step)
 
-        on_a_line = Signal()  # state A or C; else the default one or B
+        on_a_line = Signal()  # state A or C; otherwise the default state or B
         vertical = Signal()  # state B or C
         along = Signal(max(column_bits, row_bits))  # position on the line
         line = Signal(range(max(len(size.scan_rows), len(size.scan_columns), 2)))
@@ -93,7 +91,7 @@ class NadirScan(Component):
             with m.Else():
                 sync += [line.eq(0), vertical.eq(1), on_a_line.eq(vertical)]
 
-        # Where along and line are 0, so is the address but for the first line's offset.
+        # Where along and line are 0, the address is the first line's offset.
         scanned_row = Cat(Const(size.first_row, step_bits) & on_a_line.replicate(step_bits), line)
         scanned_column = Cat(
             Const(size.first_column, step_bits) & on_a_line.replicate(step_bits), line

@@ -1,7 +1,7 @@
-"""Both of CubeSense's FPGAs, their link and their common microcontroller bus.
+"""Both of CubeSense's FPGAs, their link and their shared microcontroller bus.
 
-CubeSense thesis, figure 3.9 and tables 3.3 and 3.4. What is wired between the two chips is
-resolved here, so that simulators need no tri-state lines.
+CubeSense thesis, figure 3.9 and tables 3.3 and 3.4. The wires between the two chips are resolved
+here, so that simulators need no tri-state lines.
 """
 
 from amaranth.hdl import Cat, Module, Value
@@ -12,27 +12,26 @@ from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
-#: Ports that each FPGA has for itself; in the pair SUN_ or NAD_ goes before their names.
+#: Ports that each FPGA has separately; in the pair their names have the prefix SUN_ or NAD_.
 OWN_PORTS = [port.name for pin in pins.OWN_PINS for port in pin.ports]
 
 
 class CubeSensePair(PinnedComponent):
-    """The two FPGAs with all of their pins but those of the link.
+    """The two FPGAs with all of their pins except those of the link.
 
-    SUNEN and NADEN are low active; RNW, CLK, EDGE and SHIFT go to both FPGAs. DATA is the
-    microcontroller's bus, 0 while nobody drives it, which DATA_OE tells. A data line of the link
-    that nobody drives is 0, and a control line 1. With ``mcu_addressing`` DATA_I is what the
-    microcontroller drives on its bus; it must drive nothing while DATA_OE is high.
+    SUNEN and NADEN are active low; RNW, CLK, EDGE and SHIFT go to both FPGAs. DATA is the
+    microcontroller's bus; it is 0 while no FPGA drives it, that is while DATA_OE is low. On the
+    link, an undriven data line is 0 and an undriven control line 1. With ``mcu_addressing`` DATA_I
+    is what the microcontroller drives on its bus; it must drive nothing while DATA_OE is high.
 
     CONTENTION is not 0 when both FPGAs drive the same wire: bit 0 DATA, bit 1 the link's data,
-    bits 2 and 3 its control lines. The SRAMs' data buses are not among these.
+    bits 2 and 3 its control lines. The SRAMs' data buses are not included.
 
-    In a linked store one FPGA's clock is an output of the other one. A simulator that works in
-    cycles, as CXXRTL does, must evaluate twice before it commits, or it misses that clock's edges.
+    In a linked store one FPGA's clock is an output of the other one. A cycle-based simulator such
+    as CXXRTL must evaluate twice before it commits, or it misses that clock's edges.
     """
 
     def __init__(self, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False) -> None:
-        """Make the pair."""
         self.read_out = read_out
         self.mcu_addressing = mcu_addressing
         width = read_out.address_bits
@@ -41,7 +40,6 @@ class CubeSensePair(PinnedComponent):
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Join the two FPGAs."""
         m = Module()
         m.submodules.sun = sun = CubeSenseFpga("sun", self.read_out, self.mcu_addressing)
         m.submodules.nadir = nadir = CubeSenseFpga("nadir", self.read_out, self.mcu_addressing)
@@ -71,10 +69,10 @@ class CubeSensePair(PinnedComponent):
 
 
 def driven(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
-    """Level of eight data lines that at most one FPGA drives; 0 where none does."""
+    """Level of eight data lines that at most one FPGA drives; 0 when neither does."""
     return (sun & sun_oe.replicate(8)) | (nadir & nadir_oe.replicate(8))
 
 
 def released(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
-    """Level of lines that are pulled up, which a driver of either FPGA may hold low."""
+    """Level of lines with a pull-up, which either FPGA may pull low."""
     return (sun | ~sun_oe) & (nadir | ~nadir_oe)

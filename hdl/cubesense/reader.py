@@ -1,8 +1,8 @@
-"""SRAM to microcontroller: the whole picture, the nadir scan or the Sun window, byte by byte.
+"""SRAM to microcontroller: the whole image, the nadir scan or the Sun window, byte by byte.
 
 CubeSense thesis, section 6.4.2 (microcontroller, edge and address control) and figures 6.7 and
-6.16; section 9.2.2 (address control from the microcontroller). The microcontroller makes the clock,
-so it alone sets the rate, and reading works when no camera gives a clock.
+6.16; section 9.2.2 (address control from the microcontroller). The microcontroller generates the
+clock, so it alone sets the rate, and reading works when no camera has a clock.
 """
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Mux, ResetSignal
@@ -17,27 +17,26 @@ from cubestack.hdl.cubesense.sun_window import SunWindow
 class CubeSenseReader(Component):
     """Presents the next byte at each rising edge of ``clk``, in one of three orders.
 
-    At most one of the three requests is high. Each is the other end of its order's reset: while it
-    is low the order stands at its first byte, and while all are low ``address`` and ``data`` are 0.
+    At most one of the three requests is high. Each request releases its order's reset: while it is
+    low the order stays at its first byte, and while all are low ``address`` and ``data`` are 0.
 
     Ports:
         clk: data clock.
-        picture: row by row without end; past the last pixel comes the first one.
+        picture: row by row without end; the last pixel is followed by the first one.
         scan: the nadir scan.
         window: the Sun window.
         sun_x, sun_y: first Sun pixel, for the window.
         address: SRAM address of the byte that the next edge presents.
-        memory: what the SRAM offers at that address.
+        memory: the byte that the SRAM offers at that address.
         data: the byte presented.
-        addressing: a fourth request, with ``mcu_addressing`` only: the picture, but while
-            ``take_address`` is high each edge shifts a byte into the address instead, from below,
-            and ``data`` is 0.
-        take_address, read_from: which of the two it is; neither without ``addressing``.
+        addressing: a fourth request, with ``mcu_addressing`` only: the image, but while
+            ``take_address`` is high each edge shifts a byte into the address instead, from the
+            low end, and ``data`` is 0.
+        take_address, read_from: the kind of ``addressing``; both low without it.
         address_byte: from the microcontroller.
     """
 
     def __init__(self, read_out: ReadOut, *, mcu_addressing: bool = False) -> None:
-        """Make a reader of ``read_out``."""
         self._read_out = read_out
         self._mcu_addressing = mcu_addressing
         requests = dict.fromkeys(("clk", "picture", "scan", "window"), In(1))
@@ -48,7 +47,6 @@ class CubeSenseReader(Component):
         super().__init__({**requests, **sun, **memory, **(option if mcu_addressing else {})})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the three orders, each with a reset of its own, and the output register."""
         m = Module()
         size = self._read_out
         picture_wanted = output_wanted = self.picture

@@ -1,8 +1,8 @@
-"""First Sun pixel: found while the picture is being stored.
+"""Finds the first Sun pixel while the image is being stored.
 
-CubeSense thesis, section 6.6.1 and figure 6.15. A lone bright pixel may be a damaged one, so the
-first of three bright pixels side by side counts. The search as flown (appendix D.4) also counts
-across the end of a line; the other one does not, because pixels there are not side by side.
+CubeSense thesis, section 6.6.1 and figure 6.15. A single bright pixel may be damaged, so the first
+of three adjacent bright pixels counts. The search as flown (appendix D.4) also counts across the
+end of a line; the corrected one does not, because pixels there are not adjacent.
 """
 
 from amaranth.hdl import Module, Mux, Signal
@@ -12,16 +12,16 @@ from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRES
 
 
 class SunSearch(Component):
-    """Looks at each pixel in the clock period in which it is written.
+    """Examines each pixel in the clock period in which it is written.
 
-    ``x`` and ``y`` keep their values in reset, and are of no meaning before the first frame. They
+    ``x`` and ``y`` keep their values in reset, and have no meaning before the first frame. They
     become all ones, "not found", with the second clock after reset and in each gap between frames,
-    and the first Sun pixel's once the third bright pixel is written. What comes after it in the
-    same frame is ignored.
+    and those of the first Sun pixel once the third bright pixel is written. The rest of the same
+    frame is ignored.
 
-    As flown nothing says "not found": the first pixel of every run is noted at once, whatever
-    follows, and a picture without a bright pixel leaves the coordinates as they were. ``start`` is
-    ignored; reset alone begins a new search.
+    As flown there is no "not found": the first pixel of every run is noted at once, whatever
+    follows, and an image without a bright pixel leaves the coordinates unchanged. ``start`` is
+    ignored; only reset begins a new search.
 
     Ports:
         start: between frames; the search begins again with the next one.
@@ -32,7 +32,6 @@ class SunSearch(Component):
     """
 
     def __init__(self, read_out: ReadOut, *, domain: str = "pix") -> None:
-        """Make a search in pictures of ``read_out``'s size."""
         self._column_bits = read_out.column_bits
         self._as_flown = read_out.as_flown
         self._domain = domain
@@ -41,10 +40,9 @@ class SunSearch(Component):
         super().__init__({"start": In(1), **written, **sun})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the count of bright pixels and the retained coordinates."""
         m = Module()
         sync = m.d[self._domain]
-        # Reset does not reach these two, and while it lasts nothing is searched.
+        # These two are not reset, and nothing is searched during reset.
         x = Signal.like(self.x, reset_less=True)
         y = Signal.like(self.y, reset_less=True)
         m.d.comb += [self.x.eq(x), self.y.eq(y)]

@@ -1,7 +1,7 @@
 """Sun window: the first Sun pixel's coordinates, then the square of pixels around the Sun.
 
-CubeSense thesis, section 6.6.2 and figure 6.16. At the picture's border the whole window is moved
-inside of the picture; as flown (appendix D.4) it wraps over the ends of the address.
+CubeSense thesis, section 6.6.2 and figure 6.16. At the image border the whole window moves inside
+the image; as flown (appendix D.4) it wraps over the ends of the address.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
@@ -11,23 +11,22 @@ from cubestack.firmware_model.interface.cubesense.fpga import ReadOut
 
 
 class SunWindow(Component):
-    """Steps at each rising edge of its domain's clock, through figure 6.16's states.
+    """Steps through figure 6.16's states at each rising edge of its domain's clock.
 
-    States A to D offer the coordinates in ``byte``, one after the other, and hold the address at
-    0. State E gives the address of one pixel of the window after the other, row by row, and after
-    the last one the first again. As flown the address has a register behind its counters, which
-    outlives the reset: the window's first byte is at the address that the read-out before ended
-    with, and past the last one comes the row below.
+    States A to D offer the coordinates in ``byte``, one after the other, and hold the address at 0.
+    State E addresses the pixels of the window row by row and starts again after the last one. As
+    flown the address has a register after its counters, which is not reset: the window's first byte
+    is at the last address of the previous read-out, and the last pixel is followed by the row
+    below.
 
     Ports:
-        x, y: first Sun pixel; must stand still while the domain is out of reset.
-        address: row : column of the pixel that the next clock is to present.
-        coordinate: state A, B, C or D: the next clock is to present ``byte`` instead.
+        x, y: first Sun pixel; must be stable while the domain is out of reset.
+        address: row : column of the pixel that the next clock presents.
+        coordinate: state A, B, C or D: the next clock presents ``byte`` instead.
         byte: x low, x high, y low or y high.
     """
 
     def __init__(self, read_out: ReadOut, *, domain: str = "window") -> None:
-        """Make the window that ``read_out`` describes."""
         self._read_out = read_out
         self._domain = domain
         sun = {"x": In(read_out.column_bits), "y": In(read_out.row_bits)}
@@ -35,7 +34,6 @@ class SunWindow(Component):
         super().__init__({**sun, **offered})
 
     def elaborate(self, platform: object) -> Module:
-        """Build the states and the address."""
         m = Module()
         state = Signal(range(4))  # A, B, C, D
         in_window = Signal()  # state E
@@ -52,7 +50,7 @@ class SunWindow(Component):
         return m
 
     def _wrapping(self, m: Module, in_window: Signal) -> None:
-        """Counters that the listing loads while it waits, here while coordinates are offered."""
+        """The listing loads these counters while it waits; here, while coordinates are offered."""
         size, sync = self._read_out, m.d[self._domain]
         left = (self.x - size.window_left)[: len(self.x)]
         right = (left + size.window)[: len(left)]
@@ -72,7 +70,7 @@ class SunWindow(Component):
             m.d.comb += self.address.eq(shown)
 
     def _moved_inside(self, m: Module, in_window: Signal) -> None:
-        """The position in the window, and the window's origin."""
+        """Address = position in the window + the window's origin."""
         size = self._read_out
         right, last_column = self._position(m, "right", size.window_left, in_window)
         down, _ = self._position(m, "down", size.window_above, in_window & last_column)
@@ -92,9 +90,9 @@ class SunWindow(Component):
     def _clamped(
         self, m: Module, sun: Signal, before: int, length: int, in_window: Signal
     ) -> Signal:
-        """The pixel that the window is placed around: ``sun``, unless the border is too near.
+        """The pixel that the window is placed around: ``sun``, clamped away from the border.
 
-        Outside of state E it is the nearest to 0, so that the address is 0 then.
+        Outside of state E it is the smallest, so that the address is 0 then.
         """
         furthest = length - self._read_out.window + before
         clamped = Signal.like(sun, name=f"clamped_{sun.name}")

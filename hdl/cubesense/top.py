@@ -4,19 +4,19 @@ CubeSense thesis, tables 3.4, 6.3 and 6.4, sections 6.4 to 6.6 and figure 6.5; s
 
 How each asynchronous input is brought in:
 
-- Y and HREF change with PCLK and are used in its domain only; what comes over the link, in the
-  domain of the clock that comes with it. Each stores by a writer of its own, so no clock is ever
-  switched, and a camera without a clock stops nothing but its own picture.
+- Y and HREF change with PCLK and are used only in its domain; signals from the link, only in the
+  domain of the link's clock. Each domain has its own writer, so no clock is ever switched, and a
+  camera without a clock affects only its own image.
 - The control lines come from the microcontroller. For both pixel clocks, "not storing" is the
-  domain's reset: asserted at once, without a clock, released through two flip-flops. For the data
-  clock, "not reading" is reset without a synchroniser, because the same microcontroller makes
-  control lines and CLK one after the other. Picture, scan and window have one such reset each, so
-  each starts from its first byte however it was reached.
-- DATA_I, where there is one, is used with CLK only: the microcontroller makes both.
+  domain's reset: asserted asynchronously, released through two flip-flops. For the data clock, "not
+  reading" is the reset without a synchroniser, because the same microcontroller drives the control
+  lines and CLK one after the other. Image, scan and window have one such reset each, so each starts
+  from its first byte however it was reached.
+- DATA_I, where present, is used with CLK only: the microcontroller drives both.
 - The other FPGA's enable comes over the link and is used like the own one.
 
-The coordinates of the first Sun pixel outlive the reset: they are written by a pixel clock while a
-Sun picture is stored and stand still whenever a data clock looks at them.
+The coordinates of the first Sun pixel are not reset: a pixel clock writes them while a Sun image is
+stored, and they are stable whenever a data clock reads them.
 """
 
 from amaranth.hdl import Cat, Module, ResetSignal
@@ -38,14 +38,14 @@ class CubeSenseFpga(PinnedComponent):
     With EN high every output is at its reset value, all drivers off, whatever the other pins do.
 
     ``mcu_addressing`` makes the microcontroller's data bus bidirectional and adds the rows in which
-    it sets the address. No FPGA drives the bus while SHIFT and RNW are both low, so that is when
-    the microcontroller may.
+    it sets the address. No FPGA drives the bus while SHIFT and RNW are both low, so the
+    microcontroller may drive it then.
     """
 
     def __init__(
         self, side: Side, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False
     ) -> None:
-        """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
+        """Raise ValueError unless ``side`` is "sun" or "nadir"."""
         self.side = checked(side)
         self.read_out = read_out
         self.mcu_addressing = mcu_addressing
@@ -53,20 +53,19 @@ class CubeSenseFpga(PinnedComponent):
         super().__init__(resized(pins, SRAM_A=read_out.address_bits))
 
     def elaborate(self, platform: object) -> Module:
-        """Wire the blocks to the pins."""
         m = Module()
         is_sun, one_search = self.side == "sun", self.read_out.one_search
         addressing = self.mcu_addressing
         m.submodules.dataflow = mode = DataflowControl(self.side, mcu_addressing=addressing)
         m.submodules.reader = reader = CubeSenseReader(self.read_out, mcu_addressing=addressing)
-        # With one search the sun's FPGA looks for the Sun in a picture that it sends, too.
+        # With one search the sun's FPGA also searches an image that it sends.
         writing = mode.store | mode.send_picture if one_search and is_sun else mode.store
         own_writer = add_writer(m, "pix", writing, self.PCLK, self.HREF, self.Y, self.read_out)
         link_clock, link_href = self.LINK_C_I[0], self.LINK_C_I[1]
         link_writer = add_writer(
             m, "link", mode.store_other, link_clock, link_href, self.LINK_D_I, self.read_out
         )
-        # The Sun is looked for in the sun camera's picture, whichever memory it goes to.
+        # The search runs on the sun camera's image, whichever memory stores it.
         if is_sun or not one_search:
             sun_writer = own_writer if is_sun else link_writer
             search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
@@ -117,7 +116,7 @@ class CubeSenseFpga(PinnedComponent):
             self.DATA_OE.eq(presenting | mode.pass_edge),
             self.LINK_D_O.eq(reader.data | (self.Y & mode.send_picture.replicate(8))),
             self.LINK_D_OE.eq(mode.send_picture | mode.send_edge),
-            # An enable is shown by pulling the line low, so an FPGA without power shows none.
+            # An enabled FPGA pulls the line low, so one without power reads as disabled.
             self.LINK_C_O.eq(Cat(self.PCLK, self.HREF) & mode.send_picture.replicate(2)),
             self.LINK_C_OE[own_line].eq(mode.send_picture | shows_enable),
             self.LINK_C_OE[other_line].eq(mode.send_picture),
@@ -127,8 +126,8 @@ class CubeSenseFpga(PinnedComponent):
             self.SRAM_D_OE.eq(own_stores | link_writer.store),
             self.SRAM_CE_N.eq(~(reading | storing)),
             self.SRAM_OE_N.eq(~reading),
-            # The pulse ends with the clock's rising edge itself, ahead of the address that the
-            # same edge moves on.
+            # The pulse ends with the clock's rising edge itself, before the address that this
+            # edge advances.
             self.SRAM_WE_N.eq(
                 ~((own_stores & ~self.PCLK) | (link_writer.store & ~self.LINK_C_I[0]))
             ),

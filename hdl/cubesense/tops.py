@@ -1,4 +1,4 @@
-"""CubeSense's tops with their clocks, and its blocks, by the names that the command line uses."""
+"""CubeSense's tops with their clocks, and its blocks, by their names on the command line."""
 
 from functools import partial
 from pathlib import Path
@@ -53,7 +53,7 @@ def _pair(mcu_addressing: bool) -> Top:
 
 _EDGE_BLOCKS = {"nadir scan": NadirScan, "Sun search": SunSearch, "Sun window": SunWindow}
 
-#: Their tracked area, as ``cubestack hdl area --ice40 --fmax --json`` prints it.
+#: Recorded area of the designs: output of ``cubestack hdl area --ice40 --fmax --json``.
 AREA_FILE = Path(__file__).parent / "area.json"
 
 TOPS: TopTable = {

@@ -1,6 +1,6 @@
-"""A writer with a clock domain of its own, as each of CubeSense's FPGAs has two of.
+"""A writer in its own clock domain; each of CubeSense's FPGAs has two.
 
-CubeSense thesis, section 6.4.2: the own camera's picture, or the one that comes over the link.
+CubeSense thesis, section 6.4.2: one for the own camera's image, one for the image over the link.
 """
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Value
@@ -14,9 +14,9 @@ from cubestack.hdl.blocks.frame_writer import FrameWriter
 def add_writer(
     m: Module, domain: str, wanted: Value, clock: Value, href: Value, pixel: Value, size: ReadOut
 ) -> FrameWriter:
-    """A writer in ``domain``, which is new, has ``clock``, and is in reset unless ``wanted``.
+    """Add a writer in the new clock domain ``domain`` of ``clock``, in reset unless ``wanted``.
 
-    The reset comes without a clock and is released through two flip-flops.
+    The reset is asserted asynchronously and released through two flip-flops.
     """
     m.domains += ClockDomain(domain, async_reset=True, local=True)
     m.d.comb += ClockSignal(domain).eq(clock)

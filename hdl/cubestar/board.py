@@ -1,8 +1,8 @@
-"""What CubeStar's boards have in common: size, camera, writer, and the processor's bus.
+"""Common parts of CubeStar's boards: size, camera, writer, and the processor's bus.
 
-How the camera's pins are brought in: PIXDATA, HSYNC and VSYNC change with PIXCLK and are used in
-its domain only. "Not storing" is that domain's reset: asserted at once, without a clock, released
-through two flip-flops.
+How the camera's pins are brought in: PIXDATA, HSYNC and VSYNC change with PIXCLK and are used only
+in its domain. "Not storing" is that domain's reset: asserted asynchronously, released through two
+flip-flops.
 """
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Value
@@ -21,10 +21,9 @@ class CubeStarBoard(PinnedComponent):
     """A board, or a model of two, that stores images of ``columns`` x ``rows`` pixels."""
 
     _pins: tuple[Pin, ...]
-    _banks: bool  # whether each memory has two images, and its address a bit to tell them apart
+    _banks: bool  # each memory holds two images; the top address bit selects one
 
     def __init__(self, columns: int = 1024, rows: int = 512) -> None:
-        """Make the board for images of ``columns`` x ``rows`` pixels."""
         self.columns = columns
         self.rows = rows
         width = MatrixCounter.address_width(columns, rows) + self._banks
@@ -34,9 +33,9 @@ class CubeStarBoard(PinnedComponent):
     def _row_stored(
         self, name: str = "row", memory: str = "SRAM", into: tuple[tuple[str, int], ...] = ()
     ) -> Stride:
-        """Pixels inside a row, from the first one's write to the last one's.
+        """Stride of the pixels inside a row, from the first one's write to the last one's.
 
-        ``into`` are levels of registers with which they go to ``memory``.
+        ``into``: levels of the registers that select ``memory``.
         """
         over = ("line_full", "frame_full", "ack")
         begun = ("store", "line_open", "between_lines_seen")
@@ -59,7 +58,7 @@ class CubeStarBoard(PinnedComponent):
         )
 
     def _add_writer(self, m: Module, storing: Value) -> FrameWriter:
-        """The camera's writer in its domain "pix", in reset unless ``storing``."""
+        """Add the camera's writer in the domain "pix", in reset unless ``storing``."""
         m.domains.pix = ClockDomain(async_reset=True, local=True)
         m.submodules.pix_reset = ResetSynchronizer(~storing, domain="pix")
         m.submodules.writer = writer = FrameWriter(self.columns, self.rows, domain="pix")
@@ -73,7 +72,6 @@ class CubeStarBoard(PinnedComponent):
         return writer
 
     def _add_bus(self, m: Module, on: Value, address_width: int) -> BusPort:
-        """The processor's external bus."""
         m.submodules.bus = bus = BusPort(address_width)
         m.d.comb += [
             bus.on.eq(on),

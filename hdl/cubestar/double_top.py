@@ -1,14 +1,14 @@
-"""CubeStar's FPGA board with two SRAMs in turn: one is filled while the processor has the other.
+"""CubeStar's FPGA board with two SRAMs: one is filled while the processor reads the other.
 
-CubeStar thesis, option 3 of section 3.3. It was not taken up because the AGLN030 has too few pins,
-77: this design has 95. Pins and protocol are assumed.
+CubeStar thesis, option 3 of section 3.3. It was rejected because the AGLN030 has only 77 pins; this
+design needs 95. Pins and protocol are assumed.
 
 How each asynchronous input is brought in:
 
 - The camera's pins, ENABLE and RNW as in :mod:`cubestack.hdl.cubestar.top`.
 - INTO is latched by the falling edge of RNW and must be stable around it.
-- The bus passes through without a clock; ALE clocks the address latch. ENABLE changes between two
-  accesses only, and so does RNW for accesses to the memory that is stored in.
+- The bus is combinational; ALE clocks the address latch. ENABLE changes only between two accesses,
+  and so does RNW for accesses to the memory that is being filled.
 """
 
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Signal
@@ -21,13 +21,13 @@ _SRAM = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 
 class CubeStarDouble(CubeStarBoard):
-    """Frame buffer and bus switch for two memories of one picture each.
+    """Frame buffer and bus switch for two memories of one image each.
 
-    ENABLE = 0: standby, every output at its reset value. ENABLE = 1: the bus has the memories, at
-    addresses memory : row : column. RNW = 0 besides: the next whole frame is stored in memory INTO,
-    which the bus does not reach meanwhile, then ACK rises; it stays until RNW rises. Reading a
-    memory that is out of reach drives nothing. With one memory failed the other one serves both in
-    turn.
+    ENABLE = 0: standby, every output at its reset value. ENABLE = 1: the bus is connected to the
+    memories, at addresses memory : row : column. ENABLE = 1, RNW = 0: the next whole frame is
+    stored in memory INTO, which is disconnected from the bus meanwhile, then ACK rises; it stays
+    high until RNW rises. Reading a disconnected memory drives nothing. If one memory has failed,
+    the other one is filled and read alternately.
     """
 
     _pins = DOUBLE
@@ -35,14 +35,13 @@ class CubeStarDouble(CubeStarBoard):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """A row that is stored in either memory."""
+        """A stored row, for either memory."""
         return tuple(
             self._row_stored(f"row-{number}", f"SRAM{number}", (("into", number - 1),))
             for number in (1, 2)
         )
 
     def elaborate(self, platform: object) -> Module:
-        """Wire writer and bus to either SRAM."""
         m = Module()
         m.domains.start = ClockDomain(clk_edge="neg", reset_less=True, local=True)
         storing = Signal()

@@ -1,14 +1,14 @@
-"""CubeStar's FPGA board for the next version: one SRAM for FPGA and processor.
+"""CubeStar's FPGA board for the next version: FPGA and processor share one SRAM.
 
 CubeStar thesis, option 2 of section 3.3, and section 7.2. The processor's external bus ends at the
-FPGA, which connects it to the SRAM: the processor has the whole memory for itself, or the FPGA
-stores a picture there. Nothing is copied. Not built then: pins and protocol are assumed.
+FPGA, which connects it to the SRAM: either the processor has the whole memory, or the FPGA stores
+an image there. Nothing is copied. It was not built then: pins and protocol are assumed.
 
 How each asynchronous input is brought in:
 
 - The camera's pins, ENABLE, RNW and BANK as in :mod:`cubestack.hdl.cubestar.top`.
-- The bus passes through without a clock; ALE clocks the address latch. RNW and ENABLE change
-  between two accesses only.
+- The bus is combinational; ALE clocks the address latch. RNW and ENABLE change only between two
+  accesses.
 """
 
 from amaranth.hdl import Cat, ClockDomain, ClockSignal, Module, Signal
@@ -21,9 +21,10 @@ from cubestack.hdl.cubestar.board import CubeStarBoard
 class CubeStarShared(CubeStarBoard):
     """Frame buffer and bus switch.
 
-    ENABLE = 0: standby, every output at its reset value but the top bit of SRAM_A, which keeps the
-    bank. ENABLE = 1, RNW = 0: store the next whole frame, then raise ACK; the bus is cut off and
-    AD_LOW not driven. ENABLE = 1, RNW = 1: the bus has the SRAM, at addresses bank : row : column.
+    ENABLE = 0: standby, every output at its reset value except the top bit of SRAM_A, which keeps
+    the bank. ENABLE = 1, RNW = 0: store the next whole frame, then raise ACK; the bus is
+    disconnected and AD_LOW not driven. ENABLE = 1, RNW = 1: the bus is connected to the SRAM, at
+    addresses bank : row : column.
     """
 
     _pins = SHARED
@@ -31,11 +32,9 @@ class CubeStarShared(CubeStarBoard):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """A row that is stored."""
         return (self._row_stored(),)
 
     def elaborate(self, platform: object) -> Module:
-        """Wire writer, bus and bank register to the SRAM."""
         m = Module()
         m.domains.enable = ClockDomain(reset_less=True, local=True)
         storing = Signal()

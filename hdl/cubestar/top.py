@@ -6,11 +6,11 @@ SRAM, and the microcontroller reads it strictly in sequence.
 How each asynchronous input is brought in:
 
 - The camera's pins as in :mod:`cubestack.hdl.cubestar.board`.
-- ENABLE and RNW come from the microcontroller. For the DCLK domain, "not reading" is its reset
-  without a synchroniser, because the same microcontroller makes ENABLE, RNW and DCLK one after the
+- ENABLE and RNW come from the microcontroller. For the DCLK domain, "not reading" is the reset
+  without a synchroniser, because the same microcontroller drives ENABLE, RNW and DCLK one after the
   other, and a synchroniser would swallow its first two clocks.
-- BANK is latched by the rising edge of ENABLE and must be stable around it. Standby retains it: an
-  address bit that fell with ENABLE could take a write pulse that ENABLE cuts off to the other bank.
+- BANK is latched by the rising edge of ENABLE and must be stable around it. Standby retains it: if
+  the address bit fell with ENABLE, a write pulse that ENABLE cuts off could hit the other bank.
 
 No clock is ever switched: each counter has its own, and only the SRAM address is multiplexed.
 """
@@ -27,11 +27,11 @@ from cubestack.hdl.cubestar.board import CubeStarBoard
 class CubeStarTop(CubeStarBoard):
     """The frame buffer with the pins of table C.2 and its SRAM of two banks.
 
-    The SRAM's data bus is an i / o / oe triple; its three strobes are low active.
+    The SRAM's data bus is an i / o / oe triple; its three strobes are active low.
 
-    ENABLE = 0: standby, every output at its reset value but the top bit of SRAM_A, which keeps the
-    bank. ENABLE = 1, RNW = 0: store the next whole frame, then raise ACK. ENABLE = 1, RNW = 1: each
-    rising DCLK presents the next byte.
+    ENABLE = 0: standby, every output at its reset value except the top bit of SRAM_A, which keeps
+    the bank. ENABLE = 1, RNW = 0: store the next whole frame, then raise ACK. ENABLE = 1, RNW = 1:
+    each rising DCLK presents the next byte.
     """
 
     _pins = PUBLISHED
@@ -39,7 +39,7 @@ class CubeStarTop(CubeStarBoard):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """A row that is stored, and one that is read."""
+        """A stored row, and a row that is read."""
         read = Stride(
             "row-read",
             clock=pins.DCLK,
@@ -55,7 +55,6 @@ class CubeStarTop(CubeStarBoard):
         return self._row_stored(), read
 
     def elaborate(self, platform: object) -> Module:
-        """Wire writer, reader and bank register to the pins."""
         m = Module()
         m.domains.dclk = ClockDomain(async_reset=True)
         m.domains.enable = ClockDomain(reset_less=True)
@@ -81,7 +80,7 @@ class CubeStarTop(CubeStarBoard):
             self.SRAM_CE_N.eq(~self.ENABLE),
             self.SRAM_OE_N.eq(~reading),
             # The pulse ends with the clock's rising edge itself, one flip-flop and one
-            # multiplexer ahead of the address that the same edge moves on.
+            # multiplexer before the address that this edge advances.
             self.SRAM_WE_N.eq(~writer.store | self.PIXCLK),
         ]
         return m

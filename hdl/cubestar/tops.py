@@ -1,4 +1,4 @@
-"""CubeStar's tops with their clocks, and its blocks, by the names that the command line uses."""
+"""CubeStar's tops with their clocks, and its blocks, by their names on the command line."""
 
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,7 @@ _DCLK = Clock(DCLK, 770.8, "37 cycles (fitted) of the microcontroller's 48 MHz")
 _ENABLE = Clock(ENABLE, 1000, "microcontroller, a few times a second; latches BANK")
 _ALE = Clock(ALE, 83, "bus accesses of four cycles at 48 MHz")
 
-#: Their tracked area, as ``cubestack hdl area --ice40 --fmax --json`` prints it.
+#: Recorded area of the designs: output of ``cubestack hdl area --ice40 --fmax --json``.
 AREA_FILE = Path(__file__).parent / "area.json"
 
 TOPS: TopTable = {

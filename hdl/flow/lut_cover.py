@@ -1,4 +1,4 @@
-"""Covers a network of gates with 3-input look-up tables, as few as a quick search finds.
+"""Maps a network of gates to 3-input look-up tables, as few as a quick search finds.
 
 Cut enumeration, area flow and exact local area, as in A. Mishchenko, S. Chatterjee, R. Brayton,
 "Improvements to technology mapping for LUT-based FPGAs", IEEE Trans. CAD 26 (2007).
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 __all__ = ["FALSE", "TRUE", "GateNetwork"]
 
 INPUTS = 3
-CUTS_KEPT = 12  # per gate; with 3 inputs more make no difference
+CUTS_KEPT = 12  # per gate; with 3 inputs, more make no difference
 ROUNDS = 5
 
 Cut = frozenset[int]
@@ -22,27 +22,24 @@ FALSE, TRUE = 0, 1
 class GateNetwork:
     """Gates of at most three inputs; equal gates are one gate.
 
-    A signal is an integer: twice its gate's number, plus 1 for the inverse, which is free inside of
-    a look-up table. The methods that make a gate fold constants, so what they return may be an
-    older signal.
+    A signal is an integer: twice its gate's number, plus 1 for the inverse, which costs nothing
+    inside a look-up table. The methods that create a gate fold constants, so they may return an
+    existing signal.
     """
 
     def __init__(self) -> None:
-        """Make a network that has the two constants only."""
         self._fan_in: list[tuple[int, ...]] = [()]
         self._known: dict[tuple[str, tuple[int, ...]], int] = {}
 
     def source(self) -> int:
-        """A signal from elsewhere: a pin, or a flip-flop's output."""
+        """A new input signal: a pin or a flip-flop's output."""
         self._fan_in.append(())
         return 2 * (len(self._fan_in) - 1)
 
     def not_(self, a: int) -> int:
-        """Not ``a``."""
         return a ^ 1
 
     def and_(self, a: int, b: int) -> int:
-        """``a`` and ``b``."""
         if a == b or b == TRUE:
             return a
         if a == TRUE:
@@ -52,11 +49,9 @@ class GateNetwork:
         return self._gate("and", min(a, b), max(a, b))
 
     def or_(self, a: int, b: int) -> int:
-        """``a`` or ``b``."""
         return self.and_(a ^ 1, b ^ 1) ^ 1
 
     def xor(self, a: int, b: int) -> int:
-        """Exactly one of ``a`` and ``b``."""
         inverse = (a ^ b) & 1
         a, b = sorted((a & ~1, b & ~1))
         if a == b:
@@ -64,7 +59,7 @@ class GateNetwork:
         return (b if a == FALSE else self._gate("xor", a, b)) ^ inverse
 
     def mux(self, select: int, low: int, high: int) -> int:
-        """``high`` where ``select``, else ``low``."""
+        """``high`` if ``select`` is 1, else ``low``."""
         if low == high:
             return low
         if {select, low, high} & {FALSE, TRUE}:
@@ -72,7 +67,7 @@ class GateNetwork:
         return self._gate("mux", select, low, high)
 
     def add(self, a: list[int], b: list[int], carry: int = FALSE) -> list[int]:
-        """Sum of two numbers of equal width, lowest bit first, with the carry as a last bit."""
+        """Sum of two numbers of equal width, lowest bit first; the last bit is the carry."""
         total = []
         for x, y in zip(a, b, strict=True):
             either = self.xor(x, y)
@@ -88,9 +83,9 @@ class GateNetwork:
         return self._known[key]
 
     def tables(self, wanted: Iterable[int]) -> int:
-        """Number of look-up tables that make all the ``wanted`` signals."""
+        """Number of look-up tables that compute all the ``wanted`` signals."""
         roots = {signal for signal in wanted if signal not in (FALSE, TRUE)}
-        # A table is needed to invert a source, or to have a gate both ways.
+        # A table is needed to invert a source, or where both a gate and its inverse are wanted.
         inverters = [s for s in roots if s & 1 and (s ^ 1 in roots or not self._fan_in[s >> 1])]
         cover = _Cover(self._fan_in, {signal >> 1 for signal in roots})
         for _ in range(ROUNDS):
@@ -99,12 +94,12 @@ class GateNetwork:
 
 
 class _Cover:
-    """Look-up tables over a network: for each gate one of the cuts that it is a function of."""
+    """A choice of one cut for each gate; a look-up table computes the gate from the cut."""
 
     def __init__(self, fan_in: Sequence[tuple[int, ...]], roots: Iterable[int]) -> None:
         self.area = 0
         self._cuts = self._enumerate(fan_in)
-        self._users = [0] * len(fan_in)  # tables and roots that take the gate's table
+        self._users = [0] * len(fan_in)  # tables and roots that use the gate's table
         self._chosen = self._by_area_flow(fan_in)
         for root in roots:
             self.area += self._take(root)
@@ -126,7 +121,7 @@ class _Cover:
         return cuts
 
     def _by_area_flow(self, fan_in: Sequence[tuple[int, ...]]) -> list[Cut]:
-        """A first choice: shares each table's area between the gates that it could serve."""
+        """First choice: divides each table's area between the gates that it could serve."""
         fan_out = Counter(child for children in fan_in for child in children)
         flow = [0.0] * len(fan_in)
         chosen: list[Cut] = []
@@ -137,7 +132,7 @@ class _Cover:
         return chosen
 
     def improve(self) -> None:
-        """Give each table in turn the cut that needs the fewest other tables."""
+        """For each table in turn choose the cut that needs the fewest other tables."""
         for node, cuts in enumerate(self._cuts):
             if self._users[node] and cuts:
                 self.area -= self._release(self._chosen[node])
@@ -149,7 +144,7 @@ class _Cover:
                 self.area += self._use(self._chosen[node])
 
     def _take(self, node: int) -> int:
-        """One more user of ``node``; the tables that this adds."""
+        """Add a user of ``node``; returns the number of tables that this adds."""
         self._users[node] += 1
         if self._users[node] > 1 or not self._cuts[node]:
             return 0
@@ -159,7 +154,7 @@ class _Cover:
         return sum(self._take(leaf) for leaf in cut)
 
     def _release(self, cut: Cut) -> int:
-        """One user less of each leaf; the tables that this frees."""
+        """Remove a user of each leaf; returns the number of tables that this frees."""
         freed = 0
         for leaf in cut:
             self._users[leaf] -= 1

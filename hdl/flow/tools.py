@@ -1,7 +1,7 @@
-"""Tools that the designs are made without: a whole Yosys, and a placer.
+"""Optional tools: a complete Yosys and a placer.
 
-The Yosys that comes with Amaranth turns designs into text; mapping to another part and proofs take
-commands that it leaves out. The tools are in this distribution's extras ``hdl`` and ``place``.
+The Yosys that comes with Amaranth converts designs to text; mapping to another part and proofs need
+commands that it lacks. The tools are in this distribution's extras ``hdl`` and ``place``.
 """
 
 import os
@@ -20,12 +20,12 @@ class ToolMissingError(OSError):
 
 
 class ToolError(OSError):
-    """A tool did not do what it was asked."""
+    """A tool failed."""
 
 
 @dataclass(frozen=True)
 class _Tool:
-    """A program: a function of a Python package, or else on the PATH; the package is an extra."""
+    """A program: ``function`` of a Python package from ``extra``, else ``program`` on the PATH."""
 
     name: str
     package: str
@@ -34,7 +34,7 @@ class _Tool:
     extra: str
 
     def command(self) -> list[str] | None:
-        """What starts it; None when it is not installed."""
+        """The command line that starts it; None if it is not installed."""
         if find_spec(self.package):
             call = f"import sys, {self.package} as t; sys.exit(t.{self.function}(sys.argv[1:]))"
             return [sys.executable, "-c", call]
@@ -42,7 +42,7 @@ class _Tool:
         return [found] if found else None
 
     def run(self, arguments: list[str], folder: Path) -> str:
-        """Run it in ``folder``; what it printed. ToolMissingError, or ToolError when it fails."""
+        """Run it in ``folder`` and return its output; raises ToolMissingError or ToolError."""
         command = self.command()
         if command is None:
             wanted = f'pip install "cubestack[{self.extra}]"'
@@ -68,23 +68,23 @@ _NEXTPNR = _Tool(
 
 
 def have_yosys() -> bool:
-    """Whether :func:`run_yosys` can work."""
+    """Whether :func:`run_yosys` finds a Yosys."""
     return _YOSYS.command() is not None
 
 
 def run_yosys(script: str, folder: Path) -> str:
-    """Run a script in ``folder``, where its files are; what Yosys printed.
+    """Run a script in ``folder``, where its files are, and return Yosys' output.
 
-    ToolMissingError without a Yosys; ToolError with its last line when it fails.
+    Raises ToolMissingError without a Yosys, and ToolError with its last line if it fails.
     """
     (folder / "script.ys").write_text(script, encoding="utf-8")
     return _YOSYS.run(["-Q", "-T", "script.ys"], folder)
 
 
 def yosys_files(script: str, files: Mapping[str, str], *results: str) -> tuple[str, ...]:
-    """Run a script beside ``files``, given as texts by their names; errors as :func:`run_yosys`.
+    """Run a script beside ``files``, texts by their names; errors as in :func:`run_yosys`.
 
-    Returns what Yosys printed, then the texts of the files ``results`` that the script writes.
+    Returns Yosys' output, then the texts of the files ``results`` that the script writes.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -95,10 +95,10 @@ def yosys_files(script: str, files: Mapping[str, str], *results: str) -> tuple[s
 
 
 def have_nextpnr() -> bool:
-    """Whether :func:`run_nextpnr_ice40` can work."""
+    """Whether :func:`run_nextpnr_ice40` finds its tool."""
     return _NEXTPNR.command() is not None
 
 
 def run_nextpnr_ice40(arguments: list[str], folder: Path) -> None:
-    """Run the iCE40's placer in ``folder``; errors as :func:`run_yosys`."""
+    """Run the iCE40's placer in ``folder``; errors as in :func:`run_yosys`."""
     _NEXTPNR.run(arguments, folder)

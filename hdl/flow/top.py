@@ -1,4 +1,4 @@
-"""What the flow is given: a sensor's table of tops with their clocks, and of blocks, by name."""
+"""Input of the flow: a sensor's table of tops with their clocks, and of blocks, by name."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ class Top:
     """A design of whole FPGAs.
 
     Attributes:
-        make: its component, at full size.
-        summary: what it is, in one line.
+        make: creates its component, at full size.
+        summary: one line.
         clocks: inputs that clock flip-flops, unrelated to each other.
-        parts: AGLN030s that it fills; more than one for a model of several chips.
+        parts: number of AGLN030s; more than one for a model of several chips.
         pulled_up: pins that need a pull-up.
-        reset: what makes the registers' state.
-        fits: whether the part has room for it, by the estimate of tiles.
+        reset: what puts the registers into a defined state.
+        fits: whether the estimated tiles fit into the part.
     """
 
     make: Callable[[], PinnedComponent]
@@ -42,25 +42,24 @@ class Top:
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a top, or an alternative to one, whose area is worth knowing.
+    """A part of a top, or an alternative to one, whose area is reported.
 
     Attributes:
-        make: its component, at full size.
+        make: creates its component, at full size.
     """
 
     make: Callable[[], Component]
 
 
-#: Tops and blocks by the names that the command line uses.
+#: Tops and blocks by their names on the command line.
 TopTable = Mapping[str, Top | Block]
 
 
 def tops_in(table: TopTable) -> dict[str, Top]:
-    """Those that are whole FPGAs."""
     return {name: top for name, top in table.items() if isinstance(top, Top)}
 
 
 def counted(table: TopTable) -> dict[str, Top | Block]:
-    """Those whose tiles are counted: each top that is one FPGA, then each block."""
+    """The designs whose tiles are counted: each top that is one FPGA, then each block."""
     tops = {name: top for name, top in tops_in(table).items() if top.parts == 1}
     return {**tops, **{name: top for name, top in table.items() if isinstance(top, Block)}}

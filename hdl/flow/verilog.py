@@ -1,7 +1,7 @@
-"""One Verilog file of a top for other tools: core, wrapper, pin list, constraints.
+"""One Verilog file per top for other tools: core, wrapper, pin list, constraints.
 
-Bidirectional pins exist in the wrapper only. The constraints are a stub for Microsemi's Libero,
-as comments: what is known here is filled in, the package's pins are not.
+Bidirectional pins exist in the wrapper only. The constraints are a stub for Microsemi's Libero, as
+comments: known values are filled in, the package's pins are not.
 """
 
 import re
@@ -27,11 +27,11 @@ attrmap -remove init
 write_verilog -noattr -norename
 """
 
-# Style of generated text that Verilator speaks of. Widths: a constant is as wide as it has to be.
-# Loops: a switch between two bidirectional buses is one by structure, of which one half is off.
+# Verilator's warnings about the style of generated text. WIDTHEXPAND: constants are as narrow as
+# possible. UNOPTFLAT: a switch between two bidirectional buses is a loop of which one half is off.
 _STYLE = ("DECLFILENAME", "UNUSEDSIGNAL", "WIDTHEXPAND", "SYNCASYNCNET", "UNOPTFLAT")
 
-# A primitive, because Yosys warns of the usual way to write it.
+# A primitive, because Yosys warns about the usual way to write it.
 _DRIVER = """
 module {module}_driver #(parameter WIDTH = 1) (
   input wire [WIDTH-1:0] level,
@@ -50,7 +50,11 @@ _KINDS = {"input": "input", "output": "output", "tristate": "output", "inout": "
 
 
 def verilog_file(name: str, top: Top) -> str:
-    """Text of the file; its top module is ``name`` with ``_`` for ``-``, its core has ``_core``."""
+    """The file's text.
+
+    Its top module is ``name`` with ``_`` for ``-``; the module with split bidirectional pins has
+    the suffix ``_core``.
+    """
     module = name.replace("-", "_")
     component = top.make()
     pins = component.pins
@@ -126,7 +130,7 @@ def _bits(pin: Pin) -> list[str]:
 
 
 def _wrapper(module: str, pins: Sequence[Pin]) -> Iterator[str]:
-    """The module that has the bidirectional pins."""
+    """The module with the bidirectional pins."""
     yield f"module {module} ("
     yield ",\n".join(f"  {_KINDS[pin.direction]} wire {_range(pin.width)}{pin}" for pin in pins)
     yield ");"

@@ -1,1 +1,1 @@
-"""Proofs by induction that designs keep what their documents promise."""
+"""Proofs by induction of the properties that the designs' documents state."""

@@ -1,4 +1,4 @@
-"""Properties that several designs share, as assumptions and assertions on a harness."""
+"""Properties that several designs share, as assumptions and assertions in a harness."""
 
 from collections.abc import Collection, Iterable
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from cubestack.hdl.proofs.prover import past
 #: What :func:`acknowledges` asserts.
 ACKNOWLEDGES = "ACK is high exactly from when all rows of a frame are stored"
 
-#: Wires of a writer, by where they are below it.
+#: Wires of a writer and their paths below it.
 WRITER_WIRES = {
     "rst": "{domain}_rst",
     **{name: f"counter.{name}" for name in ("column", "row")},
@@ -23,12 +23,11 @@ WRITER_WIRES = {
 
 
 def wires_below(part: str, *names: str) -> dict[str, str]:
-    """Wires of a part of the design, by their own names."""
     return {name: f"{part}.{name}" for name in names}
 
 
 def writer_wires(writer: str, domain: str, below: str | None = None) -> dict[str, str]:
-    """Wires of a writer, with its name before theirs; submodule ``below`` when named otherwise."""
+    """Wires of a writer, prefixed with its name; ``below`` is its submodule if it differs."""
     return {
         f"{writer}_{name}": f"{below or writer}.{wire.format(domain=domain)}"
         for name, wire in WRITER_WIRES.items()
@@ -36,7 +35,6 @@ def writer_wires(writer: str, domain: str, below: str | None = None) -> dict[str
 
 
 def first_step() -> Value:
-    """High in the first step."""
     return Initial()
 
 
@@ -48,14 +46,14 @@ def domain(m: Module, name: str, clock: Value, reset: Value) -> Any:
 
 
 def starts_in(m: Module, standby: Value) -> None:
-    """The first step is in standby, which makes the state; nothing else does."""
+    """Assume that the first step is in standby, which defines the state."""
     m.d.comb += Assume(standby | ~Initial())
 
 
 def idle_is_reset(m: Module, d: SimpleNamespace, standby: Value, retained: set[str]) -> None:
-    """In standby each register has its reset value, but the ``retained`` ones, which rest.
+    """In standby each register has its reset value, except the ``retained`` ones, which are stable.
 
-    ValueError when another register has no reset, or a retained one has.
+    Raises ValueError if another register has no reset, or a retained one has.
     """
     without = {register.name for register in d.registers if register.reset is None}
     if without != retained:
@@ -72,7 +70,7 @@ def idle_is_reset(m: Module, d: SimpleNamespace, standby: Value, retained: set[s
 def outputs_rest(
     m: Module, d: SimpleNamespace, standby: Value, pins: Iterable[Pin], but: Collection[str] = ()
 ) -> None:
-    """In standby each output of ``pins`` has its reset level; ``but`` are ports that need not."""
+    """In standby each output of ``pins`` has its reset level; the ports in ``but`` need not."""
     for port in (port for pin in pins for port in pin.ports):
         if port.output and port.name not in but:
             m.d.comb += Assert(~standby | (getattr(d, port.name) == port.level))
@@ -84,24 +82,24 @@ def one_sram_driver(m: Module, d: SimpleNamespace, sram: str = "SRAM") -> None:
 
 
 def written_is_driven(m: Module, d: SimpleNamespace, sram: str = "SRAM") -> None:
-    """While an SRAM is written it is selected, and its data bus driven by the FPGA alone."""
+    """While an SRAM is written it is selected, and only the FPGA drives its data bus."""
     one_sram_driver(m, d, sram)
     d_oe, ce_n, we_n = (getattr(d, f"{sram}_{name}") for name in ("D_OE", "CE_N", "WE_N"))
     m.d.comb += Assert(we_n | (d_oe & ~ce_n))
 
 
 def acknowledges(m: Module, d: SimpleNamespace, ack: Value, **clocks: Value) -> None:
-    """ACK is high exactly while one of the writers has stored all rows; their clocks by name."""
+    """ACK is high exactly while one of the writers has stored all rows; ``clocks`` by writer."""
     complete = [acknowledges_all_rows(m, d, writer, clock) for writer, clock in clocks.items()]
     m.d.comb += Assert(Cat(*complete).any() == ack)
 
 
 def acknowledges_all_rows(m: Module, d: SimpleNamespace, writer: str, clock: Value) -> Signal:
-    """One writer's ACK, from what it writes; returns the ACK that should be.
+    """One writer's ACK, derived from its writes; returns the expected ACK.
 
     ACK is high from the end of the last pixel's write on, and at no other time. Each row begins
-    with its first column, after the row before it in the same frame, so then all of them have.
-    ``d`` has the wires of WRITER_WIRES with ``writer`` before their names.
+    with its first column and follows the previous row of the same frame, so by then all rows are
+    stored. ``d`` has the wires of WRITER_WIRES, prefixed with ``writer``.
     """
     columns, rows = d.size.columns, d.size.rows
     wires = SimpleNamespace(**{name: getattr(d, f"{writer}_{name}") for name in WRITER_WIRES})
@@ -123,7 +121,7 @@ def acknowledges_all_rows(m: Module, d: SimpleNamespace, writer: str, clock: Val
         Assert(wires.ack == complete),
         Assert(~store | in_order),
         Assert(~last_pixel | (begun == rows)),
-        # What makes these inductive.
+        # Needed for the induction.
         Assert((column < columns) & (row < rows) & (begun <= rows)),
         Assert(over | in_order),
         Assert(~over | ~store),

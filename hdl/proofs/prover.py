@@ -1,12 +1,12 @@
 """Runs one proof: the design as shipped, a harness around it, temporal induction.
 
-The design is flattened; its ports, and those of its internal wires that the harness names, become
-the harness's signals. Yosys turns all clocks and asynchronous resets into steps of one time (its
+The design is flattened; its ports, and the internal wires that the harness names, become signals of
+the harness. Yosys converts all clocks and asynchronous resets into steps of one time (its
 ``clk2fflogic``), so clocks may come in any order, and its SAT solver proves every assertion: true
 in the first steps, and true in the next one whenever it was true in the steps before.
 
-Registers start with any value at all, as the part's do. What is proved of a design with a fault is
-a counterexample from its start, which takes a small picture.
+Registers start with any value, as in the part. For a design with a planted fault the proof must
+find a counterexample from the start, which needs a small image.
 """
 
 import re
@@ -45,13 +45,13 @@ opt -full
 tee -o sat.txt sat -prove-asserts -set-assumes -tempinduct -maxsteps {steps} -timeout {limit}
 """
 
-#: Most steps of an induction; what takes more is not proved.
+#: Largest number of steps of an induction; a property that needs more is not proved.
 STEPS = 4
 
-#: Most steps of a counterexample; a clock takes two.
+#: Largest number of steps of a counterexample; a clock takes two.
 FAULT_STEPS = 40
 
-#: Seconds after which a proof is given up.
+#: Time-out of a proof in seconds.
 LIMIT = 120
 
 _CELL = re.compile(r"^  cell (\$\w+) \S+\n(.*?)^  end$", re.MULTILINE | re.DOTALL)
@@ -63,7 +63,7 @@ class UnknownWireError(ValueError):
 
 
 class Fault(NamedTuple):
-    """A planted bug: a wire inside of the design is stuck at a level."""
+    """A planted bug: an internal wire is stuck at a level."""
 
     wire: str
     level: int
@@ -74,13 +74,14 @@ class Proof:
     """A property of a design, and how it is proved.
 
     Attributes:
-        property: what is proved, in one sentence.
-        make: the design, and what describes its size; of a small picture when asked for.
+        property: the property, in one sentence.
+        make: creates the design and returns it with a description of its size; of a small image
+            if its argument is True.
         harness: adds assumptions and assertions to the module; the namespace has a signal for
-            each port and each wire. Input ports are free. ``size`` is what ``make`` said, and
+            each port and each wire. Input ports are free. ``size`` is the one from ``make``, and
             ``registers`` are all of the design's.
         fault: a bug with which the proof must fail.
-        wires: internal wires of the design that ``harness`` looks at, by the name that it uses.
+        wires: internal wires of the design that ``harness`` uses, by its names for them.
             Submodules are named as in the design, without the numbers that make names unique.
     """
 
@@ -91,12 +92,12 @@ class Proof:
     wires: Mapping[str, str] = field(default_factory=dict)
 
 
-#: Fills a harness: its module, the ports' signals and the exposed wires' by their names.
+#: Fills a harness from its module and the signals of ports and exposed wires, by name.
 _Assertions = Callable[[Module, dict[str, Value], dict[str, Signal]], None]
 
 
 class Register(NamedTuple):
-    """A register of the design; ``reset`` is None when no reset reaches it."""
+    """A register of the design; ``reset`` is None if it has none."""
 
     name: str
     value: Signal
@@ -104,7 +105,7 @@ class Register(NamedTuple):
 
 
 class ProofResult(NamedTuple):
-    """How a proof ended, after how many steps; ``counterexample`` when it is refuted."""
+    """Outcome of a proof and its number of steps; ``counterexample``: it is refuted."""
 
     proved: bool
     counterexample: bool
@@ -115,7 +116,7 @@ class ProofResult(NamedTuple):
 def prove(proof: Proof, planted: bool = False) -> ProofResult:
     """Try a proof, or refute it with its fault planted.
 
-    ToolMissingError without a Yosys; UnknownWireError when the design has no such wire.
+    Raises ToolMissingError without a Yosys, and UnknownWireError if the design lacks a wire.
     """
     start = time.monotonic()
     design, size = proof.make(planted)
@@ -157,7 +158,7 @@ def prove(proof: Proof, planted: bool = False) -> ProofResult:
 
 
 def past(m: Module, value: Value) -> Signal:
-    """``value`` one step ago; anything at the first step."""
+    """``value`` one step ago; unconstrained at the first step."""
     before = Signal(len(value))
     m.submodules += Instance("$ff", p_WIDTH=len(value), i_D=value, o_Q=before)
     return before

@@ -1,4 +1,4 @@
-"""Proofs that a design does in each clock of a stride what it declares, and nothing else."""
+"""Proofs that a design does in each clock of a stride exactly what it declares."""
 
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -15,16 +15,16 @@ Make = Callable[[bool], tuple[PinnedComponent, SimpleNamespace]]
 
 
 def stride_proof(make: Make, name: str, fault: Fault) -> Proof:
-    """The proof of the stride of that name; ``make`` and ``fault`` as ``Proof`` has them."""
+    """The proof of the stride ``name``; ``make`` and ``fault`` as in ``Proof``."""
 
-    def made(small: bool) -> tuple[PinnedComponent, SimpleNamespace]:
+    def stride_design(small: bool) -> tuple[PinnedComponent, SimpleNamespace]:
         design, _ = make(small)
         (stride,) = (each for each in design.strides if each.name == name)
         return design, SimpleNamespace(stride=stride, members=design.signature.members)
 
     return Proof(
         "Inside a row each clock takes a byte to or from the next address, and does nothing else",
-        made,
+        stride_design,
         _each_clock,
         fault,
     )
@@ -66,7 +66,7 @@ def _each_clock(m: Module, d: SimpleNamespace) -> None:
 def _at_the_memory(
     m: Module, d: SimpleNamespace, stride: Stride, ready: Value, counter: Value, data: Value
 ) -> None:
-    """Its pins while the stride goes on."""
+    """Levels of the memory's pins during the stride."""
     a, d_o, d_oe, ce_n, oe_n, we_n = (
         getattr(d, f"{stride.memory}_{pin}") for pin in ("A", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
     )

@@ -1,4 +1,4 @@
-"""Running a table of proofs one after the other, and telling how they ended."""
+"""Runs a table of proofs and reports their outcome."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -8,7 +8,7 @@ from cubestack.hdl.proofs.prover import Proof, ProofResult, prove
 
 
 class Verdict(NamedTuple):
-    """What became of a proof, and of the same with a fault planted."""
+    """Outcome of a proof, and of the same with a fault planted."""
 
     name: str
     proof: Proof
@@ -17,18 +17,16 @@ class Verdict(NamedTuple):
 
     @property
     def good(self) -> bool:
-        """Whether the property is proved, and the fault refutes it."""
+        """True if the property is proved and the planted fault refutes it."""
         return self.result.proved and self.planted.counterexample
 
 
 def verdicts(proofs: Mapping[str, Proof]) -> Iterator[Verdict]:
-    """Try each, by name."""
     for name, proof in proofs.items():
         yield Verdict(name, proof, prove(proof), prove(proof, planted=True))
 
 
 def verdict_text(verdict: Verdict) -> str:
-    """Two lines for a reader."""
     name, proof, result, planted = verdict
     seconds = f"{result.seconds + planted.seconds:.1f} s"
     outcome = f"proved, induction over {result.steps}" if result.proved else "NOT PROVED"
@@ -43,7 +41,6 @@ def verdict_text(verdict: Verdict) -> str:
 
 
 def verdict_json(done: Iterable[Verdict]) -> str:
-    """For another program."""
     return json.dumps(
         {
             verdict.name: {

@@ -7,11 +7,11 @@ from amaranth.hdl import Array, Assert, Cat, Module, Mux, Signal, Value
 
 from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRESHOLD
 from cubestack.hdl.cubesense.dataflow import Side
-from cubestack.hdl.proofs.cubesense.made import column_row, fpga
+from cubestack.hdl.proofs.cubesense.designs import column_row, fpga
 from cubestack.hdl.proofs.properties import domain, starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-# The scan visits exactly the declared addresses in order.
+# Nadir scan: it visits exactly the declared addresses in order.
 
 _SCAN = {
     "scan": "reader.scan",
@@ -37,7 +37,7 @@ def _scans(m: Module, d: SimpleNamespace) -> None:
     with m.Elif(line != lines - 1):
         sync += [pixel.eq(0), line.eq(line + 1)]
     with m.Else():
-        # The preset between rows and columns comes once: columns follow columns.
+        # There is one preset between rows and columns; the columns repeat without one.
         sync += [pixel.eq(0), line.eq(0), columns.eq(1), preset.eq(~columns)]
     x = Mux(columns, Array(size.scan_columns)[line], pixel)
     y = Mux(columns, pixel, Array(size.scan_rows)[line])
@@ -45,7 +45,7 @@ def _scans(m: Module, d: SimpleNamespace) -> None:
     at_pixel = (column == x) & (row == y)
     m.d.comb += [
         Assert(~d.scan | Mux(preset, d.SRAM_A == 0, at_pixel)),
-        # What makes this inductive.
+        # Needed for the induction.
         Assert((pixel < length) & (line < lines)),
         Assert((d.on_a_line == ~preset) & (d.vertical == columns)),
         Assert((d.along == pixel) & (d.line == line)),
@@ -53,7 +53,7 @@ def _scans(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-# The Sun window is inside of the picture, around the first Sun pixel.
+# Sun window: it lies inside the image, around the first Sun pixel.
 
 _WINDOW = {
     **{"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"},
@@ -63,7 +63,7 @@ _WINDOW = {
 
 
 def _windows(m: Module, d: SimpleNamespace) -> None:
-    """``ReadOut.window_origin`` for any coordinates at all, those of no Sun too."""
+    """``ReadOut.window_origin`` for all coordinates, including "not found"."""
     size = d.size
     starts_in(m, d.EN)
     sync = domain(m, "monitor", d.CLK, ~d.window)
@@ -89,7 +89,7 @@ def _windows(m: Module, d: SimpleNamespace) -> None:
         Assert((left + size.window <= size.columns) & (top + size.window <= size.rows)),
         Assert(~d.window | inside | (d.SRAM_A == 0)),
         Assert(~d.window | ~inside | ((column == left + i) & (row == top + j))),
-        # What makes these inductive.
+        # Needed for the induction.
         Assert(clocks <= 4),
         Assert((i < size.window) & (j < size.window)),
         Assert((d.in_window == inside) & (inside | (d.state == clocks))),
@@ -99,28 +99,28 @@ def _windows(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-# The first Sun pixel is the first of three bright ones side by side.
+# First Sun pixel: the first of three adjacent bright pixels.
 
 _SEARCH = wires_below("search", "x", "y", "awake", "searching", "run", "pixel")
 
 
 def _searching(side: Side) -> dict[str, str]:
-    """The sun camera's writer is the own one, or the link's."""
+    """Wires of the search and of the writer that receives the sun camera's image."""
     writer, domain_name = ("pix_writer", "pix") if side == "sun" else ("link_writer", "link")
     wires = writer_wires("writer", domain_name, below=writer)
     return wires | _SEARCH | {"line_seen": f"{writer}.between_lines_seen"}
 
 
 def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
-    """By addresses: bright pixels are side by side when their columns follow in one row."""
+    """Computed from addresses: bright pixels are adjacent if their columns follow in one row."""
     size = d.size
     starts_in(m, d.EN)
     sync = domain(m, "monitor", d.PCLK if side == "sun" else d.LINK_C_I[0], d.writer_rst)
     column, row, store = d.writer_column, d.writer_row, d.writer_store
     awake = Signal()
-    began, found = Signal(), Signal()  # a search since reset; its Sun
+    began, found = Signal(), Signal()  # a search began since reset; it found the Sun
     sun_x, sun_y = Signal.like(column), Signal.like(row)
-    count = Signal(range(SUN_RUN + 1))  # bright pixels side by side that end with the last one
+    count = Signal(range(SUN_RUN + 1))  # adjacent bright pixels up to the last one
     last_x, last_y = Signal.like(column), Signal.like(row)
 
     start = ~d.writer_vsync & ~d.writer_ack
@@ -136,19 +136,19 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
             sync += [found.eq(1), sun_x.eq(column - (SUN_RUN - 1)), sun_y.eq(row)]
     shown = (d.x == sun_x) & (d.y == sun_y)
     none = d.x.all() & d.y.all()
-    said_none = Signal()  # the first clock of reset's end leaves the coordinates as they were
+    none_reported = Signal()  # not at the first clock after reset, which keeps the coordinates
     with m.If(start & awake):
-        sync += said_none.eq(1)
+        sync += none_reported.eq(1)
     m.d.comb += [
         Assert(~found | shown),
         Assert(~found | ((sun_x + SUN_RUN <= size.columns) & (sun_y < size.rows))),
-        Assert(~said_none | found | none),
-        # What makes these inductive.
+        Assert(~none_reported | found | none),
+        # Needed for the induction.
         Assert((column < size.columns) & (row < size.rows)),
         Assert(store | (column == 0)),
         Assert(~store | (d.writer_line_open & ~d.writer_line_full & d.line_seen)),
         Assert(~store | (~d.writer_frame_full & ~d.writer_ack)),
-        Assert((d.awake == awake) & (awake | ~began) & (began | (~found & ~said_none))),
+        Assert((d.awake == awake) & (awake | ~began) & (began | (~found & ~none_reported))),
         Assert(d.searching == (began & ~found)),
         Assert(~d.searching | (d.run < SUN_RUN)),
         Assert(~d.searching | ~store | (column == 0) | (d.run == count)),
@@ -158,11 +158,11 @@ def _first_sun_pixel(side: Side, m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-# As flown: what the listing of appendix D.4 does.
+# As flown: the behaviour of the listing in appendix D.4.
 
 
 def _keeps_coordinates(m: Module, d: SimpleNamespace) -> None:
-    """Only a bright pixel that is written changes them, into its own."""
+    """The coordinates change only when a bright pixel is written, and become its position."""
     starts_in(m, d.EN)
     sync = domain(m, "monitor", d.PCLK, d.writer_rst)
     known, bright = Signal(), Signal()
@@ -178,11 +178,11 @@ def _keeps_coordinates(m: Module, d: SimpleNamespace) -> None:
 
 
 def _wraps(m: Module, d: SimpleNamespace) -> None:
-    """Behind the first byte, whose address is old, row by row in the address' own arithmetic."""
+    """After the first byte, whose address is old: row by row, modulo the width of the address."""
     size = d.size
     starts_in(m, d.EN)
     sync = domain(m, "monitor", d.CLK, ~d.window)
-    clocks = Signal(range(6))  # of the coordinates, and of the window's first byte
+    clocks = Signal(range(6))  # for the coordinates and the window's first byte
     i, j = Signal(range(size.window)), Signal.like(d.y, name="j")
     begun = clocks == 5
     with m.If(~begun):
@@ -196,7 +196,7 @@ def _wraps(m: Module, d: SimpleNamespace) -> None:
     y = (d.y - size.window_above + j)[: len(d.y)]
     m.d.comb += [
         Assert(~d.window | ~begun | ((column == x) & (row == y))),
-        # What makes this inductive.
+        # Needed for the induction.
         Assert(clocks <= 5),
         Assert((i < size.window) & (d.in_window == (clocks >= 4))),
         Assert((clocks >= 4) | (d.state == clocks)),
@@ -206,13 +206,13 @@ def _wraps(m: Module, d: SimpleNamespace) -> None:
 
 
 def _sends_only(m: Module, d: SimpleNamespace) -> None:
-    """While the Sun is looked for in a picture that is sent, the own memory rests."""
+    """While the search runs on an image that is sent, the own memory is idle."""
     sending = ~d.EN & d.SHIFT & ~d.EDGE & ~d.RNW
     m.d.comb += Assert(~sending | (d.SRAM_CE_N & d.SRAM_WE_N & ~d.SRAM_D_OE & ~d.ACK))
 
 
 def as_flown_proofs() -> dict[str, Proof]:
-    """Of the sun's FPGA, which is the nadir's too but for the side of its camera."""
+    """Proofs of the sun's FPGA; the nadir's differs only in the side of its camera."""
     make = fpga("sun", gateware="as-flown")
     at = {"at_column": "reader.window.column", "at_row": "reader.window.row"}
     window = {"window": "reader.window", "x": "reader.sun_x", "y": "reader.sun_y"}
@@ -242,7 +242,6 @@ def as_flown_proofs() -> dict[str, Proof]:
 
 
 def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:
-    """Of one of the two FPGAs."""
     make = fpga(side, mcu_addressing)
     option = "-addressing" * mcu_addressing
     return {

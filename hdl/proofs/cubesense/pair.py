@@ -13,12 +13,12 @@ from cubestack.firmware_model.interface.cubesense.pins import FPGA, PREFIXES
 from cubestack.hdl.cubesense.dataflow import SIDES, Side
 from cubestack.hdl.cubesense.pair import CubeSensePair
 from cubestack.hdl.proofs import properties
+from cubestack.hdl.proofs.cubesense.designs import column_row, fpga, proof_design
 from cubestack.hdl.proofs.cubesense.edge import as_flown_proofs, edge_proofs
-from cubestack.hdl.proofs.cubesense.made import column_row, fpga, made
 from cubestack.hdl.proofs.properties import starts_in, wires_below, writer_wires
 from cubestack.hdl.proofs.prover import Fault, Proof
 
-# The address never leaves the picture.
+# The address never leaves the image.
 
 _COUNTERS = {
     "own": "pix_writer.counter",
@@ -61,7 +61,7 @@ def _idle(m: Module, d: SimpleNamespace, further: Collection[str] = ()) -> None:
     properties.idle_is_reset(m, d, d.EN, {"search.x", "search.y", *further})
 
 
-# ACK exactly when all rows are stored.
+# ACK is high exactly when all rows are stored.
 
 _WRITERS = writer_wires("pix_writer", "pix") | writer_wires("link_writer", "link")
 
@@ -71,7 +71,7 @@ def _acknowledges(m: Module, d: SimpleNamespace) -> None:
     properties.acknowledges(m, d, d.ACK, pix_writer=d.PCLK, link_writer=d.LINK_C_I[0])
 
 
-# No two drivers on in any settled state.
+# No wire has two active drivers in any settled state.
 
 _DRIVES_DATA = {Action.READ, Action.EDGE, Action.PASS_EDGE, Action.READ_FROM}
 _DRIVES_LINK = {Action.SEND_PICTURE, Action.SEND_EDGE}
@@ -87,7 +87,7 @@ def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
     m.d.comb += Assert(d.CONTENTION == 0)
     for prefix in PREFIXES.values():
         properties.one_sram_driver(m, d, f"{prefix}SRAM")
-    # Each row of the table, listed or not, where the wires can tell it from the others.
+    # Each combination of levels that the wires can tell from the others, listed or not.
     lines = Cat(d.SHIFT, d.EDGE, d.RNW, d.SUNEN, d.NADEN)
     for levels in product((0, 1), repeat=5):
         shift, edge, _, sunen, naden = levels
@@ -103,13 +103,13 @@ def _drivers(mcu_addressing: bool, m: Module, d: SimpleNamespace) -> None:
         m.d.comb += Assert(~microcontroller_may | ~d.DATA_OE)
 
 
-# The microcontroller's address is the one that is read.
+# The address that the microcontroller sends is the one that is read.
 
 _TAKEN = wires_below("dataflow", "addressing", "take_address", "read_from")
 
 
 def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
-    """Three clocks make the address, whatever it was before; SHIFT alone never changes it."""
+    """Three clocks set the address, whatever it was; SHIFT alone never changes it."""
     starts_in(m, d.EN)
     sync = properties.domain(m, "monitor", d.CLK, ~d.addressing)
     taken = Signal(8 * ADDRESS_BYTES)
@@ -133,7 +133,6 @@ def _takes_addresses(m: Module, d: SimpleNamespace) -> None:
 
 
 def _proofs(side: Side) -> dict[str, Proof]:
-    """Of one of the two FPGAs."""
     return {
         f"{side}-address": Proof(
             "The SRAM address never leaves the picture",
@@ -173,12 +172,11 @@ def _proofs(side: Side) -> dict[str, Proof]:
     }
 
 
-#: By name.
 PROOFS = {
     **{
         f"pair-drivers{'-addressing' * mcu_addressing}": Proof(
             "No wire of the two FPGAs has two drivers in any settled state",
-            made(partial(CubeSensePair, mcu_addressing=mcu_addressing)),
+            proof_design(partial(CubeSensePair, mcu_addressing=mcu_addressing)),
             partial(_drivers, mcu_addressing),
             Fault("nadir.dataflow.pass_edge", 1),
             _DRIVERS,
@@ -187,7 +185,7 @@ PROOFS = {
     },
     "pair-drivers-one-search": Proof(
         "No wire of the two FPGAs has two drivers in any settled state",
-        made(CubeSensePair, "one-search"),
+        proof_design(CubeSensePair, "one-search"),
         partial(_drivers, False),
         Fault("nadir.dataflow.pass_edge", 1),
         _DRIVERS,

@@ -2,5 +2,4 @@
 
 from cubestack.hdl.proofs.cubestar import published, successors
 
-#: By name.
 PROOFS = published.PROOFS | successors.PROOFS

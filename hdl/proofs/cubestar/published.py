@@ -19,26 +19,26 @@ from cubestack.hdl.proofs.strides import stride_proof
 Make = Callable[[bool], tuple[CubeStarBoard, SimpleNamespace]]
 
 
-def _made(
+def _sized_design(
     design: type[CubeStarBoard], columns: int, rows: int, small: bool
 ) -> tuple[CubeStarBoard, SimpleNamespace]:
-    """The design at a size, or so small that a counterexample takes a few clocks."""
+    """The design at a size, or small enough that a counterexample takes a few clocks."""
     size = SimpleNamespace(columns=3 if small else columns, rows=3 if small else rows)
     return design(size.columns, size.rows), size
 
 
 def full(design: type[CubeStarBoard]) -> Make:
-    """The shipped size."""
-    return partial(_made, design, 1024, 512)
+    """Creates the design at its shipped size."""
+    return partial(_sized_design, design, 1024, 512)
 
 
 def gapped(design: type[CubeStarBoard]) -> Make:
-    """A size that is no power of two, so that the address could leave it; wide as the shipped."""
-    return partial(_made, design, 1000, 500)
+    """Creates it as wide as shipped, but not a power of two, so that the address could leave it."""
+    return partial(_sized_design, design, 1000, 500)
 
 
 def inside(address: Value, size: SimpleNamespace) -> Value:
-    """Whether row : column is within the picture."""
+    """Whether row : column is within the image."""
     bits = ceil_log2(size.columns)
     return (address[:bits] < size.columns) & (address[bits:] < size.rows)
 
@@ -64,7 +64,7 @@ def ack_is_right(m: Module, d: SimpleNamespace) -> None:
 
 
 def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
-    """Address of the n-th byte before the n-th data clock, and its byte after it."""
+    """The n-th byte's address before the n-th data clock, and the byte after it."""
     starts_in(m, ~d.ENABLE)
     reading = d.ENABLE & d.RNW
     sync = properties.domain(m, "monitor", d.DCLK, ~reading)
@@ -83,7 +83,7 @@ def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
     ]
 
 
-#: Wires of the one writer that a board has.
+#: Wires of a board's only writer.
 WRITER = properties.writer_wires("writer", "pix")
 LAST_ROW = Fault("writer.counter.last_row", 1)
 LAST_COLUMN = Fault("writer.counter.last_column", 0)
@@ -91,7 +91,6 @@ ROW_ENDS = Fault("writer.counter.last_column", 1)
 
 BANK_RESTS = "With ENABLE low every register but the bank is reset, and the bank rests"
 
-#: By name.
 PROOFS = {
     "cubestar-ack": Proof(
         properties.ACKNOWLEDGES, full(CubeStarTop), ack_is_right, LAST_ROW, WRITER

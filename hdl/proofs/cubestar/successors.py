@@ -53,7 +53,7 @@ def _boards_idle(m: Module, d: SimpleNamespace) -> None:
 
 
 def _double_idle(m: Module, d: SimpleNamespace) -> None:
-    """INTO is latched by RNW in standby too, as its docstring says; nothing shows it there."""
+    """RNW latches INTO in standby too; no output shows it there."""
     properties.outputs_rest(m, d, ~d.ENABLE, DOUBLE)
     for register in d.registers:
         if register.reset is not None:
@@ -63,7 +63,7 @@ def _double_idle(m: Module, d: SimpleNamespace) -> None:
 def _shared_drivers(m: Module, d: SimpleNamespace) -> None:
     written_is_driven(m, d)
     m.d.comb += [
-        # The processor lets go of the data lines before it pulls RE_N low.
+        # The processor releases the data lines before it pulls RE_N low.
         Assert(~d.AD_LOW_OE | (~d.RE_N & ~d.CS_N)),
         Assert(~d.AD_LOW_OE | (d.ENABLE & d.RNW)),
     ]
@@ -76,7 +76,7 @@ def _double_drivers(m: Module, d: SimpleNamespace) -> None:
 
 
 def _apart(m: Module, d: SimpleNamespace) -> None:
-    """While a memory is stored in, its pins are the camera's and the other's are the bus's."""
+    """While one memory is being filled, its pins follow the camera and the other's the bus."""
     storing = d.ENABLE & ~d.RNW
     a, d_o, d_oe, ce_n, oe_n, we_n = (
         (getattr(d, f"SRAM1_{name}"), getattr(d, f"SRAM2_{name}"))
@@ -102,7 +102,6 @@ def _one_board_drives(m: Module, d: SimpleNamespace) -> None:
 
 _STORES_INSIDE = "Storing never leaves the picture, at 1000 x 500 pixels, where it could"
 
-#: By name.
 PROOFS = {
     "cubestar-shared-ack": Proof(
         properties.ACKNOWLEDGES,

@@ -1,4 +1,4 @@
-"""CubeSense's designs for proofs: at full size, or so small that a counterexample is short."""
+"""CubeSense's designs for proofs, at full size or small enough for short counterexamples."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,17 +11,19 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, READ_OU
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.cubesense.top import CubeSenseFpga
 
-#: What makes a design, and its size; small when asked for.
-Make = Callable[[bool], tuple[Component, ReadOut]]
+#: Creates a design and returns it with its size; small if the argument is True.
+DesignMaker = Callable[[bool], tuple[Component, ReadOut]]
 
-#: So small that a counterexample takes a few clocks.
+#: Small enough that a counterexample takes a few clocks.
 SMALL = ReadOut(
     6, 3, 2, scan_step=2, first_row=1, first_column=1, window=3, window_left=1, window_above=1
 )
 
 
-def made(design: Callable[[ReadOut], Component], gateware: str = "corrected") -> Make:
-    """What makes a design for :class:`cubestack.hdl.proofs.prover.Proof`."""
+def proof_design(
+    design: Callable[[ReadOut], Component], gateware: str = "corrected"
+) -> DesignMaker:
+    """A function that creates the design for :class:`cubestack.hdl.proofs.prover.Proof`."""
 
     def make(small: bool) -> tuple[Component, ReadOut]:
         known = READ_OUTS[gateware]
@@ -32,12 +34,11 @@ def made(design: Callable[[ReadOut], Component], gateware: str = "corrected") ->
     return make
 
 
-def fpga(side: Side, mcu_addressing: bool = False, gateware: str = "corrected") -> Make:
-    """What makes the FPGA of a side."""
-    return made(lambda size: CubeSenseFpga(side, size, mcu_addressing), gateware)
+def fpga(side: Side, mcu_addressing: bool = False, gateware: str = "corrected") -> DesignMaker:
+    return proof_design(lambda size: CubeSenseFpga(side, size, mcu_addressing), gateware)
 
 
 def column_row(d: SimpleNamespace) -> tuple[Value, Value]:
-    """The two halves of the SRAM's address."""
+    """Column and row of the SRAM's address."""
     bits = d.size.column_bits
     return d.SRAM_A[:bits], d.SRAM_A[bits:]
