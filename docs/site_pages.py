@@ -1,13 +1,12 @@
-"""Pages of the site that are made when it is built: the start, all commands, all of `cubestack`.
+"""Hooks of mkdocs that generate two pages: all commands, and all public names of `cubestack`.
 
-Hooks of mkdocs. Links that lead out of the documents lead to the repository.
+Links that lead out of the documents lead to the repository.
 """
 
 import inspect
 import re
 from argparse import _SubParsersAction
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -15,17 +14,12 @@ from mkdocs.structure.files import File, Files
 import cubestack
 from cubestack.host.cli.main import make_parser
 
-ROOT = Path(__file__).parent.parent
 REPOSITORY = "https://github.com/cubestack/cubestack/blob/main/"
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages."""
-    pages = {
-        "index.md": _from_root((ROOT / "README.md").read_text(encoding="utf-8")),
-        "reference-commands.md": commands(),
-        "reference-python.md": python(),
-    }
+    pages = {"reference-commands.md": commands(), "reference-python.md": python()}
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
     return files
@@ -85,10 +79,3 @@ def _described(name: str, found: Any) -> str:
 
 def _help(parser: Any) -> str:
     return f"```text\n{parser.format_help()}```\n"
-
-
-def _from_root(text: str) -> str:
-    """The README, as if it lay beside the documents."""
-    text = text.replace("](docs/", "](")
-    outside = r"\]\((?!https?:|images/)([\w./-]+\.(?!md\))\w+|[\w-]+/[\w./-]*|[A-Z]+\.md)\)"
-    return re.sub(outside, r"](../\1)", text)

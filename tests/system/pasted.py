@@ -249,12 +249,8 @@ def main() -> int:
             document, ready = clone / name, list[str]()
             folder = clone
             if document.name in EMPTY_FOLDER:
-                folder = Path(base) / document.stem
+                folder = Path(base) / document.stem  # beside the clone, as the page says
                 folder.mkdir()
-                text = document.read_text("utf-8")
-                document.write_text(
-                    text.replace("pip install cubestack ", f"pip install {clone} "), "utf-8"
-                )
             elif document.name != "README.md":
                 ready = ["make -s venv", ". .venv/bin/activate"]
                 for file, content in reader_files().items():

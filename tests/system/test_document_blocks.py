@@ -182,7 +182,8 @@ def python_of(document: str, first: str) -> str:
 
 def test_the_first_script_of_the_readme(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Against what the command above it serves."""
-    (line,) = (one for _, one in OWN if one == "emulate cubestar --pty ./ttyCUBESTAR")
+    line = "emulate cubestar --pty ./ttyCUBESTAR"
+    assert ("README.md", line) in OWN
     with Served(shlex.split(line)[1:], folder):
         exec(python_of("README.md", "import cubestack"), {})
     stars = capsys.readouterr().out.splitlines()[1:]

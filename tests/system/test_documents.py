@@ -23,8 +23,7 @@ from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.firmware_model.cubesense.memory import Memory, budget, used
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
-from cubestack.host.cli.main import COMMANDS, make_parser
-from cubestack.host.cli.reports import reports
+from cubestack.host.cli.main import make_parser
 from cubestack.host.devices.registry import devices
 from tests.conftest import Run
 from tests.system.conftest import ROOT
@@ -200,11 +199,6 @@ def test_make_has_the_targets_that_are_promised() -> None:
     targets = set(re.findall(r"^(\w+):", text_of("Makefile"), re.MULTILINE))
     assert {"venv", "run", "test", "lint", "bench", "clean"} <= targets
     assert set(re.findall(r"^make (\w+)", text_of("README.md"), re.MULTILINE)) <= targets
-
-
-def test_commands_of_the_readme_exist() -> None:
-    named = re.findall(r"^(?:\.venv/bin/)?cubestack (\w+)", text_of("README.md"), re.MULTILINE)
-    assert {*named} <= {*COMMANDS, *reports()}
 
 
 @pytest.mark.parametrize(
