@@ -1,9 +1,9 @@
-"""The satellite's I2C bus: messages with their time on the wire, and targets that answer.
+"""The satellite's I2C bus: transfers with their time on the wire, and targets.
 
 Repeated starts join the messages of one transfer, as in Linux's I2C_RDWR. A target that has no byte
 ready stretches the clock. Targets may also listen to the general call, address 0. Not modelled: the
-acknowledge of a byte that the host reads, 10-bit addresses, and several hosts at one time: whole
-transfers queue for the wire.
+acknowledge of a byte that the host reads, 10-bit addresses, and arbitration between hosts: whole
+transfers queue for the bus.
 """
 
 import errno
@@ -22,26 +22,23 @@ T = TypeVar("T")
 BITS_PER_BYTE = 9  # eight data bits and the acknowledge
 
 LONGEST_STRETCH_PS = PS_PER_S
-"""A host gives up a transfer whose clock is held low for longer, as Linux's drivers do."""
+"""Longest clock stretch before a host aborts the transfer, as Linux's drivers do."""
 
 GENERAL_CALL = 0x00
 
 MAX_BLOCK_BYTES = 32
-"""Length that a target may send in front of a block; SMBus 2.0, section 5.5.7."""
+"""Largest length byte of a block; SMBus 2.0, section 5.5.7."""
 
 
 @dataclass
 class I2cMessage:
-    """A message to a 7-bit ``address``: ``data`` to write, or ``read`` bytes to fetch into it.
+    """A message to a 7-bit ``address``: writes ``data``, or reads ``read`` bytes into it.
 
-    With neither, only the address goes out, for writing: a probe.
+    With neither, only the address is sent, for writing: a probe.
 
     Attributes:
-        address: 7-bit address.
-        data: bytes to write, or the bytes read.
-        read: bytes to read.
-        block: a read whose first byte says how many follow it, beside the ``read`` ones.
-        probe_read: only the address goes out, for reading.
+        block: a read whose first byte is the number of bytes that follow the ``read`` ones.
+        probe_read: only the address is sent, for reading.
     """
 
     address: int
@@ -52,7 +49,7 @@ class I2cMessage:
 
     @property
     def reading(self) -> bool:
-        """Whether the address goes out for reading."""
+        """Whether the address is sent for reading."""
         return self.read > 0 or self.probe_read
 
 
@@ -60,82 +57,80 @@ class I2cError(OSError):
     """A transfer failed; errno as on Linux.
 
     ENXIO: no acknowledge of an address; EIO: of a byte; ETIMEDOUT: the clock was held low too long;
-    EPROTO: a target sent a block length that is none.
+    EPROTO: a target sent an invalid block length.
     """
 
 
 class I2cTarget(Protocol):
     """A device on the bus; called byte by byte, like the interrupts of a slave peripheral."""
 
-    def i2c_start(self, read: bool) -> None:
-        """A (repeated) start addressed this target."""
+    def i2c_start(self, read: bool) -> None: ...
 
     def i2c_write(self, byte: int) -> bool | None:
-        """A byte came; returns whether it is acknowledged, None as ``i2c_read``."""
+        """Receive a byte; returns whether to acknowledge it, None as ``i2c_read``."""
 
     def i2c_read(self) -> int | None:
-        """The next byte to send, 0..255; None stretches the clock: asked again a bit later."""
+        """The next byte to send, 0..255; None stretches the clock: called again one bit later."""
 
     def i2c_stop(self) -> None:
-        """The transfer ended, or went on with another target."""
+        """The transfer ended, or continued with another target."""
 
 
 class OpenTarget(I2cTarget, Protocol):
-    """A device that knows by itself which addresses are its own; ``i2c_start`` is not called."""
+    """A device that matches addresses itself; ``i2c_start`` is not called."""
 
     def i2c_address(self, address: int, read: bool) -> bool | None:
-        """A (repeated) start with that address; whether it answers, None as ``i2c_read``."""
+        """Handle a (repeated) start; returns whether to acknowledge, None as ``i2c_read``."""
 
 
 class I2cFaultHook(Protocol):
-    """Stands between a host and the targets; each hook may wait, or raise I2cError."""
+    """A fault between a host and the targets; each method may wait, or raise I2cError."""
 
     def before_start(self) -> Generator[simpy.Event, Any, None]:
-        """A host is about to begin a transfer."""
+        """Called before a transfer begins."""
 
     def after_address(self, address: int) -> Generator[simpy.Event, Any, None]:
-        """The address of a message was sent."""
+        """Called after the address of a message was sent."""
 
     def after_byte(self, address: int, read: bool) -> Generator[simpy.Event, Any, None]:
-        """A byte was sent by the host, or by the target, and is not acknowledged yet."""
+        """Called after a byte was sent by either side, before its acknowledge."""
 
 
 class I2cTap:
-    """Listens to whole transfers, to what it overrides, and changes nothing."""
+    """Observer of whole transfers; subclasses override what they need."""
 
     def transfer_began(self, messages: list[I2cMessage]) -> None:
-        """A host wants this transfer from now on, behind those already under way."""
+        """A host requests this transfer now; it queues behind those under way."""
 
     def transfer_ended(
         self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
     ) -> None:
-        """It has ended now, read data in the messages; with ``error``, not all of it was done."""
+        """The transfer ended now; the messages hold the data read.
+
+        With ``error``, it is incomplete.
+        """
 
 
 class Forwarder:
-    """Hands every call on: to the program that runs now, or to all that hear a general call."""
+    """Forwards calls to the current program, or to all listeners of a general call."""
 
     def __init__(self, targets: Callable[[], Sequence[I2cTarget]]) -> None:
-        """Ask ``targets`` at each call, as a reset replaces the program."""
+        """``targets`` is evaluated at each call, as a reset replaces the program."""
         self._targets = targets
 
     def i2c_start(self, read: bool) -> None:
-        """A (repeated) start."""
         for target in self._targets():
             target.i2c_start(read)
 
     def i2c_write(self, byte: int) -> bool:
-        """A byte came; one acknowledge is enough."""
         acknowledges = [target.i2c_write(byte) for target in self._targets()]
-        return any(acknowledges)  # nobody of these stretches here
+        return any(acknowledges)  # none of these stretches the clock here
 
     def i2c_read(self) -> int | None:
-        """The next byte to send; only one target answers."""
-        (target,) = self._targets()
+        (target,) = self._targets()  # only one target can answer a read
         return target.i2c_read()
 
     def i2c_stop(self) -> None:
-        """The transfer ended."""
         for target in self._targets():
             target.i2c_stop()
 
@@ -144,14 +139,13 @@ class I2cBus:
     """One bus with any number of targets.
 
     Attributes:
-        kernel: virtual time.
         bit_ps: time of one bit.
-        fault_hook: what is on the wires, if anything.
-        taps: who else listens.
+        fault_hook: the current fault on the wires.
+        taps: observers of the transfers.
     """
 
     def __init__(self, kernel: Kernel, hz: int = 100_000) -> None:
-        """Make an idle bus at ``hz`` bits a second (positive, else ValueError)."""
+        """Create an idle bus at ``hz`` bits per second (positive, else ValueError)."""
         if hz <= 0:
             raise ValueError(f"an I2C bus needs a positive bit rate, not {hz} Hz")
         self.kernel = kernel
@@ -166,29 +160,28 @@ class I2cBus:
         self.bit_ps = PS_PER_S // hz
 
     def attach(self, address: int, target: I2cTarget, *, general_call: bool = False) -> None:
-        """Put ``target`` on the bus at a free 7-bit ``address`` (else ValueError).
+        """Connect ``target`` at a free 7-bit ``address`` (else ValueError).
 
-        With ``general_call`` it also hears what is written to address 0.
+        With ``general_call`` it also receives writes to address 0.
         """
         if not 0x08 <= address <= 0x77:
             raise ValueError(f"I2C address {address:#04x} is not in 0x08..0x77")
         if address in self._targets:
-            raise ValueError(f"I2C address {address:#04x} is taken already")
+            raise ValueError(f"I2C address {address:#04x} is already in use")
         self._targets[address] = target
         if general_call:
             self._listeners.append(target)
 
     def attach_open(self, target: OpenTarget) -> None:
-        """Put a target on the bus that is asked for each address that nobody else has."""
+        """Connect a target that is offered each address that no other target has."""
         self._open.append(target)
 
     @property
     def targets(self) -> Mapping[int, I2cTarget]:
-        """Who answers at which address."""
         return self._targets
 
     def move(self, address: int, new_address: int) -> None:
-        """Let the target at ``address`` answer at another one; both as for ``attach``."""
+        """Change a target's address; raises ValueError as ``attach``."""
         if address not in self._targets:
             raise ValueError(f"no I2C device is at address {address:#04x}")
         if address != new_address:
@@ -196,9 +189,9 @@ class I2cBus:
             del self._targets[address]
 
     def transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
-        """Perform one transfer, behind those already under way.
+        """Perform one transfer, after those already under way.
 
-        Read data lands in the messages. Raises I2cError, after the stop condition.
+        Stores the data read in the messages. Raises I2cError, after the stop condition.
         """
         began_ps, failure = self.kernel.now, None
         for tap in self.taps:
@@ -226,7 +219,7 @@ class I2cBus:
         self._turns.append(turn)
         try:
             yield turn
-        except BaseException:  # who waits no longer holds up nobody
+        except BaseException:  # a cancelled transfer must not block the queue
             if turn.triggered:
                 self._hand_on()
             else:
@@ -234,7 +227,7 @@ class I2cBus:
             raise
 
     def _hand_on(self) -> None:
-        """Give the wire to the next one, for whom it stays taken, or free it."""
+        """Pass the bus to the next transfer in the queue, or free it."""
         if self._turns:
             self._turns.popleft().succeed()
         else:
@@ -268,7 +261,7 @@ class I2cBus:
             raise failure
 
     def _find(self, message: I2cMessage) -> I2cTarget | None:
-        """Who has the address; None where somebody has to be asked."""
+        """The target with the address; None if only open targets can have it."""
         address = message.address
         if address == GENERAL_CALL and self._listeners and not message.reading:
             return self._general
@@ -280,13 +273,13 @@ class I2cBus:
     def _open_target(
         self, message: I2cMessage, addressed: I2cTarget | None
     ) -> Generator[simpy.Event, Any, I2cTarget]:
-        """Ask those who know their addresses by themselves; all of them hear the start."""
+        """Offer the address to all open targets; the first that accepts is the target."""
         address, found = message.address, None
         if addressed is not None and addressed not in self._open:
             addressed.i2c_stop()
         for target in self._open:
-            ask = partial(target.i2c_address, address, message.reading)
-            if (yield from self._stretched(ask, address)):
+            offer = partial(target.i2c_address, address, message.reading)
+            if (yield from self._stretched(offer, address)):
                 found = found or target
         if found is None:
             raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
@@ -297,7 +290,7 @@ class I2cBus:
             message.data = bytearray()
             wanted = message.read
             while len(message.data) < wanted:
-                byte = yield from self._next_byte(target, message.address)
+                byte = yield from self._stretched(target.i2c_read, message.address)
                 yield self.kernel.timeout(BITS_PER_BYTE * self.bit_ps)
                 if self.fault_hook is not None:
                     yield from self.fault_hook.after_byte(message.address, read=True)
@@ -311,18 +304,15 @@ class I2cBus:
                 yield from self.fault_hook.after_byte(message.address, read=False)
             write = partial(target.i2c_write, byte)
             if not (yield from self._stretched(write, message.address)):
-                text = f"I2C device {message.address:#04x} refused byte {byte:#04x}"
+                text = f"I2C device {message.address:#04x} did not acknowledge byte {byte:#04x}"
                 raise I2cError(errno.EIO, text)
 
-    def _next_byte(self, target: I2cTarget, address: int) -> Generator[simpy.Event, Any, int]:
-        return (yield from self._stretched(target.i2c_read, address))
-
     def _stretched(
-        self, ask: Callable[[], T | None], address: int
+        self, call: Callable[[], T | None], address: int
     ) -> Generator[simpy.Event, Any, T]:
-        """What a target answers; waits while it stretches the clock."""
+        """The result of ``call``; waits while the target stretches the clock."""
         give_up_ps = self.kernel.now + LONGEST_STRETCH_PS
-        while (answer := ask()) is None:
+        while (answer := call()) is None:
             if self.kernel.now >= give_up_ps:
                 text = f"I2C device {address:#04x} held the clock low for over 1 s"
                 raise I2cError(errno.ETIMEDOUT, text)

@@ -1,11 +1,11 @@
-"""How characters look on an asynchronous serial line, and what a receiver makes of the levels.
+"""Characters on an asynchronous serial line: levels that a sender drives, and how they are decoded.
 
-A sender puts a start bit (low), the data bits from the lowest on, a parity bit if any and the stop
-bits (high) on the line; bit k of a character begins floor(k / baud) after its start. A receiver
-waits for a falling edge and looks at the middle of each of its own bits: a start bit that is not
-low is noise; a stop bit that is low is a framing error, after which it waits for a high level; only
-the first stop bit is looked at. This is what UARTs do, but for the number of samples in a bit.
-So a wrong rate or a wrong parity gives the same garbage and the same errors every time.
+A sender drives a start bit (low), the data bits from the lowest on, an optional parity bit and the
+stop bits (high); bit k of a character begins floor(k / baud) after its start. A receiver waits for
+a falling edge and samples the middle of each of its own bits. A start bit that is not low is noise.
+A low stop bit is a framing error, after which the receiver waits for a high level; it checks only
+the first stop bit. UARTs do the same, except that they take several samples per bit. A wrong baud
+rate or parity therefore results in the same wrong characters and the same errors every time.
 """
 
 from collections import deque
@@ -27,7 +27,7 @@ class LineFormat:
     """Settings of one end of a line.
 
     Attributes:
-        baud: bits a second, 1..``FASTEST_BAUD``.
+        baud: bits per second, 1..``FASTEST_BAUD``.
         data_bits: 5 to 8.
         parity: see ``Parity``.
         stop_bits: 1, 1.5 or 2.
@@ -39,7 +39,6 @@ class LineFormat:
     stop_bits: float = 1
 
     def __post_init__(self) -> None:
-        """Check the settings; raises ValueError."""
         if not 0 < self.baud <= FASTEST_BAUD:
             raise ValueError(f"a UART needs a baud rate in 1..{FASTEST_BAUD}, not {self.baud}")
         if self.data_bits not in (5, 6, 7, 8):
@@ -50,21 +49,20 @@ class LineFormat:
             raise ValueError(f"a UART has 1, 1.5 or 2 stop bits, not {self.stop_bits}")
 
     def __str__(self) -> str:
-        """As in "57600 8N1"."""
+        """For example "57600 8N1"."""
         return f"{self.baud} {self.data_bits}{self.parity}{self.stop_bits:g}"
 
     @property
     def bits(self) -> Fraction:
-        """Bits of a character, start and stop bits included."""
+        """Bits per character, start and stop bits included."""
         return 1 + self.data_bits + (self.parity != "N") + Fraction(self.stop_bits)
 
     @property
     def character_ps(self) -> int:
-        """Time of one character."""
         return self.after_ps(self.bits)
 
     def after_ps(self, bits: Fraction | int) -> int:
-        """Time from the start of a character to ``bits`` later."""
+        """Time of ``bits`` bits in ps, rounded down."""
         return int(bits * PS_PER_S // self.baud)
 
     def levels(self, value: int) -> list[int]:
@@ -73,16 +71,16 @@ class LineFormat:
         return [0, *data] + ([] if self.parity == "N" else [self.parity_of(data)])
 
     def parity_of(self, data: list[int]) -> int:
-        """Level of the parity bit."""
+        """Level of the parity bit; 1 (a stop bit) without parity."""
         odd = sum(data) & 1
         return {"E": odd, "O": 1 - odd, "M": 1, "S": 0, "N": 1}[self.parity]
 
 
 class Character(NamedTuple):
-    """What a receiver found.
+    """A received character.
 
     Attributes:
-        time_ps: when: the middle of the first stop bit.
+        time_ps: middle of the first stop bit.
         value: the data bits.
         framing_error: the stop bit was low.
         parity_error: the parity bit was wrong.
@@ -100,18 +98,17 @@ _HALF = Fraction(1, 2)
 class LineSampler:
     """A receiver at one end of a line whose other end may have another format.
 
-    Memory is bounded by what has been put on the line and not been taken.
+    It stores only levels that were put on the line and not decoded yet.
     """
 
     def __init__(self, form: LineFormat) -> None:
-        """Listen with the settings ``form`` to a line that is high."""
         self._form = form
         self._edges: deque[tuple[int, int]] = deque()  # (time, level from then on), in order
         self._level = 1  # before the first of them
-        self._from_ps = 0  # nothing before this time counts any more
+        self._from_ps = 0  # levels before this time are decoded
 
     def put(self, value: int, start_ps: int, form: LineFormat) -> None:
-        """A character goes out at ``start_ps``, not before the end of the one before it."""
+        """Add a character from ``start_ps``, which must not precede the end of the last one."""
         last = self._edges[-1][1] if self._edges else self._level
         bits = [*form.levels(value), 1]
         for index, level in enumerate(bits):
@@ -120,20 +117,20 @@ class LineSampler:
                 last = level
 
     def take(self, until_ps: int) -> Iterator[Character]:
-        """Characters found up to ``until_ps``; all that is put later must start then or later."""
+        """Characters received up to ``until_ps``; later calls of ``put`` must start after it."""
         while (found := self._next(until_ps)) is not None and found.time_ps <= until_ps:
             self._forget(found.time_ps)
             yield found
 
     def next_ps(self) -> int | None:
-        """When the next character will have been found if nothing more is put; None if none."""
-        if not self._edges:  # a quiet line, asked after each byte
+        """Time of the next character if the line stays quiet; None if there is none."""
+        if not self._edges:  # fast path: this is called after each byte
             return None
         found = self._next(0)
         return None if found is None else found.time_ps
 
     def _next(self, known_ps: int) -> Character | None:
-        """The next character; noise that has ended by ``known_ps`` is forgotten."""
+        """The next character; drops noise that has ended by ``known_ps``."""
         form, from_ps = self._form, self._from_ps
         count = 1 + form.data_bits + (form.parity != "N")
         while (start_ps := self._falling_edge(from_ps)) is not None:
@@ -168,7 +165,7 @@ class LineSampler:
         return found
 
     def _forget(self, before_ps: int) -> None:
-        """The receiver has done with everything before ``before_ps``."""
+        """Drop everything before ``before_ps``."""
         self._from_ps = before_ps
         while self._edges and self._edges[0][0] < before_ps:
             self._level = self._edges.popleft()[1]

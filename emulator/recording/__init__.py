@@ -1,1 +1,1 @@
-"""What passed on the ports, recorded, replayed and traced."""
+"""Records, replays and traces the traffic on the ports."""

@@ -1,7 +1,7 @@
-"""Records what goes over a board's serial lines and I2C bus.
+"""Records the traffic on a board's serial lines and I2C bus.
 
-Every byte with its side, port and virtual time, as its sender sent it: what a fault does to it on
-its way is not on record, so that it can be done again. The format is that of
+Each byte has its side, port and virtual time, and is recorded as sent. What a fault does to it on
+its way is not recorded, as the replayed fault does it again. The format is that of
 ``firmware_model.formats.recording``; ``replay`` plays it back.
 """
 
@@ -18,12 +18,12 @@ BLOCK_BYTES = 256
 
 
 class Recorder:
-    """Writes a recording; attach it before anything is said."""
+    """Writes a recording; attach it before the first byte is sent."""
 
     def __init__(
         self, stream: IO[str], device: str, uarts: Mapping[str, Uart], setup: Setup | None = None
     ) -> None:
-        """Record ``uarts`` by the names of their ports; ``stream`` stays its owner's."""
+        """Record ``uarts`` by the names of their ports; the caller closes ``stream``."""
         bauds = {port: uart.form.baud for port, uart in uarts.items()}
         self._writer = rec.RecordingWriter(stream, device, bauds, setup)
         self._taps: list[_LineTap | _BusTap] = [
@@ -31,27 +31,26 @@ class Recorder:
         ]
 
     def listen(self, bus: I2cBus, port: str = "i2c") -> None:
-        """Record the transfers of ``bus`` as well."""
         self._taps.append(_BusTap(self._writer, port, bus))
 
     def control(self, time_ps: int, words: tuple[str, ...], text: str = "") -> None:
-        """The device was told so, from outside of its ports; see ``Control``."""
+        """Record a command that reached the device outside of its ports; see ``Control``."""
         self._writer.write(rec.Control(time_ps, words, text))
 
     def flush(self) -> None:
-        """Write what is pending, so that the file is whole."""
+        """Write pending bytes, so that the file is complete."""
         for tap in self._taps:
             tap.flush()
         self._writer.flush()
 
     def close(self) -> None:
-        """Write what is pending and detach."""
+        """Write pending bytes and detach; the stream stays open."""
         for tap in self._taps:
             tap.close()
 
 
 class _LineTap(UartTap):
-    """Joins bytes that follow each other without a gap."""
+    """Records a serial line; joins bytes that follow each other without a gap."""
 
     def __init__(self, writer: rec.RecordingWriter, port: str, uart: Uart) -> None:
         self._writer = writer
@@ -94,7 +93,7 @@ class _LineTap(UartTap):
 
 
 class _BusTap(I2cTap):
-    """An I2C bus on record."""
+    """Records an I2C bus."""
 
     def __init__(self, writer: rec.RecordingWriter, port: str, bus: I2cBus) -> None:
         self._writer = writer
@@ -112,7 +111,7 @@ class _BusTap(I2cTap):
         )
 
     def flush(self) -> None:
-        """Every transfer was written at its end."""
+        """Nothing is pending: each transfer is written at its end."""
 
     def close(self) -> None:
         self._bus.taps.remove(self)

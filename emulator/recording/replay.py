@@ -1,7 +1,8 @@
-"""Plays the host of a recording to a board, and compares what the device says.
+"""Replays the host of a recording to a board, and compares the device's answers.
 
-The board was powered up like the recorded one. It gets the host's part at the same virtual times,
-and what was done to it from outside of its ports; a same byte at another time is a difference.
+The board must be configured and powered up like the recorded one. It receives the host's bytes at
+the same virtual times, and the recorded commands from outside of its ports. The same byte at
+another time counts as a difference.
 """
 
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -18,11 +19,11 @@ from cubestack.firmware_model.formats.byte_names import name_answer_byte, name_b
 from cubestack.firmware_model.interface.codec.message import Interface
 
 SETTLE_PS = PS_PER_S
-"""How long a replay goes on after the last event: what comes late is different, too."""
+"""A replay continues for this time after the last event, to detect additional bytes."""
 
 
 class Replay:
-    """Plays a recording's host to a board that has just been powered up."""
+    """Replays a recording's host to a board that has just been powered up."""
 
     def __init__(
         self,
@@ -32,14 +33,14 @@ class Replay:
         bus: I2cBus,
         act: Callable[[rec.Control], None] | None = None,
     ) -> None:
-        """Prepare; ``act`` does to the board what was done from outside of its ports.
+        """Prepare; ``act`` performs the recorded commands from outside of the ports.
 
-        Raises ValueError for a recording with ports that the board lacks, or with such acts when
-        nobody does them.
+        Raises ValueError for a recording with ports that the board lacks, or with such commands
+        but no ``act``.
         """
         if recording.controls and act is None:
             words = " ".join(recording.controls[0].words)
-            raise ValueError(f"{recording.name}: {words} can not be done here")
+            raise ValueError(f"{recording.name}: command {words!r} is not supported here")
         missing = set(recording.bauds) - set(uarts)
         if missing:
             raise ValueError(
@@ -48,8 +49,8 @@ class Replay:
             )
         self._recording = recording
         self._kernel = kernel
-        self._heard = {port: _Listener(uart) for port, uart in uarts.items()}
-        self._bus_found: list[rec.BusTransfer] = []
+        self._listeners = {port: _Listener(uart) for port, uart in uarts.items()}
+        self._bus_transfers: list[rec.BusTransfer] = []
         self._stopped = False
         for port, uart in uarts.items():
             kernel.process(self._write(port, uart))
@@ -58,21 +59,21 @@ class Replay:
             kernel.process(self._act(act))
 
     def run(self, interface: Interface) -> list[str]:
-        """Play to the end.
+        """Replay to the end.
 
-        Returns one line for each port where the device says something else, the first byte that
-        differs and its field named.
+        Returns one line for each port on which the device's answers differ; it names the first
+        byte that differs and its field.
         """
         self._kernel.advance_to(self._recording.end_ps + SETTLE_PS)
-        lines = [self._compare_line(interface, *heard) for heard in self._heard.items()]
+        lines = [self._compare_line(interface, *item) for item in self._listeners.items()]
         return [text for text in (*lines, self._compare_bus(interface)) if text is not None]
 
     def stop(self) -> None:
-        """Play no more; what is on a wire gets there."""
+        """Send nothing more; bytes on a wire still arrive."""
         self._stopped = True
 
     def _until(self, time_ps: int) -> Generator[simpy.Event, Any, bool]:
-        """Wait for a time; whether it is to be played on."""
+        """Wait until ``time_ps``; returns whether to continue."""
         yield self._kernel.timeout(max(0, time_ps - self._kernel.now))
         return not self._stopped
 
@@ -112,7 +113,7 @@ class Replay:
                 errno = error.errno or 0
             found = tuple(rec.BusMessage(m.address, bytes(m.data), m.reading) for m in messages)
             begun, now_ps = (transfer.time_ps, transfer.port), self._kernel.now
-            self._bus_found.append(rec.BusTransfer(*begun, now_ps, found, errno))
+            self._bus_transfers.append(rec.BusTransfer(*begun, now_ps, found, errno))
 
     def _compare_line(self, interface: Interface, port: str, heard: "_Listener") -> str | None:
         expected, times = self._recording.sent(port, "device")
@@ -125,7 +126,7 @@ class Replay:
         return f"{name_answer_byte(interface, self._recording, port, index)}: {what}"
 
     def _compare_bus(self, interface: Interface) -> str | None:
-        for then, now in zip(self._recording.transfers, self._bus_found, strict=False):
+        for then, now in zip(self._recording.transfers, self._bus_transfers, strict=False):
             for number, (before, after) in enumerate(zip(then.messages, now.messages, strict=True)):
                 index = _first_difference(before.data, after.data)
                 if index is not None:
@@ -138,7 +139,7 @@ class Replay:
 
 
 class _Listener(UartTap):
-    """Keeps what the device sends on a line."""
+    """Stores what the device sends on a line."""
 
     def __init__(self, uart: Uart) -> None:
         self.data = bytearray()

@@ -1,12 +1,13 @@
-"""A run as a VCD file for waveform viewers: lines, buses, FPGA pins and firmware on one time axis.
+"""Writes a run as a VCD file: lines, buses, FPGA pins and firmware on one time axis.
 
-- Serial lines: levels of both directions as a scope would show them, and each byte as it begins.
+- Serial lines: levels of both directions as an oscilloscope would show them, and each byte at its
+  start.
 - I2C: whether the bus is busy, the address, and a text for each transfer.
-- FPGA: every input from the microcontroller and every output, as they stand after each event of the
-  simulation. What happens within one event is not there: the pulses of a transfer loop, and memory
-  cycles while a picture is stored.
-- Firmware: whether the processor is awake, and variables that are looked at as a debugger would. Of
-  a compiled one, the function that runs and the exception that is served, at their own times.
+- FPGA: every input from the microcontroller and every output, after each event of the simulation.
+  Changes within one event are missing: the pulses of a transfer loop, and memory cycles while an
+  image is stored.
+- Firmware: whether the processor is awake, and variables as a debugger would read them. For
+  compiled firmware, also the current function and exception, at the exact times.
 
 Times are rounded down to 1 ns.
 """
@@ -26,22 +27,22 @@ from cubestack.emulator.sim.virtual_time import Kernel
 PS_PER_NS = 1000
 
 Probes = Callable[[], Mapping[str, int | str]]
-"""Looks at values, always the same ones by name: texts, and numbers of at most 32 bits."""
+"""Returns values by name, always the same names: texts, and numbers of at most 32 bits."""
 
 
 class History(Protocol):
-    """Something that knows when its variables changed."""
+    """Variables that are recorded with the times of their changes."""
 
     @property
     def variables(self) -> Mapping[str, int | None]:
-        """Bits of each one by name; None for a text."""
+        """Width in bits by name; None for a text."""
 
     def take(self) -> Iterable[tuple[int, str, int | str]]:
-        """Changes since the last call: time in ps, variable and value, by time."""
+        """Changes since the last call, ordered by time: time in ps, variable and value."""
 
 
 class VcdTrace:
-    """Writes a VCD file while the simulation runs; attach it before that."""
+    """Writes a VCD file while the simulation runs; attach it before the start."""
 
     def __init__(
         self,
@@ -53,9 +54,9 @@ class VcdTrace:
         probes: Probes = dict,
         history: History | None = None,
     ) -> None:
-        """Trace ``uarts``, what ``probes`` see and what ``history`` knows, by names.
+        """Trace ``uarts``, the values of ``probes`` and the changes in ``history``, by name.
 
-        ``stream`` stays its owner's.
+        The caller closes ``stream``.
         """
         self._kernel = kernel
         self._engine = engine
@@ -75,28 +76,27 @@ class VcdTrace:
             self.declare(f"firmware.{name}", bits)
         self._pins: tuple[str, ...] = ()
         if engine is not None:
-            engine.use_strides(False)  # a trace shows clocks that were made, one by one
+            engine.use_strides(False)  # the trace shows each clock
             self._pins = (*engine.wiring.mcu_pins, *engine.wiring.output_pins)
             for pin in self._pins:
                 self.declare(f"fpga.{pin}", engine.wiring.widths[pin], engine.get_pin(pin))
         self._taps: list[_LineTap | _BusTap] = [
             _LineTap(self, port, uart) for port, uart in uarts.items()
         ]
-        self._look()
+        self._sample()
         # SimPy has no hook for observers but the method itself.
         self._step = kernel.step
         vars(kernel)["step"] = self._observed_step
 
     def listen(self, bus: I2cBus, port: str = "i2c") -> None:
-        """Trace the transfers of ``bus`` as well."""
         self._taps.append(_BusTap(self, bus, port))
 
     def put(self, time_ps: int, name: str, value: int | str) -> None:
-        """A declared variable has a value from ``time_ps`` on."""
+        """Set a declared variable from ``time_ps`` on."""
         heapq.heappush(self._pending, (time_ps // PS_PER_NS, next(self._numbers), name, value))
 
     def declare(self, name: str, bits: int | None, init: int | str = 0) -> None:
-        """A variable, dots between its scopes; ``bits`` None is a text."""
+        """Declare a variable, its scopes separated by dots; ``bits`` is None for a text."""
         *scopes, last = name.split(".")
         scope = ".".join([self._device, *scopes])
         if bits is None:
@@ -106,7 +106,7 @@ class VcdTrace:
         self._variables[name] = variable
 
     def close(self, until_ps: int | None = None) -> None:
-        """Write what is pending and detach; what begins at ``until_ps`` or later is left out."""
+        """Write pending changes before ``until_ps`` and detach; the stream stays open."""
         vars(self._kernel).pop("step", None)
         for tap in self._taps:
             tap.close()
@@ -115,18 +115,18 @@ class VcdTrace:
 
     def _observed_step(self) -> None:
         self._step()
-        if not self._kernel.paused:  # a debugger leaves no mark
-            self._look()
+        if not self._kernel.paused:  # halts by a debugger do not appear
+            self._sample()
             self._flush(self._kernel.now - self._lag_ps)
 
-    def _look(self) -> None:
+    def _sample(self) -> None:
         if self._history is not None:
             for time_ps, name, value in self._history.take():
                 self._change(time_ps, f"firmware.{name}", value)
         for name, value in self._probes().items():
             self._change(self._kernel.now, f"firmware.{name}", value)
         if self._engine is not None:
-            # The FPGA may be ahead of the kernel, never behind what it shows.
+            # The FPGA may be ahead of the kernel; its levels have its own time.
             time_ps = max(self._engine.now_ps, 0)
             for pin in self._pins:
                 self._change(time_ps, f"fpga.{pin}", self._engine.get_pin(pin))
@@ -137,7 +137,7 @@ class VcdTrace:
             self.put(time_ps, name, value)
 
     def _flush(self, until_ps: int | None) -> None:
-        """Write what can not be preceded by anything any more."""
+        """Write changes that no earlier one can follow any more."""
         pending = self._pending
         while pending and (until_ps is None or pending[0][0] * PS_PER_NS < until_ps):
             time_ns, _, name, value = heapq.heappop(pending)
@@ -201,8 +201,8 @@ class _BusTap(I2cTap):
         self, messages: list[I2cMessage], began_ps: int, error: BaseException | None
     ) -> None:
         self._put("busy", 0)
-        made = (f"{'WR'[m.reading]}{m.address:02x}:{bytes(m.data).hex()}" for m in messages)
-        self._put("transfer", "refused" if error else ",".join(made))
+        parts = (f"{'WR'[m.reading]}{m.address:02x}:{bytes(m.data).hex()}" for m in messages)
+        self._put("transfer", "refused" if error else ",".join(parts))
 
     def close(self) -> None:
         self._bus.taps.remove(self)

@@ -1,1 +1,1 @@
-"""Virtual time, the processor that spends it, and the supplies."""
+"""Virtual time, microcontrollers that run in it, and power supplies."""

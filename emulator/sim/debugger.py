@@ -1,12 +1,12 @@
 """Halts a machine, and virtual time with it, for a debugger.
 
-A breakpoint ends the machine's run in the middle of an event of the kernel; the event after it is
-at the same time, and the kernel makes no step before the debugger lets it. So everything stands,
-and nothing has happened that would not have happened without: a trace is the same. The machine may
-be ahead of the kernel then, by no more than to the next thing that happens.
+A breakpoint ends the machine's run in the middle of a kernel event. The next event is at the same
+time, and the kernel waits there until the debugger resumes. Halting therefore changes nothing: a
+trace is the same with and without a debugger. A halted machine may be ahead of the kernel, at most
+up to the next event.
 
-While the kernel is held, a scheduler of ports makes no steps; anybody else's call of
-``Kernel.step`` waits in ``serve``.
+While the kernel is held, a scheduler of ports makes no steps; any other caller of ``Kernel.step``
+waits in ``serve``.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,39 +39,36 @@ FAULT_SIGNALS = {0xFFFF_0000: SIGILL, 0xFF00: SIGBUS, 0x00FF: SIGSEGV}
 """By the bits of CFSR: usage faults, bus faults, memory management."""
 
 ALL_FAULTS = 0x7F0
-"""Bits VC_* of DEMCR but that for a reset: C1.6.5."""
+"""Bits VC_* of DEMCR except the one for a reset: C1.6.5."""
 
 BKPT_BYTES = 2
 
 HOLDER = "debugger"
-"""Who holds the kernel."""
 
-OWN_COMMANDS = """reset [halt]      reset the processor, and stand at its first instruction
-catch on|off      stop at faults, before their handlers"""
+OWN_COMMANDS = """reset [halt]      reset the processor and halt at its first instruction
+catch on|off      halt at faults, before their handlers run"""
 
 
 class Window(Protocol):
-    """Memory of something else that a debugger sees beside the machine's."""
+    """Memory outside the machine that a debugger can access."""
 
     def read(self, offset: int, count: int) -> bytes:
-        """Bytes, fewer where it ends."""
+        """``count`` bytes; fewer at the end of the memory."""
 
     def write(self, offset: int, data: bytes) -> bool:
-        """Change bytes."""
+        """Returns False, and writes nothing, beyond the end of the memory."""
 
 
 @dataclass(frozen=True)
 class ArrayWindow:
-    """A window on an array of bytes."""
+    """A window onto an array of bytes."""
 
     memory: NDArray[np.uint8]
 
     def read(self, offset: int, count: int) -> bytes:
-        """Bytes of it."""
         return self.memory[offset : offset + count].tobytes()
 
     def write(self, offset: int, data: bytes) -> bool:
-        """Change bytes of it."""
         if offset + len(data) > self.memory.size:
             return False
         self.memory[offset : offset + len(data)] = np.frombuffer(data, np.uint8)
@@ -82,15 +79,14 @@ class ArrayWindow:
 class Debugger:
     """A target for debuggers: a machine that a processor runs in virtual time.
 
+    The methods from ``registers`` on implement ``iss.gdb.target.Target``.
+
     Attributes:
-        kernel: virtual time.
-        machine: what is debugged.
-        reset: resets the processor.
         own_regions: the part's memory map.
-        windows: further memories, by the lines of the memory map that they add.
-        command: answers ``monitor`` commands that are not about the processor.
-        serve: waits for the debugger a moment, while the kernel is paused.
-        visit: looks at the debugger, if it is time again.
+        windows: further memories, by the regions that they add to the memory map.
+        command: answers ``monitor`` commands that do not concern the processor.
+        serve: called repeatedly while the kernel is paused; blocks briefly for debugger input.
+        visit: called before each kernel step; polls the debugger when that is due.
     """
 
     kernel: Kernel
@@ -103,19 +99,18 @@ class Debugger:
     visit: Callable[[], None] = lambda: None
 
     def __post_init__(self) -> None:
-        """Take a place before the kernel."""
         self.halted: Reason | None = None
         self._attached = False
         self._range: tuple[int, int] | None = None
-        self._to_wake = False  # a step has fallen asleep: stand when it goes on
+        self._to_wake = False  # a step ended in sleep: halt when the core wakes
         self._at_bkpt: int | None = None
-        self._told_lock_up = False
+        self._reported_lock_up = False
         self._watches: dict[tuple[int, int, WatchKind], Watch] = {}
         self._step = self.kernel.step
         vars(self.kernel)["step"] = self._gated_step
 
     def close(self) -> None:
-        """Let everything run without a debugger."""
+        """Detach, and restore the kernel's ``step``."""
         self.detach()
         vars(self.kernel)["step"] = self._step
 
@@ -128,9 +123,9 @@ class Debugger:
     # --- the processor's side -------------------------------------------------------------------
 
     def run(self, until_ps: int) -> Stop:
-        """``Machine.run`` as the debugger wants it; the kernel is paused where it stands then."""
+        """As ``Machine.run``; pauses the kernel where the debugger halts the machine."""
         machine = self.machine
-        if self.kernel.paused:  # somebody gives it an input: it stands where it is
+        if self.kernel.paused:  # an input arrives while halted: stay halted
             return Stop(StopReason.TIME, machine.now_ps)
         if not self._attached:
             return machine.run(until_ps)
@@ -138,35 +133,35 @@ class Debugger:
             stop = machine.run(until_ps)
         else:
             stop = machine.step(until_ps, self._range)
-        self._look(stop)
+        self._halt_on(stop)
         if self._to_wake and not machine.asleep:
-            self._stand(Reason())
+            self._halt(Reason())
         return stop
 
-    def _look(self, stop: Stop) -> None:
-        """Stand where the end of a run is the debugger's."""
+    def _halt_on(self, stop: Stop) -> None:
+        """Halt if the run ended for a reason that concerns the debugger."""
         if stop.reason is not StopReason.LOCKED_UP:
-            self._told_lock_up = False
+            self._reported_lock_up = False
         match stop.reason:
             case StopReason.STEPPED if self.machine.asleep:
                 self._to_wake = True
             case StopReason.STEPPED:
-                self._stand(Reason())
+                self._halt(Reason())
             case StopReason.BREAKPOINT:
-                self._stand(Reason(breakpoint=True))
+                self._halt(Reason(breakpoint=True))
             case StopReason.WATCHPOINT:
-                self._stand(Reason(watch=self._hit(self.machine.watch_hit)))
+                self._halt(Reason(watch=self._hit(self.machine.watch_hit)))
             case StopReason.HALTED:
                 self._at_bkpt = self.machine.register("pc")
-                self._stand(Reason())
+                self._halt(Reason())
             case StopReason.FAULT:
-                self._stand(Reason(self._fault_signal()))
-            case StopReason.LOCKED_UP if not self._told_lock_up:
-                self._told_lock_up = True
-                self._stand(Reason(SIGSEGV))
+                self._halt(Reason(self._fault_signal()))
+            case StopReason.LOCKED_UP if not self._reported_lock_up:
+                self._reported_lock_up = True
+                self._halt(Reason(SIGSEGV))
 
     def _fault_signal(self) -> int:
-        """That of the fault; of one that was escalated, that of what it was."""
+        """Signal of the fault; for an escalated fault, that of the original one."""
         status = int.from_bytes(self.machine.peek(CFSR, 4), "little")
         for mask, signal in FAULT_SIGNALS.items():
             if status & mask:
@@ -174,14 +169,13 @@ class Debugger:
         return SIGSEGV
 
     def _hit(self, hit: WatchHit) -> tuple[WatchKind, int]:
-        """The watchpoint that was hit."""
         for start, count, kind in self._watches:
-            apt = kind == "access" or hit.write == (kind == "write")
-            if apt and start < hit.address + hit.size and hit.address < start + count:
+            matches = kind == "access" or hit.write == (kind == "write")
+            if matches and start < hit.address + hit.size and hit.address < start + count:
                 return kind, start
         return "access", hit.address
 
-    def _stand(self, reason: Reason) -> None:
+    def _halt(self, reason: Reason) -> None:
         self.halted = reason
         self.kernel.hold(HOLDER)
         self._range = None
@@ -191,22 +185,18 @@ class Debugger:
 
     @property
     def registers(self) -> dict[int, str]:
-        """See ``Target``."""
         return REGISTERS
 
     @property
     def regions(self) -> tuple[MemoryRegion, ...]:
-        """See ``Target``."""
         return (*self.own_regions, *self.windows)
 
     def attach(self) -> None:
-        """See ``Target``."""
         self._attached = True
         self.machine.attach_debugger(True)
         self.halt()
 
     def detach(self) -> None:
-        """See ``Target``."""
         for address in list(self.machine.breakpoints):
             self.machine.breakpoints.discard(address)
         for watch in self._watches.values():
@@ -217,12 +207,10 @@ class Debugger:
         self.resume()
 
     def halt(self) -> None:
-        """See ``Target``."""
         if self.halted is None:
-            self._stand(Reason(SIGINT))
+            self._halt(Reason(SIGINT))
 
     def resume(self) -> None:
-        """See ``Target``."""
         if self._at_bkpt is not None and self._at_bkpt == self.machine.register("pc"):
             self.machine.set_register("pc", self._at_bkpt + BKPT_BYTES)
         self._at_bkpt = None
@@ -230,38 +218,35 @@ class Debugger:
         self.kernel.release(HOLDER)
 
     def step(self, low: int, high: int) -> None:
-        """See ``Target``."""
         self.resume()
         self._range, self._to_wake = (low, high), self.machine.asleep
 
     def register(self, name: str) -> int:
-        """See ``Target``."""
         return self.machine.register(name)
 
     def set_register(self, name: str, value: int) -> None:
-        """See ``Target``."""
         self.machine.set_register(name, value)
 
     def read(self, address: int, count: int) -> bytes:
-        """See ``Target``."""
-        for region, window in self.windows.items():
-            if region.start <= address < region.start + region.length:
-                return window.read(address - region.start, count)
+        if (found := self._window(address)) is not None:
+            return found[0].read(found[1], count)
         return self.machine.peek(address, count)
 
     def write(self, address: int, data: bytes) -> bool:
-        """See ``Target``."""
-        for region, window in self.windows.items():
-            if region.start <= address < region.start + region.length:
-                return window.write(address - region.start, data)
+        if (found := self._window(address)) is not None:
+            return found[0].write(found[1], data)
         return self.machine.poke(address, data) == len(data)
 
+    def _window(self, address: int) -> tuple[Window, int] | None:
+        for region, window in self.windows.items():
+            if region.start <= address < region.start + region.length:
+                return window, address - region.start
+        return None
+
     def set_breakpoint(self, address: int, on: bool) -> None:
-        """See ``Target``."""
         (self.machine.breakpoints.add if on else self.machine.breakpoints.discard)(address)
 
     def set_watchpoint(self, address: int, count: int, kind: WatchKind, on: bool) -> None:
-        """See ``Target``."""
         watch = Watch(address, count, WATCHES[kind])
         self.machine.watch(watch, on)
         if on:
@@ -270,12 +255,10 @@ class Debugger:
             self._watches.pop((address, count, kind), None)
 
     def restart(self) -> None:
-        """See ``Target``."""
-        self._stand(Reason())
+        self._halt(Reason())
         self.reset()
 
     def monitor(self, command: str) -> str:
-        """See ``Target``."""
         match command.split():
             case [] | ["help"]:
                 return f"{OWN_COMMANDS}\n{self.command(['help'])}"

@@ -1,7 +1,7 @@
 """Couples a machine's port pins to an FPGA.
 
-A compiled FPGA's driver is handed to the machine, whose reads and data clocks then cost no Python;
-any other FPGA, and one with faults at its pins, is reached by callbacks, with the same results.
+The machine calls the driver of a compiled FPGA directly, without Python. It reaches any other FPGA,
+and one with faults at its pins, by callbacks, with the same results.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,14 +19,13 @@ from cubestack.firmware_model.mcu.external_bus import EBI
 
 @dataclass(frozen=True)
 class FpgaPin:
-    """A pin of the FPGA, or a bus of them, at neighbouring port pins.
+    """A pin of the FPGA, or a bus, connected to neighbouring port pins.
 
     Attributes:
-        name: at the FPGA.
-        port, bit: of the machine, where its lowest bit is.
-        width: bits.
+        name: name of the FPGA's pin.
+        port, bit: the machine's port pin of the lowest bit.
         input: the FPGA drives it.
-        alert: its changes raise the machine's pin interrupts, too.
+        alert: changes also raise the machine's pin interrupts.
     """
 
     name: str
@@ -38,11 +37,7 @@ class FpgaPin:
 
 
 class FpgaCoupling:
-    """A machine and an FPGA, pin to pin.
-
-    Attributes:
-        fpga: the FPGA, or what stands before it.
-    """
+    """Connection of a machine's pins to an FPGA, or to a fault at the FPGA's pins."""
 
     def __init__(
         self,
@@ -56,11 +51,9 @@ class FpgaCoupling:
         """Couple them.
 
         Args:
-            machine, fpga: to be coupled.
-            pins: which lead where; outputs of the machine that are not among these are the
-                caller's.
+            pins: the connections; the caller handles all other outputs of the machine.
             banks: chip select of each bank of the machine's external bus that leads to the FPGA.
-            compiled: use the FPGA's own functions where there are any.
+            compiled: use the FPGA's compiled functions if it has any.
         """
         self._machine, self.fpga, self._banks = machine, fpga, tuple(banks)
         self._pins, self._by_driver = tuple(pins), compiled and not banks
@@ -74,9 +67,9 @@ class FpgaCoupling:
         self._couple()
 
     def _couple(self) -> None:
-        """Lead the machine's pins to the FPGA's driver, or to callbacks."""
+        """Connect the machine's pins to the FPGA's driver, or to callbacks."""
         self._driver = driver = self.fpga.driver if self._by_driver else None
-        self._told = -1  # which cameras the machine believes to run
+        self._reported = -1  # the running cameras that the machine was last given
         addresses = (0, 0, 0, 0) if driver is None else driver[:4]
         numbers = (
             range(len(self._pins))
@@ -91,23 +84,23 @@ class FpgaCoupling:
         self._machine.couple(record, (binding.FpgaWireRecord * len(wires))(*wires))
 
     def before_run(self) -> None:
-        """The machine is about to run: it has to know which cameras do."""
+        """Give the machine the set of running cameras; call before it runs."""
         if self._by_driver and self.fpga.driver is not self._driver:
-            self._couple()  # faults have come to stand between, or are over
+            self._couple()  # a fault at the pins began or ended
         running = self.fpga.running
-        if running or self._told:
+        if running or self._reported:
             self._machine.fpga_running(running)
-            self._told = running
+            self._reported = running
 
     def after_run(self, time_ps: int) -> None:
-        """The machine has run to ``time_ps``: the FPGA follows. Raises what callbacks raised."""
+        """Run the FPGA up to ``time_ps``; raises what a callback raised in the machine's run."""
         if self._error is not None:
             error, self._error = self._error, None
             raise error
         self.fpga.run(max(self.fpga.now_ps, time_ps))
 
     def set_pin(self, name: str, value: int, time_ps: int) -> None:
-        """Drive a pin that the machine reaches through Python."""
+        """Drive a pin whose changes the machine reports to Python."""
         self.fpga.run(max(self.fpga.now_ps, time_ps))
         self.fpga.set_pin(name, value)
 
@@ -120,7 +113,7 @@ class FpgaCoupling:
         self.fpga.set_pin(self._pins[pin].name, value)
 
     def _external(self, bank: int, address: int, value: int, now_ps: int) -> int:
-        """One access on the external bus; it began before the machine came to its data."""
+        """Perform one access on the external bus, which began before its data phase."""
         if bank not in self._banks:
             return -1
         self.fpga.run(max(self.fpga.now_ps, now_ps))
@@ -134,7 +127,7 @@ class FpgaCoupling:
         return int(data[0])
 
     def _guarded(self, act: Callable[..., int | None], failed: int | None) -> Callable[..., object]:
-        """``act`` for compiled code, which can not pass an exception on."""
+        """Wrap ``act`` for compiled code, through which exceptions can not propagate."""
 
         def call(*arguments: int) -> object:
             try:

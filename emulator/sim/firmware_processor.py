@@ -1,8 +1,8 @@
-"""Runs a user's own firmware in virtual time: a machine behind the kernel's events.
+"""Runs a user's own firmware in virtual time.
 
-The machine runs by itself up to the kernel's next event, so no input comes late, and returns sooner
-when something is for the outside; the kernel catches up to that picosecond, the board does what is
-due, and the machine goes on. While it sleeps, the kernel goes from event to event without it.
+The machine runs alone up to the kernel's next event, so no input comes late. It returns sooner when
+it has an output; the kernel catches up to that picosecond, the board handles the output, and the
+machine continues. While it sleeps, the kernel goes from event to event without it.
 """
 
 import logging
@@ -22,22 +22,22 @@ from cubestack.emulator.sim.fpga_port import FpgaPort
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
 
 LOOK_AHEAD_PS = 80 * PS_PER_US
-"""Longest run of a machine, unless a board says otherwise."""
+"""Default of the longest run of a machine."""
 
 QUANTUM_PS = 10 * PS_PER_US
-"""Run of a machine that has to take turns with another one at the same picosecond."""
+"""Run of a machine that takes turns with another one at the same picosecond."""
 
 QUIET_PS = 2 * PS_PER_S
-"""A program that sent nothing for so long, and sleeps at last, waits for the outside."""
+"""A program that now sleeps and sent nothing for this time waits for input."""
 
 QUIET_AWAKE_PS = 5 * PS_PER_S
-"""Likewise one that never sleeps: it computes, or polls."""
+"""The same for a program that never sleeps: it computes, or polls."""
 
-FAULT_LOOK_PS = 10 * PS_PER_MS
-"""Time between two looks whether the program stands in the handler of a fault."""
+FAULT_CHECK_PS = 10 * PS_PER_MS
+"""Period of the check whether the program hangs in a fault handler."""
 
 INWARD = frozenset({Kind.SLEEP, Kind.LOG, Kind.SUPPLY})
-"""What is no work that anybody outside would wait for."""
+"""Outputs that do not count as activity visible outside."""
 
 logger = logging.getLogger(__name__)
 
@@ -45,10 +45,9 @@ Steps = Generator[simpy.Event, Any, None]
 
 
 class Debugger(Protocol):
-    """What runs the machine in place of the processor, and may halt it."""
+    """Runs the machine in place of the processor, and may halt it."""
 
-    def run(self, until_ps: int) -> Stop:
-        """As ``Machine.run``."""
+    def run(self, until_ps: int) -> Stop: ...
 
 
 @dataclass(eq=False)
@@ -56,20 +55,18 @@ class FirmwareProcessor:
     """One microcontroller with the user's own firmware.
 
     Attributes:
-        env: kernel.
         machine: the microcontroller, loaded, in reset.
-        handlers: what happens to each kind of thing that leaves the machine.
-        causes: the part's bits for each cause of a reset that ``reset`` may be given; those that
-            are not among them hang it instead.
-        couple: leads the machine's pins to an FPGA.
+        handlers: called with the machine's outputs, by their kind.
+        causes: the part's reset cause bits, by the cause given to ``reset``.
+        couple: connects the machine's pins to an FPGA.
         look_ahead_ps: longest run of the machine: less than the time of a byte on the wires, so
-            what a host begins to send while the machine is ahead arrives after that.
-        on_activity: told when the core falls asleep (False) or awakes (True).
-        console: receives text that the program prints by its debug channels, line by line.
-        on_fault: told of what stops the program for good, with a line of text.
-        debugger: runs the machine, if any.
+            what a host begins to send while the machine is ahead arrives after the run.
+        on_activity: called when the core falls asleep (False) or wakes (True).
+        console: receives the text that the program prints on its debug channels, line by line.
+        on_fault: called with a text when a fault stops the program for good.
+        debugger: runs the machine, if not None.
         resets: number of resets since power-up.
-        energy_mode: 0 awake, else how deep the part sleeps.
+        energy_mode: 0 awake, else the energy mode (EM1 to EM4) of the sleep.
     """
 
     env: Kernel
@@ -85,7 +82,6 @@ class FirmwareProcessor:
     on_fault: Callable[[str], None] = logger.error
 
     def __post_init__(self) -> None:
-        """Power up."""
         self.debugger: Debugger | None = None
         self.resets = self.energy_mode = 0
         self._fpga: FpgaPort | None = None
@@ -94,22 +90,21 @@ class FirmwareProcessor:
         self._awake = True
         self._active_ps = 0
         self._lines: dict[int, str] = {}
-        self._early: list[Outgoing] = []  # what left the machine while it caught up
+        self._early: list[Outgoing] = []  # outputs from ``catch_up``
         self._locked_up = False
-        self._look_ps = self._told_faults = 0
+        self._check_ps = self._reported_faults = 0
         self._faults = Counter[tuple[int, int, int]]()
         self._unwanted_resets = Counter[str]()
         self.machine.reset(self.power_on)
         for _ in self.machine.outbox():
-            pass  # being made is no news to anybody
+            pass  # outputs of the initial reset concern nobody
         self.on_activity(True)
         self._running = self.env.process(self._run())
 
-    # --- what boards, faults and hosts use ------------------------------------------------------
+    # --- used by boards, faults and hosts -------------------------------------------------------
 
     @property
     def fpga(self) -> FpgaPort | None:
-        """What it has at its pins to the FPGA."""
         return self._fpga
 
     @fpga.setter
@@ -124,10 +119,10 @@ class FirmwareProcessor:
 
     @property
     def waiting(self) -> bool:
-        """Whether nothing happens until somebody outside does something.
+        """Whether nothing happens without input from outside.
 
-        A program sleeps for its next tick as well as for its next telecommand. So one that sleeps
-        waits when nothing is due soon, or when it did nothing that is seen outside for a while.
+        A program sleeps between ticks as well as between telecommands. A sleeping program counts as
+        waiting when no event is due within ``QUIET_PS``, or it had no output for that time.
         """
         now_ps = self.env.now
         if self._locked_up:
@@ -138,9 +133,9 @@ class FirmwareProcessor:
         return due_ps >= now_ps + QUIET_PS or now_ps > self._active_ps + QUIET_PS
 
     def reset(self, cause: int, hang_us: int = 0) -> None:
-        """Reset for a reason, one of ``causes``.
+        """Reset with one of ``causes``.
 
-        With ``hang_us`` the program hangs instead: what ends that is its own watchdog.
+        With ``hang_us`` the program hangs instead, until its own watchdog resets it.
         """
         self.catch_up()
         if hang_us:
@@ -150,7 +145,7 @@ class FirmwareProcessor:
         self.wake()
 
     def catch_up(self) -> None:
-        """Bring the machine to the kernel's time, before something is done to its inputs."""
+        """Run the machine to the kernel's time; call before changing its inputs."""
         reached_ps = -1
         while reached_ps < self.machine.now_ps < self.env.now and not self.env.paused:
             reached_ps = self.machine.now_ps
@@ -158,12 +153,12 @@ class FirmwareProcessor:
             self._early.extend(self.machine.outbox())
 
     def wake(self) -> None:
-        """Something was done to the machine's inputs: a sleeping one is to be looked at."""
+        """Report changed inputs, so that a sleeping machine runs."""
         if not self._input.triggered:
             self._input.succeed()
 
     def give(self, act: Callable[[], None]) -> None:
-        """Do something to the machine's inputs, now."""
+        """Change the machine's inputs by ``act`` at the kernel's time."""
         self.catch_up()
         act()
         self.wake()
@@ -175,10 +170,10 @@ class FirmwareProcessor:
         reached_ps = self.machine.now_ps
         while True:
             if env.horizon() == env.now:
-                yield env.timeout(0)  # everybody else who is to act now does so first
+                yield env.timeout(0)  # all other processes that are due now run first
             stop = self._run_machine(self._until())
-            while env.paused:  # by the debugger: as if it had not stopped here
-                yield self._urgent()
+            while env.paused:  # by the debugger; then continue as if it had not stopped
+                yield env.urgent(env.now)
                 if stop.sends or self._early:
                     break
                 stop = self._go_on(self._until())
@@ -189,7 +184,7 @@ class FirmwareProcessor:
             ahead_ps = stop.now_ps - env.now
             standing = standing + 1 if stop.now_ps == reached_ps and ahead_ps <= 0 else 0
             reached_ps = stop.now_ps
-            if standing > 2:  # a machine that can not go on must not keep the kernel
+            if standing > 2:  # a machine that makes no progress must not block the kernel
                 yield from self._await_input(self._until())
                 continue
             yield env.timeout(max(0, ahead_ps))
@@ -200,25 +195,25 @@ class FirmwareProcessor:
         return self._go_on(until_ps)
 
     def _go_on(self, until_ps: int) -> Stop:
-        """Run on after a halt, or from what ``before_run`` has prepared."""
+        """Run without ``before_run``, which is done already."""
         runner = self.machine if self.debugger is None else self.debugger
         stop = runner.run(until_ps)
         if stop.reason is StopReason.LOCKED_UP and not self._locked_up:
-            self._tell_fault("the core is locked up")
+            self._report_fault("the core is locked up")
         self._locked_up = stop.reason is StopReason.LOCKED_UP
-        if stop.now_ps >= self._look_ps:
-            self._look_ps = stop.now_ps + FAULT_LOOK_PS
-            self._look_for_fault()
+        if stop.now_ps >= self._check_ps:
+            self._check_ps = stop.now_ps + FAULT_CHECK_PS
+            self._check_for_fault()
         return stop
 
-    def _look_for_fault(self) -> None:
-        """Tell of a fault whose handler does nothing, once each."""
-        if unhandled(self.machine) and last_fault(self.machine).count != self._told_faults:
-            self._told_faults = last_fault(self.machine).count
-            self._tell_fault("the firmware does not handle a fault")
+    def _check_for_fault(self) -> None:
+        """Report a fault whose handler does nothing, once per fault."""
+        if unhandled(self.machine) and last_fault(self.machine).count != self._reported_faults:
+            self._reported_faults = last_fault(self.machine).count
+            self._report_fault("the firmware does not handle a fault")
 
-    def _tell_fault(self, what: str) -> None:
-        """With a report; of the same fault again and again a line, ever more seldom."""
+    def _report_fault(self, what: str) -> None:
+        """Report a fault in full the first time; repetitions in one line, at powers of ten."""
         fault = last_fault(self.machine)
         kind = fault.pc, fault.cfsr, fault.hfsr
         self._faults[kind] += 1
@@ -226,18 +221,18 @@ class FirmwareProcessor:
         if times == 1:
             symbols = Symbols.of(self.machine.image)
             self.on_fault(f"{what}\n{fault_report(self.machine, symbols, self.machine.now_ps)}")
-        elif _round(times):
+        elif _is_power_of_ten(times):
             self.on_fault(f"{what}: the same fault, {times} times now")
 
-    def _tell_reset(self, what: str) -> None:
-        """One that the program did not want; ever more seldom."""
+    def _report_reset(self, what: str) -> None:
+        """Report a reset that the program did not request; repetitions at powers of ten."""
         self._unwanted_resets[what] += 1
         times = self._unwanted_resets[what]
-        if _round(times):
+        if _is_power_of_ten(times):
             self.on_fault(what if times == 1 else f"{what}, {times} times now")
 
     def _until(self) -> int:
-        """Nothing else happens before this time."""
+        """The time before which no other event happens."""
         now_ps, horizon = self.env.now, self.env.horizon()
         if horizon is None:
             return now_ps + self.look_ahead_ps
@@ -246,17 +241,16 @@ class FirmwareProcessor:
         return min(horizon, now_ps + self.look_ahead_ps)
 
     def _sleeps(self, stop: Stop) -> bool:
-        """Whether the kernel can go on without the machine for a while."""
+        """Whether the kernel can continue without the machine."""
         machine = self.machine
         return machine.asleep and machine.next_event_ps > max(stop.now_ps, self.env.now)
 
     def _sleep(self) -> Steps:
-        """Until the machine's own next event, or an input."""
         due_ps = self.machine.next_event_ps
         yield from self._await_input(None if due_ps == NEVER else max(due_ps, self.env.now))
 
     def _await_input(self, until_ps: int | None) -> Steps:
-        """Until an input, one that was there already included, or a time."""
+        """Wait for an input, which may be there already, or a time."""
         alternatives: list[simpy.Event] = [self._input]
         if until_ps is not None and not self._input.triggered:
             alternatives.append(self.env.timeout(until_ps - self.env.now))
@@ -264,17 +258,9 @@ class FirmwareProcessor:
         if self._input.triggered:
             self._input = self.env.event()
 
-    def _urgent(self) -> simpy.Event:
-        """An event at this very time, before all others."""
-        event = simpy.Event(self.env)
-        event._ok, event._value = True, None
-        self.env.schedule(event, simpy.events.URGENT)
-        return event
-
-    # --- what leaves the machine ----------------------------------------------------------------
+    # --- outputs of the machine -----------------------------------------------------------------
 
     def _settle(self, stop: Stop) -> Steps:
-        """Do what is due after a run."""
         if stop.sends or self._early or self.debugger is not None:
             yield from self._empty_outbox()
         if self._coupling is not None:
@@ -302,9 +288,9 @@ class FirmwareProcessor:
             case Kind.RESET:
                 self.resets += 1
                 self._locked_up = False
-                self._told_faults = 0
+                self._reported_faults = 0
                 if one.text:
-                    self._tell_reset(one.text)
+                    self._report_reset(one.text)
             case Kind.ITM:
                 self._print(one.unit, one.value.to_bytes(8, "little")[: max(1, one.extra)])
             case Kind.SEMIHOSTING:
@@ -318,13 +304,12 @@ class FirmwareProcessor:
             handler(one)
 
     def _print(self, channel: int, data: bytes) -> None:
-        """Whole lines go to the console."""
         text = self._lines.get(channel, "") + data.decode("latin-1")
         *lines, self._lines[channel] = text.split("\n")
         for line in lines:
             self.console(line.rstrip("\r"))
 
 
-def _round(times: int) -> bool:
-    """Whether it is 1, 10, 100 and so on."""
+def _is_power_of_ten(times: int) -> bool:
+    """Whether ``times`` is 1, 10, 100 and so on."""
     return str(times).strip("0") == "1"

@@ -1,4 +1,4 @@
-"""What a microcontroller has at its pins to an FPGA: lines, a data clock, an external bus.
+"""A microcontroller's connection to an FPGA: lines, a data clock, an external bus.
 
 A transaction on the bus has the phases of :mod:`cubestack.firmware_model.mcu.external_bus`.
 """
@@ -19,21 +19,20 @@ STEPS = 6
 """
 
 TAKE = 4
-"""The event at which a read takes its byte, right before it."""
+"""A read samples its byte right before this event."""
 
 
 @dataclass(frozen=True)
 class Transactions:
-    """Reads, or writes, one after the other.
+    """Consecutive reads or writes.
 
     Attributes:
         addresses: (n,) int32, C-contiguous, of 24 bits each.
-        data: (n,) uint8, C-contiguous: the bytes to be written, or where the bytes read go.
-        write: to write them.
-        cycle: of the core clock, in ps.
-        cycles: from the start of one transaction to that of the next.
+        data: (n,) uint8, C-contiguous: the bytes to write, or the destination of the bytes read.
+        cycle: period of the core clock in ps.
+        cycles: core cycles from the start of one transaction to that of the next.
         select: number of the chip select.
-        above: a byte read that is above it ends the whole.
+        above: the first byte read that is larger ends the sequence.
         timing: phases of a transaction.
     """
 
@@ -47,7 +46,6 @@ class Transactions:
     timing: BusTiming = EBI
 
     def __post_init__(self) -> None:
-        """Refuse what can not be: ValueError."""
         for array, kind in ((self.addresses, np.int32), (self.data, np.uint8)):
             if array.dtype != kind or array.ndim != 1 or not array.flags.c_contiguous:
                 raise ValueError(f"transactions need contiguous {kind.__name__}, not {array!r}")
@@ -58,21 +56,20 @@ class Transactions:
             raise ValueError(f"a transaction takes {self.timing.cycles} cycles, not {self.cycles}")
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self.addresses)
 
     def first(self, count: int) -> "Transactions":
-        """The first ``count``; a live view."""
+        """The first ``count``; they share the data."""
         return replace(self, addresses=self.addresses[:count], data=self.data[:count])
 
     @property
     def period(self) -> Fraction:
-        """From one to the next in ps."""
+        """Time from one transaction to the next in ps."""
         return self.cycle * self.cycles
 
     @cached_property
     def offsets(self) -> tuple[int, ...]:
-        """Cycle of each event within a transaction."""
+        """Core cycle of each event within a transaction."""
         timing = self.timing
         phases = (timing.address_setup, timing.address_hold, timing.setup, timing.strobe)
         closes, selects, falls, rises = np.cumsum(phases).tolist()
@@ -85,11 +82,11 @@ class Transactions:
 
 
 class Driver(NamedTuple):
-    """Compiled FPGAs' own functions, for compiled code that stands at their pins.
+    """C functions of compiled FPGAs, for other compiled code to call.
 
     Attributes:
         handle: first argument of the functions.
-        set, get, burst: their addresses.
+        set, get, burst: addresses of the functions.
         pins: number of each pin.
     """
 
@@ -101,7 +98,7 @@ class Driver(NamedTuple):
 
 
 class FpgaPort(Protocol):
-    """FPGAs as the microcontroller reaches them. Time only moves in the last three calls."""
+    """FPGAs as the microcontroller sees them. Only the last three methods advance time."""
 
     @property
     def now_ps(self) -> int:
@@ -109,50 +106,50 @@ class FpgaPort(Protocol):
 
     @property
     def running(self) -> int:
-        """Cameras whose clocks are made now, one bit each; other time changes nothing."""
+        """Cameras whose pixel clock runs now, one bit each; without them, time changes nothing."""
 
     @property
     def driver(self) -> Driver | None:
-        """The FPGAs' own functions, where they are compiled and nothing stands before them.
+        """The FPGAs' C functions; None if they are not compiled, or a fault is at their pins.
 
-        Who calls them at a time does so after the bursts of ``running`` up to it, and hands a
-        burst that ends otherwise to ``attend``.
+        Before a call, the caller runs the bursts of all ``running`` cameras up to its time, and
+        passes a burst that ends early to ``attend``.
         """
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
-        """A burst of ``driver`` ended so; does what is due, up to ``until_ps``; ``running``."""
+        """Handle the ``end`` of a burst of ``driver``, up to ``until_ps``; returns ``running``."""
 
     def set_pin(self, name: str, value: int) -> None:
-        """Drive one of the microcontroller's outputs from ``now_ps`` on; ValueError for others."""
+        """Drive an output of the microcontroller from ``now_ps`` on; ValueError for others."""
 
     def get_pin(self, name: str) -> int:
         """Settled level at ``now_ps`` of any input or output pin.
 
-        Clocks that change nothing may have been skipped. The one trace that leaves is in a memory's
-        D_O while its D_OE is low.
+        Clocks that change nothing may have been skipped. This shows only in a memory's D_O while
+        its D_OE is low.
         """
 
     def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
         """Advance to ``until_ps``, pixel clock edges at that very instant included.
 
-        ``stop_on`` is an acknowledge and a level: stop right after the edge that brings it to that
-        level, or at once when it is there already; later cameras' edges at that instant are then
-        still to come. Returns ``now_ps``; ValueError for a time in the past.
+        ``stop_on`` is an acknowledge pin and a level: stop right after the edge that sets it to
+        that level, or at once when it has it already; edges of later cameras at that instant then
+        remain. Returns ``now_ps``; ValueError for a time in the past.
         """
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
         """Run the microcontroller's transfer loop from ``now_ps``.
 
-        In each cycle of ``period`` ps, the data clock rises, the data pins are taken into ``out``
-        after half the period, and the clock falls. Only cycles that end by ``until_ps`` are made.
-        Returns how many, n; ``now_ps`` advances by floor(n * period). The fraction cut off there is
-        kept for a burst of the same period that follows at once, so that bursts do not drift.
+        In each cycle of ``period`` ps, the data clock rises, the data pins are sampled into ``out``
+        after half the period, and the clock falls. Only cycles that end by ``until_ps`` run.
+        Returns their number n; ``now_ps`` advances by floor(n * period). The fraction cut off there
+        is kept for a burst of the same period that follows at once, so bursts do not drift.
         """
 
     def access(self, transactions: Transactions, until_ps: int) -> int:
-        """Make transactions on the microcontroller's external bus from ``now_ps``.
+        """Perform transactions on the microcontroller's external bus from ``now_ps``.
 
-        A read of which no byte comes back takes what the lines kept: address bits 15..8. Only
-        transactions that end by ``until_ps`` are made. Returns how many, n; ``now_ps`` advances by
+        A read that nothing answers returns the level that the lines kept: address bits 15..8. Only
+        transactions that end by ``until_ps`` run. Returns their number n; ``now_ps`` advances by
         floor(n * period). ValueError for a design without that bus.
         """

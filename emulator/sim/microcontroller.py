@@ -1,4 +1,4 @@
-"""What boards, faults and hosts use of a microcontroller, whatever runs on it."""
+"""The interface of a microcontroller to boards, faults and hosts, for any kind of program."""
 
 from typing import Protocol
 
@@ -9,31 +9,28 @@ class Microcontroller(Protocol):
     """A processor in virtual time.
 
     Attributes:
-        fpga: what it has at its pins to the FPGA; a fault may stand before it. None without one.
+        fpga: the FPGA at its pins, or a fault in front of it; None on a board without.
         resets: number of resets since power-up.
-        waiting: nothing happens until somebody outside does something.
+        waiting: nothing happens without input from outside.
         dozing: it sleeps, with or without a deadline.
     """
 
     resets: int
 
     @property
-    def fpga(self) -> FpgaPort | None:
-        """See above."""
+    def fpga(self) -> FpgaPort | None: ...
 
     @fpga.setter
     def fpga(self, fpga: FpgaPort | None) -> None: ...
 
     @property
-    def waiting(self) -> bool:
-        """See above."""
+    def waiting(self) -> bool: ...
 
     @property
-    def dozing(self) -> bool:
-        """See above."""
+    def dozing(self) -> bool: ...
 
     def wake(self) -> None:
-        """Something happened that an interrupt tells of: one that sleeps looks at it."""
+        """An interrupt is pending: if it sleeps, it wakes."""
 
     def reset(self, cause: int, hang_us: int = 0) -> None:
-        """Reset for a reason; ``hang_us``: after the program has hung for so long."""
+        """Reset with ``cause``, after the program has hung for ``hang_us``."""

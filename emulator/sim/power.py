@@ -13,11 +13,11 @@ COMPARATOR_US = 2
 
 @dataclass(frozen=True)
 class Part:
-    """A consumer.
+    """A component that draws current.
 
     Attributes:
-        channel: load switch that it is behind; None for the unswitched supply.
-        ma: current in mA by state; it starts in the first one.
+        channel: load switch of its supply; None for the unswitched supply.
+        ma: current in mA by state; the first one is the initial state.
     """
 
     channel: str | None
@@ -29,10 +29,9 @@ class PowerTable:
     """A board's supplies.
 
     Attributes:
-        volts: of the supply that the currents are drawn from.
+        volts: supply voltage for the currents.
         parts: by name.
-        channels: load switches, with the trip current of each one's comparator in mA; None where
-            there is no comparator.
+        channels: trip current in mA of each load switch's comparator; None without a comparator.
     """
 
     volts: float
@@ -41,13 +40,12 @@ class PowerTable:
 
 
 class PowerModel:
-    """Sums what the parts draw, and cuts off a channel only when the firmware says so.
+    """Sums the currents of the parts; only the firmware switches a channel off.
 
     Attributes:
-        table: what the parts draw.
         on_overcurrent: interrupt: the comparator of a channel tripped.
-        on_switch: told (channel, on) when a load switch changed.
-        on_change: told after a current may have changed.
+        on_switch: called with (channel, on) when a load switch changed.
+        on_change: called after a current may have changed.
     """
 
     def __init__(self, env: Kernel, table: PowerTable) -> None:
@@ -66,7 +64,7 @@ class PowerModel:
         self.on_change: Callable[[], None] = lambda: None
 
     def set_state(self, part: str, state: str) -> None:
-        """Part ``part`` is in ``state`` from now on (names of the table, else ValueError)."""
+        """Change the state of a part; ValueError for names that are not in the table."""
         parts = self.table.parts
         if part not in parts:
             raise ValueError(f"no supplied part {part!r}, only {sorted(parts)}")
@@ -77,7 +75,7 @@ class PowerModel:
         self._compare()
 
     def switch(self, channel: str, on: bool) -> None:
-        """Turn a load switch; turning it off also ends a latch-up behind it."""
+        """Set a load switch; switching off also ends a latch-up behind it."""
         self._check_channel(channel)
         if self._on[channel] == on:
             return
@@ -88,15 +86,14 @@ class PowerModel:
         self.on_switch(channel, on)
 
     def is_on(self, channel: str) -> bool:
-        """Whether a load switch is on."""
         self._check_channel(channel)
         return self._on[channel]
 
     def latch_up(self, channel: str, extra_ma: float = 300.0, *, lasting: bool = False) -> None:
-        """A particle strike: ``channel`` draws ``extra_ma`` more until it is switched off.
+        """Simulate a particle strike: ``channel`` draws ``extra_ma`` more until switched off.
 
-        A ``lasting`` one comes back with each switching on. Nothing else happens to a channel that
-        is off.
+        A ``lasting`` latch-up returns each time the channel is switched on. A channel that is off
+        is not affected otherwise.
         """
         self._check_channel(channel)
         if lasting:

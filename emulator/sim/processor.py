@@ -1,8 +1,8 @@
 """Runs a firmware program in virtual time: spends its cycles and performs its requests.
 
 While the processor waits for the FPGA, the FPGA runs ahead of the kernel, in bursts that end at
-the next scheduled event and within ``LOOK_AHEAD_PS``. What is scheduled from outside in between
-(a host that starts to write) can only be late for the FPGA, by no more than that.
+the next scheduled event, at most ``LOOK_AHEAD_PS`` ahead. An event that is scheduled from outside
+during a burst (a host starts to write) reaches the FPGA late by at most that time.
 """
 
 from collections.abc import Callable, Generator
@@ -28,31 +28,27 @@ Steps = Generator[simpy.Event, Any, Any]
 class Program(Protocol):
     """A firmware program: its main routine never returns, it ends in a ``Reset`` request."""
 
-    def main(self) -> requests.Routine[None]:
-        """Run from reset."""
+    def main(self) -> requests.Routine[None]: ...
 
 
 class CameraBus(Protocol):
     """The bus over which the processor controls the camera."""
 
     def transfer_ps(self, request: requests.CameraTransfer) -> int:
-        """How long ``request`` occupies the bus, in ps."""
+        """Time for which ``request`` occupies the bus, in ps."""
 
     def transfer(self, request: requests.CameraTransfer, now_ps: int) -> bytes | None:
-        """Perform ``request``, which ends at ``now_ps``; None when not acknowledged."""
+        """Perform ``request``, which ends at ``now_ps``; None if not acknowledged."""
 
 
 class Pins(Protocol):
     """Pins of the processor that do not lead to the FPGA."""
 
-    def __contains__(self, pin: object) -> bool:
-        """Whether this is one of them."""
+    def __contains__(self, pin: object) -> bool: ...
 
-    def set_pin(self, pin: str, level: int) -> None:
-        """Drive an output pin from now on."""
+    def set_pin(self, pin: str, level: int) -> None: ...
 
-    def get_pin(self, pin: str) -> int:
-        """Level of a pin now."""
+    def get_pin(self, pin: str) -> int: ...
 
 
 @dataclass(eq=False)
@@ -60,20 +56,18 @@ class Processor:
     """One microcontroller: a clock, a program, and the pins it shares with the FPGA.
 
     Attributes:
-        env: kernel; its time is in ps.
-        meter: what the program charges its cycles to; its table gives the clock.
-        fpga: what the processor has at its pins to the FPGA; None on a board without: requests that
-            need it are a ValueError then.
+        meter: counts the cycles that the program charges; its table has the clock frequency.
+        fpga: the FPGA at the processor's pins; if None, requests that need one raise ValueError.
         camera_bus: the camera's control bus; None where the program drives its lines as pins.
-        boot: makes the program after a reset; its argument is the cause (see ``Reset``).
+        boot: creates the program after a reset, from the cause (see ``Reset``).
         power_on_cause: cause of the first start.
         boot_us: time from reset to the first instruction of ``main``.
         other_pins: pins that do not lead to the FPGA.
-        on_pin: told about every output pin change, after it happened.
-        on_activity: told when the processor falls asleep (False), starts or awakes (True).
-        on_access: told when the program begins to use the external bus (True), and when it
-            requests something else after that.
-        on_forced_reset: told at a reset that the program did not ask for.
+        on_pin: called after each change of an output pin.
+        on_activity: called when the processor falls asleep (False), starts or wakes (True).
+        on_access: called when the program begins to use the external bus (True), and at its next
+            request of another kind (False).
+        on_forced_reset: called at a reset that the program did not request.
         program: the running program, for the interrupt lines of the peripherals.
         resets: number of resets since power-up.
         waiting: asleep until an interrupt, with no deadline.
@@ -95,7 +89,6 @@ class Processor:
     on_forced_reset: Callable[[], None] = lambda: None
 
     def __post_init__(self) -> None:
-        """Power up."""
         self._accesses = False
         self._forced = 0, 0
         self._clock = CycleClock(self.meter.table.clock_hz)
@@ -106,7 +99,7 @@ class Processor:
         self._running = self.env.process(self._run())
 
     def wake(self) -> None:
-        """End the running wakeable sleep, or the next one at once."""
+        """End the current wakeable sleep, or the next one at once."""
         if not self._wake.triggered:
             self._wake.succeed()
 
@@ -116,15 +109,15 @@ class Processor:
         self._running.interrupt()
 
     def load(self, select: int, address: int, count: int, cycles: int) -> bytes:
-        """Read bytes over the external bus in an interrupt, which still has to charge them.
+        """Read bytes over the external bus in an interrupt, which charges their cycles later.
 
-        Each takes ``cycles``. The FPGA is ahead of the kernel then, until they are paid.
+        Each takes ``cycles``. The FPGA is ahead of the kernel until the cycles are paid.
         """
         self._follow()
         addresses = np.arange(address, address + count, dtype=np.int32)
         data = np.zeros(count, np.uint8)
         reads = Transactions(addresses, data, False, self._cycle, cycles, select)
-        self._reached.access(reads, self._reached.now_ps + int(count * reads.period))
+        self._port.access(reads, self._port.now_ps + int(count * reads.period))
         return reads.data.tobytes()
 
     def _run(self) -> Steps:
@@ -140,7 +133,7 @@ class Processor:
             self.program = self.boot(cause)
 
     def _stopped(self) -> Steps:
-        """The program was stopped, as ``reset`` wants; the cause of the reset that comes first."""
+        """Handle ``reset``; returns the cause of the reset that comes first."""
         cause, hang_us = self._forced
         self.waiting = self.dozing = False
         self.on_activity(True)
@@ -171,7 +164,7 @@ class Processor:
                 answer = yield from self._perform(request)
 
     def _pay(self) -> Steps:
-        """Be busy for the charged cycles, and for those that interrupts charge meanwhile."""
+        """Stay busy for the charged cycles, and for those that interrupts charge meanwhile."""
         while cycles := self.meter.take():
             yield self.env.timeout(self._clock.elapse(cycles))
 
@@ -206,33 +199,32 @@ class Processor:
                 self._follow()
                 return self.camera_bus.transfer(request, self.env.now)
             case _:
-                raise TypeError(f"a program can not request {request!r}")
+                raise TypeError(f"unknown request {request!r} from a program")
 
     @property
     def _cycle(self) -> Fraction:
         return Fraction(PS_PER_S, self._clock.hz)
 
     def _follow(self) -> None:
-        """Let the FPGA be where the processor is; after an interrupt's accesses it is ahead."""
+        """Run the FPGA to the kernel's time; after accesses in an interrupt it is ahead."""
         if self.fpga is not None:
             self.fpga.run(max(self.env.now, self.fpga.now_ps))
 
     @property
-    def _reached(self) -> FpgaPort:
-        """The FPGA; asked for anew after each wait, as a fault may begin to stand before it."""
+    def _port(self) -> FpgaPort:
+        """The FPGA; read anew after each wait, as a fault may have replaced it."""
         if self.fpga is None:
-            raise ValueError("this board has no FPGA: its program can not reach for one")
+            raise ValueError("this board has no FPGA, but its program requests access to one")
         return self.fpga
 
     def _pins_of(self, request: requests.SetPin | requests.ReadPin) -> Pins | FpgaPort:
-        """Where the pin of ``request`` leads to."""
         self._follow()
         if self.other_pins is not None and request.pin in self.other_pins:
             return self.other_pins
-        return self._reached
+        return self._port
 
     def _horizon(self) -> int:
-        """Nothing else happens before this time, so the FPGA may run ahead up to it."""
+        """Limit for the FPGA's look-ahead: nothing else happens before this time."""
         limit = self.env.now + LOOK_AHEAD_PS
         horizon = self.env.horizon()
         return limit if horizon is None else min(limit, horizon)
@@ -242,11 +234,11 @@ class Processor:
         deadline = start + request.timeout_us * PS_PER_US
         self._follow()
         reached = start
-        while self._reached.get_pin(request.pin) != request.level:
+        while self._port.get_pin(request.pin) != request.level:
             if self.env.now >= deadline:
                 return False
-            until = max(self._reached.now_ps, min(deadline, self._horizon()))
-            reached = self._reached.run(until, (request.pin, request.level))
+            until = max(self._port.now_ps, min(deadline, self._horizon()))
+            reached = self._port.run(until, (request.pin, request.level))
             yield self.env.timeout(reached - self.env.now)
         poll = request.poll_cycles * PS_PER_S
         polls = max(1, -(-(reached - start) * self._clock.hz // poll))
@@ -278,8 +270,8 @@ class Processor:
         while done < len(request.target):
             yield from self._pay()
             self._follow()
-            fpga = self._reached
-            # At least one cycle: an event inside it is an interrupt in the middle of the loop.
+            fpga = self._port
+            # At least one cycle: an event within it is an interrupt in the middle of the loop.
             limit = max(self._horizon(), self.env.now + ceil(period))
             done += fpga.strobe_read(request.target[done:], period, limit)
             yield self.env.timeout(fpga.now_ps - self.env.now)
@@ -290,11 +282,11 @@ class Processor:
         while done < total:
             yield from self._pay()
             self._follow()
-            fpga = self._reached
+            fpga = self._port
             addresses, data = request.addresses[done:], request.data[done:]
             timing = self._cycle, request.cycles, request.select, request.above
             wanted = Transactions(addresses, data, request.write, *timing)
-            # At least one, as above.
+            # At least one transaction, as above.
             done += fpga.access(wanted, max(self._horizon(), fpga.now_ps + ceil(wanted.period)))
             yield self.env.timeout(fpga.now_ps - self.env.now)
             if not request.write and request.data[done - 1] > request.above:

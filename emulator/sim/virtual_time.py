@@ -1,4 +1,4 @@
-"""Virtual time: an integer number of picoseconds, its kernel, and clocks that convert exactly."""
+"""Virtual time as an integer number of picoseconds, its kernel, and exact clock conversion."""
 
 from itertools import count
 from time import monotonic_ns
@@ -14,35 +14,33 @@ class Kernel(simpy.Environment):
     """SimPy's environment with an integer clock in ps.
 
     Attributes:
-        held_ns: wall time of all pauses that are over.
+        held_ns: wall time of all finished pauses.
     """
 
     held_ns: int = 0
 
     def __init__(self, initial_time: int = 0) -> None:
-        """Begin at ``initial_time``."""
         super().__init__(initial_time)
         self._holders = set[str]()
         self._since_ns = 0
 
     @property
     def paused(self) -> bool:
-        """Whether anybody holds it, as a debugger that has halted a processor."""
+        """Whether it is held, for example by a debugger that has halted a processor."""
         return bool(self._holders)
 
     @property
     def holders(self) -> frozenset[str]:
-        """Who holds it."""
         return frozenset(self._holders)
 
     def hold(self, holder: str) -> None:
-        """Let nothing happen until ``holder`` releases it."""
+        """Stop all events until ``holder`` calls ``release``."""
         if not self._holders:
             self._since_ns = monotonic_ns()
         self._holders.add(holder)
 
     def release(self, holder: str) -> None:
-        """``holder`` holds it no more; it may be held by others."""
+        """End a hold of ``holder``; other holders keep the kernel paused."""
         if self._holders == {holder}:
             self.held_ns += monotonic_ns() - self._since_ns
         self._holders.discard(holder)
@@ -53,56 +51,48 @@ class Kernel(simpy.Environment):
         return self._now  # type: ignore[return-value]  # all delays are whole numbers
 
     def restart(self) -> None:
-        """Begin at 0 again with nothing to come; who holds it still does."""
+        """Clear all events and set the time to 0; holds remain."""
         self._queue.clear()
         self._eid = count()
         self._now = 0
 
     def horizon(self) -> int | None:
-        """Time of the next scheduled event in ps; None when there is none."""
+        """Time of the next scheduled event in ps; None if there is none."""
         peek = self.peek()
         return None if peek == float("inf") else int(peek)
 
     def advance_to(self, time_ps: int) -> None:
-        """Let everything before ``time_ps`` happen, then stand there; a past time does nothing.
+        """Run all events before ``time_ps``, then stop at that time; a past time does nothing.
 
-        Unlike ``run``, it leaves no event of its own behind, which would pass for the horizon.
+        Unlike ``run``, it leaves no event behind that ``horizon`` would report.
         """
         if time_ps <= self._now:
             return
         if self.peek() >= time_ps and "step" not in vars(self):
-            self._now = time_ps  # nothing happens before, and nobody stands before each step
+            self._now = time_ps  # no event until then, and no observer of steps
             return
-        arrival = _Arrival(self, time_ps)  # what looks ahead meanwhile stops there
+        arrival = self.urgent(time_ps)  # limits the look-ahead of others
         while not arrival.processed:
             self.step()
 
-
-class _Arrival(simpy.Event):
-    """Comes before all else that happens at its time."""
-
-    def __init__(self, env: Kernel, time_ps: int) -> None:
-        super().__init__(env)
-        self._ok = True
-        self._value = None
-        env.schedule(self, simpy.events.URGENT, time_ps - env.now)
+    def urgent(self, time_ps: int) -> simpy.Event:
+        """Schedule and return an event that comes before all others at ``time_ps``."""
+        event = simpy.Event(self)
+        event._ok, event._value = True, None
+        self.schedule(event, simpy.events.URGENT, time_ps - self.now)
+        return event
 
 
 class CycleClock:
-    """Turns cycle counts into picoseconds; what one conversion rounds off, the next one pays.
-
-    Attributes:
-        hz: clock frequency.
-    """
+    """Converts cycle counts to picoseconds; each remainder carries over to the next call."""
 
     def __init__(self, hz: int) -> None:
-        """Make a clock of ``hz`` cycles a second (positive, else ValueError)."""
         if hz <= 0:
             raise ValueError(f"a clock needs a positive frequency, not {hz} Hz")
         self.hz = hz
         self._remainder = 0
 
     def elapse(self, cycles: int) -> int:
-        """Picoseconds that the next ``cycles`` take; summed over calls, exact to one ps."""
+        """Picoseconds for the next ``cycles``; their sum over all calls is exact to 1 ps."""
         ps, self._remainder = divmod(cycles * PS_PER_S + self._remainder, self.hz)
         return ps

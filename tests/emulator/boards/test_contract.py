@@ -88,7 +88,7 @@ def test_boards_share_a_bus(stack: ExitStack) -> None:
     bus = I2cBus(kernel)
     powered(stack, kernel=kernel, i2c_bus=bus)
     assert sorted(bus.targets) == [0x1A, 0x1B, 0x1C, 0x1D]
-    with pytest.raises(ValueError, match="0x1d is taken already"):
+    with pytest.raises(ValueError, match="0x1d is already in use"):
         BOARDS["aramis"](kernel=kernel, i2c_bus=bus)
 
 

@@ -87,7 +87,7 @@ def test_nobody_at_the_address_stops_an_open_target_and_frees_the_bus():
 def test_refused_byte_ends_the_transfer():
     kernel, bus = make(x1A=(target := Memory(refuse=2)))
     messages = I2cMessage(0x1A, bytearray([1, 2, 3])), I2cMessage(0x1A, read=1)
-    refused = (errno.EIO, "I2C device 0x1a refused byte 0x02")
+    refused = (errno.EIO, "I2C device 0x1a did not acknowledge byte 0x02")
     assert failure(kernel, bus, *messages) == refused
     assert target.calls == ["write", 1, 2, "stop"]
     assert kernel.now == (1 + 9 + 2 * 9 + 1) * BIT_PS[100_000]
@@ -120,7 +120,7 @@ def test_who_gives_up_waiting_holds_up_nobody(granted):
 
 @pytest.mark.parametrize(
     ("address", "text"),
-    [(0x1A, "0x1a is taken already")]
+    [(0x1A, "0x1a is already in use")]
     + [(address, r"is not in 0x08\.\.0x77") for address in (-1, 0x00, 0x07, 0x78, 0x3FF)],
 )
 def test_reserved_and_taken_addresses_are_refused(address, text):

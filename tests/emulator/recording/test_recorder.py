@@ -203,7 +203,7 @@ def test_what_was_done_meanwhile_is_done_again(tmp_path):
 
     Replay(recording, again.kernel, {"uart": again.uart}, again.bus, act).run(INTERFACE)
     assert done == [(PS_PER_MS, Control(PS_PER_MS, ("scene", "x.toml"), "text"))]
-    with pytest.raises(ValueError, match=r"a\.rec: scene x\.toml can not be done here"):
+    with pytest.raises(ValueError, match=r"a\.rec: command .scene x\.toml. is not supported here"):
         Device().replay(recording)
 
 
