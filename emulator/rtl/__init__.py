@@ -1,1 +1,1 @@
-"""The FPGA in virtual time: compiled to C++, or in Amaranth's simulator."""
+"""FPGAs in virtual time: compiled to C++, or in Amaranth's simulator."""

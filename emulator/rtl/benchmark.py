@@ -1,4 +1,4 @@
-"""How long the compiled engine's first builds take."""
+"""Measures first builds of the compiled engine."""
 
 import tempfile
 import time
@@ -10,11 +10,11 @@ from cubestack.emulator.rtl.cxxrtl.build import library_for
 from cubestack.emulator.rtl.wiring import Wiring
 
 ROUNDS = 5
-"""Times that a figure is measured; the best one counts: the others were disturbed."""
+"""Repetitions of a measurement; the shortest counts, as other processes disturb the rest."""
 
 
 def cold_build_s(wiring: Wiring) -> float:
-    """Wall time from a design to its shared library by this machine's compiler.
+    """Wall time in s to build a design's shared library with this machine's compiler.
 
     Raises NoCompilerError.
     """
@@ -23,7 +23,7 @@ def cold_build_s(wiring: Wiring) -> float:
         raise NoCompilerError("no C++ compiler to measure")
     with tempfile.TemporaryDirectory() as name, noted() as wanted:
         folder = Path(name)
-        library_for(wiring, folder)  # one that comes along
+        library_for(wiring, folder)  # may be one that is shipped
         start = time.perf_counter()
         wanted[0].build(compiler, folder, folder / "log")
         return time.perf_counter() - start

@@ -1,4 +1,4 @@
-"""Makes the engine of a wiring: the compiled one, or the reference where there is no compiler."""
+"""Creates the engine of a wiring: the compiled one, or the reference without a compiler."""
 
 import warnings
 from typing import Literal
@@ -11,7 +11,6 @@ from cubestack.emulator.rtl.sram import SramTiming
 from cubestack.emulator.rtl.wiring import Wiring
 
 EngineKind = Literal["auto", "compiled", "exact", "python"]
-"""How FPGAs are run."""
 
 
 def make_engine(
@@ -21,13 +20,12 @@ def make_engine(
     *,
     skipping: bool = True,
 ) -> RtlEngine:
-    """Make an engine.
+    """Create an engine.
 
     Args:
         wiring: the design with its surroundings.
-        kind: "compiled", "exact" (compiled, and every clock made one by one), "python" (the
-            Amaranth simulator), or "auto": compiled where there is a C++ compiler, else the
-            simulator with a warning.
+        kind: "compiled", "exact" (compiled, runs every clock), "python" (the Amaranth simulator),
+            or "auto": compiled if there is a C++ compiler, else the simulator with a warning.
         sram_timing: limits that the SRAM model checks.
         skipping: skip pixel clocks that provably change nothing.
 

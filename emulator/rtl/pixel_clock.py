@@ -1,7 +1,7 @@
-"""What a camera sends, and the edges of its pixel clock inside one segment of that.
+"""Segments of a camera's output, and the edges of their pixel clock.
 
 Edge k of a segment is at floor(start + k * period / 2): even edges rise, odd ones fall. Rising
-edge 2n takes sample n, which stands on the lines since the falling edge before.
+edge 2n samples pixel n, which is on the lines since the falling edge before.
 """
 
 from collections.abc import Callable
@@ -15,19 +15,18 @@ from numpy.typing import NDArray
 
 
 class PixelSegment(Protocol):
-    """A stretch of the camera's output with an unbroken pixel clock: blanking, or whole lines."""
+    """A part of the camera's output with a continuous pixel clock: blanking, or whole lines."""
 
     @property
     def start_ps(self) -> int:
         """First rising edge of the clock; rising edge n is at floor(start_ps + n * period)."""
 
     @property
-    def clocks(self) -> int:
-        """Number of pixel clocks."""
+    def clocks(self) -> int: ...
 
     @property
     def vsync(self) -> int:
-        """Level of the frame pin throughout, where there is one."""
+        """Level of the frame pin in the whole segment, if the pin is wired."""
 
     @property
     def rows(self) -> int:
@@ -41,12 +40,12 @@ class PixelSegment(Protocol):
     def pixels(self) -> Callable[[], NDArray[np.uint8]] | None:
         """Renders the lines: shape (rows, active_columns), uint8, C-contiguous.
 
-        Called only when the FPGA may store them, and once for each time the segment is given out.
+        Called only if the FPGA may store them, once per segment returned by ``segment_at``.
         """
 
 
 class PixelSource(Protocol):
-    """The camera's parallel output. All but the clock change with its falling edge."""
+    """The camera's parallel output; data and syncs change with the falling edge of the clock."""
 
     @property
     def period(self) -> Fraction:
@@ -54,29 +53,26 @@ class PixelSource(Protocol):
 
     @property
     def line_clocks(self) -> int:
-        """Clocks of a line, those with the line pin low included."""
+        """Clocks per line, including those with the line pin low."""
 
     @property
     def active_columns(self) -> int:
-        """Clocks of a line with the line pin high."""
+        """Clocks per line with the line pin high."""
 
     def segment_at(self, time_ps: int) -> PixelSegment | None:
-        """Segment whose clocks contain ``time_ps``; None when there is no pixel clock then.
+        """Segment whose clocks contain ``time_ps``; None without a pixel clock at that time.
 
-        After None the engine asks again only when told to, by ``stream_changed``.
+        After None, the engine calls again only after ``stream_changed``.
         """
 
 
 @dataclass
 class LoadedSegment:
-    """A segment together with what its source says about clock and lines.
+    """A segment with its source's clock and line lengths.
 
     Attributes:
-        segment: as the source gave it.
-        half_period: ps between a rising and a falling edge.
-        line_clocks: as in the source.
-        active_columns: as in the source.
-        pixels: the lines once rendered, else None.
+        half_period: time between a rising and a falling edge in ps.
+        pixels: the rendered lines; None before that.
     """
 
     segment: PixelSegment
@@ -87,7 +83,7 @@ class LoadedSegment:
 
     @classmethod
     def of(cls, source: PixelSource, segment: PixelSegment) -> "LoadedSegment":
-        """Check ``segment`` of ``source``; ValueError names what does not fit."""
+        """Load ``segment`` of ``source``; ValueError for inconsistent lengths."""
         if segment.rows and segment.clocks != segment.rows * source.line_clocks:
             raise ValueError(
                 f"a segment of {segment.rows} rows of {source.line_clocks} clocks has "
@@ -99,39 +95,37 @@ class LoadedSegment:
 
     @property
     def edges(self) -> int:
-        """Number of edges."""
         return 2 * self.segment.clocks
 
     @property
     def end_ps(self) -> int:
-        """Where the first rising edge of a segment that follows without a gap is."""
+        """Time of the first rising edge of a segment that follows without a gap."""
         return self.time_of(self.edges)
 
     def time_of(self, edge: int) -> int:
-        """Time of ``edge`` in ps."""
         return self.segment.start_ps + int(edge * self.half_period)
 
     def first_edge(self, time_ps: int) -> int:
-        """First edge at ``time_ps`` or later; ``edges`` when all are over."""
+        """First edge at ``time_ps`` or later; ``edges`` if there is none."""
         # floor(k * h) >= d exactly when k * h >= d, because d is an integer.
         edge = ceil((time_ps - self.segment.start_ps) / self.half_period)
         return min(max(edge, 0), self.edges)
 
     def sample(self, n: int) -> tuple[int, int]:
-        """HSYNC and PIXDATA of sample ``n``; pixels that were never rendered are 0."""
+        """HSYNC and PIXDATA of sample ``n``; pixels that are not rendered are 0."""
         row, column = divmod(n, self.line_clocks)
         if not self.segment.rows or column >= self.active_columns:
             return 0, 0
         return 1, 0 if self.pixels is None else int(self.pixels[row, column])
 
     def low_until(self, n: int) -> int:
-        """Sample after the run of low HSYNC that sample ``n`` is in."""
+        """Number of the sample after the low run of HSYNC that contains sample ``n``."""
         if not self.segment.rows:
             return self.segment.clocks
         return (n // self.line_clocks + 1) * self.line_clocks
 
     def render(self) -> NDArray[np.uint8]:
-        """Have the lines rendered, and keep them; ValueError when they are not as declared."""
+        """Render the lines, and keep them; ValueError for another shape or type."""
         shape = (self.segment.rows, self.active_columns)
         if self.segment.pixels is None:
             raise ValueError(f"a segment of {self.segment.rows} rows needs pixels")

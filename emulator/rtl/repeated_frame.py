@@ -1,4 +1,4 @@
-"""A camera that sends the same frame for ever, for measuring engines."""
+"""A camera that repeats one frame, for benchmarks of engines."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class _Segment:
-    """Blanking, or all lines of a picture."""
+    """Blanking, or all lines of the image."""
 
     start_ps: int
     clocks: int
@@ -22,13 +22,13 @@ class _Segment:
 
 @dataclass(frozen=True)
 class RepeatedFrame:
-    """A :class:`~cubestack.emulator.rtl.pixel_clock.PixelSource`: blanking, then the picture.
+    """A :class:`~cubestack.emulator.rtl.pixel_clock.PixelSource`: blanking, then the image.
 
     Attributes:
         image: (rows, columns).
-        period: of the pixel clock in ps.
-        line_clocks: from one line to the next.
-        blank_clocks: before the first line.
+        period: period of the pixel clock in ps.
+        line_clocks: clocks from one line to the next.
+        blank_clocks: clocks before the first line.
     """
 
     image: NDArray[np.uint8]
@@ -38,20 +38,18 @@ class RepeatedFrame:
 
     @property
     def active_columns(self) -> int:
-        """Pixels of a line."""
         return len(self.image[0])
 
     @property
     def clocks(self) -> int:
-        """Pixel clocks of a frame."""
+        """Pixel clocks per frame."""
         return self.blank_clocks + len(self.image) * self.line_clocks
 
     def segment_at(self, time_ps: int) -> _Segment:
-        """Blanking or picture at that time."""
         # The last frame that begins at this time or before, its start rounded down.
         first = (ceil((time_ps + 1) / (self.clocks * self.period)) - 1) * self.clocks
-        picture_ps = int((first + self.blank_clocks) * self.period)
-        if time_ps < picture_ps:
+        image_ps = int((first + self.blank_clocks) * self.period)
+        if time_ps < image_ps:
             return _Segment(int(first * self.period), self.blank_clocks, 0, None)
         lines = len(self.image)
-        return _Segment(picture_ps, lines * self.line_clocks, lines, lambda: self.image)
+        return _Segment(image_ps, lines * self.line_clocks, lines, lambda: self.image)

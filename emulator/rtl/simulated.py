@@ -17,7 +17,7 @@ from cubestack.emulator.rtl.wiring import CameraPins, MemoryPins, Wiring
 
 @dataclass
 class _Stream:
-    """What a camera sends, and how far it is."""
+    """A camera's stream, and the position in it."""
 
     pins: CameraPins
     loaded: LoadedSegment | None = None
@@ -32,16 +32,14 @@ class _Stream:
 
 
 class SimulatedEngine(RtlEngine):
-    """Some ten thousand clocks a second; it has no way to a register inside the design.
+    """Runs some ten thousand clocks per second; it has no access to registers of the design.
 
-    With ``skipping``, of longer time outside of lines only the clocks are made that the wiring says
-    the design needs to settle.
+    With ``skipping``, it runs at most the wiring's ``settling_clocks`` of a period between lines.
     """
 
     def __init__(
         self, wiring: Wiring, sram_timing: SramTiming | None = None, *, skipping: bool = True
     ) -> None:
-        """Elaborate the wiring's design."""
         super().__init__(wiring, skipping=skipping)
         timing = sram_timing or SramTiming()
         self._srams = [Sram(memory, timing, self._log, n) for n, memory in self.memories.items()]
@@ -55,7 +53,7 @@ class SimulatedEngine(RtlEngine):
         simulator = Simulator(wiring.component)
         simulator.add_testbench(lend_context)
         simulator.advance()
-        # Time is kept here; the simulator only has to settle: its context does so in every set().
+        # The simulator's own time stays 0; each set() of its context settles the design.
         self._context = contexts[0]
         self._settle(0)
 
@@ -79,7 +77,7 @@ class SimulatedEngine(RtlEngine):
         self._settle(time_ps)
 
     def _settle(self, time_ps: int) -> None:
-        """Let the memories follow the pins."""
+        """Update the memories after a change of the pins."""
         memories = list(zip(self._srams, self.wiring.memories, strict=True))
         for sram, memory in memories:
             sram.drive(time_ps, self._memory_pins(memory))
@@ -108,7 +106,7 @@ class SimulatedEngine(RtlEngine):
         self._put_sample(stream)
 
     def _put_sample(self, stream: _Stream) -> None:
-        # Registers' inputs only: nothing but the next rising edge can show them.
+        # These are inputs of registers only, so they have no effect before the next rising edge.
         loaded = stream.loaded
         line, pixel = (0, 0) if loaded is None else loaded.sample(stream.edge // 2)
         self._put(stream.pins.line, line)
@@ -126,18 +124,18 @@ class SimulatedEngine(RtlEngine):
             time_ps = stream.time_ps
             if time_ps > until_ps:
                 return until_ps, BurstEnd.TIME_REACHED, camera
-            self._make_edge(stream, stream.loaded, time_ps, until_ps)
+            self._run_edge(stream, stream.loaded, time_ps, until_ps)
             changed = self._acknowledges() != before
             if changed or stream.edge == stream.loaded.edges:
                 for number in cameras:
-                    self._come_back(self._streams[number], time_ps, number > camera)
+                    self._go_back(self._streams[number], time_ps, number > camera)
                 end = BurstEnd.ACKNOWLEDGE_CHANGED if changed else BurstEnd.SEGMENT_OVER
                 return time_ps, end, camera
 
     def _acknowledges(self) -> list[int]:
         return [self._get(name) for name in self.wiring.acknowledges]
 
-    def _make_edge(
+    def _run_edge(
         self, stream: _Stream, loaded: LoadedSegment, time_ps: int, until_ps: int
     ) -> None:
         falling = stream.edge % 2
@@ -150,18 +148,18 @@ class SimulatedEngine(RtlEngine):
         self._drive(time_ps, stream.pins.clock, 1)
         stream.low_clocks = 0 if self._get(stream.pins.line) else stream.low_clocks + 1
         if self._skipping and stream.low_clocks >= self.wiring.settling_clocks:
-            # Go on with the falling edge of the last sample of this low part that is in reach.
+            # Continue with the falling edge of the last sample of this low run that is in reach.
             in_reach = (loaded.first_edge(until_ps + 1) - 1) // 2
             last = min(loaded.low_until(stream.edge // 2) - 1, in_reach)
             stream.edge = max(stream.edge, 2 * last + 1)
 
-    def _come_back(self, stream: _Stream, now_ps: int, still_to_come: bool) -> None:
-        """Take back what was skipped beyond ``now_ps``: the pins may change before that.
+    def _go_back(self, stream: _Stream, now_ps: int, include_now: bool) -> None:
+        """Undo the skipping beyond ``now_ps``, as the pins may change before those edges.
 
-        An edge at this very instant may be ``still_to_come``.
+        With ``include_now``, an edge at ``now_ps`` itself has yet to run.
         """
         assert stream.loaded is not None
-        edge = stream.loaded.first_edge(now_ps if still_to_come else now_ps + 1)
+        edge = stream.loaded.first_edge(now_ps if include_now else now_ps + 1)
         if stream.edge > edge:
             stream.edge = edge
             self._drive(now_ps, stream.pins.clock, edge % 2)

@@ -1,4 +1,4 @@
-"""Reference model of the asynchronous SRAM beside the FPGA, with its timing checked.
+"""Reference model of the asynchronous SRAM at the FPGA, with checks of its timing.
 
 The part is Alliance Semiconductor's of the 12 ns class: AS7C34096A-12 gives 12 ns access and 6 ns
 output enable. The CubeStar thesis (section 5.2.2) names only the maker and the size, 1024 kB.
@@ -24,8 +24,8 @@ ViolationKind = Literal[
     "wire-contention",
 ]
 
-#: Each violation with what its measured time means; the order is that of the C++ model's enum.
-#: The last one is no memory's: the engine finds it between two FPGAs.
+#: Text of each violation with its measured times, in the order of the C++ model's enum.
+#: The last one concerns two FPGAs, not a memory; the engine detects it.
 RULES: dict[ViolationKind, str] = {
     "short-write-pulse": "write pulse of {} ps, at least {} ps needed",
     "address-changed-during-write": "address moved {} ps into the write pulse",
@@ -36,7 +36,7 @@ RULES: dict[ViolationKind, str] = {
     "wire-contention": "two FPGAs drive the same wires, CONTENTION is {}",
 }
 
-#: Where a wire contention is: no memory's.
+#: Place of a wire contention.
 BETWEEN_FPGAS = "wires"
 
 MAX_VIOLATIONS = 64  # of each kind are kept; all are counted
@@ -45,7 +45,7 @@ LONG_AGO = -(10**12)
 
 @dataclass(frozen=True)
 class SramTiming:
-    """Limits of the part in ps. Address set-up and all hold times are 0, as in this class.
+    """Limits of the part in ps. Address set-up and hold times are 0, as for this class of parts.
 
     Attributes:
         access_ps: address or chip enable to valid data, at most (AS7C34096A-12).
@@ -65,8 +65,8 @@ class SramTiming:
 class Violation(NamedTuple):
     """One broken rule of the memory's data sheet, or two drivers on one wire.
 
-    The model goes on as a good part at room temperature might; a real part may not. Times found and
-    needed are in ps; ``where`` is the memory's name, or ``BETWEEN_FPGAS``.
+    The model continues as a good part at room temperature might; a real part may fail. ``found``
+    and ``needed`` are in ps; ``where`` is the memory's name, or ``BETWEEN_FPGAS``.
     """
 
     kind: ViolationKind
@@ -78,13 +78,13 @@ class Violation(NamedTuple):
 
     @property
     def detail(self) -> str:
-        """What is wrong, in words."""
+        """Description with the measured times."""
         return RULES[self.kind].format(self.found, self.needed)
 
 
 @dataclass
 class ViolationLog:
-    """The first ``MAX_VIOLATIONS`` of each kind in the order of time, and how many there were.
+    """The first ``MAX_VIOLATIONS`` of each kind, ordered by time, and the number of all.
 
     The first of each kind also goes to the Python log as a warning.
     """
@@ -93,7 +93,6 @@ class ViolationLog:
     counts: Counter[ViolationKind] = field(default_factory=Counter)
 
     def add(self, violation: Violation) -> None:
-        """Record one violation."""
         if not self.counts[violation.kind]:
             kind, time_ps, address, *_, where = violation
             text = "%s %s at %d ps, address 0x%05X: %s"
@@ -104,9 +103,9 @@ class ViolationLog:
 
 
 class SramPins(NamedTuple):
-    """Settled levels at the memory's pins.
+    """Settled levels of the memory's pins.
 
-    ``data`` is the byte that the FPGA drives, None when it leaves the bus alone.
+    ``data`` is the byte that the FPGA drives, None while it does not drive the bus.
     """
 
     address: int = 0
@@ -117,27 +116,24 @@ class SramPins(NamedTuple):
 
     @property
     def writes(self) -> bool:
-        """Whether the memory is taking data."""
         return not self.ce_n and not self.we_n
 
     @property
     def reads(self) -> bool:
-        """Whether the memory drives the bus."""
         return not self.ce_n and not self.oe_n and bool(self.we_n)
 
 
 @dataclass
 class Sram:
-    """The memory, told about every change of its pins; they are inactive since long ago.
+    """The memory; ``drive`` must be called at every change of its pins.
 
-    A write takes effect when its pulse ends, with the address and data from just before that
-    instant: hold times are 0, so address and data may change together with the pulse's end.
+    A write takes effect at the end of its pulse, with the address and data from just before that
+    instant: hold times are 0, so address and data may change together with the end of the pulse.
 
     Attributes:
         memory: the stored bytes, shape (size,); a live view.
-        timing: the limits that are checked.
-        violations: what was broken so far; several memories may share it.
-        name: what violations call it.
+        violations: log of violations; several memories may share it.
+        name: the memory's name in violations.
     """
 
     memory: NDArray[np.uint8]
@@ -146,13 +142,12 @@ class Sram:
     name: str = "SRAM"
 
     def __post_init__(self) -> None:
-        """Begin with the supply."""
         self.power(True)
 
     def power(self, on: bool) -> None:
-        """Turn the supply on or off; what the pins are then is yet to be told, by ``drive``.
+        """Switch the supply; the pins are inactive until the next ``drive``.
 
-        Without supply the memory takes no writes, offers 0 and breaks no rules.
+        Without supply the memory ignores writes, returns 0 and reports no violations.
         """
         self._powered = on
         self._pins = SramPins()
@@ -167,7 +162,7 @@ class Sram:
         return self._pins.data or 0
 
     def drive(self, time_ps: int, pins: SramPins) -> None:
-        """Settled pin levels from ``time_ps`` on, which is not before the previous call's."""
+        """Set the settled pin levels from ``time_ps`` on; times must not decrease."""
         if not self._powered:
             return
         old, self._pins = self._pins, pins
@@ -188,7 +183,7 @@ class Sram:
             self._data_since = time_ps
 
     def sample(self, time_ps: int) -> int:
-        """The FPGA takes the bus at ``time_ps``: returns its level, checks that it was valid."""
+        """The level of the bus that the FPGA samples at ``time_ps``; checks that it is valid."""
         if self._pins.reads:
             for since, needed in (
                 (self._address_since, self.timing.access_ps),

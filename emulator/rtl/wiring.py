@@ -1,6 +1,6 @@
-"""What is soldered to which pin of a design, declared once for both engines.
+"""Connections of a design's pins, declared once for both engines.
 
-Everything that no camera drives and no memory is the microcontroller's.
+All pins that belong to no camera and no memory lead to the microcontroller.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -12,14 +12,13 @@ from amaranth.lib.wiring import In
 from cubestack.emulator.sim.fpga_port import STEPS, Transactions
 from cubestack.hdl.blocks.pinned import PinnedComponent
 
-#: An SRAM's pins, seen from the FPGA.
+#: An SRAM's pins, with directions as seen from the FPGA.
 MEMORY_PINS = ("A", "D_I", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
 
 Level = Callable[[str], int]
-"""Tells a pin's level."""
+"""Returns a pin's level."""
 
 Levels = tuple[tuple[str, int], ...]
-"""Pins with levels."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +26,11 @@ class CameraPins:
     """Inputs that a camera drives.
 
     Attributes:
-        name: of the camera.
+        name: name of the camera.
         clock: pixel clock.
         data: pixels.
         line: high while a line's pixels are sent.
-        frame: low between frames; None where that is not wired.
+        frame: low between frames; None if not wired.
     """
 
     name: str
@@ -42,19 +41,16 @@ class CameraPins:
 
     @property
     def pins(self) -> tuple[str, ...]:
-        """All of them."""
         wired = (self.clock, self.data, self.line)
         return wired if self.frame is None else (*wired, self.frame)
 
 
 @dataclass(frozen=True)
 class MemoryPins:
-    """Pins to an SRAM: names as ``SRAM_A``, after a prefix.
+    """Pins of the design at an SRAM, named ``<prefix><part>_A`` and so on.
 
     Attributes:
-        name: of the memory.
-        prefix: what goes before the pins' names.
-        part: what stands for SRAM in them.
+        name: name of the memory.
     """
 
     name: str
@@ -62,7 +58,7 @@ class MemoryPins:
     part: str = "SRAM"
 
     def __getitem__(self, pin: str) -> str:
-        """Pin of the design at ``pin`` of the memory: A, D_I, D_O, D_OE, CE_N, OE_N or WE_N."""
+        """The design's pin at ``pin`` of the memory: A, D_I, D_O, D_OE, CE_N, OE_N or WE_N."""
         return f"{self.prefix}{self.part}_{pin}"
 
 
@@ -86,10 +82,10 @@ class BusPins:
     write: str
 
     def levels(self, transactions: Transactions, event: int) -> Sequence[tuple[str, int]]:
-        """What the microcontroller's lines go to at ``event`` of ``transactions``.
+        """Changes of the microcontroller's lines at ``event`` of ``transactions``.
 
-        It drives the lower lines while they carry an address, or a byte to be written; after that
-        they keep their level. The phases between events are ``firmware_model.mcu.external_bus``'s.
+        It drives the lower lines with an address or a byte to write; after that they keep their
+        level. The phases between events are those of ``firmware_model.mcu.external_bus``.
         """
         index, step = divmod(event, STEPS)
         address, low = int(transactions.addresses[index]), f"{self.low}_I"
@@ -115,27 +111,27 @@ class BusPins:
 class Wiring:
     """A design with its surroundings.
 
-    Two pixel clocks may share no register's input: what one camera's clock changes is nothing that
-    the other's samples.
+    The clock domains of two cameras must be independent: no register of one camera's clock may
+    sample what the other's clock changes.
 
     Attributes:
         component: the design.
         cameras: at one instant, edges of the first one's clock come first.
         memories: the SRAMs.
-        data_clock: the clock of the microcontroller's transfer loop, or its read strobe: at its
-            rise what the memories offer is taken.
-        data: what is taken.
+        data_clock: the clock of the microcontroller's transfer loop, or its read strobe; its rising
+            edge samples the memories' output.
+        data: pins with the sampled data.
         acknowledges: outputs that ``run`` may stop on.
-        storing: names of the cameras whose pixel clocks may change anything, by the levels of the
-            other pins. Changes with those pins and the acknowledges only.
-        stored: names of those of them that have stored a whole picture: their registers follow, but
-            no pixel goes anywhere.
-        settling_clocks: after as many clocks with the line pin low no further one changes a
-            register.
-        contention: output that is not 0 while two drivers are on one wire; None for no such.
-        burst_levels: levels of inputs at which the compiled engine is to be quickest; each takes
-            longer to build.
-        bus: the microcontroller's external bus; None where it does not lead here.
+        storing: names of the cameras whose pixel clocks may change anything, from the levels of the
+            other pins. May depend on those pins and the acknowledges only.
+        stored: names of the cameras among them that have stored a whole image: their registers
+            still change, but their pixels have no effect.
+        settling_clocks: number of clocks with the line pin low after which no further clock changes
+            a register.
+        contention: output that is not 0 while two drivers are on one wire; None if there is none.
+        burst_levels: levels of inputs for which the compiled engine gets an optimised copy of the
+            design; each one lengthens the build.
+        bus: the microcontroller's external bus; None if it does not lead here.
     """
 
     component: PinnedComponent
@@ -153,23 +149,21 @@ class Wiring:
 
     @cached_property
     def widths(self) -> dict[str, int]:
-        """Bits of every pin."""
+        """Width of every pin."""
         return {name: len(getattr(self.component, name)) for name in self._members(None)}
 
     @cached_property
     def initial(self) -> dict[str, int]:
-        """Levels of the inputs before anybody drives them."""
+        """Initial levels of the inputs."""
         members = self.component.signature.members
         return {name: int(members[name].init or 0) for name in self._members(In)}
 
     @cached_property
     def camera_pins(self) -> tuple[str, ...]:
-        """Inputs that cameras drive."""
         return tuple(pin for camera in self.cameras for pin in camera.pins)
 
     @cached_property
     def mcu_pins(self) -> tuple[str, ...]:
-        """Inputs that the microcontroller drives."""
         others = {*self.camera_pins, *(memory["D_I"] for memory in self.memories)}
         return tuple(name for name in self.initial if name not in others)
 

@@ -1,1 +1,1 @@
-"""The compiled engine: CXXRTL, a C++ driver around it, and their build."""
+"""The compiled engine: CXXRTL's C++ of a design, a C++ driver, and the build of both."""

@@ -1,6 +1,6 @@
-"""Builds libraries of driver and design, once each.
+"""Builds the libraries of driver and design, and caches them.
 
-The key in the cache covers the design and its wiring, the driver, and the CXXRTL runtime.
+The cache key covers the design and its wiring, the driver, and the CXXRTL runtime.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,11 +17,11 @@ from cubestack.hdl.flow.generate import cxxrtl_headers, cxxrtl_text, design_hash
 _FOLDER = Path(__file__).parent
 
 SOURCES = ("*.cpp", "*.h", "pins_header.py", "clock_steps.py", "variants.py", "strides.py")
-"""Files here of which a library is made."""
+"""Files of this folder that a library depends on."""
 
 
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
-    """Shared library of the driver with ``wiring``; folder and errors as :func:`driver_library`."""
+    """Shared library of the driver with ``wiring``; see :func:`driver_library`."""
     design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
     return driver_library(design, partial(_compile, wiring), folder)
 
@@ -29,7 +29,7 @@ def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
 def driver_library(
     design: str, build: Callable[[Compiler, Path, Path], Path], folder: Path | None = None
 ) -> Path:
-    """Shared library of the driver with what ``design`` says, from the cache or built now.
+    """Shared library of the driver with ``design``, from the cache or built now.
 
     See :func:`cubestack.emulator.native.cache.cached_library`.
     """
@@ -42,15 +42,15 @@ def driver_library(
 def compile_driver(
     compiler: Compiler, scratch: Path, log: Path, options: Iterable[str] = ()
 ) -> Path:
-    """Library of driver.cpp with the design.cpp and pins.h of the scratch folder.
+    """Compile driver.cpp with the design.cpp and pins.h of the scratch folder.
 
-    CompilerError when the compiler fails; the message names the log.
+    Raises CompilerError; the message names the log.
     """
     sources = f"-I{scratch}", f"-I{cxxrtl_headers()}", _FOLDER / "driver.cpp"
     return compile_library(compiler, scratch / "library.so", log, [*sources, *options])
 
 
-# Kept, because a large design takes a good part of a second.
+# Cached, because hashing a large design takes a good part of a second.
 _design_hash = lru_cache(maxsize=8)(design_hash)
 
 

@@ -1,4 +1,4 @@
-// Edges of the cameras' pixel clocks, many at a time.
+// Bursts of edges of the cameras' pixel clocks.
 
 #pragma once
 
@@ -7,7 +7,7 @@
 
 namespace {
 
-// In the order of Outcome.
+// In the order of BurstEnd in contract.py.
 enum Outcome : int32_t { TIME_REACHED, ACKNOWLEDGE_CHANGED, SEGMENT_OVER };
 
 class Bursts : public Settled {
@@ -32,9 +32,9 @@ public:
         with(camera, [&](auto n) { put_sample<n()>(top); });
     }
 
-    // Makes the edges of the cameras in the mask `running` up to `until`, or up to the one that
-    // changes an acknowledge, or that is the last of a segment. `reached` is the time then,
-    // `camera` the one whose segment is over.
+    // Runs the edges of the cameras in the mask `running` up to `until`, or up to one that changes
+    // an acknowledge or is the last of a segment. Sets `reached` to that time, and `camera` to the
+    // one whose segment is over.
     Outcome burst(int64_t until, uint32_t running, int64_t &reached, int32_t &camera) {
 #define VARIANT(number) \
     if (suits_##number(top)) { \
@@ -55,8 +55,8 @@ public:
     }
 
     const bool skipping;
-    bool strides;                // whether clocks may be made at once
-    int64_t clocks_at_once = 0;  // how many were
+    bool strides;                // whether strides are allowed
+    int64_t clocks_at_once = 0;  // number of clocks within strides
 
 protected:
     template <class Model>
@@ -73,12 +73,12 @@ protected:
 private:
     Stream streams[CAMERA_COUNT];
 
-    // The design at some levels of its pins; variants.py says more.
+    // The design with some pins at fixed levels; see variants.py.
 #define VARIANT(number) variant_##number##_steps variant_##number;
     VARIANTS
 #undef VARIANT
 
-    // Calls `act` with the camera's number as a constant.
+    // Calls `act` with the camera's number as a compile-time constant.
     template <int N = 0, class Act> void with(int camera, Act act) {
         if (camera == N)
             act(std::integral_constant<int, N>());
@@ -91,7 +91,7 @@ private:
         Camera<N>::data(top, streams[N].pixel());
     }
 
-    template <int N, class Model> void make_edge(Model &top, int64_t time, int64_t until) {
+    template <int N, class Model> void run_edge(Model &top, int64_t time, int64_t until) {
         Stream &stream = streams[N];
         if (stream.edge % 2 == 0) {
             const bool wrote = writes();
@@ -111,8 +111,8 @@ private:
         stream.next_edge();
     }
 
-    // Makes at once the clocks of camera N that a stride describes, up to `until`. The row's last one,
-    // and one more, are left, so that an ordinary clock follows.
+    // Runs a stride of camera N, up to `until`, in one step. Leaves the row's last two clocks, so
+    // that an ordinary clock follows.
     template <int N, class Model> void store_strides(Model &top, int64_t until) {
         store_strides<N>(top, until, std::make_integer_sequence<int, STRIDE_COUNT>());
     }
@@ -164,7 +164,7 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            make_edge<N>(top, time, until);
+            run_edge<N>(top, time, until);
             if (acknowledges(top) != before)
                 return ACKNOWLEDGE_CHANGED;
         }
@@ -188,7 +188,7 @@ private:
                 return TIME_REACHED;
             }
             reached = time;
-            with(camera, [&](auto n) { make_edge<n()>(top, time, until); });
+            with(camera, [&](auto n) { run_edge<n()>(top, time, until); });
             if (acknowledges(top) != before)
                 outcome = ACKNOWLEDGE_CHANGED;
             else if (streams[camera].over())
@@ -197,16 +197,16 @@ private:
                 continue;
             for (int n = 0; n < CAMERA_COUNT; n++)
                 if (running >> n & 1)
-                    with(n, [&](auto constant) { come_back<constant()>(top, time, n > camera); });
+                    with(n, [&](auto constant) { go_back<constant()>(top, time, n > camera); });
             return outcome;
         }
     }
 
-    // Takes back what was skipped beyond `now`: the pins may change before that. An edge at this
-    // very instant may be `still_to_come`.
-    template <int N, class Model> void come_back(Model &top, int64_t now, bool still_to_come) {
+    // Undoes the skipping beyond `now`, as the pins may change before those edges. With
+    // `include_now`, an edge at `now` itself has yet to run.
+    template <int N, class Model> void go_back(Model &top, int64_t now, bool include_now) {
         Stream &stream = streams[N];
-        const int64_t next = stream.edge_after(now - still_to_come);
+        const int64_t next = stream.edge_after(now - include_now);
         if (stream.edge <= next)
             return;
         stream.go_to(next);

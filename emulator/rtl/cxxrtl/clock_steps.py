@@ -1,9 +1,9 @@
-"""A variant's evaluation taken apart by pixel clock, as C++ for driver.cpp.
+"""Splits a variant's evaluation by pixel clock, as C++ for driver.cpp.
 
-CXXRTL's eval() computes everything, and finds the fixed point by being called until no register
-changes. While no register is in reset, much less is true of a variant: an edge of one camera's
-clock changes that camera's registers once, and of the outputs those that follow from them or from
-the camera's pins. Everything else is left out here.
+CXXRTL's eval() computes everything, and is called until no register changes. A variant needs less
+while none of its registers is in reset: an edge of one camera's clock changes that camera's
+registers once, and the outputs that depend on them or on the camera's pins. The generated code
+computes only these.
 """
 
 import re
@@ -22,7 +22,7 @@ _IGNORED = re.compile(r"\t(//.*|bool (converged|posedge_\w+) = .*|return converg
 
 
 def port(name: str) -> str:
-    """Member of CXXRTL's class for a pin."""
+    """Member of CXXRTL's class for the pin ``name``."""
     return "p_" + name.replace("_", "__")
 
 
@@ -31,10 +31,10 @@ class _Evaluation:
     """The statements of eval().
 
     Attributes:
-        types: of what is assigned to, by name.
-        assignments: in their order, name and expression.
-        at_edge: by clock, what sets ``.next`` at its rising edge.
-        resets: by condition on a register, what it sets to reset values.
+        types: type of each assigned name.
+        assignments: names and expressions, in their order.
+        at_edge: by clock, the blocks that set ``.next`` at its rising edge.
+        resets: by condition on a register, the registers that it resets.
     """
 
     types: dict[str, str] = field(default_factory=dict)
@@ -45,7 +45,7 @@ class _Evaluation:
 
 @dataclass(frozen=True)
 class _Steps:
-    """What clock_steps() makes for one camera."""
+    """Generated code of one camera."""
 
     in_reset: str
     rise: str
@@ -54,15 +54,15 @@ class _Steps:
 
 
 def clock_steps(wiring: Wiring, variant: str, members: dict[str, str], number: int) -> str:
-    """Text of struct ``variant_<number>_steps``, the variant's class with these members more.
+    """Text of struct ``variant_<number>_steps``: the variant's class with additional members.
 
-    - in_reset(camera): whether any register of the camera's clock is, or might be; then only eval()
-      and commit() will do.
+    - in_reset(camera): whether any register of the camera's clock is or may be in reset, which
+      requires eval() and commit().
     - rise(camera): the clock has risen; returns whether any register changed.
     - fall(camera): it has fallen, and the camera's other pins may have changed.
-    - may_move(camera, memory): whether the clock can move a pin of that memory.
+    - may_move(camera, memory): whether the clock can change a pin of that memory.
 
-    Where eval() has something that this module does not know, in_reset() is always true.
+    If eval() has a statement that this module can not parse, in_reset() is always true.
     """
     evaluation = _evaluation(variant, members)
     lines = [f"struct variant_{number}_steps : cxxrtl_variant_{number}::p_top {{"]
@@ -82,7 +82,7 @@ def clock_steps(wiring: Wiring, variant: str, members: dict[str, str], number: i
 
 
 def _evaluation(variant: str, members: dict[str, str]) -> _Evaluation | None:
-    """None where something is unknown."""
+    """Parse eval(); None for an unknown statement."""
     found = _Evaluation()
     body = variant[variant.index("bool p_top::eval(") :]
     lines = iter(body[body.index("\n") + 1 : body.index("\n}\n")].splitlines())
@@ -105,7 +105,7 @@ def _evaluation(variant: str, members: dict[str, str]) -> _Evaluation | None:
     for name, expression in found.assignments:
         later = {*_NAME.findall(expression)} & {*found.types} - done
         if later or name in done:
-            return None  # a loop, or a name that is used twice
+            return None  # a loop, or a name that is assigned twice
         done.add(name)
     return found
 
@@ -123,27 +123,27 @@ def _block(lines: Iterable[str]) -> list[str]:
 def _steps(
     wiring: Wiring, camera: CameraPins, tag: str, evaluation: _Evaluation, members: dict[str, str]
 ) -> _Steps | None:
-    """None where an edge does more than its share."""
+    """None if an edge of the camera's clock affects more than that camera."""
     clock = port(camera.clock)
     blocks = evaluation.at_edge.get(clock, [])
     registers = sorted({name for block in blocks for name in _NEXT.findall(block)})
     pins = {port(name) for name in camera.pins}
     outputs = {port(name) for name in wiring.output_pins}
-    after_fall = _following(evaluation, pins)
-    after_rise = _following(evaluation, {*pins, *registers})
+    after_fall = _dependents(evaluation, pins)
+    after_rise = _dependents(evaluation, {*pins, *registers})
     clocks = {*evaluation.at_edge} - {clock}
     other_resets = [
         condition for condition, reset in evaluation.resets.items() if not reset <= {*registers}
     ]
-    alien = clocks | {*_NAME.findall(" ".join(other_resets))}
+    foreign = clocks | {*_NAME.findall(" ".join(other_resets))}
     if wiring.contention is not None:
-        alien.add(port(wiring.contention))
-    offered = _following(evaluation, {port(memory["D_I"]) for memory in wiring.memories})
-    if alien & after_rise or outputs & offered:
+        foreign.add(port(wiring.contention))
+    offered = _dependents(evaluation, {port(memory["D_I"]) for memory in wiring.memories})
+    if foreign & after_rise or outputs & offered:
         return None
 
     now = f"prev_{clock} = {clock};\n" if blocks else ""
-    # A clock that is high already has no edge.
+    # A clock that is already high has no edge.
     rise = f"if (!posedge_{clock}()) {{ fall({tag}()); return false; }}\n" if blocks else ""
     rise += now + "bool changed = false;\n{\n" + _assignments(evaluation, set())
     for name in registers:
@@ -162,17 +162,17 @@ def _steps(
     )
 
 
-def _following(evaluation: _Evaluation, names: set[str]) -> set[str]:
-    """What is computed from ``names``, at any number of removes."""
-    following = set(names)
+def _dependents(evaluation: _Evaluation, names: set[str]) -> set[str]:
+    """All names that depend on ``names``, directly or indirectly, and these themselves."""
+    dependents = set(names)
     for name, expression in evaluation.assignments:
-        if following & {*_NAME.findall(expression)}:
-            following.add(name)
-    return following
+        if dependents & {*_NAME.findall(expression)}:
+            dependents.add(name)
+    return dependents
 
 
 def _assignments(evaluation: _Evaluation, wanted: set[str]) -> str:
-    """All assignments, those to others than ``wanted`` to variables of the same names."""
+    """All assignments; those to names not in ``wanted`` set local variables instead."""
     text = "".join(
         f"{kind} {name};\n" for name, kind in evaluation.types.items() if name not in wanted
     )

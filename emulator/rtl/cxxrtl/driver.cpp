@@ -1,14 +1,12 @@
-// Drives the compiled FPGA: pixel clock edges in, data clock cycles in, SRAMs beside it.
-// One of these is behind every CompiledEngine; contract.py says what is asked of it and when.
-//
-// pins.h is made of the wiring; pins_header.py says what is in it.
+// Drives a compiled FPGA with pixel clocks, data clocks and SRAMs. Each CompiledEngine owns one
+// driver; contract.py documents the calls. pins_header.py generates pins.h from the wiring.
 
 #include "bursts.h"
 
 namespace {
 
 #ifdef BUS_HIGH
-// Transactions as external_bus.py describes them; an event's cycle k is at
+// Transactions, see external_bus.py; an event's cycle k is at
 // start + floor(k * numerator / denominator).
 struct Transactions {
     const int32_t *addresses;
@@ -29,7 +27,7 @@ class Driver : public Bursts {
 public:
     using Bursts::Bursts;
 
-    // The microcontroller's transfer loop; cycle edges are at start + floor of `halves`.
+    // Runs the microcontroller's transfer loop; clock edges are at start + floor of `halves`.
     __attribute__((flatten)) void strobe(uint8_t *out, int64_t count, int64_t start, Steps halves) {
         for (int64_t i = 0; i < count; i++) {
             if (strides)
@@ -51,9 +49,10 @@ public:
     }
 
 #ifdef BUS_HIGH
-    // Makes the events of `wanted` from number `event` on, with the edges of the cameras in the
-    // mask `running` up to each. Returns the next event: the one before which a camera's segment is
-    // over or an acknowledge changed, or, with `over`, the one after the last.
+    // Runs the events of `wanted` from number `event` on, and before each one the edges of the
+    // cameras in the mask `running`. Returns the next event: if a camera's segment is over or an
+    // acknowledge changed, the one that follows; at the end, the one after the last, and sets
+    // `over`.
     __attribute__((flatten)) int64_t access(const Transactions &wanted, int64_t event,
                                             uint32_t running, int32_t &over) {
         int64_t reached;
@@ -122,8 +121,8 @@ private:
     }
 #endif
 
-    // Reads into `out` at once what a stride describes, but the last one of `count` bytes at least;
-    // how many. The next edge is number `edge` of `halves`.
+    // Reads a stride into `out` in one step, leaving at least the last of `count` bytes; returns
+    // the number of bytes. The next edge is number `edge` of `halves`.
     int64_t read_strides(uint8_t *out, int64_t count, int64_t start, Steps halves, int64_t edge) {
         return read_strides(out, count, start, halves, edge,
                             std::make_integer_sequence<int, STRIDE_COUNT>());
@@ -171,7 +170,7 @@ Driver *driver_new(uint8_t *const *memories, const SramTiming *timing, int64_t k
 
 void driver_delete(Driver *driver) { delete driver; }
 
-// Number of the pin of that name, -1 when there is none.
+// Number of the pin `name`, -1 if there is none.
 int32_t driver_pin(const char *name) {
     for (size_t i = 0; i < sizeof PIN_TABLE / sizeof *PIN_TABLE; i++)
         if (strcmp(PIN_TABLE[i].name, name) == 0)
@@ -185,7 +184,7 @@ void driver_set(Driver *driver, int32_t pin, uint32_t value, int64_t now) {
 
 uint32_t driver_get(const Driver *driver, int32_t pin) { return PIN_TABLE[pin].get(driver->top); }
 
-// Name and bits of register number `index`; null behind the last one.
+// Name and width of register number `index`; null after the last one.
 const char *driver_register(int32_t index, int32_t *bits) {
     if (index < 0 || index >= REGISTER_COUNT)
         return nullptr;
@@ -201,7 +200,7 @@ void driver_use_strides(Driver *driver, int32_t on) { driver->strides = on != 0;
 
 int64_t driver_clocks_at_once(const Driver *driver) { return driver->clocks_at_once; }
 
-// Levels of all registers into `out`, unless null; how many words of 32 bits.
+// Writes the levels of all registers to `out`, unless null; returns the number of 32-bit words.
 int64_t driver_state(const Driver *driver, uint32_t *out) {
     int64_t words = 0;
     for (int32_t index = 0; index < REGISTER_COUNT; index++) {
@@ -249,7 +248,7 @@ int64_t driver_access(Driver *driver, const Transactions *wanted, int64_t event,
 #endif
 }
 
-// Number of violations kept; `out`, unless null, receives those from number `first` on.
+// Number of violations stored; writes those from number `first` on to `out`, unless null.
 int64_t driver_violations(const Driver *driver, int64_t first, Violation *out) {
     const std::vector<Violation> &kept = driver->log.kept;
     if (out)
@@ -257,7 +256,7 @@ int64_t driver_violations(const Driver *driver, int64_t first, Violation *out) {
     return (int64_t)kept.size();
 }
 
-// Number of violations of one kind, kept or not.
+// Number of violations of one kind, including those not stored.
 int64_t driver_violation_count(const Driver *driver, int32_t kind) {
     return driver->log.counts[kind];
 }

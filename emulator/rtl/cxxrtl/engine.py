@@ -1,4 +1,4 @@
-"""The compiled engine: CXXRTL's C++ of the design with driver.cpp around it, through ctypes."""
+"""The compiled engine: CXXRTL's C++ of the design with driver.cpp, called by ctypes."""
 
 import ctypes
 from collections import Counter
@@ -24,7 +24,7 @@ _BURST_ENDS = tuple(BurstEnd)  # declared in the driver's order
 
 
 _INT, _LONG, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
-_INT_OUT, _LONGS = ctypes.POINTER(_INT), ctypes.POINTER(_LONG)  # the driver's structures, too
+_INT_OUT, _LONGS = ctypes.POINTER(_INT), ctypes.POINTER(_LONG)  # also for structures
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "driver_new": (_POINTER, (ctypes.POINTER(_POINTER), _LONGS, _LONG, _INT)),
     "driver_delete": (None, (_POINTER,)),
@@ -48,15 +48,15 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 def _longs(*values: int) -> ctypes.Array[ctypes.c_int64]:
-    """One of the driver's structures."""
+    """Pack one of the driver's structures."""
     return (_LONG * len(values))(*values)
 
 
 class CompiledEngine(RtlEngine):
-    """Tens of millions of clocks a second.
+    """Runs tens of millions of clocks per second.
 
-    With ``skipping``, a clock outside of lines that changed no register is not repeated, and the
-    design's strides are made at once.
+    With ``skipping``, a clock between lines that changed no register is not repeated, and each
+    stride of the design runs in one step.
     """
 
     def __init__(
@@ -67,9 +67,7 @@ class CompiledEngine(RtlEngine):
         skipping: bool = True,
         library: Path | None = None,
     ) -> None:
-        """Load the library of ``wiring``, building it first where the cache has none.
-
-        ``library`` is another one with the same driver in it.
+        """Load ``library``, by default that of ``wiring``, which is built if not cached.
 
         Raises:
             CompilerError: there is no C++ compiler, or it failed.
@@ -92,29 +90,27 @@ class CompiledEngine(RtlEngine):
         bits = _INT()
         while (name := self._library.driver_register(len(self._registers), bits)) is not None:
             self._registers[name.decode()] = bits.value
-        self._where = [*self.memories, sram.BETWEEN_FPGAS]  # the driver's -1 is the last one
+        self._places = [*self.memories, sram.BETWEEN_FPGAS]  # the driver's -1 is the last one
         self._reached, self._camera = _LONG(), _INT()
 
     def close(self) -> None:
-        """Release the driver."""
         if self._driver is not None:
             self._library.driver_delete(self._driver)
             self._driver = None
 
     def __del__(self) -> None:
-        """Release the driver."""
         self.close()
 
     @property
     def _handle(self) -> int:
-        """The driver; without this check a closed one would end the process."""
+        """The driver; with a closed one, C++ would crash the process."""
         if self._driver is None:
-            raise RuntimeError("the engine is closed: make a new one")
+            raise RuntimeError("the engine is closed; create a new one")
         return self._driver
 
     @property
     def driver(self) -> Driver | None:
-        """The driver's functions, always the same object; None while an upset is to come."""
+        """The driver's functions, always the same object; None while an upset is pending."""
         return None if self._later else self._functions
 
     @cached_property
@@ -128,7 +124,6 @@ class CompiledEngine(RtlEngine):
 
     @property
     def violation_counts(self) -> Counter[sram.ViolationKind]:
-        """How often each rule was broken."""
         for number, kind in enumerate(_KINDS):
             if count := self._library.driver_violation_count(self._handle, number):
                 self._log.counts[kind] = count
@@ -136,20 +131,17 @@ class CompiledEngine(RtlEngine):
 
     @property
     def registers(self) -> dict[str, int]:
-        """Bits of every register."""
         return dict(self._registers)
 
     @property
     def clocks_at_once(self) -> int:
-        """Clocks that were made as strides."""
         return int(self._library.driver_clocks_at_once(self._handle))
 
     def use_strides(self, on: bool) -> None:
-        """Whether strides may be made at once."""
         self._library.driver_use_strides(self._handle, on)
 
     def state(self) -> bytes:
-        """Levels of all registers, 4 bytes for each 32 bits."""
+        """Levels of all registers, 4 bytes per 32 bits."""
         words = (ctypes.c_uint32 * self._library.driver_state(self._handle, None))()
         self._library.driver_state(self._handle, words)
         return bytes(words)
@@ -194,26 +186,27 @@ class CompiledEngine(RtlEngine):
 
     def _strobe(self, out: NDArray[np.uint8], period: Fraction, fraction: Fraction) -> None:
         if not out.flags.c_contiguous or out.dtype != np.uint8:
-            raise ValueError("the target of a transfer must be contiguous uint8")
+            raise ValueError("the destination of a transfer must be contiguous uint8")
         half = period / 2
         halves = half.numerator, half.denominator, int(fraction * half.denominator)
-        where, count = out.ctypes.data, len(out)
-        self._library.driver_strobe(self._handle, where, count, self.now_ps, *halves)
+        target, count = out.ctypes.data, len(out)
+        self._library.driver_strobe(self._handle, target, count, self.now_ps, *halves)
         self._collect_violations()
 
     def _access(self, transactions: Transactions) -> int:
-        start, made, cycle = self.now_ps, transactions, transactions.cycle
-        arrays = made.addresses.ctypes.data, made.data.ctypes.data, len(made)
-        times = start, cycle.numerator, cycle.denominator, made.cycles, *made.offsets
-        given = _longs(*arrays, made.write, made.select, made.above, *times)
-        event, over = 0, _INT(not len(made))
+        start, cycle = self.now_ps, transactions.cycle
+        arrays = transactions.addresses.ctypes.data, transactions.data.ctypes.data
+        times = start, cycle.numerator, cycle.denominator, transactions.cycles
+        limits = transactions.write, transactions.select, transactions.above
+        record = _longs(*arrays, len(transactions), *limits, *times, *transactions.offsets)
+        event, over = 0, _INT(not len(transactions))
         while not over.value:
             running = sum(1 << camera.number for camera in self._running())
-            event = self._library.driver_access(self._handle, given, event, running, over)
+            event = self._library.driver_access(self._handle, record, event, running, over)
             self._collect_violations()
             if not over.value:
-                # A camera wants something before this event.
-                self.run(start + made.time_of(event))
+                # A camera's segment or acknowledge must be handled before this event.
+                self.run(start + transactions.time_of(event))
         return event // STEPS
 
     def _collect_violations(self) -> None:
@@ -223,6 +216,6 @@ class CompiledEngine(RtlEngine):
             return
         new = (_LONG * 6 * (kept - known))()
         self._library.driver_violations(self._handle, known, new)
-        for kind, time_ps, address, found, needed, where in new:
-            broken = _KINDS[kind], time_ps, address, found, needed, self._where[where]
-            self._log.add(sram.Violation(*broken))
+        for kind, time_ps, address, found, needed, place in new:
+            violation = _KINDS[kind], time_ps, address, found, needed, self._places[place]
+            self._log.add(sram.Violation(*violation))

@@ -1,4 +1,4 @@
-// The design's pins, registers, and lines to cameras and memories, made of pins.h.
+// The design's pins, registers, and lines to cameras and memories, from pins.h.
 
 #pragma once
 

@@ -1,11 +1,11 @@
-"""The wiring as C++, for driver.cpp to include: pins.h."""
+"""Generates pins.h, the wiring as C++, for driver.cpp."""
 
 import re
 from collections.abc import Sequence
 
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps, port
 from cubestack.emulator.rtl.cxxrtl.strides import path_of, stride_functions, stride_table
-from cubestack.emulator.rtl.cxxrtl.variants import held, members
+from cubestack.emulator.rtl.cxxrtl.variants import input_names, members
 from cubestack.emulator.rtl.wiring import MEMORY_PINS, BusPins, CameraPins, MemoryPins, Wiring
 
 
@@ -15,19 +15,19 @@ def pins_header(wiring: Wiring, design: str, variants: Sequence[str] = ()) -> st
     ``variants`` are those of the design at each of the wiring's burst levels.
 
     - PINS: INPUT(name, port, initial level) and OUTPUT(name, port) of every pin.
-    - CAMERAS: CAMERA(number, clock, data, line, how the frame pin follows ``level``).
+    - CAMERAS: CAMERA(number, clock, data, line, statement that sets the frame pin to ``level``).
     - MEMORIES: MEMORY(number, A, D_I, D_O, D_OE, CE_N, OE_N, WE_N).
-    - DATA_CLOCK_NAME, DATA_CLOCK, DATA: of the transfer loop.
-    - BUS_HIGH, BUS_LOW_I, BUS_LOW_O, BUS_LOW_OE, BUS_LATCH, BUS_READ, BUS_WRITE: of the external
-      bus, where there is one; BUS_SELECTS: SELECT(number, port) of every chip select.
+    - DATA_CLOCK_NAME, DATA_CLOCK, DATA: pins of the transfer loop.
+    - BUS_HIGH, BUS_LOW_I, BUS_LOW_O, BUS_LOW_OE, BUS_LATCH, BUS_READ, BUS_WRITE: pins of the
+      external bus, if there is one; BUS_SELECTS: SELECT(number, port) of every chip select.
     - ACKNOWLEDGES, CONTENTION: levels in one word each.
     - REGISTERS: REGISTER(name, port, bits) of every register.
-    - derived_edge(top): whether a clock that is no pin has an edge that takes effect;
-      forget_derived_edges(top) has none of them seen.
-    - VARIANTS: VARIANT(number) of each; suits_0(top) tells whether the pins of the design are at
-      its levels, same_0(a, b) whether outputs agree, copy_0(from, to) copies all state that can
-      change, hold_0(from, to) the rest to the copy; its class is what clock_steps.py makes of it.
-    - what strides.py makes of the design, and of each of the variants.
+    - derived_edge(top): whether a clock that is not a pin has an edge that takes effect;
+      forget_derived_edges(top) clears these edges.
+    - VARIANTS: VARIANT(number) of each. suits_0(top): whether the pins of the design have the
+      variant's levels; same_0(a, b): whether outputs agree; copy_0(from, to) copies all state that
+      can change; hold_0(from, to) copies the rest. The variant's class is from clock_steps.py.
+    - the output of strides.py for the design and for each variant.
     """
     acknowledges = " | ".join(
         f"{_level(pin)} << {bit}" for bit, pin in enumerate(wiring.acknowledges)
@@ -93,14 +93,14 @@ def _bus(bus: BusPins | None) -> dict[str, str]:
 
 
 def _registers(design: str) -> list[str]:
-    """What CXXRTL buffers are registers; it escapes what C++ does not take in a name."""
+    """CXXRTL's buffered wires are the registers; it escapes special characters in names."""
     kinds = members(design).items() if design else ()
     wires = [(member, kind) for member, kind in kinds if kind.startswith("wire")]
     return [f'REGISTER("{path_of(member)}", {member}, {kind[5:-1]})' for member, kind in wires]
 
 
 def _derived_edges(wiring: Wiring, design: str, namespace: str) -> str:
-    """Ask CXXRTL's own edge detectors, but for those of the pins."""
+    """Edge detectors of CXXRTL, without those of the pins."""
     pins = {port(name) for name in wiring.initial}
     detectors = re.findall(r"bool ((?:pos|neg)edge_(\w+))\(\) const", design)
     edges = [f"top.{detector}()" for detector, clock in detectors if clock not in pins]
@@ -124,7 +124,7 @@ def _variant(wiring: Wiring, design: str, variant: str, number: int) -> str:
     ]
     holding = " ".join(
         f"to.{name} = from.{name}.curr;"
-        for name in held(variant)
+        for name in input_names(variant)
         if whole.get(name, "").startswith("wire")
     )
     suits = " && ".join(f"{_level(pin)} == {level}u" for pin, level in wiring.burst_levels[number])

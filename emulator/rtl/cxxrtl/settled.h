@@ -1,9 +1,9 @@
-// The design and the SRAMs beside it, settled after each change of an input.
+// The design and its SRAMs, settled after each change of an input.
 //
-// design.cpp is CXXRTL's output. Its eval() computes outputs and the registers' next values,
-// commit() makes those current and tells whether any changed. Outputs lag a register change by
-// one eval(), and an asynchronous reset takes one more, hence settle(). Edges are found before
-// anything is computed, so one that eval() itself makes, on a clock that is no pin, needs another
+// design.cpp is CXXRTL's output. Its eval() computes outputs and the registers' next values;
+// commit() makes those current and returns whether any changed. Outputs follow a register change
+// one eval() later, and an asynchronous reset takes one more, hence settle(). eval() detects edges
+// at its start, so an edge that it produces itself, on a clock that is not a pin, needs another
 // eval() before the commit.
 
 #pragma once
@@ -53,7 +53,7 @@ protected:
 
     bool settle(int64_t time) { return settle(top, time); }
 
-    // Lets everything follow the inputs, as of `time`; tells whether any register changed.
+    // Settles the design and the memories at `time`; returns whether any register changed.
     template <class Model> bool settle(Model &top, int64_t time) {
         bool changed = false;
         eval(top);
@@ -75,8 +75,8 @@ protected:
             eval_once(top);
     }
 
-    // Once in the library: a large design would not stay in the processor's instruction cache, and
-    // take half a minute to compile.
+    // Not inlined: several copies of a large design would exceed the processor's instruction cache,
+    // and take half a minute to compile.
     template <class Model> __attribute__((noinline, flatten)) static void eval_once(Model &top) {
         top.Model::eval(nullptr);
     }
@@ -84,7 +84,7 @@ protected:
         return top.Model::commit();
     }
 
-    // Only registers listen to the memories, and the external bus: nothing else has to follow them.
+    // Only registers and the external bus depend on the memories, so one eval() at most is needed.
     template <class Model, int... N>
     void drive_memories(Model &top, int64_t time, std::integer_sequence<int, N...>) {
         (srams[N].drive(time, Memory<N>::pins(top)), ...);
@@ -106,8 +106,8 @@ protected:
 
     template <class Model> static uint32_t acknowledges(const Model &top) { return ACKNOWLEDGES; }
 
-    // Settling after an edge of camera N's clock. A copy makes this edge's share only, unless its
-    // registers are in reset; clock_steps.py says more.
+    // Settle after an edge of camera N's clock. A variant computes only what the edge affects,
+    // unless registers are in reset; see clock_steps.py.
     template <int N> bool settle_rise(Top &top, int64_t time) { return settle(top, time); }
     template <int N> void settle_fall(Top &top, int64_t time) { settle(top, time); }
 
@@ -137,7 +137,7 @@ protected:
         return settle(top, time);
     }
 
-    // Lets the memories follow that a camera's clock can move.
+    // Updates the memories whose pins the clock of a camera can change.
     template <int N, class Model> void follow(Model &top, int64_t time) {
         follow<N>(top, time, std::make_integer_sequence<int, MEMORY_COUNT>());
     }

@@ -1,5 +1,5 @@
-// The asynchronous SRAM with its timing checked: the rules of emulator/rtl/sram.py, which says more,
-// at the speed that a compiled frame needs. A test drives both with the same pins.
+// The asynchronous SRAM with checks of its timing: a fast version of emulator/rtl/sram.py, which
+// documents it. A test drives both with the same pins.
 #pragma once
 
 #include <algorithm>
@@ -22,10 +22,10 @@ struct Violation {
     int64_t where;  // number of the memory
 };
 
-// What all memories of an engine report, in the order of time.
+// Violations of all memories of an engine, ordered by time.
 class ViolationLog {
 public:
-    // Of each kind, the first `keep` are kept.
+    // Stores the first `keep` of each kind.
     explicit ViolationLog(int64_t keep) : keep(keep) {}
 
     std::vector<Violation> kept;
@@ -41,8 +41,8 @@ private:
     const int64_t keep;
 };
 
-// Settled levels at the memory's pins. One word, because a structure of small fields that is
-// written one by one and copied as a whole costs the processor a stall in every half clock.
+// Settled levels of the memory's pins. Packed in one word: with a structure of small fields,
+// written one by one and copied as a whole, the processor would stall in every half clock.
 class SramPins {
 public:
     SramPins() : SramPins(0, true, true, true, false, 0) {}
@@ -66,7 +66,7 @@ private:
 
 class Sram {
 public:
-    // `number` is what violations in `log` call it.
+    // `number` identifies the memory in violations.
     Sram(uint8_t *memory, const SramTiming &timing, ViolationLog &log, int64_t number)
         : memory(memory), timing(timing), log(log), number(number) { power(true); }
 
@@ -76,7 +76,7 @@ public:
 
     bool reads() const { return pins.reads(); }
 
-    // Without supply it takes no writes, offers 0 and breaks no rules.
+    // Without supply it ignores writes, returns 0 and reports no violations.
     void power(bool on) {
         powered = on;
         pins = SramPins();
@@ -106,16 +106,16 @@ public:
             data_since = time;
     }
 
-    // Whether clocks from `time` on can store a byte each, one to the next address, without breaking a
-    // rule: low for `low` of `period`.
+    // Whether clocks from `time` on, each low for `low` of `period`, can store a byte each at
+    // consecutive addresses without a violation.
     bool stores_at(int64_t time, int64_t low, int64_t period) const {
         return powered && pins.writes() && pins.driven() && pins.selected() &&
                low >= timing.write_pulse && time - write_since >= timing.write_pulse &&
                period >= timing.data_setup && time - data_since >= timing.data_setup;
     }
 
-    // `count` such clocks, the last one of which rose and fell then: the byte on the lines is
-    // stored, and all of `next` but the last one, which is on the lines afterwards.
+    // Performs `count` such clocks, the last of which rises at `rose` and falls at `fell`. Stores
+    // the byte on the lines and all of `next` except its last byte, which is then on the lines.
     void store(const uint8_t *next, int64_t count, int64_t rose, int64_t fell) {
         uint8_t *const to = memory + pins.address();
         *to = pins.data();
@@ -125,21 +125,21 @@ public:
         write_since = fell;
     }
 
-    // Whether clocks from `time` on can read a byte each, one from the next address, likewise.
+    // Whether clocks from `time` on can read a byte each from consecutive addresses.
     bool offers_at(int64_t time, int64_t period) const {
         return powered && pins.reads() && !pins.driven() && period >= timing.access &&
                time - address_since >= timing.access && time - selected_since >= timing.access &&
                time - reads_since >= timing.output_enable;
     }
 
-    // `count` such clocks, the last one of which rose then.
+    // Performs `count` such clocks, the last of which rises at `rose`.
     void offer(uint8_t *out, int64_t count, int64_t rose) {
         std::copy(memory + pins.address(), memory + pins.address() + count, out);
         pins = SramPins(pins.address() + (uint32_t)count, false, false, true, false, 0);
         address_since = rose;
     }
 
-    // The FPGA takes the bus at `time`.
+    // The FPGA samples the bus at `time`.
     void sample(int64_t time) {
         if (!pins.reads())
             return;

@@ -1,4 +1,4 @@
-// What a camera sends, edge by edge of its pixel clock.
+// A camera's stream, edge by edge of its pixel clock.
 
 #pragma once
 
@@ -7,7 +7,7 @@
 
 namespace {
 
-// The times of evenly spaced edges, one after the other without a division for each:
+// Times of evenly spaced edges, computed without a division per edge:
 // value() = floor((numerator * k + offset) / denominator).
 class Steps {
 public:
@@ -43,23 +43,23 @@ private:
     int64_t whole, rest;
 };
 
-// A segment of a camera's stream as pixel_clock.py describes it; edge k is at
+// A segment of a camera's stream, see pixel_clock.py; edge k is at
 // start + floor(k * half_numerator / half_denominator).
 struct Segment {
     int64_t start, half_numerator, half_denominator, edges;
     int64_t rows, line_clocks, active_columns, vsync;
 };
 
-// Clocks that are worth to be made at once.
+// Shortest stride that is worth its overhead, in clocks.
 constexpr int64_t SHORTEST_STRIDE = 4;
 
-// What a camera sends, and how far it is.
+// A camera's stream, and the position in it.
 struct Stream {
     Segment segment = {};
     const uint8_t *pixels = nullptr;  // rows x active_columns, or null: all 0
-    int64_t edge = 0;                 // the next one to be made
-    Steps times{1, 1, 0};             // of that edge, from the segment's start
-    int64_t row = 0, column = 0;      // of the sample on the lines
+    int64_t edge = 0;                 // the next one
+    Steps times{1, 1, 0};             // time of that edge, from the segment's start
+    int64_t row = 0, column = 0;      // place of the sample on the lines
 
     int64_t time() const { return segment.start + times.value(); }
 
@@ -70,7 +70,7 @@ struct Stream {
         times.next();
     }
 
-    // Continue with that edge; the sample on the lines is what the edges before it left there.
+    // Continues with edge `next`; the sample on the lines is that of the edges before it.
     void go_to(int64_t next) {
         edge = next;
         times.go_to(edge);
@@ -87,7 +87,7 @@ struct Stream {
 
     bool inside() const { return segment.rows && column < segment.active_columns; }
 
-    // A clock is to rise that has many more behind it in its row.
+    // Whether the next edge rises, and enough clocks for a stride follow in its row.
     bool in_row() const {
         return edge % 2 == 0 && pixels && inside() &&
                segment.active_columns - column > SHORTEST_STRIDE + 2;
@@ -100,8 +100,8 @@ struct Stream {
     // First edge after `time`.
     int64_t edge_after(int64_t time) const { return times.last_within(time - segment.start) + 1; }
 
-    // A clock that changed no register changes none the next time either, while its inputs stay:
-    // go on with the falling edge of the last such clock. The SRAMs see no pulse meanwhile.
+    // After a clock that changed no register, no further one does while the inputs stay the same:
+    // continues with the falling edge of the last such clock. The SRAMs see no pulse meanwhile.
     void skip_low_samples(int64_t until) {
         const int64_t end = segment.rows ? (row + 1) * segment.line_clocks : segment.edges / 2;
         const int64_t last = std::min(end - 1, times.last_within(until - segment.start) / 2);

@@ -1,7 +1,7 @@
-"""The strides of a design as C++, for driver.cpp: whether one can begin, and where it ends.
+"""Generates C++ of a design's strides for driver.cpp: whether one can begin, and its end state.
 
 A stride is declared with its design, and proved (:mod:`cubestack.hdl.blocks.stride`); driver.cpp
-does at the memory what the design's pins would.
+performs its memory accesses.
 """
 
 import re
@@ -15,7 +15,7 @@ _ESCAPE = re.compile("__|_([0-9a-f]{2})_")
 
 
 def stride_table(wiring: Wiring) -> str:
-    """Which strides there are: C++ for all translations of the design.
+    """C++ table of the strides, for all translations of the design.
 
     STRIDE_COUNT, and ``Stride<K>`` with the numbers of its camera (-1 for the data clock) and its
     memory, and the last value of its counter.
@@ -38,11 +38,11 @@ def stride_table(wiring: Wiring) -> str:
 def stride_functions(
     wiring: Wiring, namespace: str, members: Mapping[str, str], fixed: Levels = ()
 ) -> str:
-    """C++ functions of one translation of the design with those ``members``; some pins are fixed.
+    """C++ functions for one translation of the design, which has ``members`` and ``fixed`` pins.
 
-    - stride_ready(k, top): whether pins and registers have the stride's levels. Never, where the
+    - stride_ready(k, top): whether pins and registers have the stride's levels; false if the
       translation lacks one of them.
-    - stride_counter(k, top), and stride_to(k, top, counter, data): where it goes on.
+    - stride_counter(k, top): the counter; stride_to(k, top, counter, data) sets the end state.
     """
     found = {path_of(member): member for member in members}
     text = ""

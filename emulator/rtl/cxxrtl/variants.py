@@ -1,11 +1,11 @@
-"""Copies of a design in which some pins have fixed levels, for long bursts at these levels.
+"""Variants of a design with some pins at fixed levels, for long bursts at these levels.
 
 With its control lines fixed, nearly all of a pair of FPGAs may be in reset. Yosys then leaves a few
 registers of some eighty, and resolves the link's clock to a pin.
 
-Every register that can still change stays, whether an output shows it or not, because its state
-goes back to the whole design after the burst. A register without reset whose clock is fixed holds
-its value, so it is an input of the copy. What Yosys leaves out is in reset.
+Every register that can still change stays, even if no output depends on it, because its state is
+copied back to the whole design after the burst. A register without reset whose clock is fixed holds
+its value, so it is an input of the variant. The registers that Yosys removes are in reset.
 """
 
 import re
@@ -53,7 +53,7 @@ def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
     """CXXRTL's C++ of module top of ``rtlil`` with its one-bit inputs ``levels`` fixed.
 
     Raises:
-        ValueError: there is no such input.
+        ValueError: the design has no such input.
         subprocess.CalledProcessError: Yosys failed.
     """
     design = _flat(rtlil)
@@ -70,12 +70,12 @@ def variant_text(rtlil: str, levels: Iterable[tuple[str, int]]) -> str:
 
 
 def members(design: str) -> Mapping[str, str]:
-    """State and pins of CXXRTL's class with their types."""
+    """Names and types of the state and the pins of CXXRTL's class."""
     return {name: kind for kind, name in _MEMBER.findall(_class(design))}
 
 
-def held(design: str) -> list[str]:
-    """Inputs of CXXRTL's class, pins and held registers."""
+def input_names(design: str) -> list[str]:
+    """Inputs of CXXRTL's class: pins, and registers that hold their value."""
     return _INPUT.findall(_class(design))
 
 
@@ -85,7 +85,7 @@ def _class(design: str) -> str:
 
 @lru_cache(maxsize=1)
 def _flat(rtlil: str) -> str:
-    """Kept, because all of a wiring's copies begin with it."""
+    """Cached, because all variants of a wiring begin with it."""
     return _yosys(rtlil, _FLATTEN)
 
 
@@ -101,8 +101,8 @@ def _yosys(rtlil: str, script: str) -> str:
 
 
 def _hold(design: str) -> str:
-    """Registers that nothing can change become inputs."""
-    number = 1000  # of the port; others have less
+    """Turn registers that nothing can change into inputs."""
+    number = 1000  # port number, above those of all other ports
     for cell in list(_CELL.finditer(design)):
         kind, body = cell.groups()
         reset, output = _RESET.search(body), _OUTPUT.search(body)
@@ -119,7 +119,7 @@ def _hold(design: str) -> str:
 
 
 def _constants_once(design: str) -> str:
-    """Have what never changes set when the object is made, not in every evaluation."""
+    """Set constants when the object is created, not in every evaluation."""
     state = members(design)
     start = design.index("bool p_top::eval(")
     before, evaluation = design[:start], design[start:]

@@ -201,7 +201,7 @@ def test_a_strobe_too_short_for_the_memory_is_noticed(shared: RtlEngine) -> None
 
 
 def test_errors_say_what_would_be_right(shared: RtlEngine) -> None:
-    with pytest.raises(ValueError, match="no chip select 1, only CS_N"):
+    with pytest.raises(ValueError, match="no chip select has number 1; they are CS_N"):
         shared.access(transactions([1], select=1), 10**9)
     with pytest.raises(ValueError, match="CubeStarTop has no external bus"):
         make_engine(cubestar_wiring(CubeStarTop(3, 2)), "python").access(transactions([1]), 10**9)

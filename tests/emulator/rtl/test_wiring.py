@@ -57,13 +57,13 @@ def test_a_camera_is_stored_in_the_ways_to_store_until_the_acknowledge():
 @pytest.mark.parametrize("kind", ["compiled", "python"])
 def test_wrong_names_and_levels(kind):
     engine = make_engine(PAIR, kind)
-    with pytest.raises(ValueError, match="cameras are sun, nadir, not moon"):
+    with pytest.raises(ValueError, match="unknown camera moon; cameras: sun, nadir"):
         engine.attach(None, "moon")
-    with pytest.raises(ValueError, match="memories are sun, nadir, not moon"):
+    with pytest.raises(ValueError, match="unknown memory moon; memories: sun, nadir"):
         engine.power_memory("moon", False)
     with pytest.raises(ValueError, match="SUNEN has 1 bits, too few for 2"):
         engine.set_pin("SUNEN", 2)
-    with pytest.raises(ValueError, match="SUNACK or NADACK only, not on DATA"):
+    with pytest.raises(ValueError, match="stop on DATA, only on SUNACK or NADACK"):
         engine.run(1, ("DATA", 1))
     assert np.shares_memory(engine.sram, engine.memories["sun"])
 

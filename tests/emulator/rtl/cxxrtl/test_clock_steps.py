@@ -10,7 +10,7 @@ from cubestack.emulator.boards.cubestar.wiring import (
     cubestar_wiring,
 )
 from cubestack.emulator.rtl.cxxrtl.clock_steps import clock_steps
-from cubestack.emulator.rtl.cxxrtl.variants import held, members, variant_text
+from cubestack.emulator.rtl.cxxrtl.variants import input_names, members, variant_text
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, RNW
 from cubestack.hdl.cubestar.double_top import CubeStarDouble
@@ -82,5 +82,5 @@ def test_the_memory_of_the_board_that_does_not_store_stays_as_it_is():
 def test_registers_that_nothing_clocks_are_inputs():
     wiring = cubestar_double_wiring(CubeStarDouble(32, 16))
     text = variant(wiring)
-    assert {"p_into", "p_bus_2e_latched"} < {*held(text)}
+    assert {"p_into", "p_bus_2e_latched"} < {*input_names(text)}
     assert not {"p_into", "p_bus_2e_latched"} & {n for n, k in members(text).items() if "wire" in k}
