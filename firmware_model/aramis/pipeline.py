@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats
-from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.detection.background import Background
 from cubestack.firmware_model.aramis.detection.local import brighter, measure_sky
@@ -24,39 +23,35 @@ from cubestack.firmware_model.aramis.reasons import is_hit, true_reason
 from cubestack.firmware_model.aramis.solution import Light, Profile, Solution, StarList, unsolved
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 
 SPIKE_SIGMAS = 8.0
 """A pixel is far above its surroundings from so many standard deviations on."""
 
 
 @dataclass(frozen=True)
-class Detection:
+class Detection(DeclaredValues):
     """Settings of the search for stars; the defaults are the published ones.
 
-    Attributes:
-        sigmas: a bright pixel is above the mean by so many standard deviations, 0 to 20.
-        spikes: how noise is removed.
-        needed: bright pixels that a window of 25 must have, 1 to 25.
-        min_pixels, max_pixels: size of a star (assumed; the thesis has no limits).
-        max_stars: the brightest are kept, 3 to 255 (assumed).
-        subtract: whether the mean level is taken off before weighing (an extension).
-        local: whether every place has its own threshold, and stars are told by their shape (an
-            extension).
+    ``spikes`` says how noise is removed. The limits of a star's size and of the number of stars
+    are assumed; the thesis has none.
     """
 
-    sigmas: float = 2.0
+    sigmas: float = number(2.0, "standard deviations of a bright pixel above the mean", 0, 20)
     spikes: SpikeRemoval = SpikeRemoval.WINDOW
-    needed: int = HALF
-    min_pixels: int = 1
-    max_pixels: int = 2500
-    max_stars: int = 30
-    subtract: bool = False
-    local: bool = False
+    needed: int = whole(HALF, "bright pixels that a window of 25 must have", 1, 25)
+    min_pixels: int = whole(1, "smallest star", 1, 1_000_000, "px")
+    max_pixels: int = whole(2500, "largest star", 1, 1_000_000, "px")
+    max_stars: int = whole(30, "the brightest are kept", 3, 255)
+    subtract: bool = flag(False, "take off the mean level before weighing (an extension)")
+    local: bool = flag(
+        False, "a threshold for every place, and stars by their shape (an extension)"
+    )
 
     def __post_init__(self) -> None:
-        """Refuse settings with which nothing can be found."""
-        check_bounds(self, sigmas=(0, 20), needed=(1, 25), min_pixels=(1, self.max_pixels))
-        check_bounds(self, max_pixels=(1, 1_000_000), max_stars=(3, 255))
+        """Refuse settings with which nothing can be found: ValueError."""
+        super().__post_init__()
+        self.check_within("min_pixels", high=self.max_pixels)
 
 
 _FIELD, _DETECTION, _PROFILE = Field(), Detection(), Profile()

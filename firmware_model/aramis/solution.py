@@ -10,80 +10,74 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats
-from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
+from cubestack.firmware_model.values import DeclaredValues, choice, flag, number, whole
 
 NONE = -1
 """Mark of a measured star without identity."""
 
 
 @dataclass(frozen=True)
-class Profile:
+class Profile(DeclaredValues):
     """Settings of the identification; the defaults are the published ones.
 
-    Attributes:
-        sigma_rad: noise of a measured direction per axis, in rad. The thesis' appendix E settles on
-            0.26 px of its simulator, 0.3759 rad / 582.
-        pivots: pivot triangles at most, 0 to 3.
-        always_pivot: whether one is measured even when one candidate is left, as appendix E does.
-        filtered: whether a unique triangle near a rough direction must also have the right sides
-            and a boresight near it (an extension).
-        identities: how stars are told apart: by section 5.8 or appendix E, or either criterion of
-            section 5.8 where the sides are checked.
-        hint_tolerance_deg: with a rough direction, a boresight farther from it is refused (an
-            extension).
-        side_tolerance_rad: largest difference of a side near a rough direction; three sigma of a
-            difference of two stars' places by default.
-        verify: whether an attitude must be confirmed by further stars; what follows is only then.
-        tolerance_rad: distance within which a star speaks for an attitude at first.
-        largest_chance: an attitude is believed when so many wrong ones, at most, would be confirmed
-            as well in a picture.
-        largest_sigma_rad: an attitude is refused whose turn about the boresight has a larger
-            standard deviation.
-        within_ms: of processor time from the picture on; then identification is given up. Beside
-            it a second holds the longest wait for a frame, 233 ms, and the catalogue's check.
-        smear_px: where stars are drawn out farther, that is why there is no attitude.
-        skew_px: stars that also moved farther from row to row are refused.
-        moved_px: stars that moved farther from row to row are also refused when they leave too much
-            doubt about the turn about the boresight; below it, stars that look long may just be
-            drawn so by the lens.
-        motion_sigma_rad: that much doubt.
+    ``within_ms`` is 650 ms because a second also holds the longest wait for a frame, 233 ms, and
+    the catalogue's check. Stars that moved farther than ``moved_px`` may also just be drawn so by
+    the lens, so ``motion_sigma_rad`` decides about them.
     """
 
-    sigma_rad: float = 0.26 * 0.3759 / 582  # chosen by appendix E
-    pivots: int = 3
-    always_pivot: bool = False
-    filtered: bool = True
-    identities: Literal["section-5.8", "appendix-e", "either"] = "either"
-    verify: bool = False
-    tolerance_rad: float = 1.2e-3
-    side_tolerance_rad: float = 7e-4
-    largest_chance: float = 1e-5
-    largest_sigma_rad: float = 1.5e-3
-    within_ms: float = 650.0
-    hint_tolerance_deg: float = 6.0
-    smear_px: float = 4.0
-    skew_px: float = 4.0
-    moved_px: float = 1.8
-    motion_sigma_rad: float = 7e-4
-
-    def __post_init__(self) -> None:
-        """Refuse settings with which nothing can be found."""
-        check_bounds(
-            self,
-            sigma_rad=(1e-7, 1e-2),
-            pivots=(0, 3),
-            tolerance_rad=(1e-5, 0.05),
-            side_tolerance_rad=(1e-6, 0.05),
-            largest_chance=(0, 1),
-            largest_sigma_rad=(0, 1),
-            within_ms=(1, 10_000),
-            hint_tolerance_deg=(0, 180),
-            smear_px=(1, 1000),
-            skew_px=(0, 1000),
-            moved_px=(0, 1000),
-            motion_sigma_rad=(0, 0.1),
-        )
+    sigma_rad: float = number(
+        0.26 * 0.3759 / 582,  # chosen by appendix E: 0.26 px of the thesis' simulator
+        "noise of a measured direction per axis",
+        1e-7,
+        1e-2,
+    )
+    pivots: int = whole(3, "pivot triangles at most", 0, 3)
+    always_pivot: bool = flag(
+        False, "measure a pivot triangle even when one candidate is left, as appendix E does"
+    )
+    filtered: bool = flag(
+        True,
+        "a unique triangle near a rough direction must also have the right sides and a boresight "
+        "near it (an extension)",
+    )
+    identities: Literal["section-5.8", "appendix-e", "either"] = choice(
+        "either",
+        "how stars are told apart; either: where the sides are checked, by section 5.8's criteria",
+        ("section-5.8", "appendix-e", "either"),
+    )
+    verify: bool = flag(
+        False, "an attitude must be confirmed by further stars; what follows is only then"
+    )
+    tolerance_rad: float = number(
+        1.2e-3, "distance within which a star speaks for an attitude at first", 1e-5, 0.05
+    )
+    side_tolerance_rad: float = number(
+        7e-4,  # three sigma of a difference of two stars' places
+        "largest difference of a side near a rough direction",
+        1e-6,
+        0.05,
+    )
+    largest_chance: float = number(
+        1e-5, "believed wrong attitudes per picture, at most, that would be confirmed as well", 0, 1
+    )
+    largest_sigma_rad: float = number(
+        1.5e-3, "largest standard deviation of the turn about the boresight", 0, 1
+    )
+    within_ms: float = number(650.0, "processor time from the picture until it gives up", 1, 10_000)
+    hint_tolerance_deg: float = number(
+        6.0, "with a rough direction, a boresight farther from it is refused", 0, 180
+    )
+    smear_px: float = number(
+        4.0, "where stars are drawn out farther, that is why there is no attitude", 1, 1000
+    )
+    skew_px: float = number(
+        4.0, "stars that also moved farther from row to row are refused", 0, 1000
+    )
+    moved_px: float = number(
+        1.8, "the same where the turn about the boresight is too uncertain", 0, 1000
+    )
+    motion_sigma_rad: float = number(7e-4, "uncertainty that is too much then", 0, 0.1)
 
 
 @dataclass(frozen=True)

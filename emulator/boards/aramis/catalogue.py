@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.native.cache import cache_folder
 from cubestack.emulator.scene.hipparcos import CATALOGUE_SHA256, DEFAULT_EPOCH, Sky, load_sky
-from cubestack.firmware_model.aramis.bounds import check_bounds
 from cubestack.firmware_model.aramis.catalogue import database, geodesic, kvector
 from cubestack.firmware_model.aramis.catalogue.database import Database, DatabaseError
 from cubestack.firmware_model.aramis.catalogue.geodesic import geodesic_sphere
 from cubestack.firmware_model.aramis.catalogue.kvector import KVector
 from cubestack.firmware_model.aramis.field import FOV_DEG
+from cubestack.firmware_model.values import DeclaredValues, number, whole
 
 Progress = Callable[[Iterable[int], int, str], Iterable[int]]
 """Passes items through and shows how many of a total are done, under a label."""
@@ -49,29 +49,17 @@ ADVICE = "change fov_deg, stars_per_field, longest_side_deg or mag_limit"
 
 
 @dataclass(frozen=True)
-class CatalogueParameters:
-    """What a database is made for; the defaults are the published ones.
+class CatalogueParameters(DeclaredValues):
+    """What a database is made for; the defaults are the published ones."""
 
-    Attributes:
-        fov_deg: diameter of the round field of view, 1 to 60 degrees.
-        stars_per_field: brightest stars that each field keeps, 3 to 50.
-        mag_limit: faintest V magnitude, included.
-        step_deg: step of the scan in right ascension and declination, 0.25 to 10 degrees.
-        epoch: Julian year of the directions.
-        longest_side_deg: no side of a triangle is longer; None: the field.
-    """
-
-    fov_deg: float = FOV_DEG
-    stars_per_field: int = 6
-    mag_limit: float = 6.0
-    step_deg: float = 1.0
-    epoch: float = DEFAULT_EPOCH
-    longest_side_deg: float | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse what gives no database."""
-        check_bounds(self, fov_deg=(1, 60), stars_per_field=(3, 50), mag_limit=(0, 7.5))
-        check_bounds(self, step_deg=(0.25, 10), epoch=(1800, 2200), longest_side_deg=(1, 60))
+    fov_deg: float = number(FOV_DEG, "diameter of the round field of view", 1, 60)
+    stars_per_field: int = whole(6, "brightest stars that each field keeps", 3, 50)
+    mag_limit: float = number(6.0, "faintest V magnitude, included", 0, 7.5)
+    step_deg: float = number(1.0, "step of the scan in right ascension and declination", 0.25, 10)
+    epoch: float = number(DEFAULT_EPOCH, "Julian year of the directions", 1800, 2200)
+    longest_side_deg: float | None = number(
+        None, "no side of a triangle is longer; None: the field", 1, 60
+    )
 
     @property
     def side_deg(self) -> float:

@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.values import DeclaredValues, flag, whole
+
 
 class DetectionConfigError(ValueError):
-    """A detection setting out of range; `setting` names the field of `DetectionConfig`."""
-
-    def __init__(self, setting: str, requirement: str) -> None:
-        """Say which setting must be what."""
-        super().__init__(f"{setting} must be {requirement}")
-        self.setting = setting
+    """A detection setting out of range."""
 
 
 class SearchEnd(Enum):
@@ -29,60 +26,43 @@ class SearchEnd(Enum):
 
 
 @dataclass(frozen=True)
-class DetectionConfig:
+class DetectionConfig(DeclaredValues):
     """Settings of telecommands 20 to 23, with the published values as defaults.
 
-    Attributes:
-        step: distance of sampled pixels and rows in px; the background search reads all.
-        x_start, x_end, y_start, y_end: region of the samples in px, ends excluded.
-        detection_threshold: a sample above it (and the star threshold) starts an area, DN.
-        star_threshold: a neighbour above it joins the area, DN. Both count from the background up
-            in the background search.
-        min_pixels: smaller areas are noise.
-        max_pixels: larger areas are invalid.
-        grid_size: width of the square around the brightest pixel that gives the centroid, odd.
-        max_stars: the search ends with so many stars; the background search keeps twice as many,
-            the brightest ones.
-        max_invalid: the search ends with more invalid areas; the background search goes on.
-        max_noise: the search ends with more noise areas; the background search goes on.
-        plain_weights: a pixel weighs its value, else its value above the star threshold.
-        background: thresholds count from the local background of the picture, and every pixel is
-            read (`background_search`).
+    In the background search both thresholds count from the background up, every pixel is read
+    whatever the step, twice ``max_stars`` are kept, and too many areas do not end the search.
     """
 
-    step: int = 3
-    x_start: int = 0
-    x_end: int = 1024
-    y_start: int = 0
-    y_end: int = 512
-    detection_threshold: int = 6
-    star_threshold: int = 6
-    min_pixels: int = 6
-    max_pixels: int = 60
-    grid_size: int = 5
-    max_stars: int = 20
-    max_invalid: int = 50
-    max_noise: int = 255
-    plain_weights: bool = False
-    background: bool = False
+    error = DetectionConfigError
+
+    step: int = whole(3, "distance of sampled pixels and rows", 1, 255, "px")
+    x_start: int = whole(0, "first column of the samples", 0, 65_535, "px")
+    x_end: int = whole(1024, "column after the last one", 0, 65_535, "px")
+    y_start: int = whole(0, "first row of the samples", 0, 65_535, "px")
+    y_end: int = whole(512, "row after the last one", 0, 65_535, "px")
+    detection_threshold: int = whole(
+        6, "a sample above it and the star threshold starts an area", 0, 255, "DN"
+    )
+    star_threshold: int = whole(6, "a neighbour above it joins the area", 0, 255, "DN")
+    min_pixels: int = whole(6, "smaller areas are noise", 1, 255, "px")
+    max_pixels: int = whole(60, "larger areas are invalid", 1, 255, "px")
+    grid_size: int = whole(5, "width of the square that gives the centroid, odd", 1, 255, "px")
+    max_stars: int = whole(20, "the search ends after this number of stars", 1, 255)
+    max_invalid: int = whole(50, "the search ends with more invalid areas", 0, 255)
+    max_noise: int = whole(255, "the search ends with more noise areas", 0, 255)
+    plain_weights: bool = flag(
+        False, "a pixel weighs its value, else its value above the star threshold"
+    )
+    background: bool = flag(False, "the search above the local background")
 
     def __post_init__(self) -> None:
-        """Refuse settings with which the search makes no sense."""
-        limits = {
-            **dict.fromkeys(("detection_threshold", "star_threshold"), (0, 255)),
-            **dict.fromkeys(("max_invalid", "max_noise"), (0, 255)),
-            **dict.fromkeys(("step", "min_pixels", "max_stars", "grid_size"), (1, 255)),
-            "max_pixels": (self.min_pixels, 255),
-            "x_end": (self.x_start + 1, 65_535),
-            "y_end": (self.y_start + 1, 65_535),
-            **dict.fromkeys(("x_start", "y_start"), (0, 65_535)),
-        }
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise DetectionConfigError(name, f"{low} to {high}, not {value}")
+        """Refuse settings with which the search makes no sense: DetectionConfigError."""
+        super().__post_init__()
+        self.check_within("max_pixels", low=self.min_pixels)
+        self.check_within("x_end", low=self.x_start + 1)
+        self.check_within("y_end", low=self.y_start + 1)
         if self.grid_size % 2 == 0:
-            raise DetectionConfigError("grid_size", f"odd, not {self.grid_size}")
+            raise DetectionConfigError(f"grid_size must be odd, not {self.grid_size}")
 
     @property
     def seed_threshold(self) -> int:
@@ -95,9 +75,8 @@ class DetectionConfig:
         Raises:
             DetectionConfigError: naming the edge that does.
         """
-        for name, most in (("x_end", columns), ("y_end", rows)):
-            if (value := getattr(self, name)) > most:
-                raise DetectionConfigError(name, f"at most {most}, not {value}")
+        self.check_within("x_end", high=columns)
+        self.check_within("y_end", high=rows)
 
 
 @dataclass(frozen=True)

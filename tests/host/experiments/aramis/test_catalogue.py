@@ -43,7 +43,7 @@ def test_for_people(run: Run) -> None:
         (("aramis", "--pair-limit", "40"), "--pair-limit has no effect for aramis"),
         (("--fov", "20"), "--fov has no effect for cubestar"),
         (("cubestar", "--output", "x"), "--output has no effect for cubestar"),
-        (("aramis", "--fov", "100"), "fov_deg must be 1 to 60, not 100.0"),
+        (("aramis", "--fov", "100"), "fov_deg must be 1 to 60 deg, not 100.0"),
         (("aramis", "--mag-limit", "9"), "mag_limit must be 0 to 7.5, not 9.0"),
         (("aramis", "--fov", "1", "--mag-limit", "1"), "stars give no triangle"),
     ],
