@@ -86,7 +86,7 @@ bench: .venv/ready-run
 
 libraries: .venv/ready-dev
 	@$(BIN)/python -m pip install -q ziglang
-	@$(BIN)/python -m cubestack.host.devices.libraries
+	@$(BIN)/python -m cubestack.host.emulation.libraries
 
 docs: .venv/ready-dev
 	@NO_MKDOCS_2_WARNING=1 COLUMNS=90 $(BIN)/mkdocs build --strict --quiet

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 from cubestack.emulator.recording.scope import Scope
 from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.host.cli.waveform import read
-from cubestack.host.devices.emulated import open_device
-from cubestack.host.devices.records import start_trace
+from cubestack.host.emulation.emulated import open_device
+from cubestack.host.emulation.records import start_trace
 from cubestack.host.pictures.blocks import Block, Line, blocks
 from cubestack.host.pictures.timing import Lane, levels, timing, values
 

@@ -19,7 +19,7 @@ from cubestack.emulator.scene.earth_sun import Target
 from cubestack.emulator.scene.orbit_file import load_orbit
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult
-from cubestack.host.devices.orbiting import follow
+from cubestack.host.emulation.orbit import follow
 
 COLUMNS = ("time_s", "shadow", "star_deg", "asked", "off_deg")
 

@@ -24,12 +24,12 @@ import pytest
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
 from cubestack.host.devices.device import Engine
 from cubestack.host.devices.registry import device_names, devices
-from cubestack.host.virtual_clock import VirtualClock
+from cubestack.host.emulation.virtual_clock import VirtualClock
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
-    from cubestack.host.devices.emulated import AnyEmulated
+    from cubestack.host.emulation.emulated import AnyEmulated
 
 MARKER = "cubestack"
 KEYS = ("scene", "seed", "faults", "wall_time")
@@ -80,8 +80,8 @@ def _fixture(name: str) -> Any:
 
     def powered(request: pytest.FixtureRequest) -> "Iterator[AnyEmulated]":
         from cubestack.emulator.faults.plan import load_plan, parse_plan
-        from cubestack.host.devices.emulated import open_device
         from cubestack.host.devices.registry import device
+        from cubestack.host.emulation.emulated import open_device
 
         options = _options(request.node)
         config = request.config

@@ -22,7 +22,18 @@ TABLES = ("firmware_model.values", "firmware_model.interface", "firmware_model.f
 BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_model"), "host": TABLES}
 #: Parts of ``host`` that may import the other packages, as long as they do so lazily: listing
 #: devices and asking for help must load no emulator.
-LAZY = ("api", "cli", "devices", "experiments", "ground", "sensors", "pytest_plugin")
+LAZY = (
+    "api",
+    "cli",
+    "devices",
+    "emulation",
+    "experiments",
+    "ground",
+    "pytest_plugin",
+    "sensors",
+    "studies",
+    "targets",
+)
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.
 ORDER = {
@@ -50,10 +61,13 @@ ORDER = {
         "clients",
         "recording pictures",
         "devices",
+        "emulation",
+        "targets",
         "shell",
-        "conformance experiments ground virtual_clock",
-        "sensors pytest_plugin",
+        "conformance experiments ground",
         "cli",
+        "studies",
+        "sensors pytest_plugin",
         "api",
     ),
 }

@@ -2,7 +2,7 @@
 
 A file's name carries its machine, a hash of everything that the library is made of but the
 compiler, and the hash of its own bytes: one that does not fit what is installed is not found, and
-a damaged one is noticed. ``python -m cubestack.host.devices.libraries`` makes them anew.
+a damaged one is noticed. ``python -m cubestack.host.emulation.libraries`` makes them anew.
 """
 
 import hashlib

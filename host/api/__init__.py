@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from cubestack.host.clients.cubesense.client import CubeSense
     from cubestack.host.clients.cubestar.client import CubeStar
     from cubestack.host.devices.device import BoardOption, Device
-    from cubestack.host.devices.emulated import AnyEmulated, EmulatedDevice
     from cubestack.host.devices.registry import device_names
+    from cubestack.host.emulation.emulated import AnyEmulated, EmulatedDevice
     from cubestack.host.errors import HostError
     from cubestack.host.experiments.measure import measure
     from cubestack.host.transport.smbus import CubeSMBus
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     @overload
     def open_device(name: str, scene: Any = None, **options: Any) -> AnyEmulated: ...
     def open_device(name: str, scene: Any = None, **options: Any) -> Any:
-        """Power up a registered device; see ``host.devices.emulated.open_device``."""
+        """Power up a registered device; see ``host.emulation.emulated.open_device``."""
 
     @overload
     def connect(text: str, device: Literal["cubestar"], *, baud: int | None = None) -> CubeStar: ...
@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     @overload
     def connect(text: str, device: str | None = None, *, baud: int | None = None) -> Any: ...
     def connect(text: str, device: str | None = None, *, baud: int | None = None) -> Any:
-        """The client of the device that ``text`` names; see ``host.devices.targets.connect``."""
+        """The client of the device that ``text`` names; see ``host.targets.connect``."""
 
 
 __all__ = [
@@ -106,16 +106,16 @@ _HOMES: Final = {
     "CubeStar": "host.clients.cubestar.client",
     "Device": "host.devices.device",
     "EarthSunScene": "emulator.scene.earth_sun",
-    "EmulatedDevice": "host.devices.emulated",
+    "EmulatedDevice": "host.emulation.emulated",
     "HostError": "host.errors",
     "PictureScene": "emulator.scene.sky",
     "Plan": "emulator.faults.plan",
     "SkyScene": "emulator.scene.sky",
-    "connect": "host.devices.targets",
+    "connect": "host.targets",
     "device_names": "host.devices.registry",
     "load_plan": "emulator.faults.plan",
     "measure": "host.experiments.measure",
-    "open_device": "host.devices.emulated",
+    "open_device": "host.emulation.emulated",
     "parse_plan": "emulator.faults.plan",
 }
 

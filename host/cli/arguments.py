@@ -14,15 +14,22 @@ T = TypeVar("T")
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Puts a heading above the first command of each group."""
+
+    def _format_action(self, action: argparse.Action) -> str:
+        heading = getattr(action, "heading", "")
+        return (f"\n  {heading}:\n" if heading else "") + super()._format_action(action)
+
+
 class Parser(argparse.ArgumentParser):
-    """A parser whose help stands as it is written, and whose errors are one line."""
+    """A parser that prints its help as written, and errors in one line."""
 
     def __init__(self, **options: Any) -> None:
-        """Take what every parser takes."""
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        super().__init__(formatter_class=_Formatter, **options)
 
     def format_help(self) -> str:
-        """The help; where it names documents, also where they are, as an installation has none."""
+        """The help, with the address of the documents if it names one: they aren't installed."""
         text = super().format_help()
         return f"{text}\ndocs/: {_documents()}\n" if "docs/" in text else text
 

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the script."""
-    from cubestack.host.cli.main import make_parser
+    from cubestack.host.cli.main import make_parser  # it loads this module
 
     print(shtab.complete(make_parser(), args.shell))
     return 0

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
-from cubestack.host.devices.emulated import AnyEmulated, check_options
-from cubestack.host.devices.insight import InsightFiles, open_gdb
-from cubestack.host.devices.records import create_file, start_recorder, start_trace
 from cubestack.host.devices.registry import devices
+from cubestack.host.emulation.emulated import AnyEmulated, check_options
+from cubestack.host.emulation.insight import InsightFiles, open_gdb
+from cubestack.host.emulation.records import create_file, start_recorder, start_trace
 from cubestack.host.options import flag
 from cubestack.host.terminal import say
 

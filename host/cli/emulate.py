@@ -27,10 +27,10 @@ from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
-from cubestack.host.devices.emulated import AnyEmulated, power_up
-from cubestack.host.devices.past import Past
 from cubestack.host.devices.registry import device, device_names, devices
-from cubestack.host.devices.remote_controls import TOKEN
+from cubestack.host.emulation.emulated import AnyEmulated, power_up
+from cubestack.host.emulation.history import Past
+from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.options import flag
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import busy, progress, say
@@ -193,7 +193,7 @@ def run(args: argparse.Namespace) -> int:
 def _fly(path: Path, opened: list[AnyEmulated]) -> None:
     """Have all see what there is on the orbit of a file."""
     from cubestack.emulator.scene.orbit_file import load_orbit
-    from cubestack.host.devices.orbiting import follow
+    from cubestack.host.emulation.orbit import follow
 
     orbit = load_orbit(path)
     try:

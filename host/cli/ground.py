@@ -25,9 +25,9 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.device_options import add_board_arguments, given_options
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
-from cubestack.host.devices.remote_controls import TOKEN
-from cubestack.host.devices.targets import EMULATED, FORMS, open_target
+from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.errors import TargetError
+from cubestack.host.targets import EMULATED, FORMS, open_target
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:

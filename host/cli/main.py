@@ -10,11 +10,12 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from importlib.metadata import version
 from io import TextIOWrapper
 
 from cubestack.host.cli.arguments import Parser
+from cubestack.host.cli.commands import BUILT_IN, Listed, commands, with_headings
+from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
 from cubestack.host.terminal import hush, say
 
@@ -24,34 +25,12 @@ SIGNALLED = 128
 LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
 """Of the log, by the number of times that --verbose stands there."""
 
-#: Subcommands in the order of the help text; each module offers add_arguments(parser), run(args).
-COMMANDS = {
-    "demo": "show the devices end to end, with pictures (what `make run` does)",
-    "ground": "a page in the browser: see, command and disturb a device",
-    "emulate": "serve an emulated device on serial ports until Ctrl-C",
-    "run": "run an unmodified program that sees an emulated I2C bus",
-    "measure": "scene in, attitude or directions out: each result beside the truth",
-    "campaign": "measure thousands of skies, resumable, on all cores or a cluster",
-    "hazards": "make skies hard: how often a sensor is right, refuses, or is wrong",
-    "fidelity": "measure published figures: theirs, ours in both profiles, and how ours come about",
-    "calibrate": "fit a camera's lens to pictures of known stars or lights",
-    "registers": "list a device's telecommands and telemetry",
-    "export": "write them for other programs: C, Python, XTCE, COSMOS, Wireshark, SVD",
-    "shell": "read, write and watch registers by name",
-    "picture": "make the picture that a star tracker takes at a known attitude",
-    "log": "log a device's results to a CSV file",
-    "conformance": "check a device's protocol against the tables",
-    "replay": "play a recording to an emulated device, compare what it says",
-    "decode": "tell what was said in a recording, or write it as a table",
-    "hdl": "look at the FPGA designs: area, Verilog files, proofs, waveforms of failed tests",
-    "costs": "measure what a device's program costs as compiled code",
-    "bench": "measure the cost of the hot paths on this machine",
-    "completion": "print what has bash, zsh or fish complete this command",
-}
-
 
 def make_parser(asked: str | None = None) -> Parser:
-    """Parser with every subcommand; if ``asked`` is one, with that alone, which loads less."""
+    """The parser of the command line.
+
+    Loading a command takes time: with ``asked``, all are listed but only that one is loaded.
+    """
     parser = Parser(
         prog="cubestack",
         description="Firmware-in-the-loop emulator of CubeSat camera sensors.",
@@ -60,28 +39,25 @@ def make_parser(asked: str | None = None) -> Parser:
     parser.add_argument("--version", action="version", version=f"cubestack {version('cubestack')}")
     loud = parser.add_mutually_exclusive_group()
     loud.add_argument(
-        "-v", "--verbose", action="count", default=0, help="log what is going on; -vv everything"
+        "-v", "--verbose", action="count", default=0, help="log progress; -vv logs everything"
     )
     loud.add_argument(
-        "-q", "--quiet", action="store_true", help="nothing but results and errors: no progress"
+        "-q", "--quiet", action="store_true", help="print results and errors only, no progress"
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in [asked] if asked in COMMANDS else COMMANDS:
-        module = import_module(f"cubestack.host.cli.{name}")
-        command = commands.add_parser(
-            name, help=COMMANDS[name], description=_with_names(module.__doc__ or "")
-        )
-        module.add_arguments(command)
-        command.set_defaults(run=module.run)
-    if asked in COMMANDS:
-        return parser
-
-    from cubestack.host.cli.reports import reports
-
-    for name, report in reports().items():
-        command = commands.add_parser(name, help=report.summary, description=report.description)
-        report.add_arguments(command)
-        command.set_defaults(run=report.run)
+    place = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    known: dict[str, Listed] = dict(BUILT_IN)
+    if asked not in BUILT_IN:
+        known |= commands() | {**reports()}
+    if asked in known:
+        known = {asked: known[asked]}
+    for heading, name, command in with_headings(known):
+        added = place.add_parser(name, help=command.summary)
+        place._choices_actions[-1].heading = heading  # type: ignore[attr-defined]
+        if asked in (None, name):
+            loaded = command.load()
+            added.description = _with_names(loaded.__doc__ or "")
+            loaded.add_arguments(added)
+            added.set_defaults(run=loaded.run)
     return parser
 
 
@@ -134,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _write_anywhere()
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
-    args = make_parser(asked).parse_args(given)
+    args = make_parser(asked or "").parse_args(given)
     try:
         with _loudness(args.verbose, quiet=args.quiet), warnings.catch_warnings():
             warnings.showwarning = lambda text, *_, **__: say(f"cubestack {args.command}: {text}")

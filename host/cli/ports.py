@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cubestack.host.cli.arguments import whole
-from cubestack.host.devices.emulated import AnyEmulated
 from cubestack.host.devices.registry import device_names
+from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:

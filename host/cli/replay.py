@@ -22,9 +22,9 @@ from pathlib import Path
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.arguments import typed
 from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
-from cubestack.host.devices.controls import EmulatedControls
-from cubestack.host.devices.past import Recipe
-from cubestack.host.devices.records import create_file, start_trace
+from cubestack.host.emulation.controls import EmulatedControls
+from cubestack.host.emulation.history import Recipe
+from cubestack.host.emulation.records import create_file, start_trace
 from cubestack.host.options import between
 from cubestack.host.recording.setups import setup_for
 from cubestack.host.terminal import busy, say

@@ -4,8 +4,9 @@ import argparse
 from dataclasses import dataclass, field
 
 from cubestack.host.cli.arguments import add_options
+from cubestack.host.cli.commands import STUDIES
 from cubestack.host.cli.measure import add_board, run_experiment
-from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.device import AnyDevice, Report
 from cubestack.host.devices.experiment import AnyExperiment
 from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import board_options
@@ -18,16 +19,23 @@ class Reports:
 
     Attributes:
         summary: one phrase for the help.
-        found: the experiment of each device that has it, by the device's name.
+        declared: device and report of each device that has it.
     """
 
     summary: str
-    found: dict[str, tuple[AnyDevice, AnyExperiment]] = field(default_factory=dict)
+    declared: list[tuple[AnyDevice, Report]] = field(default_factory=list)
+    group: str = STUDIES
 
-    @property
-    def description(self) -> str:
-        """Those of all devices."""
-        return "\n".join(experiment.description for _, experiment in self.found.values())
+    def load(self) -> "LoadedReports":
+        return LoadedReports({one.name: (one, report.load()) for one, report in self.declared})
+
+
+class LoadedReports:
+    """The experiments of one command, by the name of their device."""
+
+    def __init__(self, found: dict[str, tuple[AnyDevice, AnyExperiment]]) -> None:
+        self.found = found
+        self.__doc__ = "\n".join(experiment.description for _, experiment in found.values())
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare the device, and the options of all that can be it."""
@@ -62,5 +70,5 @@ def reports() -> dict[str, Reports]:
     for device in devices():
         for report in device.reports:
             command = found.setdefault(report.name, Reports(report.summary))
-            command.found[device.name] = (device, report.load())
+            command.declared.append((device, report))
     return found

@@ -24,8 +24,8 @@ from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import check_linux
-from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.terminal import busy, say
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from pathlib import Path
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.device_options import add_board_arguments, given_options, tell_notices
 from cubestack.host.devices.registry import device_names
-from cubestack.host.devices.remote_controls import TOKEN
-from cubestack.host.devices.targets import FORMS, Target, open_target
+from cubestack.host.emulation.remote_controls import TOKEN
+from cubestack.host.targets import FORMS, Target, open_target
 from cubestack.host.terminal import busy, say
 
 

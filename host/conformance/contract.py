@@ -15,8 +15,8 @@ from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.device import ConformanceNotes
-from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NoAnswerError, NodeError
+from cubestack.host.targets import Target
 
 LATE_S = 0.04
 """What an answer may take beside its time on the wire: the poll period of real hosts."""

@@ -11,7 +11,7 @@ from cubestack.host.conformance.contract import CheckResult, CheckRun
 from cubestack.host.conformance.reads import check_reads
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.device import ConformanceNotes
-from cubestack.host.devices.targets import Target
+from cubestack.host.targets import Target
 
 
 def run_suite(

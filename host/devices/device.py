@@ -5,7 +5,7 @@ Command, shell, fixtures, conformance, registers, recordings, faults and gatewar
 loads none of it.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.interface.efm32gg.table import Processor
     from cubestack.hdl.flow.top import TopTable
     from cubestack.hdl.proofs.prover import Proof
-    from cubestack.host.devices.costs import CostReport
     from cubestack.host.devices.experiment import AnyExperiment
-    from cubestack.host.devices.fidelity import Fidelity
     from cubestack.host.pictures.overlay import Overlay
 
 #: How an FPGA is run: compiled where there is a compiler, always compiled, compiled with every
@@ -118,11 +116,6 @@ class ConformanceNotes:
     optional: frozenset[str] = frozenset()
 
 
-#: Shows a device: (device, folder of the pictures, seed, folder with photographs or None, words of
-#: `cubestack emulate` that choose its board); whether all was found.
-Demo = Callable[[Any, Path, int, "Path | None", Sequence[str]], bool]
-
-
 @dataclass(frozen=True)
 class Report:
     """A command about a device: `cubestack NAME`.
@@ -138,20 +131,6 @@ class Report:
     name: str
     summary: str
     load: "Callable[[], AnyExperiment]"
-
-
-@dataclass(frozen=True)
-class Benchmark:
-    """Measures what it costs to emulate a device.
-
-    Attributes:
-        figures: names of what it gives, as in the JSON output, with what each means.
-        run: measures the device that it is given: figures by name; one that could not be measured
-            is left out.
-    """
-
-    figures: Mapping[str, str]
-    run: Callable[[Any], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -174,18 +153,14 @@ class Device(Generic[BoardT_co, ClientT_co]):
         options: of its board alone.
         has_fpga: whether an engine can be chosen.
         experiment: what ``measure`` does with it; None for nothing.
-        calibration: what ``calibrate`` does with it; None for nothing.
         reports: further commands about it.
-        benchmark: measures the cost of emulating it; None for nothing.
-        demo: shows it end to end, with pictures; None for nothing.
-        fidelity: its published figures, and what measures ours; None for a device without any.
+        studies: loads what it offers to a study, by the study's command; each study documents
+            what it expects.
         tops: tops of its FPGAs, and blocks, by name, as ``hdl.flow`` takes them.
         proofs: formal properties of them by name.
-        campaigns: package with a folder ``campaigns`` of plans that come with it; empty for none.
         prepare: makes what takes seconds the first time, such as a catalogue; it is given what
             shows progress: (items, total, label) -> the items. ``open_board`` makes it silently.
         conformance: what the protocol suite must know of it beside its tables.
-        costs: what its program costs as compiled code; None where there is none to compile.
         overlay: what its client found in the picture of a name, to be drawn over it; None where
             that is its stars, or nothing.
         processor: its processor as firmware of one's own sees it; None where that can not run.
@@ -205,17 +180,12 @@ class Device(Generic[BoardT_co, ClientT_co]):
     options: tuple[BoardOption, ...] = ()
     has_fpga: bool = True
     experiment: "Callable[[], AnyExperiment] | None" = None
-    calibration: "Callable[[], AnyExperiment] | None" = None
     reports: tuple[Report, ...] = ()
-    benchmark: Callable[[], Benchmark] | None = None
-    demo: Callable[[], Demo] | None = None
-    fidelity: "Callable[[], Fidelity] | None" = None
+    studies: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
     tops: "Callable[[], TopTable]" = dict
     proofs: "Callable[[], Mapping[str, Proof]]" = dict
-    campaigns: str = ""
     prepare: Callable[[Shown], None] = lambda _shown: None
     conformance: ConformanceNotes = field(default_factory=ConformanceNotes)
-    costs: "Callable[[], CostReport] | None" = None
     processor: "Callable[[], Processor] | None" = None
     overlay: "Callable[[Any, str], Overlay] | None" = None
     image_sensor: CameraRegisterMap | None = None
@@ -237,6 +207,11 @@ class Device(Generic[BoardT_co, ClientT_co]):
     def all_options(self) -> tuple[BoardOption, ...]:
         """Options of its board, and those that choose its profile."""
         return (*self.options, *(PROFILE_OPTIONS if self.switches.declared() else ()))
+
+    def study(self, command: str) -> Any:
+        """What it offers to a study, or None."""
+        load = self.studies.get(command)
+        return load and load()
 
     def scene(self, given: Any) -> Any:
         """The scene that ``given`` means: None the default, text or a path a file, else itself."""

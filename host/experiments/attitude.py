@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.host.clients.quality import AttitudeQuality
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result, Section
-from cubestack.host.experiments.hazards import asked as hazards
+from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole

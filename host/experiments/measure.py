@@ -5,9 +5,9 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.device import AnyDevice, BoardOption, Engine
-from cubestack.host.devices.emulated import AnyEmulated, check_options, scene_options
 from cubestack.host.devices.experiment import AnyExperiment, Result
 from cubestack.host.devices.registry import device as registered
+from cubestack.host.emulation.emulated import AnyEmulated, check_options, scene_options
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Generic
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, Switches
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device, Engine, Shown
-from cubestack.host.devices.emulated import EmulatedDevice, power_up
+from cubestack.host.emulation.emulated import EmulatedDevice, power_up
 from cubestack.host.options import PLAN, SCENE, Options, option, whole
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.host.clients.contract import Columns, DeviceClient
-from cubestack.host.devices.remote_controls import RemoteControls
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.remote_controls import RemoteControls
 from cubestack.host.errors import CommandRefusedError, HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.export.parquet import missing as parquet_missing
@@ -29,6 +28,7 @@ from cubestack.host.pictures.overlay import Overlay, star_overlay
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.result import ShellError
+from cubestack.host.targets import Target
 
 T = TypeVar("T")
 

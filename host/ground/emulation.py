@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.formats.recording import Control
 from cubestack.host.clients.quaternions import attitude_columns
-from cubestack.host.devices.controls import EmulatedControls
-from cubestack.host.devices.emulated import AnyEmulated
-from cubestack.host.devices.virtual_serial import PS_PER_S
+from cubestack.host.emulation.controls import EmulatedControls
+from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.emulation.virtual_serial import PS_PER_S
 from cubestack.host.errors import TargetError
 from cubestack.host.ground import scenes
 from cubestack.host.ground.traces import LONGEST_S as TRACE_S
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from cubestack.emulator.ports.control import ControlPort
-    from cubestack.host.devices.past import Past
+    from cubestack.host.emulation.history import Past
 
 JsonObject = dict[str, Any]
 

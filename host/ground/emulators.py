@@ -9,15 +9,15 @@ from typing import Any
 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
 from cubestack.host.devices.device import BoardOption
-from cubestack.host.devices.emulated import check_options
-from cubestack.host.devices.emulating import emulating
 from cubestack.host.devices.registry import device as registered
-from cubestack.host.devices.remote_controls import TOKEN, ControlClient, RemoteControls
-from cubestack.host.devices.targets import Target, open_target
+from cubestack.host.emulation.emulated import check_options
+from cubestack.host.emulation.process import emulating
+from cubestack.host.emulation.remote_controls import TOKEN, ControlClient, RemoteControls
 from cubestack.host.errors import HostError, PortOpenError, TargetError
 from cubestack.host.ground.guard import new_token
 from cubestack.host.ground.scenes import text_of
 from cubestack.host.options import flag
+from cubestack.host.targets import Target, open_target
 
 _CONTROL = re.compile(r"control on (\S+), token ")
 _SERVES = re.compile(r" serves on (tcp://\S+) ")

@@ -11,10 +11,10 @@ from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Interface, Kind
 from cubestack.host.clients.contract import Client
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import RECORDED, Target
 from cubestack.host.errors import NoAnswerError, PortOpenError, TargetError
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.recording.said import Said, said
+from cubestack.host.targets import RECORDED, Target
 
 SUFFIX = ".rec"
 

@@ -5,7 +5,7 @@ from urllib.parse import quote, urlencode
 
 from starlette.responses import Response
 
-from cubestack.host.devices.remote_controls import RemoteControls
+from cubestack.host.emulation.remote_controls import RemoteControls
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.scenes import FILE, text_of

@@ -10,7 +10,7 @@ from io import StringIO
 from tempfile import mkstemp
 
 from cubestack.host.clients.contract import Columns
-from cubestack.host.devices.log import ANGLE
+from cubestack.host.devices.result_table import ANGLE
 from cubestack.host.export.parquet import parquet_file
 
 MOST = 1_000_000

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.aramis.client import Aramis
 
-EXPERIMENTS = "cubestack.host.experiments.aramis"
+STUDIES = "cubestack.host.studies.aramis"
 BOARD = "cubestack.emulator.boards.aramis"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
@@ -60,19 +60,21 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     scene_form=_scene_form,
     default_scene=call("cubestack.emulator.scene.sky:SkyScene.pointing", *POINTING_DEG),
     default_scene_title="Orion",
-    experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
-    calibration=get(f"{EXPERIMENTS}.calibrate:EXPERIMENT"),
+    experiment=get("cubestack.host.experiments.aramis.measure:EXPERIMENT"),
+    studies={
+        "calibrate": get(f"{STUDIES}.calibrate:EXPERIMENT"),
+        "bench": get(f"{STUDIES}.benchmark:BENCHMARK"),
+        "demo": get(f"{STUDIES}.demo:show"),
+        "fidelity": get(f"{STUDIES}.fidelity:FIDELITY"),
+        "campaign": lambda: STUDIES,
+    },
     reports=(
         Report(
             "catalogue",
             "compile the onboard star catalogue and say what is in it",
-            get(f"{EXPERIMENTS}.catalogue:EXPERIMENT"),
+            get(f"{STUDIES}.catalogue:EXPERIMENT"),
         ),
     ),
-    benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
-    demo=get(f"{EXPERIMENTS}.demo:show"),
-    fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
-    campaigns=EXPERIMENTS,
     has_fpga=False,
     prepare=lambda shown: call(f"{BOARD}.catalogue:onboard_database", progress=shown)(),
     image_sensor=REGISTERS,

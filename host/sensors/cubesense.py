@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.earth_sun import EarthSunScene
     from cubestack.host.clients.cubesense.client import CubeSense
 
-EXPERIMENTS = "cubestack.host.experiments.cubesense"
+STUDIES = "cubestack.host.studies.cubesense"
 
 
 def _open_board(scene: "EarthSunScene | EarthSunView", **common: Any) -> "CubeSenseBoard":
@@ -36,30 +36,32 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
         nadir_deg=(-8.0, 12.0),
     ),
     default_scene_title="Earth and Sun",
-    experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
-    calibration=get(f"{EXPERIMENTS}.calibrate:EXPERIMENT"),
+    experiment=get("cubestack.host.experiments.cubesense.measure:EXPERIMENT"),
+    studies={
+        "calibrate": get(f"{STUDIES}.calibrate:EXPERIMENT"),
+        "bench": get(f"{STUDIES}.benchmark:BENCHMARK"),
+        "demo": get(f"{STUDIES}.demo:show"),
+        "fidelity": get(f"{STUDIES}.fidelity:FIDELITY"),
+        "campaign": lambda: STUDIES,
+    },
     reports=(
         Report(
             "memory",
             "list the firmware's buffers against the processor's memories",
-            get(f"{EXPERIMENTS}.memory:EXPERIMENT"),
+            get(f"{STUDIES}.memory:EXPERIMENT"),
         ),
         Report(
             "ball",
             "turn the nadir sensor before the ball of its bench",
-            get(f"{EXPERIMENTS}.ball:EXPERIMENT"),
+            get(f"{STUDIES}.ball:EXPERIMENT"),
         ),
         Report(
             "upsets",
             "turn over bits of FPGAs and memories, and see what comes of it",
-            get(f"{EXPERIMENTS}.upsets:EXPERIMENT"),
+            get(f"{STUDIES}.upsets:EXPERIMENT"),
         ),
     ),
-    benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
-    overlay=call(f"{EXPERIMENTS}.pictures:overlay"),
-    demo=get(f"{EXPERIMENTS}.demo:show"),
-    fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
-    campaigns=EXPERIMENTS,
+    overlay=call("cubestack.host.experiments.cubesense.pictures:overlay"),
     options=(
         BoardOption(
             "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.sky import Scene
     from cubestack.host.clients.cubestar.client import CubeStar
 
-EXPERIMENTS = "cubestack.host.experiments.cubestar"
+STUDIES = "cubestack.host.studies.cubestar"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 MAG_LIMIT = 3.8
@@ -134,34 +134,37 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
     scene_form=_scene_form,
     default_scene=_default_scene,
     default_scene_title="Orion",
-    experiment=get(f"{EXPERIMENTS}.measure:EXPERIMENT"),
-    calibration=get(f"{EXPERIMENTS}.calibrate:EXPERIMENT"),
+    experiment=get("cubestack.host.experiments.cubestar.measure:EXPERIMENT"),
+    studies={
+        "calibrate": get(f"{STUDIES}.calibrate:EXPERIMENT"),
+        "bench": get(f"{STUDIES}.benchmark:BENCHMARK"),
+        "demo": get(f"{STUDIES}.demo:show"),
+        "fidelity": get(f"{STUDIES}.fidelity:FIDELITY"),
+        "costs": call(f"{STUDIES}.costs:costs"),
+        "campaign": lambda: STUDIES,
+    },
     reports=(
         Report(
             "layouts",
             "compare CubeStar's memory layouts: rate, age, power, pins",
-            get(f"{EXPERIMENTS}.layouts:EXPERIMENT"),
+            get(f"{STUDIES}.layouts:EXPERIMENT"),
         ),
         Report(
             "catalogue",
             "compile the onboard star catalogue and say what is in it",
-            get(f"{EXPERIMENTS}.catalogue:EXPERIMENT"),
+            get(f"{STUDIES}.catalogue:EXPERIMENT"),
         ),
         Report(
             "memory",
             "list what firmware uses of the processor's memories",
-            get(f"{EXPERIMENTS}.memory:EXPERIMENT"),
+            get(f"{STUDIES}.memory:EXPERIMENT"),
         ),
         Report(
             "upsets",
             "turn over bits of FPGA and memories, and see what comes of it",
-            get(f"{EXPERIMENTS}.upsets:EXPERIMENT"),
+            get(f"{STUDIES}.upsets:EXPERIMENT"),
         ),
     ),
-    benchmark=get(f"{EXPERIMENTS}.benchmark:BENCHMARK"),
-    demo=get(f"{EXPERIMENTS}.demo:show"),
-    fidelity=get(f"{EXPERIMENTS}.fidelity:FIDELITY"),
-    campaigns=EXPERIMENTS,
     options=(
         BoardOption(
             "layout",
@@ -185,7 +188,6 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         ),
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),
-    costs=call(f"{EXPERIMENTS}.costs:costs"),
     tops=get("cubestack.hdl.cubestar.tops:TOPS"),
     proofs=get("cubestack.hdl.proofs.cubestar:PROOFS"),
     image_sensor=REGISTERS,

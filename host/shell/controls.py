@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from cubestack.host.devices.controls import Controls
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.controls import Controls
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
+from cubestack.host.targets import Target
 
 ON_OFF = ("on", "off")
 

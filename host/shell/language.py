@@ -12,13 +12,13 @@ from typing import TypeVar
 from cubestack.firmware_model.interface.codec.field import suggestion
 from cubestack.firmware_model.interface.codec.message import Kind
 from cubestack.host.clients.diagnosis import why_silent
-from cubestack.host.devices.targets import Target
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.shell.controls import LOG, ON_OFF, ControlCommands
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.ports import PortCommands
 from cubestack.host.shell.registers import RegisterCommands
 from cubestack.host.shell.result import Result, ShellCommand, ShellError
+from cubestack.host.targets import Target
 
 __all__ = ["Result", "Shell", "ShellError"]
 

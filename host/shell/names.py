@@ -9,8 +9,8 @@ from difflib import get_close_matches
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Kind, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
-from cubestack.host.devices.targets import Target
 from cubestack.host.shell.result import ShellError
+from cubestack.host.targets import Target
 
 ADDRESS = "@"
 NEAR = 3

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cubestack.host.devices.targets import Target
 from cubestack.host.errors import TargetError
 from cubestack.host.pictures.images import save_picture
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count
+from cubestack.host.targets import Target
 from cubestack.host.transport.streams import READ_BYTES, read_answer
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from itertools import count
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
 from cubestack.firmware_model.interface.codec.message import Kind, Message
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
-from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
 from cubestack.host.shell.names import Names, number_of
 from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
+from cubestack.host.targets import Target
 
 WATCH_PERIOD_S = 1.0
 WATCH_COUNT = 10

@@ -11,26 +11,26 @@ from PIL import Image
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host import targets
 from cubestack.host.clients.contract import DeviceClient
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices import targets
-from cubestack.host.devices.orbiting import _seen
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import Target, connect, open_target
+from cubestack.host.emulation.orbit import _seen
 from cubestack.host.errors import BadAnswerError, PortOpenError, TargetError
-from cubestack.host.experiments import workers
-from cubestack.host.experiments.campaigns.plan import Plan
-from cubestack.host.experiments.fidelity import fidelity_of, rewritten
-from cubestack.host.experiments.hazards import album
 from cubestack.host.experiments.measure import experiment_of, measure
-from cubestack.host.experiments.upsets import experiment as upsets
-from cubestack.host.experiments.upsets.clean import Interval
 from cubestack.host.pictures.campaigns import figure
 from cubestack.host.pictures.hazards import save_curves
 from cubestack.host.recording.setups import read_document
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.result import ShellError
+from cubestack.host.studies import workers
+from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.fidelity.table import fidelity_of, rewritten
+from cubestack.host.studies.hazards import album
+from cubestack.host.studies.upsets import experiment as upsets
+from cubestack.host.studies.upsets.clean import Interval
+from cubestack.host.targets import Target, connect, open_target
 from tests.conftest import Run
 
 from .conftest import FakeCubeStar, UartLink, over_i2c
@@ -234,9 +234,9 @@ def test_tables_of_a_plan_are_tables(name: str) -> None:
 def test_a_device_without_figures_or_command(monkeypatch: pytest.MonkeyPatch) -> None:
     from dataclasses import replace
 
-    from cubestack.host.experiments import fidelity
+    from cubestack.host.studies.fidelity import table as fidelity
 
-    bare = replace(device("cubestar"), fidelity=None)
+    bare = replace(device("cubestar"), studies={})
     monkeypatch.setattr(fidelity, "registered", lambda _name: bare)
     with pytest.raises(ValueError, match="cubestar declares no published figures"):
         fidelity_of("cubestar")

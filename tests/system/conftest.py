@@ -22,7 +22,7 @@ import pytest
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import main
-from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 
 ROOT = Path(__file__).parents[2]
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main")

@@ -21,8 +21,8 @@ from cubestack.emulator.scene.attitude import matrix_from_quaternion, random_qua
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, IdMode
 from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
-from cubestack.host.devices.emulated import power_up
 from cubestack.host.devices.registry import device
+from cubestack.host.emulation.emulated import power_up
 
 #: Frames that are read once, and those that give the next star at each read.
 ONCE = (

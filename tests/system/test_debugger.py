@@ -14,7 +14,7 @@ import cubestack
 from cubestack.emulator.boards.debugging import open_debugger
 from cubestack.emulator.iss.gdb.packets import framed
 from cubestack.emulator.iss.insight.symbols import Symbols
-from cubestack.host.devices.records import start_trace
+from cubestack.host.emulation.records import start_trace
 from tests.conftest import Run
 from tests.emulator.boards.cubestar.builds import build, needs_toolchain
 from tests.system.conftest import Emulate

@@ -11,7 +11,7 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from tests.system.conftest import Ear
 from tests.tiers import quick
 

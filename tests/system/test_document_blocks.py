@@ -18,7 +18,7 @@ import yaml
 
 import cubestack
 from cubestack.host.cli.main import make_parser
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from tests.conftest import Run
 
 from .conftest import ROOT, Served

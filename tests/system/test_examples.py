@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.experiments.attitude import errors
 from tests.system.conftest import ROOT
 

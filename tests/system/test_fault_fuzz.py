@@ -23,7 +23,7 @@ from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.experiments.attitude import errors
 from tests.system.conftest import Ear
 from tests.tiers import quick

@@ -24,9 +24,9 @@ from cubestack.firmware_model.interface.cubestar.codes import (
 )
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.cli.main import main
-from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device
-from cubestack.host.experiments.cubestar.layouts import EXPERIMENT, LayoutResult
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
+from cubestack.host.studies.cubestar.layouts import EXPERIMENT, LayoutResult
 from tests.system.conftest import Emulate, Measure
 
 ON_BUS = [layout for layout in Layout if layout is not Layout.COPIED]

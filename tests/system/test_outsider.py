@@ -10,9 +10,9 @@ from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.host.devices.emulated import AnyEmulated, open_device
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.shell.language import Shell
+from cubestack.host.targets import Target
 from tests.system.cubesense.conftest import FACING
 
 #: Pictures without noise are the same again.

@@ -10,8 +10,8 @@ from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import main
-from cubestack.host.devices.emulated import AnyEmulated, open_device
-from cubestack.host.devices.records import start_recorder
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.records import start_recorder
 from cubestack.host.recording.setups import emulated_setup
 from tests.emulator.boards.cubestar.builds import build, needs_toolchain
 

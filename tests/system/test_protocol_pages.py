@@ -8,7 +8,7 @@ import pytest
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.cubestar.tasks import TASKS
 from cubestack.firmware_model.interface.cubestar import INTERFACE, TaskStatus
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from tests.system.conftest import ROOT
 
 PAGES = {

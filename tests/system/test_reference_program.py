@@ -17,12 +17,12 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.conformance.contract import CheckRun, Verdict
 from cubestack.host.conformance.reads import check_reads
 from cubestack.host.conformance.writes import check_writes
-from cubestack.host.devices.controls import EmulatedControls
-from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.controls import EmulatedControls
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.errors import CommandRefusedError
 from cubestack.host.experiments.attitude import errors
+from cubestack.host.targets import Target
 from tests.system.conftest import ROOT
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

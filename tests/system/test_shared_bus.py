@@ -11,7 +11,7 @@ import pytest
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.devices.registry import device_names, devices
-from cubestack.host.devices.targets import open_target
+from cubestack.host.targets import open_target
 from tests.system.conftest import COMMAND, Served
 from tests.tiers import quick
 

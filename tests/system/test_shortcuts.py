@@ -9,8 +9,8 @@ from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.devices.emulated import open_device
-from cubestack.host.devices.records import start_recorder
+from cubestack.host.emulation.emulated import open_device
+from cubestack.host.emulation.records import start_recorder
 from cubestack.host.errors import HostError
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

@@ -4,8 +4,8 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.devices.registry import device
-from cubestack.host.experiments.cubestar.shots import PICTURES, Shot, slewing_shots
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.studies.cubestar.shots import PICTURES, Shot, slewing_shots
 
 
 def _turning(profile: str, frames: int, rate_deg_s: float) -> list[Shot]:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.firmware_model.interface.cubesense.codes import ResetTarget
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.emulated import AnyEmulated, open_device
 from cubestack.host.devices.registry import device
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 
 NAMES = ("cubestar", "cubesense", "aramis")
 

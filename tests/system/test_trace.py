@@ -14,7 +14,7 @@ from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.device_options import record
 from cubestack.host.cli.main import main
 from cubestack.host.clients.contract import Client
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.recording.setups import emulated_setup
 from tests.emulator.recording import vcd
 

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.host.clients.aramis.client import Aramis, Star
-from cubestack.host.devices.emulated import EmulatedDevice
+from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
-from cubestack.host.experiments.hazards import asked as hazards
+from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
-from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.devices.experiment import Experiment, Mark, Result
-from cubestack.host.experiments.hazards import asked as hazards
+from cubestack.host.emulation.emulated import EmulatedDevice
+from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
 

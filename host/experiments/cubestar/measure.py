@@ -37,11 +37,11 @@ from cubestack.host.calibration.camera import load_camera
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
-from cubestack.host.devices.emulated import EmulatedDevice
 from cubestack.host.devices.experiment import Mark
+from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.errors import CameraFileError
 from cubestack.host.experiments import attitude as attitudes
-from cubestack.host.experiments.hazards import asked as hazards
+from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
 

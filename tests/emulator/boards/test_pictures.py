@@ -7,7 +7,7 @@ import pytest
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.host.clients.quaternions import attitude_columns
-from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 
 SHAPES = {"cubestar": (512, 1024), "cubesense": (480, 640), "aramis": (1024, 1280)}
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.interface.cubestar.telecommands import MOST_STARS
-from cubestack.host.experiments.cubestar.reference_catalogue import catalogue_tables
+from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 
 SOURCES = Path(__file__).parents[3] / "firmware_model" / "reference" / "algorithms"
 Floats = NDArray[np.float32]

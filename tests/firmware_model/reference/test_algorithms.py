@@ -36,7 +36,7 @@ from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitche
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.settings import Settings
-from cubestack.host.experiments.cubestar.reference_catalogue import catalogue_tables
+from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 from tests.tiers import quick
 
 from ..cubestar.sky import Sky, take

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.host.cli.main import COMMANDS
+from cubestack.host.cli.commands import commands
 from cubestack.host.devices.registry import device_names
 from tests.conftest import Run
 
@@ -41,7 +41,7 @@ def test_bash_completes_commands_devices_and_options(run: Run, tmp_path: Path) -
 def test_each_shells_script_is_one_that_it_reads(shell: str, run: Run, tmp_path: Path) -> None:
     printed = run("completion", shell)
     assert (printed.code, printed.err) == (0, "")
-    for name in COMMANDS:
+    for name in commands():
         assert name in printed.out
     if shutil.which(shell) is not None:
         (tmp_path / "script").write_text(printed.out)

@@ -15,9 +15,9 @@ from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli import emulate
 from cubestack.host.cli.main import main
-from cubestack.host.devices.remote_controls import TOKEN, ControlClient
-from cubestack.host.devices.targets import open_target
+from cubestack.host.emulation.remote_controls import TOKEN, ControlClient
 from cubestack.host.errors import PortOpenError
+from cubestack.host.targets import open_target
 from tests.conftest import Run
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

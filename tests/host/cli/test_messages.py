@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.host.cli.main import COMMANDS
+from cubestack.host.cli.commands import commands
 
 from ...conftest import Run
 
@@ -104,7 +104,8 @@ ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 def test_a_locale_without_letters_of_ours_is_no_error() -> None:
     text = (
         "import sys\n"
-        "from cubestack.host.cli import demo, main\n"
+        "from cubestack.host.cli import main\n"
+        "from cubestack.host.studies.demo import command as demo\n"
         "from cubestack.host.terminal import head, say, tell\n"
         "def run(_args):\n"
         "    print(sys.stdout.encoding)\n"
@@ -125,7 +126,7 @@ def test_commands_run_in_such_a_locale(words: tuple[str, ...]) -> None:
     assert done.stdout
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", commands())
 def test_help_that_names_documents_says_where_they_are(run: Run, command: str) -> None:
     shown = run(command, "--help").out
     assert ("docs/" in shown) == ("\ndocs/: https://" in shown)

@@ -9,8 +9,8 @@ import pytest
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.cubesense.state import CameraSettings
 from cubestack.host.cli.device_options import inject_plan, record
-from cubestack.host.devices import past
-from cubestack.host.devices.emulated import open_device, power_up
+from cubestack.host.emulation import history as past
+from cubestack.host.emulation.emulated import open_device, power_up
 from cubestack.host.recording.setups import emulated_setup
 
 HEADER = '{"recording":1,"device":"cubesense","lines":{}'

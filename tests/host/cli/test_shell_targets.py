@@ -18,7 +18,7 @@ from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.main import main
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 
 pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),

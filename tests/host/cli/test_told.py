@@ -14,13 +14,15 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.native.compiler import CompilerError
-from cubestack.host.cli import campaign, hazards, measure
 from cubestack.host.cli import main as entry
+from cubestack.host.cli import measure
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.experiments.campaigns.statistics import Change
-from cubestack.host.experiments.hazards.curves import Point
 from cubestack.host.options import Options, option, whole
+from cubestack.host.studies.campaign import command as campaign
+from cubestack.host.studies.campaign.statistics import Change
+from cubestack.host.studies.hazards import command as hazards
+from cubestack.host.studies.hazards.curves import Point
 from tests.conftest import Run
 
 # --- any command ----------------------------------------------------------------------------------
@@ -37,7 +39,7 @@ def ending(monkeypatch: pytest.MonkeyPatch) -> list[BaseException | int | None]:
             raise end
         return end
 
-    monkeypatch.setattr("cubestack.host.cli.bench.run", run)
+    monkeypatch.setattr("cubestack.host.studies.bench.command.run", run)
     return ends
 
 
@@ -87,7 +89,9 @@ def test_loudness(
         return own.level, len(own.handlers), terminal._errors.quiet
 
     own, during = logging.getLogger("cubestack"), list[tuple[int, int, bool]]()
-    monkeypatch.setattr("cubestack.host.cli.bench.run", lambda _: during.append(state()))
+    monkeypatch.setattr(
+        "cubestack.host.studies.bench.command.run", lambda _: during.append(state())
+    )
     before = state()
     assert run(*words, "bench").code == 0
     assert during == [(level, before[1] + 1, "-q" in words)]
@@ -278,7 +282,7 @@ def test_all_devices_are_measured_by_default(run: Run, monkeypatch: pytest.Monke
 
 
 def test_the_scale_of_each_hazard_is_listed(run: Run) -> None:
-    from cubestack.host.experiments.hazards.asked import known
+    from cubestack.host.experiments.hazard_options import known
 
     lines = run("hazards", "--list").out.splitlines()
     for name, kind in known().items():

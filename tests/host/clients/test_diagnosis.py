@@ -15,11 +15,11 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.clients import diagnosis
 from cubestack.host.clients.diagnosis import why_silent
-from cubestack.host.devices.emulating import emulating
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import open_target
+from cubestack.host.emulation.process import emulating
 from cubestack.host.errors import NoAnswerError
 from cubestack.host.shell.language import Shell
+from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport, open_transport
 from tests.tiers import quick
 

@@ -13,10 +13,10 @@ from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import open_target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
 from cubestack.host.ground.desk import Desk
 from cubestack.host.recording.said import said
+from cubestack.host.targets import open_target
 
 from ..conftest import Slave, over_i2c
 

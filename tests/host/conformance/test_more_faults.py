@@ -20,8 +20,8 @@ from cubestack.host.conformance.suite import run_suite
 from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.shown_settings import read_back
-from cubestack.host.devices.targets import Target
 from cubestack.host.errors import NoAnswerError
+from cubestack.host.targets import Target
 from tests.host.conformance.test_suite import SMALL, good, suite
 from tests.host.conformance.test_suite import failures as all_failures
 from tests.host.conftest import FakeNode, Line, Slave, UartLink

@@ -12,7 +12,7 @@ from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.device import ConformanceNotes
-from cubestack.host.devices.targets import Target
+from cubestack.host.targets import Target
 from tests.host.conftest import FakeNode, LetterLine, Slave, UartLink
 
 #: Of CubeSense without most of its messages, which other tests walk.

@@ -25,7 +25,7 @@ from cubestack.host.conformance.values import values_to_try
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.shown_settings import read_back
-from cubestack.host.devices.targets import Target
+from cubestack.host.targets import Target
 
 BLOCKS = 4
 NOTES = {name: device(name).conformance for name in ("cubestar", "cubesense")}

@@ -9,8 +9,8 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from cubestack.host.devices import registry
-from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.errors import TargetError
 
 

@@ -17,14 +17,14 @@ from cubestack.host.experiments.attitude import (
     is_right,
     percentile_95,
 )
-from cubestack.host.experiments.cubesense import ball
 from cubestack.host.experiments.cubesense import measure as cubesense
 from cubestack.host.experiments.cubesense.measure import SensorResult
 from cubestack.host.experiments.cubestar import measure as cubestar
-from cubestack.host.experiments.cubestar.layouts import EXPERIMENT as LAYOUTS
-from cubestack.host.experiments.cubestar.layouts import LayoutResult
 from cubestack.host.experiments.cubestar.measure import CubeStarResult
 from cubestack.host.experiments.rates import outcome
+from cubestack.host.studies.cubesense import ball
+from cubestack.host.studies.cubestar.layouts import EXPERIMENT as LAYOUTS
+from cubestack.host.studies.cubestar.layouts import LayoutResult
 
 RIGHT = AttitudeResult(
     solved=True,

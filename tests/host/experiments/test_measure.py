@@ -146,12 +146,10 @@ def test_wrong_arguments(
 def test_every_declared_experiment_report_and_demonstration_loads(name: str) -> None:
     one = device(name)
     assert one.experiment is not None
-    assert one.demo is not None
-    assert callable(one.demo())
+    assert callable(one.study("demo"))
     experiments = [one.experiment(), *(report.load() for report in one.reports)]
     for experiment in experiments:
         assert experiment.options().declared()["seed"] if experiment.powers_up else True
         assert experiment.count(experiment.options()) >= 1
         assert set(experiment.decides) <= {option.name for option in one.all_options}
-    assert one.benchmark is not None
-    assert one.benchmark().figures
+    assert one.study("bench").figures

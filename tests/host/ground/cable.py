@@ -12,10 +12,10 @@ from cubestack.emulator.bus.line_format import LineFormat, LineSampler
 from cubestack.emulator.ports.terminal_settings import line_format, read_settings
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.message import Interface, Kind
-from cubestack.host.devices.targets import open_target
 from cubestack.host.errors import PortClosedError
 from cubestack.host.recording.said import said
 from cubestack.host.shell.language import Shell
+from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport
 
 from ..conftest import UartLink

@@ -13,9 +13,9 @@ import pytest
 from cubestack.emulator.ports.control import ControlPort
 from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
-from cubestack.host.devices.emulated import AnyEmulated, open_device
-from cubestack.host.devices.past import Past
 from cubestack.host.devices.registry import device_names
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.history import Past
 from cubestack.host.ground.control_api import control_app
 from cubestack.host.ground.emulation import Emulation
 from cubestack.host.ground.guard import Guard

@@ -7,9 +7,9 @@ import pytest
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import Target
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
 from cubestack.host.ground.desk import Desk, Link
+from cubestack.host.targets import Target
 
 from ..conftest import FakeCubeStar, UartLink
 

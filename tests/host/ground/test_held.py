@@ -9,12 +9,12 @@ from websockets.sync.client import connect
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.remote_controls import RemoteControls
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.remote_controls import RemoteControls
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.serving import LOOPBACK, Serving
+from cubestack.host.targets import Target
 
 from ..conftest import UartLink
 from .conftest import SOON_S, TOKEN

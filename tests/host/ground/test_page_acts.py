@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.host.devices.targets import open_target
+from cubestack.host.targets import open_target
 from tests.emulator.recording import vcd
 
 from .browser import line, look, shown, station

@@ -11,11 +11,11 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.devices.targets import open_target
 from cubestack.host.ground.desk import FROM_A_PAGE, LONGEST_LINE, Desk
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.serving import Serving
+from cubestack.host.targets import open_target
 
 from .conftest import SOON_S, TOKEN
 

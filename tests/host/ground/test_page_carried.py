@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.host.devices.emulating import emulating
-from cubestack.host.devices.targets import connect
+from cubestack.host.emulation.process import emulating
 from cubestack.host.pictures.images import png, save_picture
+from cubestack.host.targets import connect
 
 from .browser import line, shown, station
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from cubestack.host.devices.emulating import emulating
 from cubestack.host.devices.registry import device
+from cubestack.host.emulation.process import emulating
 
 from .browser import line, shown, station
 

@@ -10,7 +10,7 @@ import pyarrow.parquet
 import pytest
 
 from cubestack.host.cli.main import main
-from cubestack.host.devices.emulating import emulating
+from cubestack.host.emulation.process import emulating
 from cubestack.host.recording.said import COLUMNS
 
 from .browser import line, shown, station

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.host.devices.targets import open_target
+from cubestack.host.targets import open_target
 from tests.tiers import quick
 
 from .browser import await_devices, look, shown, station

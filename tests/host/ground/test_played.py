@@ -7,11 +7,11 @@ import pytest
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.targets import Target, open_target
 from cubestack.host.errors import NoAnswerError, TargetError
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.logs import recording
 from cubestack.host.ground.played import PlayedClient, is_recording, open_recording
+from cubestack.host.targets import Target, open_target
 
 from ..conftest import LetterLine
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.host.devices.controls import Controls, EmulatedControls
-from cubestack.host.devices.remote_controls import TOKEN as VARIABLE
-from cubestack.host.devices.remote_controls import ControlClient, RemoteControls, controlled
+from cubestack.host.emulation.controls import Controls, EmulatedControls
+from cubestack.host.emulation.remote_controls import TOKEN as VARIABLE
+from cubestack.host.emulation.remote_controls import ControlClient, RemoteControls, controlled
 from cubestack.host.errors import PortOpenError, TargetError
 
 from .conftest import TOKEN, Controlled

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.scene.attitude import matrix_from_pointing
-from cubestack.host.devices.emulated import open_device
 from cubestack.host.devices.registry import device, device_names
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.errors import TargetError
 from cubestack.host.ground import scenes
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import pytest
 
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.devices.targets import open_target
 from cubestack.host.errors import TargetError
 from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.tables import SELECTED, sensor_rows, setting_rows
+from cubestack.host.targets import open_target
 
 
 @pytest.fixture(params=device_names())

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from cubestack.host.devices.targets import open_target
 from cubestack.host.ground.desk import Desk
+from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport
 
 from .cable import cable

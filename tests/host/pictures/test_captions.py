@@ -5,7 +5,7 @@ import pytest
 import cubestack
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.experiments.cubestar.demo import left_out_by
+from cubestack.host.studies.cubestar.demo import left_out_by
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.experiments.cubesense.pictures import overlay
 from cubestack.host.pictures.overlay import star_overlay
 

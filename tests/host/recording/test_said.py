@@ -17,9 +17,9 @@ from cubestack.firmware_model.formats.recording import (
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.host.cli.main import main
 from cubestack.host.clients.i2c import I2cClient
-from cubestack.host.devices.emulated import open_device
-from cubestack.host.devices.records import start_recorder
 from cubestack.host.devices.registry import device, device_names
+from cubestack.host.emulation.emulated import open_device
+from cubestack.host.emulation.records import start_recorder
 from cubestack.host.recording.said import COLUMNS, LINE, Said, said
 
 INTERFACE = device("cubesense").interface

@@ -15,12 +15,12 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
-from cubestack.host.devices.controls import EmulatedControls
 from cubestack.host.devices.registry import device
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TargetError
 from cubestack.host.shell.language import Shell, ShellError
 from cubestack.host.shell.registers import parse_value, parse_values
+from cubestack.host.targets import Target
 
 from ..conftest import LetterLine, Slave, UartLink
 

@@ -8,10 +8,10 @@ import pytest
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.controls import EmulatedControls
-from cubestack.host.devices.targets import Target
+from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.shell.language import Shell, ShellError
 from cubestack.host.shell.result import check_count, to_number
+from cubestack.host.targets import Target
 
 from ..conftest import LetterLine, UartLink
 

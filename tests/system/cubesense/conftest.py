@@ -10,7 +10,7 @@ from cubestack.emulator.boards.cubesense.board import HALVES, CubeSenseBoard
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera
 from cubestack.host.clients.cubesense.client import Measurement
-from cubestack.host.devices.emulated import AnyEmulated, open_device
+from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from tests.system.conftest import Open
 
 SUN_DEG = (20.0, 10.0)

@@ -10,7 +10,7 @@ from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.host.clients.cubesense.client import Measurement
-from cubestack.host.devices.emulated import AnyEmulated
+from cubestack.host.emulation.emulated import AnyEmulated
 from tests.system.conftest import Open
 
 from .conftest import FACING

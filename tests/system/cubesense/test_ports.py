@@ -17,7 +17,7 @@ from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.clients.cubesense.service_port import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
-from cubestack.host.devices.targets import open_target
+from cubestack.host.targets import open_target
 from tests.system.conftest import ROOT, Emulate, Open, Served
 
 from .conftest import NADIR_DEG, SUN_DEG, check_right, sent

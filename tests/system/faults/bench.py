@@ -31,8 +31,8 @@ from cubestack.firmware_model.interface.cubestar.codes import ImageBlockSize
 from cubestack.host.clients.aramis.client import Attitude
 from cubestack.host.clients.cubesense.client import Measurement
 from cubestack.host.clients.node import NodeClient
-from cubestack.host.devices.emulated import AnyEmulated, power_up
 from cubestack.host.devices.registry import device
+from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from tests.system.conftest import Ear
 from tests.system.cubesense.conftest import FACING, check_right, held
 

@@ -13,9 +13,9 @@ from cubestack.emulator.faults.plan import parse_plan
 from cubestack.emulator.faults.table import FAULTS
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.cli.main import main
-from cubestack.host.devices.emulated import open_device
-from cubestack.host.devices.targets import open_target
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.shell.language import Shell
+from cubestack.host.targets import open_target
 from tests.system.conftest import Ear
 from tests.tiers import quick
 

@@ -16,7 +16,7 @@ from cubestack.emulator.i2cdev.adapter import I2cAdapter
 from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.i2cdev.scheduler import open_scheduler
 from cubestack.emulator.i2cdev.server import I2cServer
-from cubestack.host.devices.emulated import open_device
+from cubestack.host.emulation.emulated import open_device
 from tests.tiers import quick
 
 COMMAND = (sys.executable, "-m", "cubestack.host.cli.main", "run")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from cubestack.host.clients.cubestar.operator import LADDER, find_threshold
-from cubestack.host.experiments.cubestar.night import choose_threshold
+from cubestack.host.studies.cubestar.night import choose_threshold
 
 
 class Sky:

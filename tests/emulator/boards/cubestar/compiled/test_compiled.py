@@ -24,7 +24,7 @@ from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.firmware_model.mcu.compiled import measured
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.host.experiments.cubestar.costs import generated
+from cubestack.host.studies.cubestar.costs import generated
 from tests.tiers import quick
 
 from .....firmware_model.cubestar.sky import take

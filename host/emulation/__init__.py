@@ -1,0 +1,1 @@
+"""A powered-up device: its ports, time, controls and history."""

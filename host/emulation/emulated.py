@@ -1,0 +1,283 @@
+"""An emulated device that is powered up: virtual time, scene, faults, and all its ports.
+
+- ``client``: this project's client on the serial line.
+- ``serial()``: pyserial's interface in virtual time, for drivers in Python; repeatable to the byte.
+- ``smbus()``: smbus2's interface, likewise.
+- ``run()``: any program, on a pseudo-terminal.
+- ``run_on_i2c()``: any program that opens /dev/i2c-N.
+
+Only one host is at a serial line at a time: plugging one in takes out the one before.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias
+
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE
+from cubestack.host.clients.contract import Client, Closable, DeviceClient
+from cubestack.host.clients.i2c import I2cClient
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Device, Engine
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.devices.registry import devices
+from cubestack.host.emulation.virtual_serial import PS_PER_S, VirtualSerial
+from cubestack.host.transport.smbus import CubeSMBus
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.contract import Board
+    from cubestack.emulator.faults.injector import Faults
+    from cubestack.emulator.ports.realtime import RealtimeScheduler
+
+PORT = "{port}"
+"""What ``run`` replaces in a command by the path of the serial port."""
+
+
+@dataclass(eq=False)
+class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
+    """A powered-up device.
+
+    Attributes:
+        device: what it is.
+        board: the emulated board, with all its parts.
+        seed: of everything random.
+        chosen: its profile, and the switches that differ, as keywords of ``open_device``.
+        follows: what moves its scene, with what is moved; empty when it stays as it was put.
+    """
+
+    device: Device[BoardT_co, ClientT_co]
+    board: BoardT_co
+    seed: int
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    follows: str = field(default="", init=False)
+    _client: ClientT_co | None = field(default=None, init=False, repr=False)
+
+    @property
+    def client(self) -> ClientT_co:
+        """This project's client on the serial line; plugged in again after any other host.
+
+        On I2C where that line has been given another protocol.
+        """
+        if self._client is None:
+            self._client = self.device.client(node_client(self.board, self.device.interface))
+        return self._client
+
+    @property
+    def faults(self) -> Faults:
+        """Injects faults into it."""
+        return self.board.faults
+
+    @property
+    def time_s(self) -> float:
+        """Virtual time since power-up."""
+        return self.board.kernel.now / PS_PER_S
+
+    def wait(self, seconds: float) -> None:
+        """Let virtual time pass."""
+        self.board.kernel.advance_to(self.board.kernel.now + round(seconds * PS_PER_S))
+
+    @property
+    def scene(self) -> Any:
+        """What the cameras see; a scene, the path of a scene file, or None for the default one."""
+        return self.board.scene
+
+    @scene.setter
+    def scene(self, scene: Any) -> None:
+        for key, value in scene_options(self.device, scene).items():
+            if value != self.chosen.get(key, ""):
+                raise ValueError(f"{scene}: {key} is chosen when the device is powered up")
+        self.board.scene = self.device.scene(scene)
+
+    # --- ports ----------------------------------------------------------------------------------
+
+    def serial(self, timeout: float | None = 1.0, line: str = "uart") -> VirtualSerial:
+        """A serial line with pyserial's interface; ``timeout`` in s of virtual time."""
+        if line == self.board.lines[0].name:
+            self._client = None
+        port = self.board.serial(line)
+        return VirtualSerial(port, self.board.uarts[line].form.baud, timeout)
+
+    def smbus(self) -> CubeSMBus:
+        """The I2C bus with smbus2's interface."""
+        return CubeSMBus(link=self.board.i2c())
+
+    def run(
+        self, *command: str | Path, timeout_s: float = 60.0, pace: Literal["real", "fast"] = "fast"
+    ) -> subprocess.CompletedProcess[str]:
+        """Run a program against the serial line; its exit code and output.
+
+        Every "{port}" in ``command`` becomes the path of a pseudo-terminal; a warning tells of a
+        program that sets another baud rate, parity or stop bits than the device has. Raises
+        subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
+        """
+        from cubestack.emulator.i2cdev.scheduler import open_scheduler
+        from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
+
+        self._client = None
+        with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
+            port = Path(folder) / "tty"
+            endpoint = PtyEndpoint(port, self.board.uart, report=warnings.warn)
+            try:
+                words = [str(word).replace(PORT, str(port)) for word in command]
+                with open_scheduler(
+                    self.board.kernel, [endpoint], self.board.busy, pace=pace
+                ) as scheduler:
+                    program = subprocess.Popen(
+                        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                    )
+                    with ThreadPoolExecutor(1) as threads:
+                        done = threads.submit(_watch, program, timeout_s, scheduler)
+                        scheduler.run()
+                        return done.result()
+            finally:
+                endpoint.close()
+
+    def run_on_i2c(self, *command: str | Path, bus: int = 7) -> int:
+        """Run a program that finds the device on /dev/i2c-``bus``; its exit code."""
+        from cubestack.emulator.i2cdev.adapter import I2cAdapter
+        from cubestack.emulator.i2cdev.running import emulated_bus, run_program
+
+        adapter = I2cAdapter(self.board.kernel, self.board.i2c_bus)
+        with tempfile.TemporaryDirectory(prefix="cubestack-") as folder:
+            path = Path(folder) / "bus"
+            opened = emulated_bus(self.board.kernel, self.board.busy, adapter, path)
+            try:
+                return run_program([str(word) for word in command], bus, opened, pace="fast")
+            finally:
+                opened.port.close()
+
+    def close(self) -> None:
+        """Power down."""
+        self.board.close()
+
+
+def node_client(board: Board, interface: Interface) -> Client:
+    """On the satellite's serial line; on I2C where that line has been given another protocol."""
+    if board.lines[0].has_node:
+        return NodeClient(board.serial(), interface)
+    bus = board.i2c()
+    return I2cClient(bus, interface, wait=bus.wait)
+
+
+#: A powered-up device, whichever it is.
+AnyEmulated: TypeAlias = "EmulatedDevice[Board, DeviceClient]"
+
+
+def _watch(
+    program: subprocess.Popen[str], timeout_s: float, scheduler: RealtimeScheduler
+) -> subprocess.CompletedProcess[str]:
+    """Wait for a program, and end the scheduler after it."""
+    try:
+        output, errors = program.communicate(timeout=timeout_s)
+        return subprocess.CompletedProcess(program.args, program.returncode, output, errors)
+    except subprocess.TimeoutExpired:
+        with program:  # closes the pipes unread, as a child of it may hold them for ever
+            program.kill()
+        raise
+    finally:
+        scheduler.stop()
+
+
+def check_options(
+    device: AnyDevice, options: Mapping[str, object], shown: Callable[[str], str] = str
+) -> None:
+    """Refuse options, and values, that ``device`` does not have; ValueError says what it has.
+
+    ``shown`` is how an option's name is told.
+    """
+    own = {option.name: option for option in device.all_options}
+    for name, value in options.items():
+        if name not in own:
+            owners = [
+                one.name for one in devices() for option in one.all_options if option.name == name
+            ]
+            whose = f"an option of {', '.join(owners)}, not" if owners else "no option"
+            raise ValueError(f"{shown(name)} is {whose} of {device.name}")
+        choices = own[name].choices or (False, True)
+        if value not in choices and not own[name].metavar:
+            known = ", ".join(map(str, choices))
+            raise ValueError(f"{name} of {device.name} must be one of {known}, not {value!r}")
+
+
+def scene_options(device: AnyDevice, scene: Any) -> dict[str, str]:
+    """What a scene file says of the device that looks at it, as keywords of ``open_device``.
+
+    Nothing where ``scene`` is no file's path. ValueError names the file, and what is right.
+    """
+    if not isinstance(scene, str | Path):
+        return {}
+    from cubestack.emulator.scene.file import device_keys
+
+    try:
+        found = device_keys(Path(scene))
+        check_options(device, found)
+        device.switches.of(found.get("profile", DEFAULT_PROFILE), found.get("set", ""))
+    except ValueError as error:
+        raise ValueError(f"{scene}: {error}") from None
+    return found
+
+
+def power_up(
+    device: Device[BoardT_co, ClientT_co],
+    scene: Any = None,
+    *,
+    seed: int = 0,
+    engine: Engine = "auto",
+    beside: AnyEmulated | None = None,
+    **options: Any,
+) -> EmulatedDevice[BoardT_co, ClientT_co]:
+    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board.
+
+    Profile and switches that are not given are those of the scene file.
+    """
+    chosen = {}
+    if beside is not None:
+        options |= {"kernel": beside.board.kernel, "i2c_bus": beside.board.i2c_bus}
+    if device.switches.declared():
+        options = scene_options(device, scene) | options
+        profile, changes = options.pop("profile", DEFAULT_PROFILE), options.pop("set", "")
+        options["switches"] = device.switches.of(profile, changes)
+        chosen = {"profile": profile, **({"set": changes} if changes else {})}
+    else:
+        scene_options(device, scene)  # there are none
+    board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
+    if board.firmware:
+        chosen["firmware"] = board.firmware
+    return EmulatedDevice(device, board, seed, chosen)
+
+
+def open_device(
+    name: str,
+    scene: Any = None,
+    *,
+    seed: int = 0,
+    engine: Engine = "auto",
+    baud: int | None = None,
+    beside: AnyEmulated | None = None,
+    **options: Any,
+) -> AnyEmulated:
+    """Power up a registered device.
+
+    Args:
+        name: of the device, one of ``device_names()``.
+        scene: what its cameras see: a scene, the path of a scene file, or None for the default.
+        seed: of everything random.
+        engine: how its FPGA is run.
+        baud: of its first serial line; None for the published rate.
+        beside: another device, whose virtual time and I2C bus it shares.
+        options: of this device's board; see ``cubestack emulate --help``.
+
+    Raises:
+        TargetError: nobody registered that name.
+        ValueError: a scene or an option that makes no sense; the text says which.
+    """
+    device = registered(name)
+    check_options(device, options)
+    return power_up(device, scene, seed=seed, engine=engine, baud=baud, beside=beside, **options)

@@ -1,0 +1,151 @@
+"""What can be done to a device that another process emulates, by its control port."""
+
+import http.client
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from cubestack.host.emulation.controls import spoken
+from cubestack.host.errors import PortOpenError, TargetError, TransportError
+from cubestack.host.recording.setups import read_document
+
+TOKEN = "CUBESTACK_TOKEN"
+"""Variable of the environment with the control port's token."""
+
+HTTP_ERRORS = 400
+"""The first status of one."""
+
+TIMEOUT_S = 60.0
+"""Wall time for an answer."""
+
+PATIENT = ("/run", "/back", "/trace")
+"""What takes as long as it does."""
+
+
+class ControlClient:
+    """Asks a control port (docs/control.md)."""
+
+    def __init__(self, url: str, token: str) -> None:
+        """Nothing is asked yet; TargetError for what is no address."""
+        try:
+            parts = urlsplit(url)
+            host, port = parts.hostname, parts.port
+        except ValueError:
+            host = port = None
+        if not host or not port:
+            raise TargetError(f"{url} is no control port: it is like http://127.0.0.1:8700")
+        self.url, self._address = f"http://{parts.netloc}", (host, port)
+        self._headers = {"Authorization": f"Bearer {token}"}
+
+    def ask(self, method: str, path: str, body: object = None) -> dict[str, Any]:
+        """The answer.
+
+        Raises ValueError for what makes no sense there, TransportError when nobody answers.
+        """
+        told: dict[str, Any] = json.loads(self.fetch(method, path, body))
+        return told
+
+    def fetch(self, method: str, path: str, body: object = None) -> bytes:
+        """The answer as it is; raises as ``ask`` does."""
+        patient = path.partition("?")[0].endswith(PATIENT)
+        timeout_s = None if patient else TIMEOUT_S
+        connection = http.client.HTTPConnection(*self._address, timeout=timeout_s)
+        try:
+            connection.request(
+                method, path, None if body is None else json.dumps(body), self._headers
+            )
+            answer = connection.getresponse()
+            content = answer.read()
+            error = json.loads(content).get("error", "") if answer.status >= HTTP_ERRORS else ""
+        except ConnectionRefusedError:
+            raise PortOpenError(f"no control port answers at {self.url}") from None
+        except (OSError, http.client.HTTPException, ValueError) as failure:
+            raise TransportError(f"{self.url}{path}: {failure or type(failure).__name__}") from None
+        finally:
+            connection.close()
+        if answer.status == http.client.UNAUTHORIZED:
+            raise PortOpenError(f"{self.url} wants its token in ${TOKEN}")
+        if error:
+            raise TargetError(str(error))
+        return content
+
+
+class RemoteControls:
+    """See ``Controls``; an emulation that runs at its pace meanwhile.
+
+    Attributes:
+        client: of the control port.
+        device: name of the device.
+        chosen: its seed, profile, switches and firmware, where they were given.
+        no_past: why nobody can go back there; empty where one can.
+    """
+
+    def __init__(self, client: ControlClient, device: str) -> None:
+        """Look what there is; raises what ``ControlClient.ask`` does."""
+        self.client, self.device = client, device
+        about = client.ask("GET", f"/devices/{device}")
+        self.chosen = {"seed": str(about["seed"]), **about["chosen"]}
+        self.no_past = str(about["no_past"])
+        self.channels = tuple(about["channels"])
+        self.faults = spoken({kind: one["targets"] for kind, one in about["faults"].items()})
+        self.fault_parameters: Mapping[str, tuple[str, ...]] = {
+            kind: tuple(one["parameters"]) for kind, one in about["faults"].items()
+        }
+
+    def fault(self, words: list[str]) -> None:
+        """See ``Controls``."""
+        self._act("fault", *words)
+
+    def fault_log(self) -> list[str]:
+        """See ``Controls``."""
+        return list(self.client.ask("GET", f"/devices/{self.device}/log")["log"])
+
+    def scene(self, path: Path) -> None:
+        """See ``Controls``; the file is read here."""
+        document = read_document(path)
+        self._act("scene", document.name, text=document.text)
+
+    def currents(self) -> dict[str, float]:
+        """See ``Controls``."""
+        return dict(self._state()["devices"][self.device]["currents_ma"])
+
+    def switch(self, channel: str, on: bool) -> None:
+        """See ``Controls``."""
+        self._act("power", channel, "on" if on else "off")
+
+    def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
+        """Not from here: ValueError."""
+        raise TargetError(f"peek {what}: only where the device is emulated in this process")
+
+    def time_s(self) -> float:
+        """See ``Controls``."""
+        return float(self._state()["time_s"])
+
+    def advance(self, seconds: float) -> None:
+        """See ``Controls``; it goes on afterwards if it went on before."""
+        state = self._state()
+        self.client.ask("POST", "/run", {"to_s": state["time_s"] + seconds})
+        if not state["held"]:
+            self.client.ask("POST", "/resume")
+
+    def _state(self) -> dict[str, Any]:
+        return self.client.ask("GET", "/state")
+
+    def _act(self, *words: str, text: str = "") -> None:
+        body = {"words": list(words), "text": text}
+        self.client.ask("POST", f"/devices/{self.device}/act", body)
+
+
+def controlled(url: str, device: str | None = None) -> RemoteControls:
+    """The controls of a device at a control port, by the token in the environment.
+
+    ``device`` is needed where there are several: TargetError.
+    """
+    client = ControlClient(url, os.environ.get(TOKEN, ""))
+    known = client.ask("GET", "/")["devices"]
+    if device is None and len(known) != 1:
+        raise TargetError(f"{url} has {', '.join(known)}: give --device")
+    return RemoteControls(client, device or known[0])

@@ -1,0 +1,110 @@
+"""AraMiS' published figures (thesis, Politecnico di Torino, 2008) and what measures ours."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
+from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
+from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
+from cubestack.host.studies.fidelity.table import mean, measured
+
+EPOCH = 2000.0  # of the thesis' catalogue
+LOOKUP_SEED = 1
+STARS = 6
+"""Of a field: the main triangle and three pivots (section 5.7)."""
+
+
+def _attitudes(results: Sequence[AramisResult]) -> Figures:
+    """Rates in percent; errors of the right ones in arcsec; mean times in ms."""
+    count = len(results)
+    right = [result for result in results if result.right]
+    errors = {
+        axis: [3600 * abs(getattr(result, f"error_{axis}_deg")) for result in right] or [np.nan]
+        for axis in ("cross", "roll")
+    }
+    return {
+        "right": 100 * len(right) / count,
+        "wrong": 100 * sum(r.solved and not r.right for r in results) / count,
+        "far": 100 * sum(bool(r.far) for r in results) / count,
+        "conclusive": 100 * sum(r.solved for r in results) / count,
+        "ambiguous": 100 * sum(r.outcome == "ambiguous" for r in results) / count,
+        "none": 100 * sum(r.outcome == "none" for r in results) / count,
+        "cross": mean(errors["cross"]),
+        "cross95": float(np.percentile(errors["cross"], 95)),
+        "roll95": float(np.percentile(errors["roll"], 95)),
+    }
+
+
+def _catalogue(_opened: AramisOpener, _frames: int) -> Figures:
+    """Stars and triangles of the published selection, and of its two variants."""
+    from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, cached_database
+
+    figures: dict[str, float] = {}
+    variants = {"six": CatalogueParameters(epoch=EPOCH)}
+    variants["five"] = CatalogueParameters(epoch=EPOCH, stars_per_field=5)
+    variants["narrow"] = CatalogueParameters(epoch=EPOCH, fov_deg=18.0)
+    for name, parameters in variants.items():
+        database = cached_database(parameters)
+        figures[f"{name}_stars"] = len(database.numbers)
+        figures[f"{name}_triangles"] = len(database)
+        figures[f"{name}_mb"] = len(database.pack()) / 1e6
+    return {**figures, "picture": IMAGE_BYTES / 2**20}
+
+
+def _lookups(_opened: AramisOpener, frames: int) -> Figures:
+    """Triangles that a lookup by area and one by moment give, both, and after one pivot.
+
+    Stars of random fields without noise, with the bounds of appendix E; means of main triangles.
+    """
+    from cubestack.emulator.boards.aramis.catalogue import onboard_database
+    from cubestack.emulator.scene.hipparcos import load_sky
+    from cubestack.firmware_model.aramis.matching.triangles import measure_triangle
+    from cubestack.firmware_model.aramis.matching.triples import (
+        BOUND_SIGMAS,
+        find_triangles,
+        match_triple,
+    )
+    from cubestack.firmware_model.aramis.solution import Profile
+    from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+    from cubestack.firmware_model.mcu.costs import Meter
+
+    rng, meter = np.random.default_rng(LOOKUP_SEED), Meter(BLACKFIN_BF533)
+    database, sigma_rad = onboard_database(), Profile().sigma_rad
+    sky = load_sky(mag_limit=6.0)
+    counts: list[tuple[int, ...]] = []
+    while len(counts) < frames:
+        boresight = rng.normal(size=3)
+        near = sky.vectors @ boresight / np.linalg.norm(boresight)
+        seen = np.flatnonzero(near > np.cos(np.radians(database.fov_deg / 2)))
+        vectors = sky.vectors[seen[np.argsort(sky.v_mag[seen])[:STARS]]].astype(np.float32)
+        triangle = (
+            measure_triangle(vectors[:3], sigma_rad, meter) if len(vectors) >= STARS else None
+        )
+        if triangle is None:
+            continue
+        area, moment = (BOUND_SIGMAS * s for s in (triangle.area_sigma, triangle.moment_sigma))
+        areas, moments = (
+            np.diff(np.searchsorted(values, (middle - reach, middle + reach)))[0]
+            for values, middle, reach in (
+                (database.areas, triangle.area, area),
+                (database.moments, triangle.moment, moment),
+            )
+        )
+        both = find_triangles(triangle, database, None, meter)
+        pivoted = match_triple(vectors, (0, 1, 2), (3,), sigma_rad, database, None, meter, None)
+        counts.append((areas, moments, len(both), len(pivoted.candidates)))
+    names = ("area", "moment", "both", "pivot")
+    return dict(zip(names, map(float, np.mean(counts, axis=0)), strict=True))
+
+
+FIDELITY = Fidelity(
+    page="fidelity-aramis.md",
+    trials={
+        "lis": measured("aramis", _attitudes, 300, 3, 90),
+        "aided": measured("aramis", _attitudes, 300, 3, 90, mode="assisted", hint_error=2),
+        "catalogue": Trial(_catalogue, seconds=30, profiles=False),
+        "lookups": Trial(_lookups, 300, 20, 5, profiles=False),
+    },
+    tables=read_tables("cubestack.host.studies.aramis"),
+)

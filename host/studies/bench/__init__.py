@@ -1,0 +1,1 @@
+"""`cubestack bench`: cost of the hot paths."""

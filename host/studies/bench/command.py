@@ -1,0 +1,36 @@
+"""Measure the cost of the hot paths on this machine, on one core."""
+
+import argparse
+import json
+
+from cubestack.host.devices.registry import devices
+from cubestack.host.terminal import busy, tell
+
+COMPARISON = "What compares the engines that can run the FPGA designs is `make bench-engines`."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the option, and tell what each figure means."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    lines = [
+        f"{name:<17} {device.title}: {meaning}"
+        for device in devices()
+        if (benchmark := device.study("bench"))
+        for name, meaning in benchmark.figures.items()
+    ]
+    parser.epilog = "\n".join([*lines, "", f"{COMPARISON} (docs/engines.md)"])
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and report."""
+    figures: dict[str, float] = {}
+    for device in devices():
+        if benchmark := device.study("bench"):
+            with busy(f"measuring {device.title}", quiet=args.json):
+                figures |= benchmark.run(device)
+    if args.json:
+        print(json.dumps(figures))
+        return 0
+    for name, value in figures.items():
+        tell(f"{name:>18}  {value:,}")
+    return 0

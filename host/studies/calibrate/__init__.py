@@ -1,0 +1,1 @@
+"""`cubestack calibrate`: lens parameters from pictures."""

@@ -1,0 +1,1 @@
+"""`cubestack campaign`: thousands of skies by a plan."""

@@ -1,0 +1,119 @@
+"""Measures a block of frames, in whatever process or on whatever machine.
+
+A frame that fails is a row with its error, and the next one starts with a seed of its own; so any
+row is measured again by its seed and its place after it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.experiments.measure import experiment_of, measure
+from cubestack.host.experiments.rates import outcome, why_refused
+from cubestack.host.studies.campaign.plan import Block, Values
+
+WALL = "wall_ms"
+"""The one value of a result that another run does not give again."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of a picture.
+
+    Attributes:
+        block, row: of the campaign; of the block, from 0.
+        seed: of the first frame since the device was powered up.
+        after: results since then.
+        swept: options that differ between blocks.
+        outcome: right, refused, wrong, or failed.
+        reason: why it was refused, or how it failed.
+        result: as `cubestack measure --json` has it, without its wall time; none of a failed one.
+    """
+
+    block: int
+    row: int
+    seed: int
+    after: int
+    swept: Values
+    outcome: str
+    reason: str
+    result: Values
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Where it stands."""
+        return self.block, self.row
+
+
+def rows_of(block: Block) -> int:
+    """How many rows it makes: of devices with several cameras, one for each in a frame."""
+    experiment = experiment_of(registered(block.device), block.command)
+    own = experiment.options.declared()
+    options = {name: value for name, value in block.options.items() if name in own}
+    return int(experiment.count(experiment.options(frames=block.frames, seed=0, **options)))
+
+
+def measured(block: Block, frames: int, seed: int, **more: Any) -> Iterator[Any]:
+    """Results from one power-up on; ``more`` as ``measure`` has it."""
+    options = {"frames": frames, "seed": seed, **block.options}
+    return measure(block.device, command=block.command, **options, **more)
+
+
+def frames_of(block: Block, seed: int) -> int:
+    """How many frames were to be measured from the power-up with that seed on."""
+    seeds = [block.seed, *(_seed(block.seed, frame) for frame in range(1, block.frames))]
+    return block.frames - seeds.index(seed)
+
+
+def perform(block: Block) -> list[Row]:
+    """All rows of a block."""
+    rows = list[Row]()
+    a_frame, frame = rows_of(block) // block.frames, 0
+    while frame < block.frames:
+        seed = _seed(block.seed, frame) if frame else block.seed
+        results = measured(block, block.frames - frame, seed)
+        rows += _measured(block, results, len(rows), seed, a_frame)
+        frame = len(rows) // a_frame
+    return rows
+
+
+def _measured(
+    block: Block, results: Iterator[Any], before: int, seed: int, a_frame: int
+) -> Iterator[Row]:
+    """Rows from one power-up on, up to the first frame that fails."""
+    from cubestack.emulator.native.compiler import CompilerError
+
+    after = 0
+    try:
+        for result in results:
+            reason = why_refused(result) if outcome(result) == "refused" else ""
+            yield Row(
+                *(block.number, before + after, seed, after, block.swept),
+                *(outcome(result), reason, _plain(result.as_dict())),
+            )
+            after += 1
+    except CompilerError:
+        raise
+    except Exception as error:  # whatever it is: of one frame of thousands
+        text = f"{type(error).__name__}: {error}"
+        for other in range(after, after + a_frame - after % a_frame):
+            yield Row(block.number, before + other, seed, other, block.swept, "failed", text, {})
+
+
+def _seed(seed: int, frame: int) -> int:
+    """For the frames of a block from one on."""
+    return int(np.random.default_rng([seed, frame]).integers(1 << 31))
+
+
+def _plain(result: dict[str, Any]) -> dict[str, Any]:
+    """As it comes back from a JSON file."""
+    return {name: _value(value) for name, value in result.items() if name != WALL}
+
+
+def _value(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,165 @@
+"""Measure thousands of skies: every combination of the values that a plan gives, on
+all cores or on a cluster; with 95 % limits of what is right, refused and wrong.
+
+A plan is a TOML file (docs/campaigns.md). Results are added to FOLDER/rows.jsonl block
+by block, so that little is lost whatever happens; --resume goes on.
+
+examples:
+  cubestack campaign --list                               plans that come with the devices
+  cubestack campaign NAME --workers 2                     one of them
+  cubestack campaign false-stars.toml
+  cubestack campaign false-stars.toml --resume --workers 2
+  cubestack campaign false-stars.toml --scheduler tcp://10.0.0.1:8786
+  cubestack campaign report false-stars.campaign          report.html there
+  cubestack campaign report NEW --compare OLD             exit code 1 when NEW is worse
+  cubestack campaign replay false-stars.campaign 17       measure row 17 again
+  cubestack campaign parquet false-stars.campaign         rows.parquet there
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.table import Table
+
+from cubestack.host.cli.arguments import whole
+from cubestack.host.experiments.rates import wilson
+from cubestack.host.studies.campaign import parquet, report, statistics
+from cubestack.host.studies.campaign import run as campaigns
+from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
+from cubestack.host.studies.campaign.statistics import Change, compared
+from cubestack.host.studies.campaign.worst import worst
+from cubestack.host.studies.workers import cores
+from cubestack.host.terminal import progress, say, show
+
+REPLAY, REPORT, PARQUET = "replay", "report", "parquet"
+WORST = 6
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.usage = (
+        "cubestack campaign PLAN [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
+        "       cubestack campaign report FOLDER [--compare FOLDER]\n"
+        "       cubestack campaign replay FOLDER ROW\n"
+        "       cubestack campaign parquet FOLDER"
+    )
+    parser.add_argument(
+        "words", nargs="*", metavar="PLAN", help="file, or name of one that comes with a device"
+    )
+    parser.add_argument("--list", action="store_true", help="list the plans that there are by name")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER", help="default: the plan's name, with .campaign"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with what is in the folder")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    )
+    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
+    parser.add_argument(
+        "--compare", type=Path, metavar="FOLDER", help="of a report: what was before, same skies"
+    )
+    parser.add_argument(
+        "--worst",
+        type=whole(0),
+        default=WORST,
+        metavar="N",
+        help=f"of a report: worst cases that are measured again and shown (default {WORST})",
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object a point")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run or replay; 1 when frames failed, or when it was stopped."""
+    if args.list:
+        return _list(as_json=args.json)
+    if not args.words:
+        raise ValueError("name a plan: a file, or one of --list")
+    if args.words[0] == REPLAY:
+        return _replay(args.words[1:])
+    if args.words[0] == REPORT:
+        return _report(args)
+    if args.words[0] == PARQUET:
+        return _parquet(args.words[1:])
+    if args.compare:
+        raise ValueError("--compare is for a report")
+    if len(args.words) > 1:
+        raise ValueError(f"one plan at a time, not {' '.join(args.words)}")
+    path = plan_file(args.words[0])
+    plan = Plan.read(path)
+    folder = Folder.begun(args.out or campaigns.default_folder(path), plan, resume=args.resume)
+    total, done = campaigns.count(plan), 0
+    before = sum(1 for _ in folder.rows())
+    rows = campaigns.run(folder, args.workers or cores(), args.scheduler)
+    try:
+        for _ in progress(rows, total, "measuring", quiet=args.json, before=before):
+            done += 1
+    except (KeyboardInterrupt, OSError):
+        say(f"{done} of {total} results are in {folder.path}; --resume goes on")
+        raise
+    failed = _show(folder, as_json=args.json)
+    return 1 if failed else 0
+
+
+def _list(*, as_json: bool) -> int:
+    for name, path in known_plans().items():
+        about = {"plan": name, "what": summary(path)}
+        print(json.dumps(about) if as_json else f"{name:<26} {about['what']}")
+    return 0
+
+
+def _replay(words: list[str]) -> int:
+    if len(words) != 2 or not words[1].isdecimal():
+        raise ValueError("replay wants a campaign's folder and the number of a row")
+    print(json.dumps(campaigns.replayed(Folder(Path(words[0])), int(words[1]))))
+    return 0
+
+
+def _parquet(words: list[str]) -> int:
+    if len(words) != 1:
+        raise ValueError("parquet wants a campaign's folder")
+    say(f"wrote {parquet.write(Folder(Path(words[0])))}")
+    return 0
+
+
+def _report(args: argparse.Namespace) -> int:
+    if len(args.words) != 2:
+        raise ValueError("report wants a campaign's folder")
+    folder, changes = Folder(Path(args.words[1])), list[Change]()
+    if args.compare:
+        changes = compared(Folder(args.compare), folder)
+    cases = list(progress(worst(folder, args.worst), args.worst, "looking", quiet=args.json))
+    page, *pictures = report.write(folder, changes, args.compare, cases)
+    worse = [change for change in changes if change.worse]
+    for change in changes if args.json else worse:
+        told = f"{statistics.told(change.point)}: {change.outcome} {change.before} before"
+        text = f"{told}, {change.after} after: {report.verdict(change)}"
+        print(json.dumps(vars(change)) if args.json else text)
+    say(f"wrote {page} and {len(pictures)} figures")
+    return 1 if worse else 0
+
+
+def _show(folder: Folder, *, as_json: bool) -> int:
+    """Rates at every point; returns how many frames failed."""
+    found = statistics.rates(folder)
+    names = list(folder.plan.grid)
+    table = Table(*names, *statistics.ENDINGS, title="results, and 95 % limits of their rates")
+    for point, ended in found.items():
+        of = ended.total()
+        if as_json:
+            print(json.dumps({"point": dict(point), "of": of, **ended}))
+            continue
+        cells = []
+        for ending in statistics.ENDINGS:
+            low, high = (100 * limit for limit in wilson(ended[ending], of))
+            cells.append(f"{ended[ending]}\n{low:.1f}-{high:.1f} %")
+        table.add_row(*(str(value) for _, value in point), *cells)
+    if not as_json:
+        show(table)
+    failed = sum(ended["failed"] for ended in found.values())
+    if failed:
+        say(f'{failed} failed: "outcome": "failed" in {folder.path}; replay shows how')
+    return failed

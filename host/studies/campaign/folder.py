@@ -1,0 +1,133 @@
+"""A campaign's folder: its plan, and a row for each result, which outlive whatever stops the run.
+
+The rows of a block are added at once when it is done. What a kill or a full disk left of a block is
+taken out when the campaign goes on. When all are there they are put into order, so that the file
+does not tell how many workers made it.
+"""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+
+from cubestack.host.studies.campaign.block import Row
+from cubestack.host.studies.campaign.plan import Plan
+
+PLAN, ROWS = "campaign.json", "rows.jsonl"
+
+
+class FolderError(ValueError):
+    """A folder that is not this campaign's."""
+
+
+class Folder:
+    """The folder of a campaign.
+
+    Attributes:
+        path: of it.
+        plan: of the campaign.
+        version: of the program that began it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open one that there is; FolderError where there is no campaign in it."""
+        self.path = path
+        try:
+            told = json.loads((path / PLAN).read_text("utf-8"))
+            self.plan, self.version = Plan(**told["plan"]), str(told["version"])
+        except FileNotFoundError:
+            raise FolderError(f"{path} is no campaign's folder: it has no {PLAN}") from None
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            raise FolderError(f"{path / PLAN}: {error}") from None
+
+    @classmethod
+    def begun(cls, path: Path, plan: Plan, *, resume: bool) -> "Folder":
+        """The folder for a plan: a new one or, to ``resume``, the one that it has.
+
+        Raises:
+            FolderError: it has results and is not to be resumed, or they are of another plan or of
+                another version of the program.
+            OSError: it can not be made.
+        """
+        path.mkdir(parents=True, exist_ok=True)
+        if not (path / PLAN).is_file():
+            if any(path.iterdir()):
+                raise FolderError(f"{path} is not empty, and no campaign's; give another folder")
+            told = {"version": version("cubestack"), "plan": plan.as_dict()}
+            _replace(path / PLAN, [json.dumps(told, indent=1) + "\n"])
+            return cls(path)
+        found = cls(path)
+        if not resume:
+            raise FolderError(f"{path} has a campaign already; --resume goes on with it")
+        if found.version != version("cubestack"):
+            raise FolderError(
+                f"{path} was begun by cubestack {found.version}, and this is {version('cubestack')}"
+            )
+        if found.plan.as_dict() != plan.as_dict():
+            changed = [
+                key for key, value in plan.as_dict().items() if vars(found.plan)[key] != value
+            ]
+            raise FolderError(f"{path} has another plan, with other {', '.join(changed)}")
+        return found
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep others from adding rows meanwhile; FolderError when one does already."""
+        with (self.path / PLAN).open() as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise FolderError(f"{self.path}: another process works on this campaign") from None
+            yield
+
+    def rows(self) -> Iterator[Row]:
+        """All rows so far, as they stand; of a torn last line, none."""
+        try:
+            with (self.path / ROWS).open(encoding="utf-8") as file:
+                for line in file:
+                    if line.endswith("\n"):
+                        yield Row(**json.loads(line))
+        except FileNotFoundError:
+            return
+
+    def repair(self, rows_of: Mapping[int, int]) -> set[int]:
+        """Take out blocks that have not all of their rows; the numbers of the others."""
+        found: dict[int, int] = {}
+        for row in self.rows():
+            found[row.block] = found.get(row.block, 0) + 1
+        whole = {block for block, count in found.items() if count == rows_of.get(block)}
+        kept = (row for row in self.rows() if row.block in whole)
+        _replace(self.path / ROWS, map(_line, kept))
+        return whole
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Add the rows of a block; OSError names the file when the disk is full."""
+        path = self.path / ROWS
+        try:
+            with path.open("a", encoding="utf-8") as file:
+                file.write("".join(map(_line, rows)))
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from None
+
+    def sort(self) -> None:
+        """Put all rows into order."""
+        _replace(self.path / ROWS, map(_line, sorted(self.rows(), key=lambda row: row.key)))
+
+
+def _line(row: Row) -> str:
+    return json.dumps(vars(row)) + "\n"
+
+
+def _replace(path: Path, lines: Iterable[str]) -> None:
+    """Write a file that is there whole or not at all."""
+    new = path.with_suffix(".new")
+    with new.open("w", encoding="utf-8") as file:
+        file.writelines(lines)
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)

@@ -1,0 +1,158 @@
+"""A campaign's page: one HTML file with its figures inside, which asks for nothing outside."""
+
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from cubestack.host.devices.experiment import Section
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.experiments.measure import experiment_of
+from cubestack.host.experiments.rates import wilson
+from cubestack.host.pictures.campaigns import error_curves, rate_curves
+from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.statistics import ENDINGS, Change, Point, errors, rates, told
+from cubestack.host.studies.campaign.worst import Case
+
+PAGE = "report.html"
+FAILURES = 20
+"""Failed frames that the page lists."""
+
+STYLE = """
+body { font: 15px/1.5 sans-serif; color: #111; background: #fff; max-width: 60em; margin: 2em auto;
+       padding: 0 1em }
+table { border-collapse: collapse } th, td { border: 1px solid #999; padding: .2em .6em;
+       text-align: right } th:first-child, td:first-child { text-align: left }
+img { max-width: 100% } code { background: #eee } .worse { font-weight: bold }
+"""
+
+
+def write(
+    folder: Folder,
+    changes: Sequence[Change] = (),
+    against: Path | None = None,
+    cases: Sequence[Case] = (),
+) -> list[Path]:
+    """Write the page and its figures into the folder; the files, the page first.
+
+    ``cases`` are shown with their pictures.
+
+    Raises ValueError for a folder without rows, or without matplotlib.
+    """
+    found = rates(folder)
+    if not found:
+        raise ValueError(f"{folder.path} has no rows yet")
+    pictures = {
+        f"rates-{name}.png": _swept(folder, name, found)
+        for name, values in folder.plan.grid.items()
+        if len(values) > 1
+    }
+    measured = experiment_of(registered(folder.plan.device), folder.plan.command)
+    for name, points in errors(folder).items():
+        curves = {told(point): values for point, values in points.items()}
+        marks = [(mark.value, mark.text) for mark in measured.marks if mark.error == name]
+        pictures[f"{name}.png"] = error_curves(name, curves, marks)
+    done = (row.result for row in folder.rows() if row.result)
+    sections = list(measured.sections(done))
+    pictures |= {f"{each.title.replace(' ', '-')}.png": each.png for each in sections if each.png}
+    for name, png in pictures.items():
+        (folder.path / name).write_bytes(png)
+    page = folder.path / PAGE
+    page.write_text(_page(folder, found, pictures, sections, changes, against, cases), "utf-8")
+    return [page, *(folder.path / name for name in pictures)]
+
+
+def _swept(folder: Folder, name: str, found: Mapping[Point, Counter[str]]) -> bytes:
+    """Rates over one swept option, whatever the others are."""
+    values = folder.plan.grid[name]
+    counted = [Counter[str]() for _ in values]
+    for point, ended in found.items():
+        value = dict(point)[name]
+        counted[values.index(list(value) if isinstance(value, tuple) else value)] += ended
+    curves = {
+        outcome: [(ended[outcome] / max(ended.total(), 1), *wilson(ended[outcome], ended.total()))
+                  for ended in counted]
+        for outcome in ENDINGS
+        if outcome != "failed" or any(ended[outcome] for ended in counted)
+    }  # fmt: skip
+    return rate_curves(name, values, curves)
+
+
+def _page(
+    folder: Folder,
+    found: Mapping[Point, Counter[str]],
+    pictures: Mapping[str, bytes],
+    sections: Sequence[Section],
+    changes: Sequence[Change],
+    against: Path | None,
+    cases: Sequence[Case],
+) -> str:
+    plan = folder.plan
+    title = f"{plan.device}: {sum(ended.total() for ended in found.values())} results"
+    parts = [
+        "<!doctype html>",
+        f'<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>',
+        f"<style>{STYLE}</style><h1>{escape(title)}</h1>",
+        f"<p>cubestack {escape(folder.version)}, seed {plan.seed}; options ",
+        f"<code>{escape(str(dict(plan.options)))}</code>; drawn anew for each block "
+        f"<code>{escape(str(dict(plan.random)))}</code>. 95 % limits are Wilson's.</p>",
+        "<h2>How often</h2>",
+        _table(["", "results", *ENDINGS], [_rates(point, ended) for point, ended in found.items()]),
+    ]
+    if against is not None:
+        parts += [f"<h2>Compared with {escape(str(against))}</h2>", _changes(changes)]
+    for section in sections:
+        if section.rows:
+            parts += [f"<h2>{escape(section.title)}</h2>", _table(section.head, section.rows)]
+    for name, png in pictures.items():
+        parts.append(f"<h2>{escape(Path(name).stem.replace('_', ' ').replace('-', ' '))}</h2>")
+        data = b64encode(png).decode("ascii")
+        parts.append(f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">')
+    if cases:
+        parts.append("<h2>worst cases, and what the cameras saw, stretched for the eye</h2>")
+    for case in cases:
+        data = b64encode(case.jpeg).decode("ascii")
+        image = f'<br><img alt="" src="data:image/jpeg;base64,{data}">' if case.jpeg else ""
+        parts.append(f"<p>row {case.number}: {escape(case.text)}{image}</p>")
+    failed = [(number, row) for number, row in enumerate(folder.rows()) if row.outcome == "failed"]
+    if failed:
+        lines = [[str(number), row.reason] for number, row in failed[:FAILURES]]
+        parts += [f"<h2>{len(failed)} failed</h2>", _table(["row, for replay", "error"], lines)]
+    return "\n".join([*parts, "</html>"]) + "\n"
+
+
+def _rates(point: Point, ended: Counter[str]) -> list[str]:
+    of = ended.total()
+    cells = [told(point), str(of)]
+    for outcome in ENDINGS:
+        low, high = (100 * limit for limit in wilson(ended[outcome], of))
+        cells.append(f"{ended[outcome]} ({low:.2f} to {high:.2f} %)")
+    return cells
+
+
+def _changes(changes: Sequence[Change]) -> str:
+    head = ["", "outcome", "before", "after", "only before", "only after", "by chance", ""]
+    return _table(
+        head,
+        [
+            [
+                *(told(each.point), each.outcome, str(each.before), str(each.after)),
+                *(str(each.lost), str(each.gained), f"{each.chance:.2g}", verdict(each)),
+            ]
+            for each in changes
+        ],
+    )
+
+
+def verdict(change: Change) -> str:
+    """In a word."""
+    return "worse" if change.worse else "better" if change.significant else "no change to be seen"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["<table>", "<tr>" + "".join(f"<th>{escape(cell)}</th>" for cell in head) + "</tr>"]
+    lines += [
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    ]
+    return "\n".join([*lines, "</table>"])

@@ -1,0 +1,65 @@
+"""Runs a campaign into its folder, and single rows of it again."""
+
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.studies.campaign.block import Row, frames_of, measured, perform, rows_of
+from cubestack.host.studies.campaign.folder import Folder, FolderError
+from cubestack.host.studies.campaign.plan import Block, Plan
+from cubestack.host.studies.workers import performed
+
+
+def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[Row]:
+    """Measure what is missing; yields each row that is in the folder, first those from before.
+
+    Raises:
+        FolderError: another process works on it.
+        WorkersError: workers that can not be had or went away; what is done is kept.
+        RuntimeError: nothing but failures in the first block that ended.
+    """
+    blocks = {block.number: block for block in folder.plan.blocks()}
+    with folder.alone():
+        whole = folder.repair({number: rows_of(block) for number, block in blocks.items()})
+        yield from folder.rows()
+        missing = [block for number, block in blocks.items() if number not in whole]
+        for _, rows in performed(perform, missing, workers, scheduler):
+            if not whole and all(row.outcome == "failed" for row in rows):
+                raise RuntimeError(f"nothing can be measured: {rows[0].reason}")
+            folder.add(rows)
+            whole.add(rows[0].block)
+            yield from rows
+        folder.sort()
+
+
+def count(plan: Plan) -> int:
+    """How many rows a campaign has."""
+    return sum(map(rows_of, plan.blocks()))
+
+
+def replayed(folder: Folder, number: int) -> dict[str, Any]:
+    """What the frame of a row of the file, counted from 0, gives now.
+
+    Raises FolderError for a row that there is not; and whatever the frame failed with.
+    """
+    rows = list(folder.rows())
+    if not 0 <= number < len(rows):
+        raise FolderError(f"{folder.path} has rows 0 to {len(rows) - 1}, not {number}")
+    return again(folder, rows[number])
+
+
+def again(
+    folder: Folder, row: Row, opened: Callable[[AnyEmulated], object] = lambda _emulated: None
+) -> dict[str, Any]:
+    """The result of a row's frame, measured again; ``opened`` is told of the device."""
+    block: Block = next(each for each in folder.plan.blocks() if each.number == row.block)
+    results = measured(block, frames_of(block, row.seed), row.seed, opened=opened)
+    found: dict[str, Any] = next(islice(results, row.after, None)).as_dict()
+    return found
+
+
+def default_folder(path: Path) -> Path:
+    """Where the results of a plan's file go."""
+    return Path(f"{path.stem}.campaign")

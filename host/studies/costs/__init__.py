@@ -1,0 +1,1 @@
+"""`cubestack costs`: cycles of a device's program as compiled code."""

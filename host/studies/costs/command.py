@@ -1,0 +1,90 @@
+"""Measure what a device's program costs as compiled code, on its simulated processor.
+
+Each operation of the cost table that the device's model charges is compiled, and counted in cycles;
+so is a whole picture's processing, phase by phase. Needs arm-none-eabi-gcc.
+
+examples:
+  cubestack costs measure
+  cubestack costs measure --level O0 --precision double
+  cubestack costs measure --write           rewrite the data file and the table of docs/fidelity.md
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.table import Table
+
+from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.registry import devices
+from cubestack.host.studies.costs.contract import CostReport, Measurement
+from cubestack.host.terminal import busy, show, tell
+
+_BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    known = [device.name for device in devices() if "costs" in device.studies]
+    parser.add_argument("action", choices=("measure",), help="compile, run, count")
+    parser.add_argument("device", nargs="?", choices=known, default=known[0] if known else None)
+    parser.add_argument(
+        "--level", action="append", metavar="O2", help="compiler option; repeatable"
+    )
+    parser.add_argument("--precision", action="append", metavar="KIND", help="repeatable")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--write", action="store_true", help="rewrite data file and docs")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure, and show or write it."""
+    report = _report(args.device)
+    levels = _known("--level", args.level, report.levels)
+    precisions = _known("--precision", args.precision, report.precisions)
+    found = []
+    with busy("compiling and counting", quiet=args.json):
+        for one in report.measure(levels, precisions):
+            found.append(one)
+            if not args.json:
+                tell(f"{one.build}, {one.timing}: {sum(one.phases.values()):,} cycles")
+    if args.write:
+        report.file.write_text(json.dumps(report.as_data(found), indent=1) + "\n", "utf-8")
+        _rewrite(Path("docs") / report.document, report.page(found))
+    elif args.json:
+        print(json.dumps(report.as_data(found)))
+    else:
+        _show(report, found)
+    return 0
+
+
+def _report(name: str | None) -> CostReport:
+    chosen: AnyDevice | None = next((d for d in devices() if d.name == name), None)
+    if chosen is None or "costs" not in chosen.studies:
+        raise ValueError("no device here has a program that can be compiled")
+    report: CostReport = chosen.study("costs")
+    return report
+
+
+def _known(option: str, wanted: list[str] | None, known: tuple[str, ...]) -> tuple[str, ...]:
+    for value in wanted or ():
+        if value not in known:
+            raise ValueError(f"{option} must be one of {', '.join(known)}, not {value}")
+    return tuple(wanted or known)
+
+
+def _show(report: CostReport, found: list[Measurement]) -> None:
+    """Operations, a column a build, beside what is charged."""
+    first = [one for one in found if one.timing == found[0].timing]
+    table = Table("operation", "charged", *(one.build for one in first))
+    for name, charged in report.table.items():
+        if name in first[0].operations:
+            table.add_row(name, f"{charged:g}", *(f"{one.operations[name]:g}" for one in first))
+    show(table)
+
+
+def _rewrite(page: Path, table: str) -> None:
+    text = page.read_text("utf-8")
+    if _BEGIN not in text or _END not in text:
+        raise ValueError(f"{page} has no {_BEGIN.strip()}")
+    before, rest = text.split(_BEGIN)
+    page.write_text(f"{before}{_BEGIN}\n{table}\n\n{_END}{rest.split(_END)[1]}", "utf-8")

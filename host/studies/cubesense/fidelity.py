@@ -1,0 +1,232 @@
+"""CubeSense's published figures (thesis, Stellenbosch University, 2011) and what measures ours."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
+from cubestack.host.experiments.measure import measure
+from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
+from cubestack.host.studies.fidelity.table import measured
+
+if TYPE_CHECKING:
+    from cubestack.emulator.scene.earth_sun import EarthSunScene
+
+ALTITUDE_KM = 750.0  # of the text
+SUN_BANDS = {
+    "30": (0, 30),
+    "40": (0, 40),
+    "60": (40, 60),
+    "90": (60, 90.1),
+    "45": (0, 45),
+    "rest": (45, 90.1),
+}
+
+
+def _sensor(results: Sequence[SensorResult]) -> Figures:
+    """Errors along rows (alpha) and columns (beta), in all, and by angle to the boresight; times.
+
+    ``sum`` is section 8's accuracy, mean absolute error plus sigma.
+    """
+    good = [result for result in results if result.detected and result.error_deg is not None]
+    axes = np.array(
+        [
+            (r.alpha_deg - r.truth_alpha_deg, r.beta_deg - r.truth_beta_deg)  # type: ignore[operator]
+            for r in good
+        ]
+    ).reshape(-1, 2)
+    mean, sigma = np.abs(axes).mean(axis=0), axes.std(axis=0)
+    error = np.array([result.error_deg for result in good])
+    angle = np.array([np.hypot(r.truth_alpha_deg, r.truth_beta_deg) for r in good])  # type: ignore[arg-type]
+    figures = {
+        **dict(zip(("alpha", "beta"), mean, strict=True)),
+        **dict(zip(("sigma_alpha", "sigma_beta"), sigma, strict=True)),
+        **dict(zip(("sum_alpha", "sum_beta"), mean + sigma, strict=True)),
+        "mean": error.mean(),
+        "p95": np.percentile(error, 95),
+        "worst": error.max(),
+        "detected": 100 * len(good) / len(results),
+        "least_edges": min((r.edges or 0) for r in good),
+        "most_edges": max((r.edges or 0) for r in good),
+    }
+    for name, (low, high) in SUN_BANDS.items():
+        own = error[(angle >= low) & (angle < high)]
+        figures[f"mean_{name}"] = own.mean() if own.size else np.nan
+        figures[f"worst_{name}"] = own.max() if own.size else np.nan
+    phases = {name: np.array([r.phase_ms[name] for r in good]) for name in good[0].phase_ms}
+    figures |= {f"{name}_ms": values.mean() for name, values in phases.items()}
+    inner = np.abs(axes[angle < 30])
+    figures["sum_30"] = (inner.mean(axis=0) + axes[angle < 30].std(axis=0)).max()
+    figures["sigma_ms"] = phases["total"].std()
+    figures["imaging_ms"] = (phases["wait"] + phases["store"]).mean()
+    return {name: float(value) for name, value in figures.items()}
+
+
+def _ball(opened: CubeSenseOpener, frames: int) -> Figures:
+    """Mean offset in each direction, and the largest sigma, of ``frames`` pictures an angle."""
+    from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
+
+    step = 5.0 if frames > 1 else 30.0
+    results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=max(2, frames))))
+    figures = {result.direction: result.offset_deg or np.nan for result in results}
+    return {**figures, "sigma": max(result.sigma_deg or 0.0 for result in results)}
+
+
+def _scene(sensor: Camera, angle_deg: float) -> "EarthSunScene":
+    """Its target at an angle along the picture's rows."""
+    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+
+    return view_of(sensor, (angle_deg, 0.0), FisheyeCondition(), ALTITUDE_KM).scene
+
+
+def _scatter(
+    opened: CubeSenseOpener, frames: int, sensor: str, angles_deg: Sequence[float]
+) -> Figures:
+    """Standard deviation of pictures of the same pose, the largest of some angles and both axes."""
+    largest, each = 0.0, max(2, frames // len(angles_deg))
+    for angle in angles_deg:
+        scene = _scene(Camera[sensor.upper()], angle)
+        results = measure(
+            "cubesense", frames=each, seed=2, sensor=sensor, scene=scene, **opened.board
+        )
+        found = np.array([(one.alpha_deg, one.beta_deg) for one in results])  # type: ignore[attr-defined]
+        largest = max(largest, float(found.std(axis=0).max()))
+    return {"sigma": largest}
+
+
+def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
+    """mW of the eight states of table 7.1."""
+    from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
+    from cubestack.emulator.sim.power import PowerModel
+    from cubestack.emulator.sim.virtual_time import Kernel
+
+    power = PowerModel(Kernel(), CUBESENSE_POWER)
+    for channel in CUBESENSE_POWER.channels:
+        power.switch(channel, False)
+    found = {}
+    steps: tuple[tuple[str, Callable[..., None], str, str | bool], ...] = (
+        ("reset", power.set_state, "processor", "reset"),
+        ("standby", power.set_state, "processor", "on"),
+        ("memory", power.switch, "SRAM1", True),
+        ("memories", power.switch, "SRAM2", True),
+        ("camera", power.switch, "sun_camera", True),
+        ("cameras", power.switch, "nadir_camera", True),
+        ("", power.set_state, "sun_fpga", "imaging"),
+        ("imaging1", power.set_state, "sram1", "active"),
+        ("", power.set_state, "nadir_fpga", "imaging"),
+        ("imaging2", power.set_state, "sram2", "active"),
+    )
+    for name, change, part, state in steps:
+        change(part, state)
+        if name:
+            found[name] = power.current_ma() * CUBESENSE_POWER.volts
+    return found
+
+
+def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
+    """What follows from the measured polynomial, the Earth's size and the pixels."""
+    from cubestack.emulator.camera.ov7620 import fisheye, lens_error
+    from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
+
+    a, b, c, d = fisheye.DISTORTION
+    field_px = lens_error.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
+    rim_px = float(fisheye.distorted(field_px))
+    earth_deg = angular_radius_deg(ALTITUDE_KM)
+    earth_px = float(fisheye.distorted(earth_deg * fisheye.PIXELS_PER_DEGREE))
+    # Two points 10 cm apart on a board at 103 cm, near the boresight (section 5.1.3).
+    board_px = float(fisheye.distorted(np.degrees(np.arctan(10 / 103)) * fisheye.PIXELS_PER_DEGREE))
+    ball_mm = 10 * 30 * ALTITUDE_KM / EARTH_RADIUS_KM
+    slant_mm = np.sqrt(1 + ball_mm**2 - 2 * ball_mm * np.cos(np.radians(30)))
+    return {
+        "discriminant": 18 * a * b * c * d
+        - 4 * b**3 * d
+        + (b * c) ** 2
+        - 4 * a * c**3
+        - 27 * (a * d) ** 2,
+        "deg_per_px": lens_error.FIELD_DEG / rim_px,
+        "field_px": field_px,
+        "rim_px": rim_px,
+        "focal_mm": board_px * 0.0076 * 103 / 10,
+        "earth_deg": earth_deg,
+        "earth_px": earth_px,
+        "sampling": 8 * earth_px / 16,
+        "edges_64": 8 * earth_px / 64,
+        "ball_px": float(fisheye.distorted(182.0)),
+        "ball_cm": ball_mm / 10,
+        "span_angle": 100 * earth_deg / lens_error.FIELD_DEG,
+        "span_px": 100 * 182 / field_px,
+        "off_deg": float(np.degrees(np.arcsin(np.sin(np.radians(30)) / slant_mm))),
+        "off_km": ALTITUDE_KM / slant_mm,
+    }
+
+
+def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
+    """Tiles as they were last estimated: both FPGAs as built and with one search, and counters."""
+    from cubestack.hdl.cubesense.tops import AREA_FILE
+    from cubestack.hdl.flow.area_report import recorded_areas
+
+    designs = recorded_areas(AREA_FILE)
+    flown = "-as-flown" * (opened.board["profile"] == "published")
+    names = {
+        **{side: f"cubesense-{side}{flown}" for side in ("sun", "nadir")},
+        **{f"{side}_one": f"cubesense-{side}-one-search" for side in ("sun", "nadir")},
+        "matrix": "matrix counter 640 x 480",
+        "gray": "Gray counter of 307200",
+    }
+    return {name: float(designs[design]["tiles"]) for name, design in names.items()}
+
+
+def _light(_opened: CubeSenseOpener, _frames: int) -> Figures:
+    """Grey value of the Earth at noon, its threshold, and the Sun's radius in px."""
+    from cubestack.emulator.camera.ov7620 import light
+    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+    from cubestack.emulator.scene.earth_sun import Target
+    from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
+
+    bloom_px, space = FisheyeCondition().bloom_px, 34
+    lines = light.USUAL_EXPOSURE[Target.NADIR] * EXPOSURE_LINES
+    grey = lines * light.scene_light(_scene(Camera.NADIR, 0.0), Target.NADIR, bloom_px, 0)
+    level = float(grey[grey > grey.max() / 3].mean()) + space
+    figures = {"earth": level, "threshold": space + 0.3 * (level - space)}
+    lines = light.USUAL_EXPOSURE[Target.SUN] * EXPOSURE_LINES
+    for name, angle in (("centre", 0.0), ("edge", 90.0)):
+        spot = lines * light.scene_light(_scene(Camera.SUN, angle), Target.SUN, bloom_px, 0)
+        figures[f"sun_{name}"] = float(np.sqrt((spot > light.SUN_EDGE).sum() / np.pi))
+    return figures
+
+
+def _memory(_opened: CubeSenseOpener, _frames: int) -> Figures:
+    """Share of the memory that pictures leave free, and that beyond their last address."""
+    from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
+
+    size = 1 << 19
+    stride = 1 << (COLUMNS - 1).bit_length()
+    beyond = ROWS * stride + COLUMNS
+    return {
+        "free": 100 * (1 - ROWS * COLUMNS / size),
+        "contiguous": 100 * (1 - beyond / size),
+        "beyond": beyond,
+    }
+
+
+FIDELITY = Fidelity(
+    page="fidelity-cubesense.md",
+    trials={
+        "ball": Trial(_ball, 10, 1, 30, "ball"),
+        "nadir": measured("cubesense", _sensor, 300, 4, 40, sensor="nadir", seed=2, units=10),
+        "sun": measured("cubesense", _sensor, 300, 6, 25, sensor="sun", seed=2, units=10),
+        "sun-time": measured(
+            "cubesense", _sensor, 100, 3, 10, sensor="sun", sun_angle=5, seed=2, units=10
+        ),
+        "sun-still": Trial(partial(_scatter, sensor="sun", angles_deg=(0.0, 40.0, 80.0)), 60, 6, 8),
+        "power": Trial(_power, profiles=False),
+        "lens": Trial(_lens, profiles=False),
+        "light": Trial(_light, profiles=False),
+        "tiles": Trial(_tiles, command="hdl area"),
+        "memory": Trial(_memory, profiles=False),
+    },
+    tables=read_tables("cubestack.host.studies.cubesense"),
+)

@@ -1,0 +1,110 @@
+"""Turn over bits of CubeSense's two FPGAs and memories, and see what comes of it.
+
+A loop is a picture of the Sun and one of the Earth in the memory of one of the two, which one by
+chance: one of them comes over the link. Each bit of each register is hit at random times while both
+FPGAs are idle, one stores, waits
+between pictures, stores the other one's picture, and is read; each upset in a copy of the
+running device. What the processor sees is compared with the same loop without the upset,
+and what the firmware answers with the truth.
+
+examples:
+  cubestack upsets cubesense
+  cubestack upsets cubesense --registers 'sun.*' --json
+  cubestack campaign seu-cubesense           the whole atlas, resumable, on all cores
+"""
+
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
+from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
+from cubestack.firmware_model.interface.cubesense.pins import CONTROLS
+from cubestack.firmware_model.interface.cubesense.switches import (
+    DEFAULT_SWITCHES,
+    CubeSenseSwitches,
+)
+from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
+from cubestack.host.options import option
+from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
+from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+    from cubestack.emulator.rtl.contract import RtlEngine
+    from cubestack.emulator.rtl.wiring import Wiring
+    from cubestack.host.clients.cubesense.client import CubeSense
+    from cubestack.host.emulation.emulated import EmulatedDevice
+
+LINKED, READING = "linked", "reading"
+
+#: The Sun no further from the middle, so that the Earth behind is in the nadir's field.
+SUN_ANGLE_DEG = 25.0
+
+
+def _scene(rng: np.random.Generator) -> Any:
+    return random_view(CubeSenseOptions(sun_angle=SUN_ANGLE_DEG), Camera.SUN, rng)
+
+
+def _start(sram: Sram, emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]") -> None:
+    for camera in Camera:
+        emulated.client.client.command("CaptureAndDetect", Camera=camera, Sram=sram)
+
+
+def _judge(emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]") -> Verdict:
+    reasons = []
+    for camera in Camera:
+        measured = emulated.client.wait_measured(camera)
+        right = is_right(emulated, camera, measured)
+        if measured.detected and not right:
+            return Verdict("wrong")
+        if not measured.detected:
+            told = measured.detect if measured.capture.stored else measured.capture
+            reasons.append(f"{camera.name.lower()}: {told.name.lower().replace('_', ' ')}")
+    return Verdict("refused", ", ".join(reasons)) if reasons else Verdict("right")
+
+
+def _state(engine: "RtlEngine") -> str:
+    commanded = actions(*(engine.get_pin(pin) for pin in CONTROLS))
+    if Action.STORE_OTHER in commanded:
+        return LINKED
+    if Action.STORE in commanded:
+        return STORING
+    return IDLE if set(commanded) == {Action.STANDBY} else READING
+
+
+@dataclass(frozen=True, kw_only=True)
+class CubeSenseUpsetOptions(UpsetOptions):
+    """Options of `cubestack upsets cubesense`."""
+
+    gateware: str = option(
+        DEFAULT_SWITCHES.gateware,
+        "of both FPGAs (default as-flown)",
+        choices=CubeSenseSwitches.declared()["gateware"].choices,
+    )
+
+
+def _wiring(gateware: str) -> "Wiring":
+    from cubestack.emulator.boards.cubesense.board import wiring_of
+
+    return wiring_of(gateware)
+
+
+@cache
+def _rig_of(gateware: str) -> Rig:
+    subjects = tuple(
+        Subject(_scene, partial(_start, sram), _judge, _state, row_bytes=640) for sram in Sram
+    )
+    phases = (IDLE, STORING, BETWEEN, LINKED, READING)
+    board = {"set": f"gateware={gateware}"}
+    return Rig(subjects, partial(_wiring, gateware), phases, ("sun", "nadir"), board)
+
+
+EXPERIMENT = UpsetExperiment(
+    lambda options: _rig_of(options.gateware),
+    __doc__,
+    decides=("profile", "set", "mcu_addressing", "uart"),
+    options=CubeSenseUpsetOptions,
+)

@@ -1,0 +1,63 @@
+"""Compile CubeStar's onboard star catalogue from Hipparcos and say what is in it.
+
+examples:
+  cubestack catalogue cubestar                         as flown: V < 3.8
+  cubestack catalogue cubestar --pair-limit 42.1       the published number of pairs
+  cubestack catalogue cubestar --mag-limit 4 --json
+  cubestack catalogue cubestar --c catalogue.c         star list and pair list as C arrays
+"""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cubestack.host.devices.device import Shown
+from cubestack.host.emulation.records import create_file
+from cubestack.host.experiments.facts import Lookup
+from cubestack.host.export.c_arrays import c_arrays
+from cubestack.host.options import NUMBER, PATH, YEAR, Options, option
+
+
+@dataclass(frozen=True, kw_only=True)
+class CatalogueOptions(Options):
+    """What the catalogue is compiled for; None as it is flown."""
+
+    mag_limit: float | None = option(None, "faintest star; default 3.8", NUMBER, metavar="V")
+    epoch: float = option(2026.0, "default 2026", YEAR, metavar="YEAR")
+    pair_limit: float | None = option(None, "default: as flown", NUMBER, metavar="DEG")
+    c: Path | None = option(None, "write star list and pair list as C arrays", PATH, metavar="FILE")
+
+
+class _Catalogue(Lookup[CatalogueOptions]):
+    options = CatalogueOptions
+    description = __doc__
+
+    def look_up(self, options: CatalogueOptions, shown: Shown) -> dict[str, Any]:
+        from cubestack.emulator.boards.cubestar import catalogue as flown
+
+        mag_limit = flown.MAG_LIMIT if options.mag_limit is None else options.mag_limit
+        pair_limit = flown.PAIR_LIMIT_DEG if options.pair_limit is None else options.pair_limit
+        catalogue = flown.onboard_catalogue(mag_limit, pair_limit, options.epoch)
+        if options.c is not None:
+            about = (
+                f"CubeStar's catalogue: V < {mag_limit:g}, pairs closer than {pair_limit:g} deg,"
+                f" epoch {options.epoch:g}; SHA-256 of the arrays {catalogue.sha256()}"
+            )
+            with ExitStack() as stack:
+                stream = create_file(options.c, stack)
+                stream.write(c_arrays("catalogue", catalogue.arrays(), about))
+        return {
+            "mag_limit": mag_limit,
+            "pair_limit_deg": pair_limit,
+            "epoch": options.epoch,
+            "stars": len(catalogue),
+            "star_bytes": catalogue.star_bytes,
+            "pairs": len(catalogue.pairs),
+            "pair_bytes": catalogue.pair_bytes,
+            "closest_pairs_rad": [float(angle) for angle in catalogue.pairs.angle[:2]],
+            "sha256": catalogue.sha256(),
+        }
+
+
+EXPERIMENT = _Catalogue()

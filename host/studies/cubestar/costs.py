@@ -1,0 +1,166 @@
+"""What CubeStar's program costs as compiled code: operations, and the phases of one picture."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from cubestack.host.studies.costs.contract import CostReport, Measurement
+from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from cubestack.emulator.boards.cubestar.compiled.build import Build
+    from cubestack.emulator.boards.cubestar.compiled.machine import Timing
+
+PUBLISHED_MS = 320.0
+"""Detection and matching of 20 centroids: CubeStar thesis, figure 5.7."""
+
+#: Where the picture is taken, right ascension and declination in degrees, and down to which
+#: magnitude: one with the published 20 centroids.
+POINTING_DEG, MAG_LIMIT = (84.0, -1.0), 4.5
+
+_BUILDS = tuple((f"O{level}", kind) for kind in ("own", "float", "literals", "double")
+                for level in ("0", "2", "s"))  # fmt: skip
+#: Waits of the memories beside the first one's; with the slowest of the builds and the fastest.
+_TIMINGS: tuple[dict[str, Any], ...] = (
+    {"flash_waits": 0},
+    {"cache": False},
+    {"bus": (3, 3, 15, 3)},
+    {"cache": False, "bus": (3, 3, 15, 3)},
+)
+
+#: Columns of the table, and the phases that each adds up.
+COLUMNS = {
+    "search": ("search",),
+    "centroids to vectors": ("centroid", "correction", "vectors"),
+    "distances": ("distances",),
+    "votes": ("votes",),
+    "identities, selection": ("identities", "selection"),
+    "verification": ("verification",),
+}
+
+
+@dataclass(frozen=True)
+class _Case:
+    build: "Build"
+    timing: "Timing"
+
+
+def _cases(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[_Case]:
+    from cubestack.emulator.boards.cubestar.compiled.build import Build
+    from cubestack.emulator.boards.cubestar.compiled.machine import Timing
+
+    chosen = [Build(*b) for b in _BUILDS if b[0] in levels and b[1] in precisions]
+    for build in chosen:
+        yield _Case(build, Timing())
+    for build in chosen:
+        if build in (Build("O2", "own"), Build("O0", "double")):
+            for waits in _TIMINGS:
+                yield _Case(build, Timing(**waits))
+
+
+def picture() -> "NDArray[np.uint8]":
+    """The picture that is processed, as the emulated camera takes it."""
+    from dataclasses import replace
+
+    from cubestack.emulator.camera.common.star_sensor import StarSensor
+    from cubestack.emulator.scene.sky import SkyScene
+    from cubestack.host.devices.registry import device
+    from cubestack.host.emulation.emulated import power_up
+
+    scene = replace(SkyScene.pointing(*POINTING_DEG), mag_limit=MAG_LIMIT)
+    with power_up(device("cubestar"), scene) as emulated:
+        emulated.client.take_picture()
+        camera = getattr(emulated.board, "camera", None)
+        assert isinstance(camera, StarSensor)
+        assert camera.rendered is not None
+        return camera.rendered
+
+
+def generated() -> dict[str, str]:
+    """Sources and headers of the measuring program that are made of tables."""
+    from cubestack.emulator.boards.cubestar.compiled.picture import defaults
+    from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+    from cubestack.firmware_model.interface.efm32gg.c_header import c_header
+
+    return {**catalogue_tables(), "defaults.h": defaults(), "efm32gg.h": c_header(LAYOUTS)}
+
+
+def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
+    """Each build in turn."""
+    from cubestack.emulator.boards.cubestar.compiled import operations
+    from cubestack.emulator.boards.cubestar.compiled.build import compiled, compiler_version
+    from cubestack.emulator.boards.cubestar.compiled.machine import started
+    from cubestack.emulator.boards.cubestar.compiled.picture import run
+
+    compiler_version()
+    pixels, sources, images = picture(), generated(), {}
+    for case in _cases(levels, precisions):
+        if case.build not in images:
+            images[case.build] = compiled(case.build, sources)
+        calls = started(images[case.build], case.timing)
+        phases = run(calls, pixels).cycles
+        cycles = operations.measure(calls, double=case.build.precision == "double")
+        calls.machine.close()
+        yield Measurement(str(case.build), str(case.timing), cycles, phases)
+
+
+def page(found: Sequence[Measurement], clock_hz: int) -> str:
+    """The table of builds, in ms, beside what the Python program charges and what is published."""
+    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+    from cubestack.emulator.boards.cubestar.compiled.picture import charged
+    from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+    from cubestack.firmware_model.mcu.costs import Meter
+
+    lines = [
+        f"| build | memory | {' | '.join(COLUMNS)} | sum, ms |",
+        "|-" * (len(COLUMNS) + 3) + "|",
+    ]
+    charges = charged(picture(), onboard_catalogue(), Meter(CORTEX_M3)).cycles
+    rows: list[tuple[str, str, Mapping[str, int]]] = [
+        ("charged by the Python program", "its own table", charges),
+        *((f"`{one.build}`", one.timing, one.phases) for one in found),
+    ]
+    for name, memory, phases in rows:
+        times = [1000 * sum(phases[p] for p in group) / clock_hz for group in COLUMNS.values()]
+        shown = " | ".join(f"{ms:.1f}" for ms in times)
+        lines.append(f"| {name} | {memory} | {shown} | {sum(times):.0f} |")
+    lines.append(f"| published | | {' | ' * (len(COLUMNS) - 1)} | {PUBLISHED_MS:.0f} |")
+    return "\n".join(lines)
+
+
+def as_data(found: Sequence[Measurement]) -> dict[str, Any]:
+    """For the file of firmware_model/mcu."""
+    from cubestack.emulator.boards.cubestar.compiled.build import compiler_version
+
+    return {"compiler": compiler_version(), "builds": [asdict(one) for one in found]}
+
+
+def _file() -> Any:
+    from cubestack.firmware_model.mcu.compiled import FILE
+
+    return FILE
+
+
+def _defaults() -> Mapping[str, float]:
+    from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+
+    return {name: cost.cycles for name, cost in CORTEX_M3.operations.items()}
+
+
+def costs() -> CostReport:
+    """For ``Device.costs``."""
+    from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+
+    return CostReport(
+        levels=("O0", "O2", "Os"),
+        precisions=("own", "float", "literals", "double"),
+        measure=measure,
+        as_data=as_data,
+        file=_file(),
+        page=lambda found: page(found, CORTEX_M3.clock_hz),
+        document="fidelity.md",
+        table=_defaults(),
+    )

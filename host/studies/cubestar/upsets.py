@@ -1,0 +1,117 @@
+"""Turn over bits of CubeStar's FPGA and memories, and see what comes of it.
+
+Each bit of each register is hit at random times while the FPGA is idle, stores, waits
+between pictures, and is read back; each upset in a copy of the running device. What the
+processor sees is compared with the same loop without the upset, and what the firmware
+answers with the truth.
+
+examples:
+  cubestack upsets cubestar
+  cubestack upsets cubestar --registers 'writer.*' --frames 10 --json
+  cubestack campaign seu-cubestar            the whole atlas, resumable, on all cores
+"""
+
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
+from cubestack.host.experiments import attitude as attitudes
+from cubestack.host.experiments.cubestar.measure import wait_started
+from cubestack.host.options import option
+from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
+from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
+
+if TYPE_CHECKING:
+    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+    from cubestack.emulator.rtl.contract import RtlEngine
+    from cubestack.emulator.rtl.wiring import Wiring
+    from cubestack.host.clients.cubestar.client import CubeStar
+    from cubestack.host.emulation.emulated import EmulatedDevice
+
+READING = "reading"
+
+#: Of a loop with each layout; but for the published one the FPGA leads the processor to its memory
+#: whenever it does not store.
+PHASES = dict.fromkeys(Layout, (STORING, BETWEEN, READING)) | {
+    Layout.COPIED: (IDLE, STORING, BETWEEN, READING)
+}
+
+MEMORIES = {
+    Layout.COPIED: ("SRAM", "external"),
+    Layout.SHARED: ("SRAM",),
+    Layout.TWO_MEMORIES: ("SRAM1", "SRAM2"),
+    Layout.TWO_BOARDS: ("SRAM1", "SRAM2"),
+}
+
+TIMEOUT_S = 20.0
+
+
+def _scene(rng: np.random.Generator) -> Any:
+    from cubestack.emulator.camera.mlx75412.lens import CONDITION
+
+    return attitudes.random_view(attitudes.SkyOptions(), CONDITION, rng)
+
+
+def _start(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> None:
+    emulated.client.client.command("CaptureAndProcess")
+
+
+def _judge(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> Verdict:
+    cubestar = emulated.client
+    cubestar.client.wait_processed(TIMEOUT_S)
+    status = cubestar.task_status()
+    attitude = cubestar.attitude()
+    if not attitude.valid:
+        return Verdict("refused", status.name.lower().replace("_", " "))
+    truth = emulated.board.truth()
+    right = truth is not None and attitudes.is_right(*attitudes.errors(attitude.quaternion, truth))
+    return Verdict("right" if right else "wrong")
+
+
+def _state(engine: "RtlEngine") -> str:
+    boards = BOARD_PREFIXES if len(engine.wiring.acknowledges) > 1 else ("",)
+    on = [board for board in boards if engine.get_pin(board + ENABLE)]
+    if not on:
+        return IDLE
+    return READING if all(engine.get_pin(board + RNW) for board in on) else STORING
+
+
+@dataclass(frozen=True, kw_only=True)
+class CubeStarUpsetOptions(UpsetOptions):
+    """Options of `cubestack upsets cubestar`."""
+
+    layout: str = option(
+        Layout.COPIED.value,
+        "memory layout, and the gateware for it (default 1, the published one)",
+        choices=tuple(layout.value for layout in Layout),
+    )
+
+
+def _wiring(layout: Layout) -> "Wiring":
+    from cubestack.emulator.boards.cubestar.layouts import BOARDS
+
+    return BOARDS[layout].wiring()
+
+
+@cache
+def _rig_of(layout: Layout) -> Rig:
+    subject = Subject(_scene, _start, _judge, _state, row_bytes=1024, ready=wait_started)
+    return Rig(
+        (subject,),
+        partial(_wiring, layout),
+        PHASES[layout],
+        MEMORIES[layout],
+        {"layout": layout.value},
+    )
+
+
+EXPERIMENT = UpsetExperiment(
+    lambda options: _rig_of(Layout(options.layout)),
+    __doc__,
+    decides=("layout",),
+    options=CubeStarUpsetOptions,
+)

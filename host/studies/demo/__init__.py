@@ -1,0 +1,1 @@
+"""`cubestack demo`: the devices end to end, with pictures."""

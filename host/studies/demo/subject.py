@@ -1,0 +1,91 @@
+"""What demonstrations share: a device served by another process, a client, and what is told."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.host.clients.contract import Progress
+from cubestack.host.clients.node import NodeClient
+from cubestack.host.devices.device import BoardT_co, ClientT_co, Device
+from cubestack.host.emulation.process import emulating
+from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.terminal import busy, head, say, tell
+from cubestack.host.transport.streams import open_transport
+
+ANSWER_TIMEOUT_S = 60.0
+"""Wall time: on a busy machine an emulator may stand for seconds; that it ends is told at once."""
+
+
+class Demo:
+    """One subject of a demonstration: its title, the device that looks at it, and its pictures.
+
+    Attributes:
+        out: folder of everything that is written.
+        name: stem of the scene file.
+    """
+
+    def __init__(self, out: Path, name: str, title: str) -> None:
+        """Show the title."""
+        self.out = out
+        self.name = name
+        self._started = time.monotonic()
+        head(title)
+
+    @contextmanager
+    def client(
+        self, device: Device[BoardT_co, ClientT_co], scene: str, board: Sequence[str] = ()
+    ) -> Iterator[tuple[ClientT_co, Path]]:
+        """A client of a ``device`` that sees ``scene``, a TOML text; and its port's path.
+
+        ``board`` are words of `cubestack emulate`.
+        """
+        path = self.out / f"{self.name}.toml"
+        path.write_text(scene, encoding="utf-8")
+        words = [device.name, "--scene", str(path), *board]
+        with _served(words, self.out / f"tty{device.name.upper()}") as port:
+            line = open_transport(str(port), device.interface.baud)
+            node = NodeClient(line, device.interface, timeout_s=ANSWER_TIMEOUT_S)
+            yield device.client(node), port
+            node.close()
+
+    def finish(self, *pictures: str, virtual_s: float | None = None) -> None:
+        """Tell how long it took, and names of the pictures that were written."""
+        wall = f"{time.monotonic() - self._started:.1f} s of wall time"
+        times = wall if virtual_s is None else f"{virtual_s:.1f} s of virtual time in {wall}"
+        names = ", ".join(str(self.out / picture) for picture in pictures)
+        tell(f"{times}; pictures: {names}")
+
+
+@contextmanager
+def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
+    """An emulator process, of what ``words`` say, that serves on ``port``."""
+    say("starting the emulator")
+    line = ""
+    try:
+        with emulating([*words, "--pty", str(port), "--pace", "fast"]) as said:
+            for line in said:
+                say(line)  # where it serves, or that it takes long, or what is wrong
+                if port.exists():
+                    break
+            else:
+                raise PortOpenError("the emulator did not start")
+            yield port
+    except PortClosedError:
+        say(f"the emulator ended: {[line, *said][-1]}")
+        raise
+
+
+def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """The picture that ``fetch`` gets, with a progress bar."""
+    with busy(f"downloading {what}") as shown:
+        return fetch(shown)
+
+
+def tell_times(phases_ms: dict[str, float], indent: str = "") -> None:
+    """Tell the virtual times of a measurement's steps."""
+    times = ", ".join(f"{name} {ms:.1f} ms" for name, ms in phases_ms.items())
+    tell(f"{indent}virtual time: {times}")

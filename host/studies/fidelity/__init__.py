@@ -1,0 +1,1 @@
+"""`cubestack fidelity`: published figures beside ours."""

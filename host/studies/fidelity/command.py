@@ -1,0 +1,135 @@
+"""Measure every published figure of the devices: what their documents have, ours in
+both profiles, and how ours comes about.
+
+  predicted   follows from the model; nothing was set to make it so
+  fitted      a constant was set so that it comes out, or nearly
+  chosen      a choice that the document leaves open makes it
+  definition  the document's own formula or setting
+
+All takes less than half an hour on two idle cores.
+
+examples:
+  cubestack fidelity --quick
+  cubestack fidelity {second} --rows 'sun-*'
+  cubestack fidelity --write                 rewrite the tables of docs/fidelity*.md
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES
+from cubestack.host.cli.arguments import whole
+from cubestack.host.devices.registry import devices
+from cubestack.host.studies.fidelity import table as fidelity
+from cubestack.host.studies.workers import cores
+from cubestack.host.terminal import busy, say, tell
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    known = [device.name for device in devices() if "fidelity" in device.studies]
+    parser.add_argument("device", nargs="?", choices=known, help="default: all")
+    parser.add_argument(
+        "--rows",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="keys of rows, as in 'sun-*'; can be given again",
+    )
+    parser.add_argument("--profile", choices=PROFILES, help="default: both")
+    parser.add_argument("--quick", action="store_true", help="a few pictures of each kind")
+    parser.add_argument("--frames", type=whole(1), metavar="N", help="pictures of each kind")
+    parser.add_argument(
+        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object a row")
+    parser.add_argument("--markdown", action="store_true", help="tables as the pages have them")
+    parser.add_argument(
+        "--write",
+        nargs="?",
+        const="docs",
+        type=Path,
+        metavar="FOLDER",
+        help="rewrite the tables of the pages there (default docs)",
+    )
+    parser.set_defaults(known=known)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and show; ValueError for rows or pages that there are not."""
+    if args.write and (args.rows or args.profile or args.quick or args.frames):
+        raise ValueError(
+            "--write wants all rows whole: without --rows, --profile, --quick, --frames"
+        )
+    names = [args.device] if args.device else args.known
+    chosen = {name: fidelity.chosen_rows(name, args.rows) for name in names}
+    if not any(chosen.values()):
+        raise ValueError(f"no row is like {', '.join(args.rows)}; --quick --json lists all keys")
+    profiles = [args.profile] if args.profile else PROFILES
+    pages = {name: _page(args.write, name) for name in names} if args.write else {}
+    jobs = [
+        job
+        for name, rows in chosen.items()
+        for job in fidelity.jobs_of(
+            name, (row for _, row in rows), profiles, quick=args.quick, frames=args.frames
+        )
+    ]
+    workers = min(args.workers or cores(), len(jobs))
+    told = _Rest(jobs, quiet=args.json)
+    with busy("measuring", quiet=args.json) as shown:
+        found = fidelity.run_jobs(jobs, workers, lambda job: shown(told(job), len(jobs)))
+    for name, rows in chosen.items():
+        _show(args, list(fidelity.filled(name, rows, found)), pages.get(name))
+    return 0
+
+
+class _Rest:
+    """Tells what is done, and how long the rest takes, going by what the done took."""
+
+    def __init__(self, jobs: list[fidelity.Job], *, quiet: bool) -> None:
+        self.all_s = self.rest_s = sum(job.seconds for job in jobs)
+        self.count, self.done, self.quiet = len(jobs), 0, quiet
+        self.started = time.monotonic()
+
+    def __call__(self, job: fidelity.Job) -> int:
+        """Tell it of ``job``; how many are done."""
+        self.done += 1
+        self.rest_s -= job.seconds
+        if not self.quiet:
+            took_s = time.monotonic() - self.started
+            rest_s = took_s * self.rest_s / max(self.all_s - self.rest_s, 1e-9)
+            say(
+                f"{self.done}/{self.count} {job.device} {job.trial}, {job.profile}: "
+                f"{took_s:.0f} s, about {rest_s:.0f} s to go"
+            )
+        return self.done
+
+
+def _page(folder: Path, name: str) -> Path:
+    """A device's page, before anything is measured; ValueError where tables have no place."""
+    declared = fidelity.fidelity_of(name)
+    path: Path = folder / declared.page
+    text = path.read_text("utf-8") if path.is_file() else ""
+    for table in declared.tables:
+        if not all(mark in text for mark in fidelity.marks(table)):
+            raise ValueError(f"{path} has no {fidelity.marks(table)[0].strip()}, or is not there")
+    return path
+
+
+def _show(args: argparse.Namespace, rows: list[fidelity.Measured], page: Path | None) -> None:
+    if page is not None:
+        page.write_text(fidelity.rewritten(page.read_text("utf-8"), rows), "utf-8")
+        say(f"wrote {len(rows)} rows to {page}")
+    elif args.json:
+        for row in rows:
+            print(json.dumps(row.as_dict()), flush=True)
+    elif args.markdown:
+        for table in dict.fromkeys(row.table for row in rows):
+            print(f"{table}\n\n{fidelity.markdown([row for row in rows if row.table == table])}")
+    else:
+        for row in rows:
+            ours = "; ".join(f"{profile} {value}" for profile, value in row.ours.items())
+            tell(f"{row.key}: {row.figure} ({row.source})")
+            tell(f"    document {row.published}; {ours}; {row.word}")

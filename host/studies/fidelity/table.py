@@ -1,0 +1,229 @@
+"""Measures the published figures of devices, and writes the tables of their pages.
+
+Rows share trials: one set of pictures gives many figures. Each trial runs once in each profile,
+several at a time.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES
+from cubestack.host.devices.experiment import Result
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.experiments.measure import measure
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import flag
+from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Row, Trial
+from cubestack.host.studies.workers import performed
+
+COLUMNS = ("figure", "source", "published", "`published`", "`extended`", "word", "command")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A trial to run.
+
+    Attributes:
+        device, trial: names.
+        profile: of it; the first one where all are the same.
+        frames: how many.
+        seconds: roughly what it takes.
+    """
+
+    device: str
+    trial: str
+    profile: str
+    frames: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Measured(Result):
+    """A row with our values; attributes are those of the JSON output.
+
+    Attributes:
+        device: its name.
+        table: of the page.
+        key, figure, source, published, word: as declared.
+        command: what shows it.
+        ours: our value by profile, as text; without one that was not measured.
+        figures: what it was made of, by profile and name.
+    """
+
+    device: str
+    table: str
+    key: str
+    figure: str
+    source: str
+    published: str
+    word: str
+    command: str
+    ours: Mapping[str, str]
+    figures: Mapping[str, Figures]
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Those of ``COLUMNS``."""
+        ours = (self.ours.get(profile, "") for profile in PROFILES)
+        return (
+            *(self.figure, self.source, self.published),
+            *ours,
+            *(self.word, f"`{self.command}`"),
+        )
+
+
+def fidelity_of(device: str) -> Fidelity:
+    """What a device declares; ValueError when that is nothing."""
+    found = registered(device)
+    if "fidelity" not in found.studies:
+        raise ValueError(f"{found.name} declares no published figures")
+    declared: Fidelity = found.study("fidelity")
+    return declared
+
+
+def chosen_rows(device: str, patterns: Sequence[str] = ()) -> list[tuple[str, Row]]:
+    """(table, row) of a device whose keys are like one of ``patterns``, by default all."""
+    declared = fidelity_of(device)
+    return [
+        (table, row)
+        for table, rows in declared.tables.items()
+        for row in rows
+        if not patterns or any(fnmatchcase(row.key, pattern) for pattern in patterns)
+    ]
+
+
+def jobs_of(
+    device: str,
+    rows: Iterable[Row],
+    profiles: Sequence[str] = PROFILES,
+    *,
+    quick: bool = False,
+    frames: int | None = None,
+) -> list[Job]:
+    """What has to run for these rows; ``frames`` in place of the number that a trial declares."""
+    declared = fidelity_of(device)
+    jobs = []
+    for name in dict.fromkeys(row.trial for row in rows):
+        trial = declared.trials[name]
+        whole = trial.frames
+        count = whole and (frames or (trial.quick if quick else whole))
+        for profile in profiles if trial.profiles else profiles[:1]:
+            share = count / whole if whole else 1.0
+            jobs.append(Job(device, name, profile, count, trial.seconds * share))
+    return jobs
+
+
+def perform(job: Job) -> Figures:
+    """Run one job, in whatever process."""
+    trial = fidelity_of(job.device).trials[job.trial]
+    opened = Opener(registered(job.device), board={"profile": job.profile})
+    return dict(trial.run(opened, job.frames))
+
+
+def run_jobs(
+    jobs: Sequence[Job], workers: int, on_done: Callable[[Job], None]
+) -> dict[Job, Figures]:
+    """Figures of all jobs, the longest first; ``on_done`` is told of each as it ends."""
+    found: dict[Job, Figures] = {}
+    order = sorted(jobs, key=lambda job: -job.seconds)
+    for job, figures in performed(perform, order, workers):
+        found[job] = figures
+        on_done(job)
+    return found
+
+
+def filled(
+    device: str, rows: Iterable[tuple[str, Row]], found: Mapping[Job, Figures]
+) -> Iterator[Measured]:
+    """The rows with our values out of what was found."""
+    declared = fidelity_of(device)
+    for table, row in rows:
+        figures = {
+            job.profile: values
+            for job, values in found.items()
+            if (job.device, job.trial) == (device, row.trial)
+        }
+        if not declared.trials[row.trial].profiles:
+            figures = {profile: one for one in figures.values() for profile in PROFILES}
+        ours = {profile: shown(row, values) for profile, values in figures.items()}
+        yield Measured(
+            *(device, table, row.key, row.figure, row.source, row.published, row.word),
+            declared.command(device, row),
+            ours,
+            figures,
+        )
+
+
+def shown(row: Row, figures: Figures) -> str:
+    """Our value as the tables have it; what there is not is a dash."""
+    return re.sub(r"\bnan\b", "-", row.ours.format(**figures))
+
+
+def measured(
+    device: str,
+    summary: Callable[[Sequence[Any]], Figures],
+    frames: int,
+    quick: int = 2,
+    seconds: float = 10.0,
+    seed: int = 1,
+    units: int = 1,
+    **options: Any,
+) -> Trial:
+    """A trial that is `cubestack measure`: ``summary`` makes figures of its results.
+
+    ``units``: the frames are of so many devices, with seeds from ``seed`` on; of several no single
+    command is what was measured, and rows are shown by `cubestack fidelity`.
+    """
+
+    def run(opened: Opener[Any, Any], count: int) -> Figures:
+        results: list[Result] = []
+        used = min(units, max(1, count // units))
+        for number in range(seed, seed + used):
+            each: dict[str, Any] = {"frames": count // used, "seed": number}
+            results += measure(device, **each, **opened.board, **options)
+        return summary(results)
+
+    if units > 1:
+        return Trial(run, frames, quick, seconds)
+    words = ["measure", device, "--frames", str(frames), "--seed", str(seed)]
+    for name, value in options.items():
+        words += [flag(name)] if value is True else [flag(name), str(value)]
+    return Trial(run, frames, quick, seconds, " ".join(words))
+
+
+# --- pages ----------------------------------------------------------------------------------------
+
+
+def markdown(rows: Sequence[Measured]) -> str:
+    """One table of a page."""
+    lines = ["| " + " | ".join(COLUMNS) + " |", "|-" * len(COLUMNS) + "|"]
+    lines += ["| " + " | ".join(row.cells) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def marks(table: str) -> tuple[str, str]:
+    """Lines of a page between which a table stands."""
+    return f"<!-- rows: {table} -->\n", "<!-- end of rows -->\n"
+
+
+def rewritten(page: str, rows: Sequence[Measured]) -> str:
+    """A page with its tables replaced; ValueError names a table that it has no place for."""
+    for table in dict.fromkeys(row.table for row in rows):
+        begin, end = marks(table)
+        if begin not in page:
+            raise ValueError(f"the page has no line {begin.strip()!r}")
+        before, after = page.split(begin, 1)
+        _, rest = after.split(end, 1)
+        own = [row for row in rows if row.table == table]
+        page = f"{before}{begin}\n{markdown(own)}\n{end}{rest}"
+    return page
+
+
+def mean(values: Iterable[float]) -> float:
+    """Mean of the values; nan of none."""
+    listed = list(values)
+    return math.fsum(listed) / len(listed) if listed else math.nan

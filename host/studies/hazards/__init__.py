@@ -1,0 +1,1 @@
+"""`cubestack hazards`: rates of right, refused and wrong results under hazards."""

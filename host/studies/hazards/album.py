@@ -1,0 +1,125 @@
+"""A folder of what hazards look like and do: sample pictures, curves, points."""
+
+import json
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.experiments.hazard_options import Asked, known
+from cubestack.host.experiments.measure import experiment_of
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.experiments.rates import wilson
+from cubestack.host.experiments.rendered import cameras_of
+from cubestack.host.pictures.hazards import save_curves, save_sample
+from cubestack.host.studies.hazards.curves import Point
+
+PROFILE = "extended"
+PAGE = "hazards.md"
+PICTURES = Path("images") / "hazards"
+BEGIN, END = "<!-- hazards -->\n", "<!-- end of hazards -->\n"
+TITLE = f"# Hard skies\n\n{BEGIN}{END}"
+
+
+def check(folder: Path) -> None:
+    """Make the folder; ValueError when it can not be one, or figures or a page have no place."""
+    if find_spec("matplotlib") is None:
+        raise ValueError('--out: figures need matplotlib: pip install "cubestack[plots]"')
+    try:
+        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise ValueError(f"--out: {folder} is a file; a folder would be right") from None
+    _page(folder)
+
+
+def write(points: Sequence[Point], folder: Path, seed: int) -> int:
+    """Write pictures, curves, all points, and the part of the page; returns how many files."""
+    pictures = folder / PICTURES
+    lines = [json.dumps(point.as_dict()) for point in points]
+    (pictures / "points.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
+    names = dict.fromkeys(point.hazard for point in points)
+    for name in names:
+        own = [point for point in points if point.hazard == name]
+        save_curves(
+            {registered(device).title: of for device, of in _by_device(own).items()},
+            _axis(name),
+            known()[name].meaning,
+            wilson,
+            pictures / f"{name}-curve.png",
+        )
+        for device in _by_device(own):
+            save_sample(sample(device, name, seed), pictures / f"{name}-{device}.jpg")
+    before, after = _page(folder)
+    sections = [_section(name, [p for p in points if p.hazard == name]) for name in sorted(names)]
+    (folder / PAGE).write_text(before + BEGIN + "\n".join(sections) + END + after, "utf-8")
+    return 2 + len(names) + len({(point.hazard, point.device) for point in points})
+
+
+def _page(folder: Path) -> tuple[str, str]:
+    """What stands on the page before and behind the hazards; ValueError without such a place."""
+    path = folder / PAGE
+    page = path.read_text("utf-8") if path.is_file() else TITLE
+    if BEGIN not in page or END not in page:
+        raise ValueError(f"--out: {path} has no lines {BEGIN.strip()} and {END.strip()}")
+    return page.split(BEGIN)[0], page.split(END, 1)[1]
+
+
+def _by_device(points: Sequence[Point]) -> dict[str, list[Point]]:
+    found: dict[str, list[Point]] = {}
+    for point in points:
+        found.setdefault(point.device, []).append(point)
+    return found
+
+
+def _axis(name: str) -> str:
+    scale = known()[name].strength
+    return f"{scale.key}, {scale.unit}" if scale.unit else scale.key
+
+
+def _section(name: str, points: Sequence[Point]) -> str:
+    """Of the page: what a hazard is, a picture of each device, the curve, and the numbers."""
+    kind = known()[name]
+    usual, where = f"{kind.strength.usual:g}", "/".join(kind.__module__.split(".")[1:])
+    lines = [
+        f"## {name}",
+        "",
+        f"{kind.meaning[0].upper()}{kind.meaning[1:]}: `--hazard {name}`, which is "
+        f"`{name}={usual}`. Source: `{where}.py`.",
+        "",
+    ]
+    for device in _by_device(points):
+        title = f"{registered(device).title}, {_axis(name)} {usual}"
+        lines += [f"![{title}]({PICTURES.as_posix()}/{name}-{device}.jpg)", ""]
+    lines += [f"![right, refused and wrong]({PICTURES.as_posix()}/{name}-curve.png)", ""]
+    lines += [f"| | {_axis(name)} | right | refused | wrong |", "|-|-|-|-|-|"]
+    for device, own in _by_device(points).items():
+        for point in own:
+            reasons = ", ".join(f"{count} {reason}" for reason, count in point.reasons.items())
+            refused = f"{point.refused} ({reasons})" if reasons else f"{point.refused}"
+            lines.append(
+                f"| {registered(device).title} | {point.strength:g} | {point.right} of "
+                f"{point.pictures} | {refused} | {point.wrong} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
+    """The picture (rows, columns) of a device's first frame with a hazard of its usual strength;
+    those of several cameras side by side.
+    """
+    found, kept = registered(device), list[AnyEmulated]()
+    options = experiment_of(found).options(hazard=(Asked(hazard),), seed=seed)
+    opener = Opener(found, board={"profile": PROFILE}, opened=kept.append)
+    pictures: list[NDArray[np.uint8]] = []
+    results = experiment_of(found).run(opener, options)
+    # Each result is of the next camera; what was rendered is what a download would bring, at once.
+    for _ in results:
+        cameras = list(cameras_of(kept[0].board))
+        pictures.append(cameras[len(pictures)].rendered)
+        if len(pictures) == len(cameras):
+            break
+    return np.hstack(pictures)

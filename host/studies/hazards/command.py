@@ -1,0 +1,107 @@
+"""Make skies hard, and see how often a sensor is right, refuses, or is wrong: for each
+hazard a sample picture, and a curve against its strength.
+
+Every picture goes through the whole device; the bands are 95 % limits of the rates.
+Results do not depend on the number of workers.
+
+examples:
+  cubestack hazards {first} --hazard moon --frames 20
+  cubestack hazards --frames 40 --out docs                all, and the page that shows them
+  cubestack hazards {first} --json > points.jsonl
+  cubestack hazards --list                                what there is
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.table import Table
+
+from cubestack.firmware_model.interface.codec.switches import PROFILES
+from cubestack.host.cli.arguments import whole
+from cubestack.host.experiments.hazard_options import known
+from cubestack.host.experiments.rates import wilson
+from cubestack.host.studies.hazards import curves
+from cubestack.host.studies.workers import cores
+from cubestack.host.terminal import progress, say, show
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("device", nargs="?", help="default: all that take hazards")
+    parser.add_argument(
+        "--hazard", action="append", default=[], metavar="NAME", help="default: all; may be given "
+        "again",
+    )  # fmt: skip
+    parser.add_argument("--list", action="store_true", help="list hazards and their strengths")
+    parser.add_argument(
+        "--frames", type=whole(1), default=20, metavar="N", help="of each strength (default 20)"
+    )
+    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="default 0")
+    parser.add_argument("--profile", choices=PROFILES, default="extended", help="default: extended")
+    parser.add_argument(
+        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="write hazards.md there, or a part of it, with pictures, curves and points",
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object a point")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and show; ValueError for devices and hazards that there are not."""
+    if args.list:
+        _list()
+        return 0
+    names = [args.device] if args.device else curves.devices_with_hazards()
+    jobs = [
+        job
+        for name in names
+        for job in curves.jobs_of(name, args.hazard, args.frames, args.seed, args.profile)
+    ]
+    if args.out:
+        from cubestack.host.studies.hazards import album
+
+        album.check(args.out)
+    workers = min(args.workers or cores(), len(jobs))
+    points = []
+    for point in progress(curves.run(jobs, workers), len(jobs), "measuring", quiet=args.json):
+        points.append(point)
+        if args.json:
+            print(json.dumps(point.as_dict()), flush=True)
+    if not args.json:
+        _show(points)
+    if args.out:
+        written = album.write(points, args.out, args.seed)
+        say(f"wrote {written} files to {args.out}")
+    return 0
+
+
+def _list() -> None:
+    table = Table("hazard", "what it is", "strength")
+    for name, kind in sorted(known().items()):
+        values = ", ".join(f"{value:g}" for value in kind.strength.values)
+        table.add_row(name, kind.meaning, f"{kind.strength.key}: {values} {kind.strength.unit}")
+    show(table)
+
+
+def _show(points: list[curves.Point]) -> None:
+    table = Table(title="pictures right, refused and wrong; 95 % limits in brackets")
+    for column in ("device", "hazard", "strength", "right", "refused", "wrong", "reasons"):
+        table.add_column(column, overflow="fold")
+    for point in points:
+        right, wrong = (
+            "{} ({:.0f}-{:.0f} %)".format(
+                count, *(100 * limit for limit in wilson(count, point.pictures))
+            )
+            for count in (point.right, point.wrong)
+        )
+        reasons = ", ".join(f"{reason} {count}" for reason, count in point.reasons.items())
+        strength = f"{point.strength:g}"
+        table.add_row(
+            *(point.device, point.hazard, strength, right, str(point.refused), wrong, reasons)
+        )
+    show(table)

@@ -1,0 +1,95 @@
+"""Log a device's results to a CSV file: time, attitude or angles, and what goes with them.
+
+TARGET is what `cubestack shell` takes: a serial port, tcp://HOST:PORT, i2c:BUS:ADDR,
+emulated:DEVICE... A log reads results and commands nothing by itself; -c has shell
+commands for its beginning, --each for every line. At the end it tells how much each
+angle scatters about a straight line.
+
+examples:
+  cubestack log /dev/ttyUSB0 --device {first} --out night.csv
+  cubestack log emulated:{first} --scene night.toml --count 100 --out night.csv
+      -c 'write setDetectionThresholds 16 16; write Trigger'
+  cubestack log emulated:{second} --count 10 --each 'write CaptureAndDetect SUN SRAM1; time 0.5'
+"""
+
+import argparse
+import csv
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from cubestack.host.cli.arguments import typed, whole
+from cubestack.host.cli.shell import split_commands
+from cubestack.host.cli.targets import add_target_arguments, open_any_target
+from cubestack.host.clients.contract import Columns
+from cubestack.host.devices.result_table import log_lines, scatter
+from cubestack.host.emulation.records import create_file
+from cubestack.host.errors import TargetError
+from cubestack.host.options import between
+from cubestack.host.shell.language import Shell
+from cubestack.host.terminal import say
+
+SECONDS = between(0, 86_400, "a number of seconds in 0..86400")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    add_target_arguments(parser)
+    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="default: standard output")
+    parser.add_argument("--count", type=whole(1), metavar="N", help="lines; default: until Ctrl-C")
+    parser.add_argument(
+        "--interval", type=typed(SECONDS), default=1.0, metavar="S", help="of the lines (default 1)"
+    )
+    for option, name, when in (("-c", "first", "the first line"), ("--each", "each", "every line")):
+        text = f"shell commands before {when}, separated by semicolons"
+        parser.add_argument(option, dest=name, default="", metavar="COMMANDS", help=text)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Log; returns 0 when every line has a result."""
+    lines: list[Columns] = []
+    with ExitStack() as stack:
+        target = open_any_target(args.target, args)
+        stack.callback(target.close)
+        if target.device is None:
+            raise TargetError(f"{args.target}: no registered device")
+        client, shell = target.device.client(target.node), Shell(target)
+        clock = time.monotonic if target.controls is None else target.controls.time_s
+
+        def perform(commands: str) -> None:
+            for command in split_commands(commands):
+                shell.execute(command)
+
+        perform(args.first)
+        stream = create_file(args.out, stack) if args.out else sys.stdout
+        writer: csv.DictWriter[str] | None = None
+        try:
+            for line in log_lines(
+                client,
+                clock,
+                count=args.count,
+                interval_s=args.interval,
+                before_each=lambda: perform(args.each),
+            ):
+                lines.append(line)
+                if writer is None and line["error"] is None:
+                    writer = csv.DictWriter(stream, list(line))
+                    writer.writeheader()
+                    writer.writerows(lines[:-1])
+                if writer is not None:
+                    writer.writerow(line)
+                    stream.flush()
+        except KeyboardInterrupt:
+            pass
+    for column, (slope, sigma, count) in scatter(lines).items():
+        say(
+            f"{column}: {sigma:.4f} deg (1 sigma) about a straight line of {slope:+.5f} deg/s, "
+            f"{count} of {len(lines)} lines"
+        )
+    wrong = [line for line in lines if line["error"] is not None]
+    if wrong:
+        say(
+            f"{len(wrong)} of {len(lines)} lines have no result, the last one: {wrong[-1]['error']}"
+        )
+    return 1 if wrong else 0

@@ -1,0 +1,1 @@
+"""`cubestack upsets`: flipped bits of gateware and memories, and their effects."""

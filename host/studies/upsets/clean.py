@@ -1,0 +1,178 @@
+"""A loop without any upset: when its phases are, and what is there when the FPGAs are done."""
+
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Subject, Verdict
+from cubestack.host.studies.upsets.watch import PortWatch
+
+if TYPE_CHECKING:
+    from cubestack.emulator.faults.sites import Sites
+    from cubestack.emulator.rtl.contract import RtlEngine
+    from cubestack.host.emulation.emulated import AnyEmulated
+
+PS_PER_S = 10**12
+
+LONGEST_S = 30.0
+"""Virtual time after which a loop is given up."""
+
+
+class NoLoopError(RuntimeError):
+    """A loop that does not come to an end."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Where one phase is, in ps of virtual time, and the camera whose picture is stored then."""
+
+    phase: str
+    start_ps: int
+    end_ps: int
+    camera: str | None = None
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What is there when the FPGAs are done.
+
+    Attributes:
+        data, seen: what the processor read, and when it saw acknowledges.
+        registers: of the FPGAs.
+        memories: of all of the board, by name.
+        violations: broken rules of the memories' timing, by kind.
+    """
+
+    data: NDArray[np.uint8]
+    seen: list[tuple[int, str, int]]
+    registers: bytes
+    memories: dict[str, NDArray[np.uint8]]
+    violations: dict[str, int]
+
+
+@dataclass(frozen=True)
+class CleanLoop:
+    """A loop without upsets.
+
+    Attributes:
+        intervals: of the phases, in their order.
+        over_ps: when the FPGAs are done: idle, or at the end.
+        snapshot: then.
+        verdict: on the answer.
+    """
+
+    intervals: list[Interval]
+    over_ps: int
+    snapshot: Snapshot
+    verdict: Verdict
+
+    @property
+    def start_ps(self) -> int:
+        """When it began."""
+        return self.intervals[0].start_ps
+
+    @property
+    def end_ps(self) -> int:
+        """When nothing was under way any more."""
+        return self.intervals[-1].end_ps
+
+    def seconds(self, period_s: float) -> dict[str, float]:
+        """How long the FPGAs are in each phase; from the end of a loop to the next, as there."""
+        rest_s = period_s - (self.end_ps - self.start_ps) / PS_PER_S
+        found = {self.intervals[-1].phase: max(0.0, rest_s)}
+        for one in self.intervals:
+            found[one.phase] = found.get(one.phase, 0.0) + (one.end_ps - one.start_ps) / PS_PER_S
+        return found
+
+
+class _State(NamedTuple):
+    """What the FPGAs are commanded from a time on, and the camera whose picture they store."""
+
+    start_ps: int
+    state: str
+    camera: str | None
+
+
+def _state(now_ps: int, subject: Subject, engine: "RtlEngine") -> _State:
+    cameras = (name for name in engine.wiring.storing(engine.get_pin) if name)
+    return _State(now_ps, subject.state(engine), next(iter(cameras), None))
+
+
+def clean_loop(
+    emulated: "AnyEmulated", subject: Subject, sites: "Sites", watch: PortWatch
+) -> CleanLoop:
+    """Go through the loop that has been started, to its end; for use in a copy.
+
+    Raises NoLoopError.
+    """
+    kernel, engine = emulated.board.kernel, sites.engine
+    assert engine is not None
+    until_ps = kernel.now + round(LONGEST_S * PS_PER_S)
+    states = [_state(kernel.now, subject, engine)]
+    snapshot = None
+    while emulated.board.busy() or len(states) == 1:
+        if kernel.now >= until_ps:
+            raise NoLoopError(f"no loop of {emulated.device.name} ends within {LONGEST_S:g} s")
+        kernel.step()
+        state = _state(kernel.now, subject, engine)
+        if state.state != states[-1].state:
+            states.append(state)
+            if state.state == IDLE:
+                snapshot = deepcopy(take(sites, watch))
+    over_ps = states[-1].start_ps
+    if snapshot is None or states[-1].state != IDLE:  # they lead the processor to its memory
+        snapshot, over_ps = deepcopy(take(sites, watch)), kernel.now
+    states.append(_State(kernel.now, IDLE, None))
+    intervals = [
+        one for state, then in pairwise(states) for one in _phases(state, then.start_ps, sites)
+    ]
+    return CleanLoop(intervals, over_ps, snapshot, subject.judge(emulated))
+
+
+def take(sites: "Sites", watch: PortWatch) -> Snapshot:
+    """What is there now; live views."""
+    engine = sites.engine
+    assert engine is not None
+    engine.run(max(sites.kernel.now, engine.now_ps))
+    return Snapshot(
+        np.frombuffer(watch.data, np.uint8),
+        list(watch.seen),
+        engine.state(),
+        sites.all_memories(),
+        {str(kind): count for kind, count in engine.violation_counts.items()},
+    )
+
+
+def render(clean: CleanLoop, sites: "Sites") -> None:
+    """Have the loop's pictures rendered, once for all copies."""
+    for one in clean.intervals:
+        if one.camera is None:
+            continue
+        source, now_ps = sites.cameras[one.camera].source, one.start_ps
+        while now_ps < one.end_ps and (segment := source.segment_at(now_ps)) is not None:
+            if segment.pixels is not None:
+                segment.pixels()
+            now_ps = int(segment.start_ps + segment.clocks * source.period) + 1
+
+
+def _phases(state: _State, end_ps: int, sites: "Sites") -> Iterator[Interval]:
+    """The intervals of one state; a camera's pauses between two pictures are apart."""
+    if state.state != STORING or state.camera is None:
+        yield Interval(state.state, state.start_ps, end_ps, state.camera)
+        return
+    source = sites.cameras[state.camera].source
+    now_ps = state.start_ps
+    while now_ps < end_ps:
+        segment = source.segment_at(now_ps)
+        over_ps = end_ps
+        if segment is not None:
+            over_ps = int(segment.start_ps + segment.clocks * source.period)
+        over_ps = min(max(over_ps, now_ps + 1), end_ps)
+        lines = segment is not None and segment.rows
+        yield Interval(STORING if lines else BETWEEN, now_ps, over_ps, state.camera)
+        now_ps = over_ps

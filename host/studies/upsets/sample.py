@@ -1,0 +1,225 @@
+"""One upset, in a copy of the running device: what it does, and what the firmware makes of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from cubestack.host.devices.experiment import Result
+from cubestack.host.errors import HostError
+from cubestack.host.studies.upsets.clean import CleanLoop, Snapshot, take
+from cubestack.host.studies.upsets.subject import Answer, Subject, Verdict
+from cubestack.host.studies.upsets.watch import PortWatch
+
+if TYPE_CHECKING:
+    from cubestack.emulator.faults.sites import Sites
+    from cubestack.host.emulation.emulated import AnyEmulated
+
+AHEAD_PS = 2_000_000
+"""So long before an upset a copy is made: no step of the processor's takes the FPGAs past it."""
+
+LOOPS = 3
+"""Loops after the hit one in which an answer may become right again."""
+
+PIXELS = 2
+"""Bytes that are a pixel's upset: itself, and one that took its place."""
+
+Effect = Literal[
+    "nothing", "left over", "pixel", "row", "picture", "late", "no ACK", "contention", "timing"
+]
+EFFECTS: tuple[Effect, ...] = get_args(Effect)
+"""What can become of an upset, as the processor sees it; "left over" is in a register or memory
+after the loop, and was never seen; "late" is right, but not at its time."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A bit: of a register of the FPGAs, or anywhere in a memory.
+
+    Attributes:
+        name: path of the register, or name of the memory.
+        bit: of the register; of a memory counted through its bytes.
+        memory: whether it is a memory.
+    """
+
+    name: str
+    bit: int
+    memory: bool = False
+
+
+@dataclass(frozen=True)
+class UpsetResult(Result):
+    """Attributes are those of the JSON output.
+
+    Attributes:
+        target, bit, memory: as ``Target`` has them.
+        phase: of the loop, in which it was hit.
+        time_s: virtual time of the upset.
+        effect: one of `EFFECTS`.
+        answer: of the loop that was hit: right, refused or wrong.
+        reason: of a refusal.
+        recovered: loops until an answer was right; 0 the one that was hit, None later than `LOOPS`.
+        phases_s: how long the FPGAs are in each phase from one loop to the next.
+        period_s: from one loop to the next.
+        bits: of the whole register or memory.
+        hits_a_day: upsets of one bit a day, by flux and cross-section.
+    """
+
+    target: str
+    bit: int
+    memory: bool
+    phase: str
+    time_s: float
+    effect: Effect
+    answer: Answer
+    reason: str
+    recovered: int | None
+    phases_s: Mapping[str, float]
+    period_s: float
+    bits: int
+    hits_a_day: float
+
+    @property
+    def right(self) -> bool:
+        """Whether the answer is."""
+        return self.answer == "right"
+
+    @property
+    def solved(self) -> bool:
+        """Whether there was an answer, right or wrong."""
+        return self.answer != "refused"
+
+    @property
+    def ending(self) -> str:
+        """How it ended."""
+        return self.reason or self.effect
+
+
+@dataclass(frozen=True)
+class Running:
+    """A device in the middle of a loop of which the clean course is known."""
+
+    emulated: "AnyEmulated"
+    subject: Subject
+    sites: "Sites"
+    watch: PortWatch
+    clean: CleanLoop
+
+
+@dataclass(frozen=True)
+class Upset:
+    """A bit, and when it is turned over."""
+
+    time_ps: int
+    phase: str
+    target: Target
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an upset; attributes as ``UpsetResult`` has them."""
+
+    effect: Effect
+    verdict: Verdict
+    recovered: int | None
+
+
+def followed(running: Running, upsets: Sequence[Upset]) -> list[Outcome]:
+    """What becomes of upsets, up to the first one that leaves a trace; for use in a copy.
+
+    One after which everything is as before it, as in a register in reset, leaves the device fit for
+    the next one.
+    """
+    outcomes = list[Outcome]()
+    for one in upsets:
+        if _left_a_trace(running, one):
+            return [*outcomes, _followed(running)]
+        outcomes.append(Outcome("nothing", running.clean.verdict, 0))
+    return outcomes
+
+
+def _left_a_trace(running: Running, upset: Upset) -> bool:
+    """Turn the bit over at its time; whether anything is different then."""
+    emulated, target = running.emulated, upset.target
+    kernel, engine = emulated.board.kernel, running.sites.engine
+    assert engine is not None
+    kernel.advance_to(upset.time_ps - AHEAD_PS)
+    if target.memory:
+        kernel.advance_to(upset.time_ps)
+        place = {"address": target.bit // 8, "bit": target.bit % 8}
+        emulated.faults.inject("memory-flip", target=target.name, **place)
+        return True
+    engine.flip(target.name, target.bit, max(upset.time_ps, engine.now_ps))
+    kernel.advance_to(upset.time_ps + AHEAD_PS)
+    engine.run(max(kernel.now, engine.now_ps))
+    return engine.flip_changed
+
+
+def _followed(running: Running) -> Outcome:
+    """What comes of an upset that was."""
+    clean = running.clean
+    running.emulated.board.kernel.advance_to(clean.over_ps)
+    found = take(running.sites, running.watch)
+    effect = effect_of(found, clean.snapshot, running.subject.row_bytes)
+    if effect == "nothing" or (effect == "left over" and _out_of_sight(found, running)):
+        return Outcome(effect, clean.verdict, 0)
+    running.watch.clear()
+    verdict = _judged(running)
+    loop, answer = 0, verdict.answer
+    while answer != "right" and loop < LOOPS:
+        loop += 1
+        answer = _judged(running, again=True).answer
+    return Outcome(effect, verdict, loop if answer == "right" else None)
+
+
+def _out_of_sight(found: Snapshot, running: Running) -> bool:
+    """Whether only bytes behind the FPGAs differ, which the processor does not read any more."""
+    clean, engine = running.clean.snapshot, running.sites.engine
+    assert engine is not None
+    return found.registers == clean.registers and all(
+        name in engine.memories or np.array_equal(found.memories[name], clean.memories[name])
+        for name in clean.memories
+    )
+
+
+def _judged(running: Running, *, again: bool = False) -> Verdict:
+    """On the loop that is under way, or on the next one."""
+    kernel, clean = running.emulated.board.kernel, running.clean
+    try:
+        end_ps = clean.end_ps
+        if again:
+            end_ps = kernel.now + clean.end_ps - clean.start_ps
+            running.subject.start(running.emulated)
+        kernel.advance_to(end_ps)  # asked before that, it would answer that it is at work
+        return running.subject.judge(running.emulated)
+    except HostError as error:
+        return Verdict("refused", type(error).__name__)
+
+
+def effect_of(found: Snapshot, clean: Snapshot, row_bytes: int) -> Effect:
+    """What differs, the gravest first."""
+    if _rises(found) < _rises(clean):
+        return "no ACK"
+    broken = {
+        kind for kind, count in found.violations.items() if count > clean.violations.get(kind, 0)
+    }
+    if broken:
+        return "contention" if any("contention" in kind for kind in broken) else "timing"
+    if len(found.data) != len(clean.data):
+        return "picture"
+    differ = np.flatnonzero(found.data != clean.data)
+    if differ.size:
+        if differ.size <= PIXELS:
+            return "pixel"
+        return "row" if differ[-1] - differ[0] < row_bytes else "picture"
+    if found.seen != clean.seen:
+        return "late"
+    same = found.registers == clean.registers and all(
+        np.array_equal(found.memories[name], clean.memories[name]) for name in clean.memories
+    )
+    return "nothing" if same else "left over"
+
+
+def _rises(snapshot: Snapshot) -> int:
+    return sum(level for _, _, level in snapshot.seen)

@@ -1,0 +1,127 @@
+"""Logs of results: their lines in time, and how much they scatter about straight lines."""
+
+import csv
+import io
+from itertools import islice
+from types import SimpleNamespace as Namespace
+
+import numpy as np
+import pytest
+
+from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
+from cubestack.host.clients.contract import Client, Columns, DeviceClient
+from cubestack.host.devices.result_table import log_lines, scatter
+from cubestack.host.errors import NoAnswerError, TargetError
+from tests.conftest import Run
+
+
+class Clock:
+    """Time that passes when somebody waits."""
+
+    now = 100.0
+    interface = CUBESENSE
+
+    def pause(self, seconds: float) -> None:
+        self.now += seconds
+
+
+class Measured(DeviceClient):
+    """Each result takes 0.3 s; the third does not come."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock, self.asked = clock, 0
+        self.client = clock  # type: ignore[assignment]
+
+    def latest(self) -> Columns:
+        self.clock.now += 0.3
+        self.asked += 1
+        if self.asked == 3:
+            raise NoAnswerError("telemetry Result: no answer")
+        return {"valid": True, "alpha_deg": 1.5}
+
+
+def test_lines_come_in_time_and_a_lost_answer_costs_one() -> None:
+    clock = Clock()
+    lines = list(log_lines(Measured(clock), lambda: clock.now, count=4, interval_s=0.5))
+    assert [line["time_s"] for line in lines] == pytest.approx([0, 0.5, 1.0, 1.5])
+    assert [line["error"] for line in lines] == [None, None, "telemetry Result: no answer", None]
+    assert [line.get("alpha_deg") for line in lines] == [1.5, 1.5, None, 1.5]
+    assert all(str(line["utc"]).endswith("+00:00") for line in lines)
+    endless = log_lines(Measured(clock), lambda: clock.now, interval_s=0.1)
+    assert [line["time_s"] for line in islice(endless, 3)] == pytest.approx([0, 0.3, 0.6])
+
+
+def test_scatter_is_what_a_straight_line_leaves() -> None:
+    rng = np.random.default_rng(1)
+    times = np.arange(400.0)
+    noise = rng.normal(0, 0.02, 400)
+    angles = (359 + 0.01 * times + noise) % 360
+    lines: list[Columns] = [
+        {"time_s": float(t) + 7, "image_time_s": float(t), "ra_deg": float(a), "valid": True}
+        for t, a in zip(times, angles, strict=True)
+    ]
+    lines[5] = {"time_s": 12.0, "image_time_s": 5.0, "ra_deg": None, "valid": False}
+    lines[6] = {"time_s": 13.0, "error": "no answer"}
+    slope, sigma, count = scatter(lines)["ra_deg"]
+    assert slope == pytest.approx(0.01, abs=1e-4)
+    assert (sigma, count) == (pytest.approx(0.02, rel=0.1), 398)
+    assert scatter(lines[:2]) == {}
+
+
+def test_a_device_without_results_says_so(either_client: Client) -> None:
+    with pytest.raises(TargetError, match="CubeStar has no results that could be logged"):
+        DeviceClient(either_client).latest()
+    with pytest.raises(TargetError, match="CubeStar takes no picture of the sky"):
+        DeviceClient(either_client).take_picture()
+
+
+def test_the_command(run: Run) -> None:
+    code, out, err = run(
+        *("log", "emulated:cubesense", "--count", "4", "--interval", "0.5", "--seed", "3"),
+        *("-c", "write SUN_THRESHOLD 30", "--each", "write CaptureAndDetect SUN SRAM1; time 0.3"),
+    )
+    lines = list(csv.DictReader(io.StringIO(out)))
+    assert code == 0
+    assert [line["time_s"] for line in lines] == ["0.0", "0.5", "1.0", "1.5"]
+    assert all(line["sun_detect"] == "SUCCESS" for line in lines)
+    assert all(abs(float(line["sun_alpha_deg"]) - 20) < 1 for line in lines)
+    assert {line["nadir_alpha_deg"] for line in lines} == {""}
+    assert "sun_alpha_deg: 0.0" in err
+    assert "4 of 4 lines" in err
+
+
+def test_lines_before_the_first_result_are_written_with_it(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    errors = ["no answer", "busy", None, "late", None]
+    lines: list[Columns] = [
+        {"time_s": float(number), "error": error} for number, error in enumerate(errors)
+    ]
+    lines[2]["alpha_deg"] = lines[4]["alpha_deg"] = 1.5
+    device = Namespace(client=lambda _node: None)
+    target = Namespace(device=device, node=None, controls=None, close=lambda: None)
+    shell = Namespace(execute=lambda _command: None)
+    for name, it in (("open_any_target", target), ("Shell", shell), ("log_lines", iter(lines))):
+        monkeypatch.setattr(
+            f"cubestack.host.studies.log.{name}", lambda *_, _it=it, **_options: _it
+        )
+    code, out, _ = run("log", "emulated:cubesense", "--count", "5")
+    written = list(csv.DictReader(io.StringIO(out)))
+    assert code == 1
+    assert [line["error"] or None for line in written] == errors
+    assert [line["alpha_deg"] for line in written] == ["", "", "1.5", "", "1.5"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (["emulated:cubesense", "--count", "0"], "'0' is not a whole number of at least 1"),
+        (["emulated:cubesense", "--interval", "-1"], "is not a number of seconds in 0..86400"),
+        (["emulated:cubesense", "-c", "read nothing"], "nothing is called 'nothing'"),
+        (["emulated:cubesense", "--count", "1", "--out", "/no/such/x.csv"], "can not write"),
+    ],
+)
+def test_wrong_calls(run: Run, arguments: list[str], error: str) -> None:
+    code, out, err = run("log", *arguments)
+    assert (code, out) == (2, "")
+    assert error in err

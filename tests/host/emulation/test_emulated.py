@@ -1,0 +1,167 @@
+"""An emulated device for a driver: its ports, its scene, its time."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.codec.switches import Switches
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.emulation.emulated import open_device, power_up
+from cubestack.host.experiments.measure import measure
+
+ASK = bytes([0x1F, 0x7F, 128, 0x1F, 0xFF])
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture
+def device() -> Iterator[Any]:
+    with open_device("cubestar", seed=4) as device:
+        yield device
+
+
+def test_a_read_waits_for_all_its_bytes_or_the_timeout(device: Any) -> None:
+    with device.serial(timeout=0.5) as port:
+        assert port.write(ASK) == len(ASK)
+        assert port.read(3)[:2] == b"\x1f\x7f"
+        began = device.time_s
+        rest = port.read(1000)
+        assert rest[-2:] == b"\x1f\xff"
+        assert device.time_s - began == pytest.approx(0.5, abs=1e-9)
+        assert port.read() == b""
+    assert not port.is_open
+
+
+def test_a_read_ends_with_what_is_expected_or_the_timeout(device: Any) -> None:
+    port = device.serial(timeout=0.5)
+    port.write(ASK + ASK)
+    first, second = port.read_until(b"\x1f\xff"), port.read_until(b"\x1f\xff")
+    assert first[-2:] == second[-2:] == b"\x1f\xff"
+    assert len(first) == len(second) == 12
+    port.write(ASK)
+    assert port.read_until(b"\x1f\xff", size=3) == first[:3]
+    began = device.time_s
+    assert len(port.readline()) == 9  # no line's end is in it
+    assert device.time_s - began == pytest.approx(0.5, abs=1e-9)
+    assert port.timeout == 0.5
+
+
+def test_what_arrived_can_be_counted_and_dropped(device: Any) -> None:
+    port = device.serial(timeout=None)
+    port.write(ASK)
+    assert port.in_waiting == 0
+    device.wait(0.1)
+    assert port.in_waiting == 12
+    port.reset_input_buffer()
+    assert port.in_waiting == 0
+
+
+def test_the_client_takes_the_line_back_and_i2c_reaches_the_same_device(device: Any) -> None:
+    assert device.client.client.telemetry("Identification")["NodeType"] == 5
+    port = device.serial()
+    port.write(ASK)
+    assert port.read(2) == b"\x1f\x7f"
+    assert device.client.client.telemetry("Identification")["NodeType"] == 5
+    with device.smbus() as bus:
+        assert bus.read_i2c_block_data(0x1A, 128, 1) == [5]
+
+
+def test_another_scene_is_seen_at_once(device: Any, tmp_path: Any) -> None:
+    device.scene = SkyScene.pointing(10, 60)
+    assert device.client.capture_and_process().name == "CALCULATED"
+    assert device.client.attitude().ra_deg == pytest.approx(10, abs=0.05)
+    path = tmp_path / "none.toml"
+    with pytest.raises(ValueError, match=r"none\.toml"):
+        device.scene = path
+
+
+def test_a_program_that_hangs_is_ended(device: Any) -> None:
+    with pytest.raises(subprocess.TimeoutExpired):
+        device.run(sys.executable, "-c", "import time; time.sleep(60)", timeout_s=0.3)
+    done = device.run(sys.executable, "-c", "print('{port}')")
+    assert done.stdout.endswith("/tty\n")
+
+
+def test_a_program_that_is_none(device: Any) -> None:
+    with pytest.raises(FileNotFoundError):
+        device.run("/no/such/program")
+    assert device.client.client.telemetry("Identification")["NodeType"] == 5
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"profile": "best"}, "profile of cubestar must be one of published, extended, not 'best'"),
+        ({"set": "tracking=far"}, "switch tracking must be one of nearest, verified, not 'far'"),
+    ],
+)
+def test_a_profile_that_there_is_not_is_refused(options: dict[str, str], text: str) -> None:
+    with pytest.raises(ValueError, match=r"profile|switch") as refused:
+        open_device("cubestar", **options)
+    assert str(refused.value) == text
+
+
+SKY = 'kind = "sky"\nra_deg = 10\ndec_deg = 20\n'
+
+
+def test_a_scene_file_chooses_the_profile_unless_something_else_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "sky.toml"
+    path.write_text(SKY + 'profile = "extended"\nset = "tracking=nearest"\n')
+    said = {"profile": "extended", "set": "tracking=nearest"}
+    cubestar, given = registered("cubestar"), []
+
+    def open_board(*scene: Any, switches: Switches, **options: Any) -> Any:
+        given.append(switches)
+        return cubestar.open_board(*scene, switches=switches, **options)
+
+    watched = replace(cubestar, open_board=open_board)
+    for options in ({}, {"profile": "published"}, {"set": "voting=confirmed"}):
+        with power_up(watched, path, **options) as device:
+            assert given.pop() == CubeStarSwitches.of(*(said | options).values())
+            assert device.chosen == said | options
+            other = tmp_path / "other.toml"
+            other.write_text(SKY + 'profile = "best"\n')
+            with pytest.raises(ValueError, match=r"other\.toml: profile of cubestar must be"):
+                device.scene = other
+            other.write_text(SKY + 'set = "tracking=verified"\n')
+            with pytest.raises(ValueError, match=r"other\.toml: set is chosen when"):
+                device.scene = other
+            other.write_text(SKY + f'profile = "{device.chosen["profile"]}"\n')
+            device.scene = other
+
+
+@pytest.mark.parametrize(
+    ("device", "line", "text"),
+    [
+        ("cubestar", 'profile = "best"', "profile of cubestar must be one of published, extended"),
+        ("cubestar", "profile = 3", "profile must be text, not 3"),
+        ("cubestar", 'set = "far"', "set: 'far' is not SWITCH=VALUE; switches: voting, weights"),
+        ("cubestar", 'set = "voting=far"', "switch voting must be one of algorithm-2, confirmed"),
+        ("aramis", 'set = "voting=confirmed"', "set: no switch 'voting'; switches: belief"),
+    ],
+)
+def test_what_a_scene_file_can_not_choose_is_named(
+    device: str, line: str, text: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "sky.toml"
+    path.write_text(SKY + line)
+    for open_it in (open_device, lambda name, scene: measure(name, scene=scene)):
+        with pytest.raises(ValueError, match=r"sky\.toml: ") as refused:
+            open_it(device, path)
+        assert text in str(refused.value)
+
+
+def test_a_device_without_switches_has_no_profile(tmp_path: Path) -> None:
+    cubestar = registered("cubestar")
+    plain = replace(cubestar, interface=replace(cubestar.interface, switches=Switches))
+    (tmp_path / "sky.toml").write_text(SKY + 'profile = "extended"')
+    with pytest.raises(ValueError, match=r"sky\.toml: profile is .* of .*aramis, not of cubestar"):
+        power_up(plain, tmp_path / "sky.toml")

@@ -1,0 +1,115 @@
+"""pyserial's port in virtual time: what it reads, and how long it waits for it."""
+
+from typing import Any
+
+import pytest
+
+from cubestack.host.emulation.virtual_serial import VirtualSerial
+
+PS_PER_S = 10**12
+
+
+class Line:
+    """Bytes that come at their times; time passes while somebody reads.
+
+    Attributes:
+        coming: (s, bytes), rising.
+    """
+
+    def __init__(self, *coming: tuple[float, bytes]) -> None:
+        self.coming = list(coming)
+        self.now_ps = 5 * PS_PER_S
+        self.said = b""
+
+    def read(self, max_bytes: int, timeout_s: float) -> bytes:
+        late_ps = self.now_ps + round(timeout_s * PS_PER_S)
+        if not self.coming or (at_ps := round(self.coming[0][0] * PS_PER_S)) > late_ps:
+            self.now_ps = late_ps
+            return b""
+        self.now_ps = max(self.now_ps, at_ps)
+        return self.coming.pop(0)[1]
+
+    def write(self, data: bytes) -> None:
+        self.said += data
+
+    def close(self) -> None:
+        pass
+
+    @property
+    def now_s(self) -> float:
+        return self.now_ps / PS_PER_S
+
+
+def opened(line: Line, timeout: float | None) -> VirtualSerial:
+    port: Any = VirtualSerial(line, 57_600)  # type: ignore[arg-type]
+    port.timeout = timeout
+    return port  # type: ignore[no-any-return]
+
+
+COMING = ((5.25, b"ab"), (5.5, b"cd\n"), (8.0, b"e"))
+
+
+def test_a_read_ends_with_its_last_byte() -> None:
+    line = Line(*COMING)
+    port = opened(line, 1.0)
+    assert port.read(3) == b"abc"
+    assert line.now_s == 5.5
+    assert port.read(2) == b"d\n"
+    assert line.now_s == 5.5
+    assert port.in_waiting == 0
+
+
+def test_a_read_ends_when_its_time_is_over_with_what_came() -> None:
+    line = Line(*COMING)
+    port = opened(line, 1.0)
+    assert port.read(9) == b"abcd\n"
+    assert line.now_s == pytest.approx(6.0)
+    assert port.read(1) == b""
+    assert line.now_s == pytest.approx(7.0)
+
+
+def test_a_line_is_read_to_its_end() -> None:
+    line = Line(*COMING)
+    port = opened(line, 1.0)
+    assert port.readline() == b"abcd\n"
+    assert line.now_s == 5.5
+    assert port.readline() == b""
+    assert line.now_s == pytest.approx(6.5)
+    assert port.timeout == 1.0
+
+
+@pytest.mark.parametrize(
+    ("expected", "size", "found"),
+    [(b"bc", None, b"abc"), (b"\n", 2, b"ab"), (b"x", 4, b"abcd"), (b"x", None, b"abcd\n")],
+)
+def test_what_is_read_ends_with_a_text_a_size_or_the_time(
+    expected: bytes, size: int | None, found: bytes
+) -> None:
+    assert opened(Line(*COMING), 1.0).read_until(expected, size) == found
+
+
+@pytest.mark.parametrize(("size", "found"), [(-1, b"abcd\n"), (0, b""), (2, b"ab")])
+def test_a_line_may_be_cut(size: int, found: bytes) -> None:
+    assert opened(Line(*COMING), 1.0).readline(size) == found
+
+
+def test_without_a_time_it_waits_as_long_as_it_takes() -> None:
+    line = Line(*COMING)
+    port = opened(line, None)
+    assert port.read(6) == b"abcd\ne"
+    assert line.now_s == 8.0
+    assert opened(Line((900.0, b"x\n")), None).readline() == b"x\n"
+
+
+def test_nothing_is_waited_for_where_the_time_is_0() -> None:
+    line = Line((5.0, b"ab"), (5.1, b"c"))
+    port = opened(line, 0.0)
+    assert port.read(3) == b"ab"
+    assert port.in_waiting == 0
+    assert line.now_s == 5.0
+
+
+def test_what_is_written_is_counted_and_sent() -> None:
+    line = Line()
+    assert opened(line, 0.0).write(bytearray(b"abc")) == 3
+    assert line.said == b"abc"

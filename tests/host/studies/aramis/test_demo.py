@@ -1,0 +1,132 @@
+"""The demonstration, with a star tracker that answers as told: what it asks for and tells."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.firmware_model.interface.aramis import (
+    CatalogueState,
+    MeasurementMode,
+    MeasurementOutcome,
+    Reason,
+)
+from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
+from cubestack.firmware_model.interface.codec.switches import Switches
+from cubestack.host.clients.aramis.client import Attitude
+from cubestack.host.studies.aramis import demo
+
+ORION = quaternion_from_pointing(84.0, -1.0, 20.0)
+OFF = quaternion_from_pointing(84.0, -0.99, 20.0)  # 36 arcsec
+FOUND = Attitude(
+    quaternion=ORION,
+    valid=True,
+    outcome=MeasurementOutcome.CONCLUSIVE,
+    reason=Reason.CONFIRMED,
+    mode=MeasurementMode.LOST_IN_SPACE,
+    matched=7,
+    detected=9,
+    frame=1,
+    image_uptime_s=1.0,
+    julian_date=None,
+)
+
+
+class Tracker:
+    """Answers each measurement with the next of ``attitudes``; ``near`` is what it was given."""
+
+    def __init__(self, *attitudes: Attitude) -> None:
+        self.near = list[NDArray[np.float64] | None]()
+        self._attitudes = iter(attitudes)
+        self.switches: Switches | None = None
+
+    def activate(self) -> CatalogueState:
+        return CatalogueState.GOOD
+
+    def measure(self, near: NDArray[np.float64] | None = None) -> Attitude:
+        self.near.append(near)
+        return next(self._attitudes)
+
+    def phase_times(self) -> dict[str, float]:
+        return {"match": 12.0}
+
+    def stars(self) -> list[Any]:
+        return []
+
+    def profile(self) -> Switches | None:
+        return self.switches
+
+    def image(self, _progress: object) -> NDArray[np.uint8]:
+        return np.zeros((8, 10), np.uint8)
+
+
+def show(monkeypatch: pytest.MonkeyPatch, folder: Path, tracker: Tracker) -> bool:
+    @contextmanager
+    def client(*_: object) -> Iterator[tuple[Tracker, Path]]:
+        yield tracker, folder
+
+    monkeypatch.setattr(demo.Demo, "client", client)
+    monkeypatch.setattr(demo, "true_stars", lambda *_: [])
+    device: Any = SimpleNamespace(name="aramis")
+    return demo.show(device, folder, 1, None, [])
+
+
+def test_it_measures_lost_in_space_and_near_a_direction(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tracker = Tracker(FOUND, replace(FOUND, quaternion=OFF, matched=8))
+    assert show(monkeypatch, tmp_path, tracker) is True
+    none, near = tracker.near
+    assert none is None
+    assert near is not None
+    ra, dec = np.radians((84.0, -1.0))
+    boresight = np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
+    assert np.linalg.norm(near) == pytest.approx(1)
+    assert np.degrees(np.arccos(near @ boresight)) == pytest.approx(2, abs=0.01)
+    told = " ".join(capsys.readouterr().out.split())
+    errors = re.findall(
+        r"(lost in space|with a direction 2° off): conclusive: confirmed, (\d) of 9 stars; "
+        r"error: ([\d.]+) arcsec across",
+        told,
+    )
+    assert errors == [("lost in space", "7", "0.0"), ("with a direction 2° off", "8", "36.0")]
+    for name in ("aramis-raw.png", "aramis-stars.png"):
+        assert (tmp_path / name).exists()
+
+
+def test_a_refused_attitude_has_no_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused = replace(
+        FOUND, valid=False, outcome=MeasurementOutcome.AMBIGUOUS, reason=Reason.SEVERAL
+    )
+    assert show(monkeypatch, tmp_path, Tracker(FOUND, refused)) is False
+    told = capsys.readouterr().out.splitlines()
+    assert "with a direction 2° off: ambiguous: several" in told
+
+
+@pytest.mark.parametrize(
+    ("switches", "left_out"),
+    [
+        (AramisSwitches(belief="unique"), ["names of stars outside the triangle that was unique"]),
+        (AramisSwitches(belief="confirmed"), []),
+        (None, []),
+    ],
+)
+def test_the_picture_tells_that_only_a_triangle_has_names(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, switches: Switches | None, left_out: list[str]
+) -> None:
+    told = list[Any]()
+    monkeypatch.setattr(demo, "annotate", lambda *given: told.append(given[4]))
+    tracker = Tracker(FOUND, FOUND)
+    tracker.switches = switches
+    show(monkeypatch, tmp_path, tracker)
+    assert told == [left_out]

@@ -1,0 +1,272 @@
+"""Benchmarks on a clock of their own: what a figure is, and what is measured for it."""
+
+import json
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from amaranth.hdl import Fragment
+
+from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.host.devices.registry import BUILT_IN, device
+from cubestack.host.studies.aramis import benchmark as aramis
+from cubestack.host.studies.bench import command as bench
+from cubestack.host.studies.bench import timing as benchmark
+from cubestack.host.studies.bench.contract import Benchmark
+from cubestack.host.studies.cubesense import benchmark as cubesense
+from cubestack.host.studies.cubestar import benchmark as cubestar
+from tests.conftest import Run
+
+
+class Clock:
+    """Wall time, that passes when it is told to."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def perf_counter(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    for module in (benchmark, cubestar):
+        monkeypatch.setattr(module, "time", made)
+    return made
+
+
+class Device:
+    """An emulated device: virtual time passes while its host waits, four times as fast.
+
+    Attributes:
+        said: what it was told, and its time then.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.time_s = 50.0
+        self.said = list[tuple[Any, float]]()
+        self.client = self
+
+    def pause(self, seconds: float) -> None:
+        self.time_s += seconds
+        self.clock.now_s += seconds / 4
+
+    def command(self, name: str, **_values: object) -> None:
+        self.said.append((name, self.time_s))
+
+    def result_then_schedule(self, camera: object) -> None:
+        self.said.append((camera, self.time_s))
+        self.pause(0.125)
+
+
+def powered(one: Device, asked: list[dict[str, Any]]) -> Callable[..., Any]:
+    """In place of ``power_up``."""
+
+    @contextmanager
+    def power_up(*_given: object, **options: Any) -> Any:
+        asked.append(options)
+        yield one
+
+    return power_up
+
+
+def built(wiring: Wiring, seconds: float) -> float:
+    """As `cold_build_s`, of a design that is used, as Amaranth wants it."""
+    Fragment.get(wiring.component, None)
+    return seconds
+
+
+def test_a_ratio_is_virtual_seconds_by_wall_seconds(clock: Clock) -> None:
+    one: Any = Device(clock)
+    assert benchmark.simulated_ratio(one, lambda: one.pause(3.0)) == 4.0
+
+    def slower() -> None:
+        one.pause(3.0)
+        clock.now_s += 1.0
+
+    assert benchmark.simulated_ratio(one, slower) == 1.71
+
+
+def test_of_something_short_the_best_of_some_counts(clock: Clock) -> None:
+    times = iter([0.5, 0.0312345, 0.2, 0.04, 0.7, 0.0])
+
+    def run() -> None:
+        clock.now_s += next(times)
+
+    assert benchmark.best_ms(run) == 31.2
+    assert next(times) == 0.0  # five were measured
+
+
+def test_the_firmware_is_measured_over_a_running_loop(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, asked = Device(clock), list[dict[str, Any]]()
+    monkeypatch.setattr(cubestar, "power_up", powered(one, asked))
+    assert cubestar._firmware_ratio(device("cubestar")) == 4.0
+    assert asked == [{"engine": "compiled", "firmware": "reference"}]
+    ((what, begun_s),) = one.said
+    assert what == "Trigger"
+    assert begun_s > 50.0
+    assert one.time_s >= begun_s + benchmark.LOOP_S + 0.9
+
+
+def test_both_sensors_are_read_once_a_second(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    one, asked = Device(clock), list[dict[str, Any]]()
+    monkeypatch.setattr(cubesense, "power_up", powered(one, asked))
+    assert cubesense._loop_ratio(device("cubesense")) == 4.0
+    times = [time_s for _, time_s in one.said]
+    assert len(times) == 2 * (benchmark.LOOP_S + 1)
+    for first, second in zip(times[::2], times[2::2], strict=False):
+        assert second - first == pytest.approx(1.0)
+    assert len({camera for camera, _ in one.said}) == 2
+
+
+def test_a_capture_and_its_transfer_are_timed_apart(clock: Clock) -> None:
+    turns = iter([(0.5, 0.2), (0.25, 0.3), (0.4, 0.125), (0.9, 0.9), (0.9, 0.9)])
+
+    class Engine:
+        """Strobes take the wall time of the turn."""
+
+        def strobe_read(self, out: bytearray, period: int, until_ps: int) -> int:
+            clock.now_s += transfer_s / 2
+            return len(out) + period + until_ps
+
+    def capture() -> None:
+        nonlocal transfer_s
+        capture_s, transfer_s = next(turns)
+        clock.now_s += capture_s
+        assert [engine.strobe_read(bytearray(2), 3, 4) for _ in range(2)] == [9, 9]
+
+    transfer_s, engine = 0.0, Engine()
+    emulated: Any = SimpleNamespace(
+        board=SimpleNamespace(engine=engine), client=SimpleNamespace(capture=capture)
+    )
+    figures = cubestar._capture(emulated)
+    assert figures == {"capture_wall_ms": 250.0, "readout_wall_ms": 125.0}
+    assert engine.strobe_read.__func__ is Engine.strobe_read  # type: ignore[attr-defined]
+
+
+def test_rates_on_the_bus_are_of_each_route_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[list[str]]()
+
+    def run(command: list[str], **_options: Any) -> SimpleNamespace:
+        asked.append(command)
+        works = "preload" not in command
+        return SimpleNamespace(returncode=0 if works else 1, stdout="1234.6\n" if works else "")
+
+    monkeypatch.setattr(cubestar.subprocess, "run", run)
+    assert cubestar._i2c() == {"i2c_seccomp_fast": 1235, "i2c_seccomp_real": 1235}
+    assert len(asked) == 4
+    assert all(command[command.index("--hz") + 1] == "400000" for command in asked)
+
+
+def test_the_program_on_the_bus_tells_the_median_rate(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import sys
+
+    now_s = 0.0
+
+    def read_byte_data(address: int, register: int) -> int:
+        nonlocal now_s
+        assert (address, register) == (0x1A, 0x83)
+        now_s += 0.001 if now_s < 1.45 else 0.5
+        return 0
+
+    bus = SimpleNamespace(read_byte_data=read_byte_data)
+    monkeypatch.setitem(sys.modules, "smbus2", SimpleNamespace(SMBus=lambda number: bus))
+    monkeypatch.setitem(sys.modules, "time", SimpleNamespace(perf_counter=lambda: now_s))
+    exec(cubestar.I2C_CLIENT, {})
+    assert float(capsys.readouterr().out) == pytest.approx(1000, rel=0.01)
+
+
+def test_all_of_cubestar_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    from cubestack.emulator.boards.cubestar import benchmark as board
+    from cubestack.emulator.iss import benchmark as core
+    from cubestack.emulator.rtl import benchmark as rtl
+
+    one, asked = Device(clock), list[dict[str, Any]]()
+    monkeypatch.setattr(cubestar, "power_up", powered(one, asked))
+    monkeypatch.setattr(board, "rtl_clocks_per_s", lambda: 1000.4)
+    monkeypatch.setattr(board, "strides_per_s", lambda: 2000.6)
+    monkeypatch.setattr(board, "strobes_per_s", lambda: 3000.2)
+    monkeypatch.setattr(core, "instructions_per_s", lambda: 4000.7)
+    monkeypatch.setattr(rtl, "cold_build_s", lambda wiring: built(wiring, 5.678))
+    monkeypatch.setattr(cubestar, "_capture", lambda _emulated: {"capture_wall_ms": 1.0})
+    monkeypatch.setattr(cubestar, "_i2c", lambda: {"i2c_seccomp_fast": 7.0})
+    assert cubestar.BENCHMARK.run(device("cubestar")) == {
+        "rtl_clocks_per_s": 1000,
+        "rtl_strides_clocks_per_s": 2001,
+        "strobes_per_s": 3000,
+        "capture_wall_ms": 1.0,
+        "realtime_ratio": 4.0,
+        "instructions_per_s": 4001,
+        "firmware_ratio": 4.0,
+        "cold_build_s": 5.7,
+        "i2c_seccomp_fast": 7.0,
+    }
+    assert [what for what, _ in one.said] == ["Trigger", "StopLoop", "Trigger"]
+    begun_s, ended_s = (time_s for _, time_s in one.said[:2])
+    assert ended_s - begun_s >= benchmark.LOOP_S + 0.9
+    assert asked[0] == {"engine": "compiled"}
+
+
+def test_all_of_cubesense_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    from cubestack.emulator.boards.cubesense import benchmark as board
+    from cubestack.emulator.rtl import benchmark as rtl
+
+    monkeypatch.setattr(cubesense, "power_up", powered(Device(clock), []))
+    monkeypatch.setattr(board, "pair_with_cameras", lambda: "pair")
+    monkeypatch.setattr(board, "pair_store_ms", lambda _pair, way: len(way) + 0.06)
+    monkeypatch.setattr(board, "pair_scan_ms", lambda _pair: 1.44)
+    monkeypatch.setattr(rtl, "cold_build_s", lambda wiring: built(wiring, 9.04))
+    found = cubesense.BENCHMARK.run(device("cubesense"))
+    stored = {f"pair_{way}_ms": len(way) + 0.1 for way in board.STORES}
+    assert found == {**stored, "sensors_ratio": 4.0, "pair_scan_ms": 1.4, "pair_build_s": 9.0}
+    assert set(found) == set(cubesense.BENCHMARK.figures)
+
+
+def test_aramis_is_measured_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes pictures in its loop, where one that is not active would only refuse to."""
+    monkeypatch.setattr(benchmark, "ROUNDS", 1)
+    monkeypatch.setattr(aramis, "LOOP_S", 1)
+    found = aramis.BENCHMARK.run(device("aramis"))
+    assert set(found) == set(aramis.BENCHMARK.figures)
+    assert min(found.values()) > 0
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Devices whose benchmarks cost nothing, and one that has none."""
+    names = iter(BUILT_IN)
+    made = [
+        replace(
+            device(name),
+            studies={
+                "bench": lambda name=name: Benchmark(
+                    {name: f"of {name}"}, lambda _one: {name: 1234.5}
+                )
+            },
+        )
+        for name in names
+    ]
+    made[1] = replace(made[1], studies={})
+    monkeypatch.setattr(bench, "devices", lambda: made)
+
+
+@pytest.mark.usefixtures("measured")
+def test_every_device_with_a_benchmark_is_measured_and_told(run: Run) -> None:
+    first, without, third = BUILT_IN
+    found = run("bench", "--json")
+    assert (found.code, json.loads(found.out)) == (0, {first: 1234.5, third: 1234.5})
+    lines = run("bench").out.splitlines()
+    assert [line.split() for line in lines] == [[first, "1,234.5"], [third, "1,234.5"]]
+    told = run("bench", "--help").out
+    assert f"of {first}" in told
+    assert f"of {without}" not in told
+    assert "make bench-engines" in told

@@ -1,0 +1,235 @@
+"""Calibrations: pictures of lights, what a reader is told, and what is refused."""
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
+from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
+from cubestack.host.calibration.camera import Camera
+from cubestack.host.calibration.fisheye import Fisheye
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.studies.calibrate import experiment as calibrate
+from cubestack.host.studies.calibrate.experiment import CalibrateOptions, CalibrateResult
+from cubestack.host.studies.cubesense import calibrate as cubesense
+from cubestack.host.studies.cubestar.calibrate import EXPERIMENT as CUBESTAR
+
+TRUE = Fisheye(322.5, 239.0, DISTORTION, PIXELS_PER_DEGREE, 95.0)
+ANGLES = np.array([(a, b) for a in range(-60, 61, 24) for b in range(-50, 51, 20)], float)
+
+
+@pytest.fixture
+def lights(tmp_path: Path) -> Path:
+    """A folder of pictures, one light in each, and angles.csv beside them."""
+    rows, columns = np.mgrid[:480, :640]
+    lines = ["file,alpha_deg,beta_deg"]
+    for number, (angles, (x, y)) in enumerate(zip(ANGLES, TRUE.project(ANGLES), strict=True)):
+        spot = 30 + 200 * np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 18)
+        Image.fromarray(spot.astype(np.uint8)).save(tmp_path / f"{number}.png")
+        lines.append(f"{number}.png,{angles[0]},{angles[1]}")
+    (tmp_path / "angles.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    return tmp_path
+
+
+def calibrated(folder: Path, **more: Any) -> list[cubesense.CalibrateResult]:
+    options = cubesense.CalibrateOptions(
+        sensor="sun", images=folder, angles=folder / "angles.csv", **more
+    )
+    return list(cubesense.EXPERIMENT.run(Opener(device("cubesense")), options))
+
+
+def test_a_lens_is_found_from_pictures_of_lights(lights: Path) -> None:
+    (found,) = calibrated(lights, out=lights / "out.json")
+    assert (found.sensor, found.places) == ("sun", len(ANGLES))
+    assert found.boresight_px == pytest.approx((322.5, 239.0), abs=0.1)
+    assert found.after_px < 0.1 < found.before_px
+    assert (found.error_before_deg, found.error_after_deg) == (None, None)
+    fitted = Fisheye(*found.boresight_px, found.factors, PIXELS_PER_DEGREE, 95.0)
+    np.testing.assert_allclose(fitted.project(ANGLES), TRUE.project(ANGLES), atol=0.2)
+    import json
+
+    told = json.loads((lights / "out.json").read_text("utf-8"))
+    assert set(told) == {"sun"}
+    assert told["sun"]["places"] == found.places
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("file,alpha_deg\n0.png,1\n", "angles.csv, line 2: must be file,alpha_deg,beta_deg"),
+        ("file,alpha_deg,beta_deg\n0.png,1,2\n1.png,x,2\n", "angles.csv, line 3: must be"),
+        ("alpha_deg,beta_deg\n1,2\n", "angles.csv, line 2: must be"),
+        ("file,alpha_deg,beta_deg\n0.png,1\n", "angles.csv, line 2: must be"),
+        ("file,alpha_deg,beta_deg\nnone.png,1,2\n", "none.png"),
+    ],
+)
+def test_a_line_that_is_wrong_is_named(lights: Path, text: str, message: str) -> None:
+    (lights / "angles.csv").write_text(text, "utf-8")
+    with pytest.raises(ValueError, match=message):
+        calibrated(lights)
+
+
+def test_angles_that_can_not_be_read_are_named(lights: Path) -> None:
+    (lights / "angles.csv").unlink()
+    with pytest.raises(ValueError, match=r"angles\.csv can not be read: No such file"):
+        calibrated(lights)
+
+
+@pytest.mark.parametrize(("above", "seen"), [(19, False), (21, True)])
+def test_a_light_is_20_grey_values_above_its_background(
+    lights: Path, above: int, seen: bool
+) -> None:
+    picture = np.full((480, 640), 30, np.uint8)
+    picture[100:103, 200:203] += above
+    Image.fromarray(picture).save(lights / "0.png")
+    if seen:
+        calibrated(lights)
+        return
+    with pytest.raises(ValueError, match=r"0\.png shows no light 20 grey values above"):
+        calibrated(lights)
+
+
+RESULT = cubesense.CalibrateResult(
+    "nadir", (371.25, 236.5), (0.1, 0.995, 7.6e-5), 900, 1.25, 0.125, 0.5, 0.0625
+)
+
+
+def test_a_reader_sees_the_parameters_of_the_telecommands() -> None:
+    lines = list(cubesense.EXPERIMENT.summarise([RESULT], 2.0))
+    assert lines == [
+        "nadir: 900 places; 1.250 px from the tables",
+        "  after the fit 0.125 px",
+        "  Boresight2 X=371.25 Y=236.50",
+        "  Distortion2, from the constant up: 0.1 0.995 7.6e-05",
+        "  error at random poses: mean 0.500 deg before, 0.062 deg after",
+        "2.0 s wall time",
+    ]
+    from dataclasses import replace
+
+    pictures = replace(RESULT, sensor="sun", error_before_deg=None, error_after_deg=None)
+    lines = list(cubesense.EXPERIMENT.summarise([pictures], 2.0))
+    assert "  Boresight1 X=371.25 Y=236.50" in lines
+    assert not any("random poses" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"images": "x"}, "--images and --angles belong together"),
+        ({"angles": "x"}, "--images and --angles belong together"),
+        ({"images": "x", "angles": "y"}, "--images are of one camera"),
+        ({"images": "x", "angles": "y", "sensor": "sun", "scene": "z"}, "without --scene"),
+        ({"emulated": 7}, "emulated: 7 is not a whole number of at least 8"),
+        ({"check_poses": 0}, "check_poses: 0 is not a whole number of at least 1"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        cubesense.CalibrateOptions(**options)
+
+
+class _Named(type(CUBESTAR)):  # type: ignore[misc]
+    """A unit that names every star before its lens exactly; each picture is of another sky."""
+
+    lens = Camera(1120.0, 530.0, 240.0)
+
+    def load(self, client: Iterator[Rotation], camera: Camera, light: Path | None) -> None:
+        pass
+
+    def identify(self, client: Iterator[Rotation]) -> list[SimpleNamespace]:
+        sky = load_sky()
+        seen = sky.vectors @ next(client).as_matrix()
+        ahead = np.flatnonzero((seen[:, 2] > 0.9) & (sky.v_mag < 4))
+        places = self.lens.directions(seen[ahead])
+        inside = ((places > 0) & (places < self.size)).all(axis=1)
+        return [
+            SimpleNamespace(x_px=x, y_px=y, hipparcos=number)
+            for (x, y), number in zip(places[inside], sky.hip[ahead][inside].tolist(), strict=True)
+        ]
+
+
+class _Powered:
+    """What an experiment gets of a unit."""
+
+    def __call__(self, scene: object, **_options: object) -> nullcontext[SimpleNamespace]:
+        client = iter(Rotation.random(20, random_state=3))
+        return nullcontext(SimpleNamespace(scene=scene, client=client))
+
+    def shown(self, items: Iterator[Any], _total: int, _label: str) -> Iterator[Any]:
+        return items
+
+
+def test_an_emulated_unit_s_principal_point_counts_from_the_sensor_s_corner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(calibrate, "GRID", (9, 5))  # quicker
+    unit = _Named()
+    (found,) = unit.run(_Powered(), CalibrateOptions(emulated=4, rounds=1))  # type: ignore[arg-type]
+    assert found.after_px < 1e-6
+    assert (found.camera["cx_px"], found.camera["cy_px"]) == pytest.approx((530, 240), abs=1e-3)
+
+
+STARS = CalibrateResult(
+    camera={"f_px": 1071.5, "cx_px": 512.25, "k1": -0.1},
+    sigma={"f_px": 0.125, "cx_px": 0.25},
+    pairs_f_px=1071.25,
+    pictures=18,
+    tried=20,
+    stars=150,
+    rejected=3,
+    before_px=2.5,
+    after_px=0.0625,
+    lens_px=0.015625,
+)
+
+
+def test_a_reader_sees_the_camera_with_its_deviations() -> None:
+    assert list(CUBESTAR.summarise([STARS], 1.5)) == [
+        "150 stars of 18 pictures (20 tried, 3 stars left out)",
+        "f_px     1071.50000 +- 0.12500",
+        "cx_px     512.25000 +- 0.25000",
+        "focal length by star pairs near the middle: 1071.2 px",
+        "residual: 2.500 px before, 0.062 px after",
+        "from the emulated unit's own lens: 0.016 px",
+        "1.5 s wall time",
+    ]
+    from dataclasses import replace
+
+    unknown = list(CUBESTAR.summarise([replace(STARS, pairs_f_px=None, lens_px=None)], 1.5))
+    assert not any("star pairs" in line or "own lens" in line for line in unknown)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"images": "x", "scene": "y"}, "--scene belongs to --emulated"),
+        ({"out": "x.txt"}, "--out must be a file NAME.json"),
+        ({"out": "no/such/x.json"}, "--out must be a file NAME.json"),
+        ({"rounds": 0}, "rounds: 0 is not a whole number of at least 1"),
+        ({"emulated": 0}, "emulated: 0 is not a whole number of at least 1"),
+        ({"seed": -1}, "seed: -1 is not a whole number of at least 0"),
+    ],
+)
+def test_options_of_star_trackers_that_make_no_sense(options: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        CalibrateOptions(**options)
+
+
+def test_pictures_are_those_of_a_folder_in_the_order_of_their_names(tmp_path: Path) -> None:
+    assert CalibrateOptions().pictures == []
+    with pytest.raises(ValueError, match="has no pictures: "):
+        CalibrateOptions(images=tmp_path).pictures  # noqa: B018
+    for name in ("b.png", "a.JPG", "c.txt"):
+        (tmp_path / name).write_bytes(b"")
+    assert [one.name for one in CalibrateOptions(images=tmp_path).pictures] == ["a.JPG", "b.png"]
+    assert CalibrateOptions(images=tmp_path / "c.txt").pictures == [tmp_path / "c.txt"]
+    assert CalibrateOptions(out=tmp_path / "x.json").out == tmp_path / "x.json"

@@ -1,0 +1,100 @@
+"""Folders of campaigns: what they refuse, and what they lose: nothing but what was torn."""
+
+import errno
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.host.studies.campaign.block import Row
+from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder, FolderError
+from cubestack.host.studies.campaign.plan import Plan
+
+
+def rows(block: int, count: int = 3) -> list[Row]:
+    return [Row(block, row, 1, row, {}, "right", "", {"x": 0.1}) for row in range(count)]
+
+
+def test_rows_come_back_as_they_were_added(tmp_path: Path, plan: Plan) -> None:
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    folder.add(rows(1))
+    folder.add(rows(0))
+    assert list(Folder(tmp_path / "c").rows()) == rows(1) + rows(0)
+    folder.sort()
+    assert list(folder.rows()) == rows(0) + rows(1)
+
+
+@pytest.mark.parametrize("cut", range(1, 200, 13))
+def test_a_torn_block_is_taken_out_and_nothing_else(tmp_path: Path, plan: Plan, cut: int) -> None:
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    folder.add(rows(2))
+    folder.add(rows(1))
+    path = tmp_path / "c" / ROWS
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert folder.repair(dict.fromkeys(range(6), 3)) == {2}
+    assert list(folder.rows()) == rows(2)
+
+
+def test_a_folder_is_resumed_only_with_the_same_plan(tmp_path: Path, plan: Plan) -> None:
+    Folder.begun(tmp_path / "c", plan, resume=True)
+    assert Folder.begun(tmp_path / "c", plan, resume=True).plan == plan
+    with pytest.raises(FolderError, match="has a campaign already; --resume goes on"):
+        Folder.begun(tmp_path / "c", plan, resume=False)
+    other = Plan(device="cubestar", frames=8, seed=6, block=3, grid={"false_stars": [0, 9]})
+    with pytest.raises(FolderError, match="another plan, with other frames, seed"):
+        Folder.begun(tmp_path / "c", other, resume=True)
+
+
+def test_a_folder_of_another_version_is_not_mixed(tmp_path: Path, plan: Plan) -> None:
+    Folder.begun(tmp_path / "c", plan, resume=False)
+    path = tmp_path / "c" / PLAN
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": "0.0.1"}))
+    with pytest.raises(FolderError, match=r"begun by cubestack 0\.0\.1, and this is"):
+        Folder.begun(tmp_path / "c", plan, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("told", "error"),
+    [
+        (None, "is no campaign's folder: it has no campaign.json"),
+        ("{", "campaign.json: "),
+        ('{"plan": {}, "version": "1"}', "campaign.json: "),
+    ],
+)
+def test_what_is_no_campaign_is_told(tmp_path: Path, told: str | None, error: str) -> None:
+    if told is not None:
+        (tmp_path / PLAN).write_text(told)
+    with pytest.raises(FolderError, match=error):
+        Folder(tmp_path)
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, plan: Plan) -> None:
+    (tmp_path / "mine.txt").write_text("x")
+    with pytest.raises(FolderError, match="is not empty, and no campaign's"):
+        Folder.begun(tmp_path, plan, resume=True)
+
+
+def test_only_one_process_works_on_a_campaign(tmp_path: Path, plan: Plan) -> None:
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    with (
+        folder.alone(),
+        pytest.raises(FolderError, match="another process works on this campaign"),
+        Folder(tmp_path / "c").alone(),
+    ):
+        pass
+
+
+def test_a_full_disk_is_told_by_its_file(
+    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    folder.add(rows(0))
+
+    def full(_fileno: int) -> Any:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match=r"No space left on device.*rows\.jsonl"):
+        folder.add(rows(1))
+    assert list(folder.rows())[:3] == rows(0)

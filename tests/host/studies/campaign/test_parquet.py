@@ -1,0 +1,42 @@
+"""Rows as a Parquet file: each value in a column, read back by another library."""
+
+import sys
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+
+from cubestack.host.studies.campaign import parquet
+from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.run import run
+
+
+def test_a_column_for_each_value(failing: set[float], plan: Plan, tmp_path: Path) -> None:
+    failing.add(0.9)
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    rows = list(run(folder, 1))
+    assert {row.outcome for row in rows} > {"failed", "right"}
+    found = pyarrow.parquet.read_table(parquet.write(folder)).to_pylist()
+    assert [(one["block"], one["row"], one["outcome"], one["reason"]) for one in found] == [
+        (row.block, row.row, row.outcome, row.reason) for row in folder.rows()
+    ]
+    assert [one["result.drawn"] for one in found] == [
+        row.result.get("drawn") for row in folder.rows()
+    ]
+    assert {one["swept.false_stars"] for one in found} == {0, 9}
+
+
+def test_without_rows_there_is_no_file(plan: Plan, tmp_path: Path) -> None:
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    with pytest.raises(ValueError, match="has no rows yet"):
+        parquet.write(folder)
+    assert not (folder.path / parquet.FILE).exists()
+
+
+def test_what_is_missing_is_told(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ValueError, match=r'pip install "cubestack\[parquet\]"'):
+        parquet.write(Folder.begun(tmp_path / "c", plan, resume=False))

@@ -1,0 +1,115 @@
+"""Plans: their blocks, and what is refused."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cubestack.host.studies.campaign.plan import Plan
+
+TEXT = """
+device = "cubestar"
+frames = 100
+seed = 1
+block = 25
+[options]
+profile = "extended"
+[grid]
+false_stars = [0, 5, 10]
+hazard = [[], ["moon"]]
+[random]
+mag_limit = { low = 3.5, high = 6.0 }
+mode = { of = ["lis", "assisted"] }
+"""
+
+
+def write(path: Path, text: str = TEXT) -> Path:
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_every_combination_is_a_point(tmp_path: Path) -> None:
+    plan = Plan.read(write(tmp_path / "a.toml"))
+    assert len(plan.points) == 6
+    blocks = list(plan.blocks())
+    assert [block.number for block in blocks] == list(range(24))
+    assert sum(block.frames for block in blocks) == 600
+    assert all(block.options["profile"] == "extended" for block in blocks)
+    assert {block.swept["mode"] for block in blocks} == {"lis", "assisted"}
+    limits = {block.swept["mag_limit"] for block in blocks}
+    assert len(limits) == 4
+    assert all(3.5 <= limit <= 6 for limit in limits)
+
+
+def test_all_points_see_the_same_skies(tmp_path: Path) -> None:
+    plan = Plan.read(write(tmp_path / "a.toml"))
+    seen: dict[Any, list[Any]] = {}
+    for block in plan.blocks():
+        point = block.swept["false_stars"], tuple(block.swept["hazard"])
+        seen.setdefault(point, []).append((block.seed, block.swept["mag_limit"]))
+    first, *others = seen.values()
+    assert all(other == first for other in others)
+    assert len(set(first)) == len(first)
+
+
+def test_a_plan_that_tells_no_seed_is_that_of_seed_0() -> None:
+    """As with every command's --seed."""
+    untold, zero, one = (
+        [block.seed for block in Plan(device="cubestar", frames=3, block=1, **seed).blocks()]
+        for seed in ({}, {"seed": 0}, {"seed": 1})
+    )
+    assert untold == zero != one
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 200), st.integers(1, 40))
+def test_blocks_hold_all_frames(frames: int, size: int) -> None:
+    blocks = list(Plan(device="cubestar", frames=frames, block=size).blocks())
+    assert sum(block.frames for block in blocks) == frames
+    assert max(block.frames for block in blocks) == min(size, frames)
+    assert len({block.seed for block in blocks}) == len(blocks)
+
+
+def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
+    write(tmp_path / "a.toml", 'device = "cubestar"\nframes = 1\n[grid]\nscene = ["x.toml"]\n')
+    (block,) = Plan.read(tmp_path / "a.toml").blocks()
+    assert block.options == {"scene": str(tmp_path / "x.toml")}
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ('device = "cubestar"', "frames is missing"),
+        ("frames = 1", "device is missing"),
+        ('device = "nobody"\nframes = 1', "no device 'nobody'; known: cubestar"),
+        ('device = "cubestar"\nframes = 0', "frames: 0 is not a whole number of at least 1"),
+        ('device = "cubestar"\nframe = 1', "no key 'frame' here; known: device, frames"),
+        ('device = "cubestar"\nframes = 1\n[grid]\nfalse_star = [1]', "no option 'false_star'"),
+        ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = [1, -2]', "false_stars = -2"),
+        ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = 3', "must be a list of values"),
+        ('device = "cubestar"\nframes = 1\n[grid]\nseed = [1]', "seed stands at the top"),
+        ('device = "cubestar"\nframes = 1\n[random]\nmag_limit = 3', "random.mag_limit must be"),
+        (
+            'device = "cubestar"\nframes = 1\n[random]\nmag_limit = { low = 6, high = 3 }',
+            "random.mag_limit must be",
+        ),
+        (
+            'device = "cubestar"\nframes = 1\n[options]\nmode = "lis"\n[grid]\nmode = ["lis"]',
+            "mode is given in two",
+        ),
+        ("device = ", "Invalid value"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, error: str) -> None:
+    with pytest.raises(ValueError, match=error) as caught:
+        Plan.read(write(tmp_path / "a.toml", text))
+    assert str(caught.value).startswith(f"{tmp_path / 'a.toml'}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_plan_of_the_page(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[4] / "docs" / "campaigns.md").read_text("utf-8")
+    plan = Plan.read(write(tmp_path / "a.toml", page.split("```toml\n")[1].split("```")[0]))
+    assert (plan.frames, len(plan.points)) == (1000, 8)

@@ -1,0 +1,178 @@
+"""What a campaign's rows say together, and the page that shows it."""
+
+import re
+from base64 import b64decode
+from collections.abc import Callable, Sequence
+from html.parser import HTMLParser
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+from scipy.stats import binomtest
+
+from cubestack.host.studies.campaign import report
+from cubestack.host.studies.campaign.block import Row
+from cubestack.host.studies.campaign.folder import Folder, FolderError
+from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.statistics import by_chance, compared, errors, rates
+
+Make = Callable[..., Folder]
+FRAMES = 120
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Folders with the outcomes of rows that are not right, by block and row as a text."""
+
+    def begun(
+        name: str, others: dict[str, str], seed: int = 5, errors: Sequence[str] = ("error_deg",)
+    ) -> Folder:
+        grid = {"false_stars": [0, 9], "hazard": [["moon"]]}
+        plan = Plan(device="cubestar", frames=FRAMES, seed=seed, block=FRAMES, grid=grid)
+        folder = Folder.begun(tmp_path / name, plan, resume=False)
+        for block in plan.blocks():
+            rows = []
+            for row in range(FRAMES):
+                outcome = others.get(f"{block.number}.{row}", "right")
+                size = -0.01 * (row + 1)
+                measured = dict.fromkeys(errors, size) | {"centroids": 8}
+                result = measured if outcome != "failed" else {}
+                reason = "<b>broken</b>" if outcome == "failed" else ""
+                key = (block.number, row, block.seed, row)
+                rows.append(Row(*key, block.swept, outcome, reason, result))
+            folder.add(rows)
+        return folder
+
+    return begun
+
+
+def some(outcome: str, count: int, block: int = 1) -> dict[str, str]:
+    return {f"{block}.{row}": outcome for row in range(count)}
+
+
+def test_rates_and_errors_are_those_of_the_rows(make: Make) -> None:
+    folder = make("a", some("refused", 20) | {"0.5": "failed"})
+    few, many = rates(folder).values()
+    assert (few["right"], few["failed"], many["right"], many["refused"]) == (119, 1, 100, 20)
+    (points,) = errors(folder).values()
+    sizes = list(points.values())
+    assert [len(values) for values in sizes] == [119, 100]
+    assert sizes[1] == sorted(sizes[1])
+    assert sizes[1][0] == pytest.approx(0.21)
+
+
+@pytest.mark.parametrize(("one", "other"), [(0, 0), (0, 1), (3, 9), (9, 3), (40, 41), (0, 30)])
+def test_chance_is_that_of_coins(one: int, other: int) -> None:
+    expected = binomtest(one, one + other).pvalue if one + other else 1.0
+    assert by_chance(one, other) == pytest.approx(expected)
+
+
+def test_a_change_is_told_where_it_is(make: Make) -> None:
+    before, after = make("before", {}), make("after", some("refused", 20) | {"0.3": "wrong"})
+    changes = {
+        (dict(each.point)["false_stars"], each.outcome): each for each in compared(before, after)
+    }
+    assert {key for key, each in changes.items() if each.worse} == {(9, "right")}
+    assert not changes[0, "wrong"].significant
+    assert changes[0, "wrong"].chance == 1.0
+    assert (changes[9, "right"].before, changes[9, "right"].after) == (120, 100)
+    back = [each for each in compared(after, before) if each.significant]
+    assert [(each.outcome, each.worse) for each in back] == [("right", False)]
+
+
+def test_more_wrong_ones_are_worse(make: Make) -> None:
+    changes = compared(make("before", {}), make("after", some("wrong", 30)))
+    assert [each.outcome for each in changes if each.worse] == ["right", "wrong"]
+
+
+def test_only_the_same_skies_are_compared(make: Make, tmp_path: Path) -> None:
+    before = make("before", {})
+    other = make("other", {}, seed=6)
+    with pytest.raises(FolderError, match=r"other skies than .*: another seed"):
+        compared(before, other)
+    plan = Plan(device="cubestar", frames=2, grid={"false_stars": [1]})
+    with pytest.raises(FolderError, match="not the same grid and as many rows"):
+        compared(before, Folder.begun(tmp_path / "less", plan, resume=False))
+
+
+class Page(HTMLParser):
+    """Sources and texts of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.sources: list[str] = []
+        self.cells: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag not in ("script", "link", "b")
+        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    def handle_data(self, data: str) -> None:
+        self.cells.append(data)
+
+
+def test_the_page_holds_all_and_asks_for_nothing(make: Make) -> None:
+    folder = make("a", some("refused", 20) | {"0.5": "failed"})
+    page, *figures = report.write(folder)
+    assert [figure.name for figure in figures] == ["rates-false_stars.png", "error_deg.png"]
+    text = page.read_text("utf-8")
+    told = Page(text)
+    assert len(told.sources) == len(figures)
+    for source, figure in zip(told.sources, figures, strict=True):
+        data = b64decode(source.removeprefix("data:image/png;base64,"))
+        assert data == figure.read_bytes()
+        with Image.open(BytesIO(data)) as image:
+            assert image.width > 400
+    assert not re.search(r"https?://", text)
+    assert "<b>broken</b>" in told.cells
+    limits = binomtest(100, FRAMES).proportion_ci(0.95, "wilson")
+    assert f"100 ({100 * limits.low:.2f} to {100 * limits.high:.2f} %)" in told.cells
+    assert "false_stars = 9, hazard = ('moon',)" in told.cells
+
+
+def test_a_published_error_is_drawn_beside_errors_of_its_kind(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CubeStar's are across the boresight and about it; none is of the whole."""
+    drawn = dict[str, list[float]]()
+
+    def curves(name: str, _errors: object, marks: Sequence[tuple[float, str]]) -> bytes:
+        drawn[name] = [value for value, _text in marks]
+        return b""
+
+    monkeypatch.setattr(report, "error_curves", curves)
+    monkeypatch.setattr(report, "rate_curves", lambda *_drawn: b"")
+    report.write(make("a", {}, errors=("error_deg", "error_cross_deg", "error_roll_deg")))
+    assert drawn == {
+        "error_deg": [],
+        "error_cross_deg": [0.0083, 0.004],
+        "error_roll_deg": [0.0203],
+    }
+
+
+def test_a_browser_shows_it_and_asks_for_nothing_else(make: Make, chromium: Any) -> None:
+    page, *figures = report.write(make("a", some("refused", 20)))
+    tab, asked = chromium.new_page(), list[str]()
+    tab.on("request", lambda one: asked.append(one.url))
+    tab.goto(page.as_uri())
+    widths = tab.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    assert len(widths) == len(figures)
+    assert min(widths) > 400
+    assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
+    tab.close()
+
+
+def test_the_page_compares(make: Make) -> None:
+    before, after = make("before", {}), make("after", some("refused", 20))
+    page, *_ = report.write(after, compared(before, after), before.path)
+    cells = Page(page.read_text("utf-8")).cells
+    assert cells.count("worse") == 1
+    assert f"Compared with {before.path}" in cells
+
+
+def test_without_rows_there_is_no_page(plan: Plan, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="has no rows yet"):
+        report.write(Folder.begun(tmp_path / "c", plan, resume=False))

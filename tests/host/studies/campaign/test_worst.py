@@ -1,0 +1,30 @@
+"""The worst cases come first, with what the cameras saw."""
+
+from pathlib import Path
+
+from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.run import run
+from cubestack.host.studies.campaign.worst import worst
+
+
+def test_outcomes_first_then_errors(tmp_path: Path, plan: Plan, failing: set[float]) -> None:
+    failing.add(0.9)
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    rows = list(run(folder, 1))
+    cases = list(worst(folder, len(rows)))
+    outcomes = [list(folder.rows())[case.number].outcome for case in cases]
+    order = ["failed", "wrong", "refused", "right"]
+    assert outcomes == sorted(outcomes, key=order.index)
+    assert {"failed", "right"} <= set(outcomes)
+    assert all(case.text.startswith(outcome) for case, outcome in zip(cases, outcomes, strict=True))
+    assert not any(case.jpeg for case in cases)  # nothing was powered up
+
+
+def test_a_real_one_has_its_picture(tmp_path: Path) -> None:
+    plan = Plan(device="cubestar", frames=2, options={"mag_limit": 3.8})
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    first, second = (row.result["error_cross_deg"] for row in run(folder, 1))
+    (case,) = worst(folder, 1)
+    assert case.number == int(second > first)
+    assert case.jpeg.startswith(b"\xff\xd8")

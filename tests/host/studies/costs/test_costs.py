@@ -1,0 +1,156 @@
+"""Costs of compiled code: what was measured once is what the page says, and how it is chosen."""
+
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.boards.cubestar.compiled.build import COMPILER, compiler_version
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.devices.registry import device
+from cubestack.host.studies.costs import command as command
+from cubestack.host.studies.costs.contract import CostReport, Measurement
+from cubestack.host.studies.cubestar.costs import COLUMNS, _cases, costs, measure
+from tests.conftest import Run
+
+DOCS = Path(__file__).parents[4] / "docs"
+
+
+def recorded() -> list[Measurement]:
+    """What was measured last."""
+    data = json.loads(costs().file.read_text("utf-8"))
+    return [Measurement(**build) for build in data["builds"]]
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_the_table_of_the_page_is_that_of_the_data() -> None:
+    page = (DOCS / costs().document).read_text("utf-8")
+    told = page.split("<!-- costs -->\n")[1].split("<!-- end of costs -->\n")[0].strip()
+    assert costs().page(recorded()).strip() == told
+
+
+def test_all_phases_of_detection_and_matching_are_in_a_column() -> None:
+    for one in recorded():
+        shown = {phase for group in COLUMNS.values() for phase in group}
+        assert one.phases.keys() - shown == {"attitude"}  # the published sum has none
+        assert shown < one.phases.keys()
+
+
+def test_each_build_is_tried_and_two_with_other_memories() -> None:
+    levels, kinds = costs().levels, costs().precisions
+    cases = [(str(case.build), str(case.timing)) for case in _cases(levels, kinds)]
+    assert cases == [(one.build, one.timing) for one in recorded()]
+    usual = cases[0][1]
+    assert len(set(cases)) == len(cases)
+    others = [build for build, timing in cases if timing != usual]
+    assert sorted(set(others)) == ["-O0 double", "-O2 own"]
+    assert others.count("-O2 own") == others.count("-O0 double") == 4
+    assert [str(case.build) for case in _cases(["Os"], ["float"])] == ["-Os float"]
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+@pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
+def test_a_build_with_doubles_costs_what_was_recorded() -> None:
+    """Operands are doubles as well: a float that is converted has shorter functions."""
+    (found,) = measure(["Os"], ["double"])
+    if json.loads(costs().file.read_text("utf-8"))["compiler"] != compiler_version():
+        pytest.skip("recorded of another compiler")
+    told = {(one.build, one.timing): one for one in recorded()}[found.build, found.timing]
+    assert found.phases == told.phases
+    assert found.operations == pytest.approx(told.operations, rel=0.1, abs=2)
+
+
+BUILDS = [
+    Measurement("-O2 own", "usual", {"add": 1.5, "mul": 3.0}, {"a": 1000, "b": 234_567}),
+    Measurement("-O0 own", "usual", {"add": 2.5, "mul": 4.25}, {"a": 2000}),
+    Measurement("-O2 own", "slow", {"add": 9.0, "mul": 9.0}, {"a": 9000}),
+]
+
+
+@pytest.fixture
+def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
+    """A device whose costs are known; how they were asked for."""
+    asked = list[Any]()
+
+    def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
+        asked.append((levels, precisions))
+        yield from BUILDS
+
+    from dataclasses import replace
+
+    made = CostReport(
+        levels=("O0", "O2"),
+        precisions=("own",),
+        measure=measure,
+        as_data=lambda found: {"builds": [one.build for one in found]},
+        file=tmp_path / "data.json",
+        page=lambda found: f"| {len(found)} builds |",
+        document="page.md",
+        table={"add": 2.0, "mul": 3.25, "never compiled": 7.0},
+    )
+    devices = [
+        replace(device("aramis"), studies={}),
+        replace(device("cubestar"), studies={"costs": lambda: made}),
+    ]
+    monkeypatch.setattr(command, "devices", lambda: devices)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "page.md").write_text(PAGE, "utf-8")
+    return asked
+
+
+PAGE = "above\n<!-- costs -->\nold\n<!-- end of costs -->\nbelow\n"
+
+
+def test_operations_are_shown_beside_what_is_charged(run: Run, report: list[Any]) -> None:
+    found = run("costs", "measure")
+    assert found.code == 0
+    lines = [line.split() for line in found.out.splitlines()]
+    assert lines[:3] == [
+        ["-O2", "own,", "usual:", "235,567", "cycles"],
+        ["-O0", "own,", "usual:", "2,000", "cycles"],
+        ["-O2", "own,", "slow:", "9,000", "cycles"],
+    ]
+    assert ["add", "2", "1.5", "2.5"] in lines
+    assert ["mul", "3.25", "3", "4.25"] in lines
+    assert not any(line[:1] == ["never"] for line in lines)
+    assert report == [(("O0", "O2"), ("own",))]
+
+
+def test_one_object_for_programs(run: Run, report: list[Any]) -> None:
+    found = run("costs", "measure", "--level", "O2", "--json")
+    assert json.loads(found.out) == {"builds": [one.build for one in BUILDS]}
+    assert report == [(("O2",), ("own",))]
+
+
+def test_data_and_page_are_rewritten(run: Run, report: list[Any], tmp_path: Path) -> None:
+    assert run("costs", "measure", "--write").code == 0
+    page = tmp_path / "docs" / "page.md"
+    new = "above\n<!-- costs -->\n\n| 3 builds |\n\n<!-- end of costs -->\nbelow\n"
+    assert page.read_text("utf-8") == new
+    assert json.loads((tmp_path / "data.json").read_text("utf-8"))["builds"][0] == "-O2 own"
+    run("costs", "measure", "--write")
+    assert page.read_text("utf-8") == new
+
+
+@pytest.mark.parametrize("cut", ["<!-- costs -->\n", "<!-- end of costs -->\n"])
+def test_a_page_without_a_place_is_told(
+    run: Run, report: list[Any], tmp_path: Path, cut: str
+) -> None:
+    (tmp_path / "docs" / "page.md").write_text(PAGE.replace(cut, ""), "utf-8")
+    found = run("costs", "measure", "--write")
+    assert found.code == 2
+    assert "page.md has no <!-- costs -->" in found.err
+
+
+def test_without_such_a_device_it_says_so(
+    run: Run, report: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices = command.devices()[:1]
+    monkeypatch.setattr(command, "devices", lambda: devices)
+    found = run("costs", "measure")
+    assert found.code == 2
+    assert "no device here has a program that can be compiled" in found.line

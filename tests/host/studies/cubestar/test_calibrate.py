@@ -1,0 +1,42 @@
+"""How a CubeStar names the stars of a picture for its calibration."""
+
+from typing import Any
+
+import pytest
+
+from cubestack.firmware_model.interface.cubestar import IdMode
+from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
+
+
+class Unit:
+    """A CubeStar that was left tracking.
+
+    Attributes:
+        valid: whether it finds an attitude.
+        modes: of identification, at each picture.
+    """
+
+    def __init__(self, valid: bool) -> None:
+        self.valid = valid
+        self.modes = list[IdMode]()
+        self._mode = IdMode.TRACKING
+        self.client = self
+
+    def command(self, _name: str, *, IdMode: IdMode) -> None:
+        self._mode = IdMode
+
+    def capture_and_process(self) -> None:
+        self.modes.append(self._mode)
+
+    def attitude(self) -> "Unit":
+        return self
+
+    def stars(self) -> list[str]:
+        return ["a star"]
+
+
+@pytest.mark.parametrize("valid", [True, False])
+def test_each_picture_is_lost_in_space_and_without_attitude_no_star_counts(valid: bool) -> None:
+    unit: Any = Unit(valid)
+    assert EXPERIMENT.identify(unit) == (["a star"] if valid else [])
+    assert unit.modes == [IdMode.LOST_IN_SPACE]

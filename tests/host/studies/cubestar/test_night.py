@@ -1,0 +1,125 @@
+"""A night on a roof: which fields count, and how their scatter is put together."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.host.studies.cubestar import night as module
+from cubestack.host.studies.cubestar.night import INTERVAL_S, SETTLING, night
+
+#: Of each field: sigma of right ascension, declination and roll, deg; part that is valid.
+CALM, SHAKEN, BLIND = (0.01, 0.02, 0.05, 1.0), (0.01, 2.0, 0.05, 1.0), (0.01, 0.01, 0.01, 0.4)
+GOOD = {0: CALM, 2: (0.03, 0.01, 0.1, 0.5), 5: (0.02, 0.04, 0.02, 0.9)}
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Scenes that were looked at, and how lines of a log were asked for."""
+    seen = list[Any]()
+
+    def log_lines(_client: object, _clock: object, *, count: int, interval_s: float) -> Any:
+        field = sum(isinstance(one, SimpleNamespace) for one in seen)
+        seen.append(SimpleNamespace(count=count, interval_s=interval_s))
+        sigmas = GOOD.get(field, SHAKEN if field % 2 else BLIND)
+        valid = round(sigmas[3] * (count - SETTLING))
+        for number in range(count):
+            sign = (-1) ** number
+            off = [sign * each for each in sigmas[:3]] if number >= SETTLING else [50.0] * 3
+            yield {
+                "time_s": float(number),
+                "valid": number < SETTLING + valid,
+                "matched": 8 + number % 5 + field,
+                **dict(zip(("ra_deg", "dec_deg", "roll_deg"), off, strict=True)),
+            }
+
+    monkeypatch.setattr(module, "log_lines", log_lines)
+    monkeypatch.setattr(module, "choose_threshold", lambda _client: 25)
+    return seen
+
+
+def opener(seen: list[Any]) -> Any:
+    @contextmanager
+    def opened(view: Any, *, seed: int) -> Iterator[Any]:
+        seen.append(view.scene)
+        commands = SimpleNamespace(command=lambda name: seen.append(name))
+        yield SimpleNamespace(client=SimpleNamespace(client=commands), time_s=0.0)
+
+    return opened
+
+
+def test_calm_fields_that_are_seen_are_pooled(asked: list[Any]) -> None:
+    found = night(opener(asked), 400)
+    assert found["fields"] == len(GOOD)
+    for place, name in enumerate(("ra", "dec", "roll")):
+        pooled = np.sqrt(np.mean([sigmas[place] ** 2 for sigmas in GOOD.values()]))
+        assert found[name] == pytest.approx(pooled, rel=0.03)
+    # Along a parallel, a degree of right ascension is shorter than on the equator.
+    across = [np.hypot(one[0] * np.cos(np.radians(33.93)), one[1]) for one in GOOD.values()]
+    assert found["across"] == pytest.approx(np.sqrt(np.mean(np.square(across))), rel=0.03)
+    assert found["valid"] == pytest.approx(100 * np.mean([one[3] for one in GOOD.values()]))
+    assert found["fewest"] == pytest.approx(np.mean([8 + field for field in GOOD]))
+    assert found["most"] == pytest.approx(np.mean([12 + field for field in GOOD]))
+
+
+def test_fields_are_at_the_zenith_over_a_sidereal_day(asked: list[Any]) -> None:
+    night(opener(asked), 10)
+    scenes = [one for one in asked if hasattr(one, "quaternion")]
+    asked_for = [one for one in asked if isinstance(one, SimpleNamespace)]
+    assert len(scenes) == len(asked_for) == 8
+    assert {(one.count, one.interval_s) for one in asked_for} == {(10 + SETTLING, INTERVAL_S)}
+    assert asked.count("Trigger") == 8
+    from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
+
+    for number, scene in enumerate(scenes):
+        ra, dec, _ = pointing_from_matrix(matrix_from_quaternion(scene.quaternion))
+        assert (ra % 360, dec) == pytest.approx((45.0 * number, -33.93), abs=1e-6)
+        # The Earth turns by 15 deg an hour, and takes the camera with it.
+        assert np.linalg.norm(scene.rate_deg_s) == pytest.approx(360 / 86164.1, rel=1e-4)
+        assert scene.atmosphere.sky_mag == 20.0
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_a_quick_run_is_of_one_field(asked: list[Any], frames: int) -> None:
+    night(opener(asked), frames)
+    asked_for = [one for one in asked if isinstance(one, SimpleNamespace)]
+    assert [(one.count, one.interval_s) for one in asked_for] == [(3 + SETTLING, 1.0)]
+
+
+def test_an_attitude_that_names_no_star_rests_on_none(
+    asked: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = module.log_lines
+
+    def unnamed(*of: Any, **how: Any) -> Iterator[Any]:
+        for number, line in enumerate(lines(*of, **how)):
+            yield line | {"matched": None if number == SETTLING else line["matched"]}
+
+    monkeypatch.setattr(module, "log_lines", unnamed)
+    assert night(opener(asked), 1)["fewest"] == 0
+
+
+def test_without_a_field_there_is_nothing(
+    asked: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "QUICK_FIELD", 1)
+    for spoilt in (SHAKEN, (0.01, 0.01, 1.2, 1.0), (0.01, 0.01, 0.01, 0.34)):
+        monkeypatch.setitem(GOOD, 0, spoilt)
+        asked.clear()
+        assert night(opener(asked), 1) == {}
+
+
+def test_it_is_measured_end_to_end() -> None:
+    from cubestack.emulator.native.compiler import find_compiler
+    from cubestack.host.studies.fidelity.table import Job, perform
+
+    if find_compiler() is None:
+        pytest.skip("needs the compiled FPGA")
+    found = perform(Job("cubestar", "night", "extended", 1, 1.0))
+    assert (found["valid"], found["fields"]) == (100, 1)
+    assert 8 <= found["fewest"] <= found["most"] <= 16
+    for name in ("ra", "dec", "roll", "across"):
+        assert 0 < found[name] < 0.02

@@ -1,0 +1,170 @@
+"""Demonstrations on devices of this process: what is told, written, and found."""
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.devices.device import AnyDevice
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.rendered import cameras_of
+from cubestack.host.studies.cubesense import demo as cubesense
+from cubestack.host.studies.cubestar import demo as cubestar
+from cubestack.host.studies.demo.subject import Demo, download
+from cubestack.host.targets import Target, open_target
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+@pytest.fixture(autouse=True)
+def _here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Devices are powered up in this process."""
+    seen = list[Target]()
+
+    @contextmanager
+    def client(
+        self: Demo, device: AnyDevice, scene: str, board: Sequence[str] = ()
+    ) -> Iterator[tuple[Any, Path]]:
+        path = self.out / f"{self.name}.toml"
+        path.write_text(scene, "utf-8")
+        options = dict(word.removeprefix("--").split("=") for word in board)
+        target = open_target(f"emulated:{device.name}", scene=path, options=options)
+        seen.append(target)
+        yield device.client(target.node), path
+        target.close()
+
+    def rendered(what: str, _fetch: object) -> NDArray[np.uint8]:
+        # What a download would bring, at once.
+        controls: Any = seen[-1].controls
+        cameras = cameras_of(controls._board)
+        picture = cameras["nadir" in what if len(cameras) > 1 else 0].rendered
+        return np.asarray(picture)
+
+    monkeypatch.setattr(Demo, "client", client)
+    for module in (cubestar, cubesense):
+        monkeypatch.setattr(module, "download", rendered)
+
+
+def opened(path: Path) -> NDArray[np.uint8]:
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+def errors_told(text: str) -> list[float]:
+    """Sizes of all errors that were told, in their own units."""
+    told = re.findall(r"error:? ([\d.]+)(?:°| arcsec across, [+-]([\d.]+) arcsec about)", text)
+    return [float(size) for sizes in told for size in sizes if size]
+
+
+def test_cubestar_solves_a_sky_and_a_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = cubestar.show(device("cubestar"), tmp_path, 1, tmp_path, ["--profile=extended"])
+    told = capsys.readouterr().out
+    assert found is True
+    across_about = errors_told(told)
+    assert len(across_about) == 4
+    assert max(across_about) < 60
+    for name in ("sky", "photograph"):
+        raw, stars = opened(tmp_path / f"{name}-raw.png"), opened(tmp_path / f"{name}-stars.png")
+        assert raw.shape == (512, 1024)
+        assert stars.shape[1:] == (1024, 3)
+        # What was found is marked where stars are bright: both rings and ticks.
+        assert np.all(stars[:512] == (120, 255, 120), axis=2).sum() > 200
+        assert np.all(stars[:512] == (255, 225, 70), axis=2).sum() > 50
+    for text in (
+        "detection threshold found by trying",
+        "measured beside the truth",
+        "virtual time: discard 70.0 ms",
+        "published:    discard 68 ms",
+        "rendered sky: Orion",
+        "a picture file that this project rendered itself",
+    ):
+        assert text in told
+    rows = re.findall(r"(measured|truth) +RA +([\d.]+)°  Dec +([+-][\d.]+)°", told)
+    assert [name for name, *_ in rows] == ["measured", "truth"] * 2
+    for (_, ra, dec), (_, true_ra, true_dec) in zip(rows[::2], rows[1::2], strict=True):
+        assert float(ra) == pytest.approx(float(true_ra), abs=0.05)
+        assert float(dec) == pytest.approx(float(true_dec), abs=0.05)
+    assert (float(rows[1][1]), float(rows[1][2])) == pytest.approx((84, -1))
+    (virtual_s, *_) = re.findall(r"([\d.]+) s of virtual time in [\d.]+ s of wall time", told)
+    assert 2 < float(virtual_s) < 300
+
+
+def test_a_photograph_of_a_folder_has_its_camera_s_truth(tmp_path: Path) -> None:
+    truth = (
+        '{"images": {"missing.png": {}, "sky.png": '
+        '{"quaternion_xyzw_inertial_to_camera": [0, 0, 0, 1]}}}'
+    )
+    (tmp_path / "truth.json").write_text(truth, "utf-8")
+    Image.fromarray(np.zeros((1024, 1024), np.uint8)).save(tmp_path / "sky.png")
+    subject = cubestar._photograph(tmp_path)
+    assert subject.camera == tmp_path / "truth.json"
+    assert f'file = "{tmp_path.resolve() / "sky.png"}"' in subject.scene
+    assert "crop = [0, 256]" in subject.scene
+    assert subject.truth.tolist() == [0, 0, 0, 1]
+    assert "photograph sky.png" in subject.title
+    assert cubestar._photograph(None).camera is None
+    assert cubestar._photograph(tmp_path / "none").camera is None
+
+
+def test_the_other_sign_is_the_same_attitude(capsys: pytest.CaptureFixture[str]) -> None:
+    from cubestack.host.clients.cubestar.client import Attitude
+
+    found: Any = replace(_attitude(Attitude), quaternion=np.array([0.0, 0.0, 0.6, 0.8]))
+    for sign in (1, -1):
+        cubestar._report(found, sign * found.quaternion)
+        measured, truth = re.findall(r"q \[([^]]+)]", capsys.readouterr().out)
+        assert measured == truth
+    cubestar._report(replace(found, valid=False), found.quaternion)
+    assert capsys.readouterr().out == "no attitude found in this picture\n"
+
+
+def _attitude(kind: Any) -> Any:
+    from dataclasses import fields
+
+    return kind(**{field.name: 5 for field in fields(kind)} | {"valid": True})
+
+
+def test_cubesense_finds_both(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = SimpleNamespace(close=lambda: None)
+    monkeypatch.setattr(cubesense, "open_transport", lambda *_where: line)
+    found = cubesense.show(device("cubesense"), tmp_path, 1, None, ["--profile=extended"])
+    told = capsys.readouterr().out
+    assert found is True
+    assert max(errors_told(told)) < 0.5
+    assert len(errors_told(told)) == 2
+    assert "sun: measured alpha +20" in told
+    assert "truth +20.00°, +10.00°" in told
+    assert "truth -8.00°, +12.00°" in told
+    assert "published:    70.4 ms" in told
+    assert "published:    245.0 ms" in told
+    for name, colour in (("sun", (255, 90, 90)), ("nadir", (120, 255, 120))):
+        assert opened(tmp_path / f"{name}-raw.png").shape == (480, 640)
+        drawn = opened(tmp_path / f"{name}.png")
+        assert drawn.shape[1:] == (1280, 3)
+        assert np.all(drawn[:960] == colour, axis=2).sum() > 100
+    nadir = opened(tmp_path / "nadir-raw.png")
+    assert np.median(nadir[240:300, 280:340]) > 100  # the Earth
+
+
+def test_a_download_tells_its_progress() -> None:
+    picture = np.zeros((2, 2), np.uint8)
+
+    def fetch(progress: Any) -> NDArray[np.uint8]:
+        progress(1, 2)
+        progress(2, 2)
+        return picture
+
+    assert download("it", fetch) is picture

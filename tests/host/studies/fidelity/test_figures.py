@@ -1,0 +1,301 @@
+"""Figures of the fidelity pages: those that cost little are measured anew, the sums are checked."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.host.devices.registry import BUILT_IN
+from cubestack.host.studies.aramis import fidelity as aramis
+from cubestack.host.studies.cubesense import fidelity as cubesense
+from cubestack.host.studies.cubestar import fidelity as cubestar
+from cubestack.host.studies.cubestar.shots import Shot
+from cubestack.host.studies.fidelity import table as fidelity
+from cubestack.host.studies.fidelity.contract import Row
+from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform
+
+DOCS = Path(__file__).parents[4] / "docs"
+LONG = {"calibration"}
+CHEAP = [
+    (device, name)
+    for device in BUILT_IN
+    for name, trial in fidelity_of(device).trials.items()
+    if (not trial.profiles or name == "tiles") and name not in LONG
+]
+
+
+def cells_of(device: str) -> Iterator[tuple[Row, *tuple[str, ...]]]:
+    """Rows, and the page's cells of each."""
+    wanted = fidelity_of(device)
+    page = (DOCS / wanted.page).read_text(encoding="utf-8")
+    for table, rows in wanted.tables.items():
+        begin, end = fidelity.marks(table)
+        lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
+        for row, line in zip(rows, lines, strict=True):
+            yield row, *line.removeprefix("| ").removesuffix(" |").split(" | ")
+
+
+def told(device: str) -> Iterator[tuple[Row, str, str]]:
+    """Rows, and what the page has of them in each profile."""
+    for row, _figure, _source, _published, *ours, _word, _command in cells_of(device):
+        yield row, ours[0], ours[1]
+
+
+@pytest.mark.parametrize("device", BUILT_IN)
+def test_a_page_names_the_command_that_measures_the_row(device: str) -> None:
+    """Were another magnitude or number of frames measured, the page would tell the old one."""
+    declared = fidelity_of(device)
+    for row, *_, word, command in cells_of(device):
+        assert (word, command) == (row.word, f"`{declared.command(device, row)}`"), row.key
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
+@pytest.mark.parametrize(("device", "name"), CHEAP)
+def test_a_figure_is_still_what_the_page_says(device: str, name: str) -> None:
+    trial = fidelity_of(device).trials[name]
+    found = [
+        perform(Job(device, name, profile, trial.frames, 1.0))
+        for profile in (("published", "extended") if trial.profiles else ("published",))
+    ]
+    rows = [(row, cells) for row, *cells in told(device) if row.trial == name]
+    assert rows
+    for row, cells in rows:
+        for figures, cell in zip([*found, found[-1]], cells, strict=False):
+            assert fidelity.shown(row, figures) == cell, row.key
+
+
+# --- sums over results ----------------------------------------------------------------------------
+
+
+def shot(detected: int, matched: int, wrong: int = 0, **more: Any) -> Shot:
+    """A right one with its stars."""
+    usual = {"valid": True, "right": True, "tracked": False, "cross_deg": 0.01}
+    return Shot(**usual | more, detected=detected, matched=matched, wrong=wrong)
+
+
+def test_rates_of_a_field_count_what_is_right_and_what_is_wrong(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shots = [
+        shot(10, 10),
+        shot(10, 5, 2),
+        shot(8, 4, 2, right=False),
+        shot(5, 2, valid=False, right=False),
+        shot(0, 0, valid=False, right=False),
+    ]
+    monkeypatch.setattr(cubestar, "field_shots", lambda _opened, frames, **_: shots[:frames])
+    found = cubestar._field(None, 5)  # type: ignore[arg-type]
+    assert found == {
+        "three": pytest.approx(40.0),
+        "right": pytest.approx(40.0),
+        "star_wrong": pytest.approx(40.0),
+        "off": pytest.approx(20.0),
+        "share": pytest.approx(100 * (1 + 0.3 + 0.25 + 0.4 + 0) / 5),
+    }
+
+
+def test_of_a_sky_the_first_picture_can_not_be_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = [shot(10, 8), *[shot(10, 10, tracked=True, cross_deg=0.03)] * 6, *[shot(10, 7)] * 3]
+    two = [shot(0, 0, valid=False, right=False, cross_deg=np.nan)] * 2
+    two += [shot(6, 6, right=False, cross_deg=0.5)]
+    monkeypatch.setattr(cubestar, "slewing_shots", lambda *_: one + two)
+    found = cubestar._slew(None, 13, 0.3)  # type: ignore[arg-type]
+    assert found["right"] == pytest.approx(100 * 10 / 13)
+    assert found["tracked"] == pytest.approx(100 * 6 / 11)
+    assert found["off"] == pytest.approx(100 / 13)
+    assert found["share"] == pytest.approx(100 * (8 + 60 + 21 + 6) / 106)
+    assert found["cross"] == 0.03
+    monkeypatch.setattr(cubestar, "slewing_shots", lambda *_: two[:2])
+    found = cubestar._slew(None, 2, 8.0)  # type: ignore[arg-type]
+    assert found["share"] == 0
+    assert np.isnan(found["cross"])
+
+
+def attitude(cross: float, roll: float = 0.0, **more: Any) -> SimpleNamespace:
+    usual: dict[str, Any] = {"right": True, "solved": True, "centroids": 10, "phase_ms": {}}
+    return SimpleNamespace(error_cross_deg=cross, error_roll_deg=roll, **usual | more)
+
+
+def test_errors_of_cubestar_are_of_right_ones_and_times_of_full_pictures() -> None:
+    times = {"detect": 100.0, "match": 20.0, "attitude": 5.0}
+    results = [attitude(0.001 * n, -0.002 * n) for n in range(101)]
+    results += [attitude(3.0, 2.0, right=False), attitude(9.0, right=False, solved=False)]
+    results += [attitude(0.05, 0.1, centroids=20, phase_ms=times)]
+    results += [attitude(0.05, 0.1, centroids=30, phase_ms=dict.fromkeys(times, 40.0))]
+    results += [attitude(0.05, 0.1, centroids=19, phase_ms=dict.fromkeys(times, 999.0))]
+    found = cubestar._attitudes(results)  # type: ignore[arg-type]
+    right = [one for one in results if one.right]
+    assert found["right"] == pytest.approx(100 * 104 / 106)
+    assert found["off"] == pytest.approx(100 / 106)
+    assert (found["cross_worst"], found["roll_worst"]) == pytest.approx((0.1, 0.2))
+    assert found["cross95"] == pytest.approx(np.quantile([r.error_cross_deg for r in right], 0.95))
+    assert found["roll95"] == pytest.approx(
+        np.quantile([abs(r.error_roll_deg) for r in right], 0.95)
+    )
+    assert (found["algorithms_ms"], found["match_ms"], found["quest_ms"]) == (120, 40, 40)
+
+
+def test_without_a_right_or_full_one_cubestar_has_no_figure() -> None:
+    found = cubestar._attitudes([attitude(3.0, right=False)])  # type: ignore[list-item]
+    assert (found["right"], found["off"]) == (0, 100)
+    rest = {name: value for name, value in found.items() if name not in ("right", "off")}
+    assert all(np.isnan(value) for value in rest.values())
+
+
+def test_errors_of_aramis_are_in_arcsec_and_endings_are_counted() -> None:
+    results = [attitude(n / 3600, -2 * n / 3600, far=False, outcome="unique") for n in range(10)]
+    results += [attitude(1.0, right=False, far=True, outcome="unique")]
+    for ending in ("ambiguous", "ambiguous", "none"):
+        results += [attitude(1.0, right=False, solved=False, far=None, outcome=ending)]
+    found = aramis._attitudes(results)  # type: ignore[arg-type]
+    of = len(results) / 100
+    shares = {"right": 10, "wrong": 1, "far": 1, "conclusive": 11, "ambiguous": 2, "none": 1}
+    assert {name: found[name] for name in shares} == pytest.approx(
+        {name: count / of for name, count in shares.items()}
+    )
+    assert found["cross"] == pytest.approx(4.5)
+    assert found["cross95"] == pytest.approx(np.quantile(range(10), 0.95))
+    assert found["roll95"] == pytest.approx(np.quantile(range(0, 20, 2), 0.95))
+
+
+def test_without_a_right_one_aramis_has_no_error() -> None:
+    found = aramis._attitudes(  # type: ignore[list-item]
+        [attitude(1.0, right=False, solved=False, far=None, outcome="none")]
+    )
+    assert (found["right"], found["none"]) == (0, 100)
+    assert all(np.isnan(found[name]) for name in ("cross", "cross95", "roll95"))
+
+
+def test_cubesense_has_sigma_and_mean_on_each_axis_and_in_bands() -> None:
+    rng = np.random.default_rng(5)
+    truth, off = rng.uniform(-70, 70, (60, 2)), rng.normal(0.1, 0.3, (60, 2))
+    phases = {"wait": 10.0, "store": 20.0, "total": 50.0}
+    results = [
+        SimpleNamespace(
+            detected=True,
+            error_deg=float(np.hypot(*away)),
+            **dict(zip(("truth_alpha_deg", "truth_beta_deg"), true, strict=True)),
+            **dict(zip(("alpha_deg", "beta_deg"), true + away, strict=True)),
+            edges=100 + number if number else None,
+            phase_ms={name: value + number for name, value in phases.items()},
+        )
+        for number, (true, away) in enumerate(zip(truth, off, strict=True))
+    ]
+    unseen = SimpleNamespace(detected=False, error_deg=None)
+    unknown = SimpleNamespace(detected=True, error_deg=None)
+    found = cubesense._sensor([*results, unseen, unknown, unseen, unseen])  # type: ignore[list-item]
+    for axis, name in enumerate(("alpha", "beta")):
+        assert found[name] == pytest.approx(np.mean(np.abs(off[:, axis])))
+        assert found[f"sigma_{name}"] == pytest.approx(np.std(off[:, axis]))
+        assert found[f"sum_{name}"] == pytest.approx(found[name] + found[f"sigma_{name}"])
+    size, angle = np.hypot(*off.T), np.hypot(*truth.T)
+    assert (found["mean"], found["worst"]) == pytest.approx((size.mean(), size.max()))
+    assert found["p95"] == pytest.approx(np.quantile(size, 0.95))
+    assert found["detected"] == pytest.approx(100 * 60 / 64)
+    assert (found["least_edges"], found["most_edges"]) == (0, 159)
+    for name, low, high in (("30", 0, 30), ("40", 0, 40), ("45", 0, 45), ("60", 40, 60)):
+        own = size[(low <= angle) & (angle < high)]
+        assert found[f"mean_{name}"] == pytest.approx(own.mean())
+        assert found[f"worst_{name}"] == pytest.approx(own.max())
+    inner = off[angle < 30]
+    both = [np.abs(inner[:, axis]).mean() + inner[:, axis].std() for axis in (0, 1)]
+    assert found["sum_30"] == pytest.approx(max(both))
+    assert (found["wait_ms"], found["total_ms"]) == pytest.approx((39.5, 79.5))
+    assert found["imaging_ms"] == pytest.approx(39.5 + 49.5)
+    assert found["sigma_ms"] == pytest.approx(np.std(range(60)))
+
+
+def test_the_sun_is_measured_up_to_the_very_side() -> None:
+    one = {"alpha_deg": 90.05, "beta_deg": 0.0, "error_deg": 0.05, "edges": None, "detected": True}
+    truth = {"truth_alpha_deg": 90.0, "truth_beta_deg": 0.0}
+    times = {"phase_ms": {"wait": 1.0, "store": 1.0, "total": 2.0}}
+    inner = one | truth | {"truth_alpha_deg": 1.0, "alpha_deg": 1.01, "error_deg": 0.01} | times
+    found = cubesense._sensor(
+        [SimpleNamespace(**one, **truth, **times), SimpleNamespace(**inner)]  # type: ignore[list-item]
+    )
+    assert found["worst_90"] == 0.05
+    assert found["worst_rest"] == 0.05
+    assert found["worst_30"] == 0.01
+    assert np.isnan(found["mean_60"])
+    behind = one | {"truth_alpha_deg": 90.5, "truth_beta_deg": 0.0} | times
+    found = cubesense._sensor(
+        [SimpleNamespace(**behind), SimpleNamespace(**inner)]  # type: ignore[list-item]
+    )
+    assert found["worst"] == 0.05
+    assert np.isnan(found["worst_90"])
+    assert np.isnan(found["worst_rest"])
+
+
+def test_the_sun_stands_still_at_the_angles_that_the_row_names(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Results there scatter by a part of the angle: the largest is told."""
+    seen: list[float] = []
+
+    def found_at(_device: str, *, frames: int, scene: Any, **_: Any) -> list[SimpleNamespace]:
+        angle = scene.truth(Target.SUN, 0, 100.0).alpha_deg
+        seen.append(angle)
+        off = angle / 1000 * np.resize([1, -1], frames)
+        return [SimpleNamespace(alpha_deg=angle, beta_deg=one) for one in off]
+
+    monkeypatch.setattr(cubesense, "measure", found_at)
+    wanted = fidelity_of("cubesense")
+    (row,) = [one for one in wanted.rows if one.trial == "sun-still"]
+    found = wanted.trials["sun-still"].run(SimpleNamespace(board={}), 6)
+    named = [float(number) for number in re.findall(r"\d+", row.figure)]
+    assert seen == pytest.approx(named, abs=1e-6)
+    assert found == {"sigma": pytest.approx(max(named) / 1000)}
+
+
+# --- a few frames of what is measured -------------------------------------------------------------
+
+compiled = pytest.mark.skipif(find_compiler() is None, reason="needs the compiled FPGA")
+
+
+@compiled
+def test_drawn_stars_are_found_within_a_hundredth_of_a_pixel() -> None:
+    found = perform(Job("cubestar", "centroids", "extended", 1, 1.0))
+    assert 0 < found["x"] < 0.01
+    assert 0 < found["y"] < 0.01
+
+
+@compiled
+def test_spots_are_as_large_as_they_are_told() -> None:
+    found = perform(Job("cubestar", "spots", "published", 1, 1.0))
+    assert 8 <= found["low"] < found["middle"] < found["high"] <= 40
+
+
+@compiled
+def test_a_turn_of_the_loop_has_the_published_times() -> None:
+    found = perform(Job("cubestar", "loop", "published", 2, 1.0))
+    parts = ("discard", "capture", "transfer", "detect", "match", "attitude")
+    assert sum(found[part] for part in parts) < found["loop_total"] + 200
+    assert found["idle"] + found["loop_total"] == pytest.approx(1000, abs=3)
+    assert found["mw"] == pytest.approx(396, rel=0.03)
+    # An attitude is what was in the middle of the exposure, until the next one a second later.
+    assert found["oldest"] - found["age"] == pytest.approx(1000, abs=10)
+    assert found["loop_total"] < found["age"] + 300 < 1500
+
+
+@compiled
+@pytest.mark.parametrize(("name", "least"), [("v3.8-exact", 90), ("false1-lis", 60)])
+def test_the_published_field_is_identified(name: str, least: float) -> None:
+    found = perform(Job("cubestar", name, "extended", 2, 1.0))
+    assert (found["three"], found["right"], found["star_wrong"], found["off"]) == (100, 100, 0, 0)
+    assert found["share"] > least
+    assert (found["share"] < 100) == name.startswith("false")
+
+
+@compiled
+def test_a_slow_turn_is_tracked_and_a_fast_one_is_lost() -> None:
+    slow = perform(Job("cubestar", "slew-0.0635", "extended", 3, 1.0))
+    assert (slow["right"], slow["tracked"]) == (100, 100)
+    assert slow["cross"] < 0.01
+    fast = perform(Job("cubestar", "slew-8.0", "extended", 1, 1.0))
+    assert fast["right"] == fast["off"] == 0

@@ -1,0 +1,180 @@
+"""Published figures: what devices declare, the command that measures ours, and the pages."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.devices.registry import BUILT_IN, device
+from cubestack.host.studies.fidelity import contract as declared
+from cubestack.host.studies.fidelity import table as fidelity
+from cubestack.host.studies.fidelity.contract import Fidelity, Row, Trial, read_tables
+from cubestack.host.studies.fidelity.table import Job, fidelity_of
+from tests.conftest import Run
+
+ROOT = Path(__file__).parents[4]
+LEAST_ROWS = 60
+
+
+def test_there_are_enough_rows_and_no_key_twice() -> None:
+    keys = {name: [row.key for row in fidelity_of(name).rows] for name in BUILT_IN}
+    assert sum(map(len, keys.values())) >= LEAST_ROWS
+    for name, own in keys.items():
+        assert len(set(own)) == len(own), name
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_trial_serves_a_row_and_every_row_has_one(name: str) -> None:
+    rows = list(fidelity_of(name).rows)
+    assert {row.trial for row in rows} == set(fidelity_of(name).trials)
+    assert all(all((row.figure, row.source, row.published, row.ours)) for row in rows)
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name == "aramis" else pytest.mark.slow) for name in BUILT_IN],
+)
+def test_a_quick_run_gives_every_row_a_value_in_both_profiles(run: Run, name: str) -> None:
+    lines = run("fidelity", name, "--quick", "--json", "--workers", "1").out.splitlines()
+    rows = [json.loads(line) for line in lines]
+    assert [row["key"] for row in rows] == [row.key for row in fidelity_of(name).rows]
+    for row in rows:
+        assert set(row["ours"]) == {"published", "extended"}, row["key"]
+        for value in row["ours"].values():
+            assert any(character.isdigit() for character in value), (row["key"], value)
+            assert "-" not in value.replace("e-", ""), (row["key"], value)
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_commands_of_the_rows_are_real(name: str) -> None:
+    from cubestack.host.cli.main import make_parser
+
+    parser, declared = make_parser(), fidelity_of(name)
+    for command in {declared.command(name, row) for row in declared.rows}:
+        parser.parse_args(command.split())
+
+
+def test_rows_are_chosen_by_their_keys(run: Run) -> None:
+    out = run("fidelity", "cubesense", "--rows", "power-*", "--workers", "1").out
+    assert "table 7.1" in out
+    assert "equation" not in out
+    refused = run("fidelity", "--rows", "colour")
+    assert refused.code == 2
+    assert refused.line.startswith("cubestack fidelity: no row is like colour")
+
+
+def test_a_part_is_not_written_to_the_pages(run: Run) -> None:
+    refused = run("fidelity", "--write", "--quick")
+    assert refused.code == 2
+    assert "--write wants all rows" in refused.line
+
+
+@pytest.fixture
+def lens_jobs() -> list[Job]:
+    rows = [row for row in fidelity_of("cubesense").rows if row.trial in ("lens", "power")]
+    return fidelity.jobs_of("cubesense", rows)
+
+
+def test_several_processes_find_what_one_does(lens_jobs: list[Job]) -> None:
+    told: list[Job] = []
+    alone = fidelity.run_jobs(lens_jobs, 1, told.append)
+    assert fidelity.run_jobs(lens_jobs, 2, told.append) == alone
+    assert sorted(map(str, told)) == sorted(2 * [str(job) for job in lens_jobs])
+
+
+def test_fitted_power_is_the_published_one() -> None:
+    for name in ("cubestar", "cubesense"):
+        rows = [row for row in fidelity_of(name).rows if row.trial == "power"]
+        assert {row.word for row in rows} == {"fitted"}
+        (figures,) = fidelity.run_jobs(fidelity.jobs_of(name, rows), 1, lambda _job: None).values()
+        for row in rows:
+            published, ours = (
+                float(text.split()[0]) for text in (row.published, fidelity.shown(row, figures))
+            )
+            assert ours == pytest.approx(published, rel=0.06), row.key
+
+
+def test_what_a_profile_does_not_change_runs_once(lens_jobs: list[Job]) -> None:
+    assert {job.trial for job in lens_jobs} == {"lens", "power"}
+    assert len(lens_jobs) == 2
+
+
+def test_frames_are_those_of_the_trial_unless_given() -> None:
+    rows = [row for row in fidelity_of("cubesense").rows if row.trial == "nadir"]
+    trial = fidelity_of("cubesense").trials["nadir"]
+    for options, frames in (({}, trial.frames), ({"quick": True}, trial.quick), ({"frames": 7}, 7)):
+        assert {job.frames for job in fidelity.jobs_of("cubesense", rows, **options)} == {frames}
+
+
+ROW = Row("a", "speed", "section 1", "3 m/s", "fitted", "walk", "{v:.1f} m/s")
+
+
+def test_what_there_is_not_is_a_dash() -> None:
+    assert fidelity.shown(ROW, {"v": float("nan")}) == "- m/s"
+    assert fidelity.shown(ROW, {"v": 2.96}) == "3.0 m/s"
+
+
+def test_a_table_with_another_word_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "published.md").write_text("## t\n| a | b | c | d | guessed | e | f |\n")
+    monkeypatch.setattr(declared.resources, "files", lambda _package: tmp_path)
+    with pytest.raises(ValueError, match="not the cells of key, figure"):
+        read_tables("anything")
+
+
+PAGE = "above\n<!-- rows: pace -->\nold\n<!-- end of rows -->\nbelow\n"
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The page of a device with one row, which stands in for AraMiS."""
+    trials = {"walk": Trial(lambda opened, _frames: {"v": 2.5 + len(opened.board["profile"])})}
+    walking = Fidelity("page.md", trials, {"pace": (ROW,)})
+    sensor = replace(device("aramis"), studies={"fidelity": lambda: walking})
+    monkeypatch.setattr(fidelity, "registered", lambda _name: sensor)
+    (tmp_path / "page.md").write_text(PAGE)
+    return tmp_path / "page.md"
+
+
+def test_only_the_tables_of_a_page_are_rewritten(run: Run, page: Path) -> None:
+    done = run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
+    assert done.code == 0
+    assert f"wrote 1 rows to {page}\n" in done.err
+    once = page.read_text()
+    assert once.startswith("above\n")
+    assert once.endswith("below\n")
+    assert "old" not in once
+    cells = "speed | section 1 | 3 m/s | 11.5 m/s | 10.5 m/s | fitted | `fidelity aramis --rows a`"
+    assert f"| {cells} |\n" in once
+    run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
+    assert page.read_text() == once
+
+
+def test_a_page_without_a_place_is_refused_before_anything_is_measured(
+    run: Run, page: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fidelity, "perform", None)
+    page.write_text("nothing\n")
+    for folder in (page.parent, page.parent / "none"):
+        refused = run("fidelity", "aramis", "--write", folder)
+        assert refused.code == 2
+        assert "has no <!-- rows: pace -->" in refused.line
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_rows_of_a_page_are_those_that_are_declared(name: str) -> None:
+    wanted = fidelity_of(name)
+    page = (ROOT / "docs" / wanted.page).read_text(encoding="utf-8")
+    for table, rows in wanted.tables.items():
+        begin, end = fidelity.marks(table)
+        lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
+        cells = [line.removeprefix("| ").removesuffix(" |").split(" | ") for line in lines]
+        assert [(*one[:3], *one[5:]) for one in cells] == [
+            (row.figure, row.source, row.published, row.word, f"`{wanted.command(name, row)}`")
+            for row in rows
+        ], table
+        assert all(one[3] and one[4] for one in cells), table

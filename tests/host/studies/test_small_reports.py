@@ -1,0 +1,258 @@
+"""Memory, settings before a measurement, sections and worst cases: what they say and send."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cubestack.emulator.iss.insight.memory_report import MemoryUse
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.devices.experiment import Section
+from cubestack.host.emulation import libraries
+from cubestack.host.experiments.aramis import measure as aramis
+from cubestack.host.studies.campaign import report
+from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.run import run
+from cubestack.host.studies.campaign.worst import worst
+from cubestack.host.studies.cubestar import memory
+from cubestack.host.studies.fidelity.table import Job, perform
+from tests.host.studies.campaign.conftest import failing, plan
+
+__all__ = ["failing", "plan"]
+
+USE = MemoryUse(
+    flash=262_144,
+    flash_size=1 << 20,
+    ram_size=1 << 17,
+    static=1 << 15,
+    heap=1 << 10,
+    stack=None,
+    process_stack=0x2000_1F00,
+    free=96,
+)
+
+
+class Observed:
+    """A device with firmware of one's own, that notes what is asked of it."""
+
+    def __init__(self) -> None:
+        self.done = list[object]()
+        self.client = SimpleNamespace(capture_and_process=lambda: self.done.append("capture"))
+
+    def __enter__(self) -> "Observed":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.done.append("closed")
+
+    def wait(self, seconds: float) -> None:
+        self.done.append(seconds)
+
+
+@pytest.mark.parametrize(("capture", "done"), [(False, [1.5, "closed"]),
+                                               (True, [1.5, "capture", "closed"])])  # fmt: skip
+def test_memory_is_told_after_a_run(
+    monkeypatch: pytest.MonkeyPatch, capture: bool, done: list[object]
+) -> None:
+    from cubestack.emulator.iss.insight import memory_report
+
+    one = Observed()
+    monkeypatch.setattr(memory, "own_firmware", lambda *_words: SimpleNamespace(observer=None))
+    monkeypatch.setattr(memory_report, "memory_use", lambda _observer: USE)
+    options = memory.MemoryOptions(seconds=1.5, capture=capture)
+    opened: Any = lambda _scene, *, seed: one  # noqa: E731
+    (facts,) = memory.EXPERIMENT.run(opened, options)
+    assert one.done == done
+    assert facts.as_dict()["heap"] == 1024
+    lines = list(memory._lines(USE))
+    assert [line.split() for line in lines] == [
+        ["flash", "262144", "bytes,", "25.0", "%"],
+        ["static", "RAM", "32768", "bytes,", "25.0", "%"],
+        ["heap", "1024", "bytes,", "0.8", "%"],
+        ["stack", "not", "known:", "the", "program", "has", "no", "symbols", "for", "it"],
+        ["process", "stack", "down", "to", "20001f00"],
+        ["never", "touched", "96", "bytes,", "0.1", "%"],
+    ]
+    # Names and numbers are below each other.
+    assert len({line.index(" bytes") for line in lines if " bytes" in line}) == 1
+
+
+def test_a_program_without_a_process_has_no_stack_of_it() -> None:
+    from dataclasses import replace
+
+    assert len(list(memory._lines(replace(USE, process_stack=None)))) == 5
+
+
+# --- AraMiS ---------------------------------------------------------------------------------------
+
+
+def sent(**options: Any) -> list[tuple[str, dict[str, Any]]]:
+    """Telecommands before a measurement with these options."""
+    said = list[tuple[str, dict[str, Any]]]()
+    client = SimpleNamespace(
+        command=lambda name, **values: said.append((name, values)),
+        wait_processed=lambda timeout_s: said.append(("wait", {"s": timeout_s})),
+    )
+    star_tracker: Any = SimpleNamespace(client=client)
+    aramis._configure(star_tracker, aramis.AramisOptions(**options))
+    return said
+
+
+def test_only_what_differs_is_sent() -> None:
+    (field, values), wait = sent()
+    assert (field, values["FieldOfView"]) == ("SetField", pytest.approx(21.534639))
+    assert wait[0] == "wait"
+    assert [name for name, _ in sent(exposure=100, gain=3.5)] == [
+        *("SetField", "SetExposure", "SetGain", "wait")
+    ]
+    assert sent(gain=3.5)[1] == ("SetGain", {"Gain": 3.5})
+
+
+@pytest.mark.parametrize("exposure_ms", [0.001, 1.0, 20.0, 200.0])
+def test_an_exposure_is_the_nearest_number_of_rows(exposure_ms: float) -> None:
+    rows = sent(exposure=exposure_ms)[1][1]["Rows"]
+    row_ms = 1000 * (1280 + 244) / 48e6
+    assert abs(rows * aramis.ROW_S * 1000 - exposure_ms) <= max(aramis.ROW_S * 500, row_ms) * 1.001
+    assert rows >= 1
+
+
+@pytest.mark.parametrize("given", ["4.5,6", (4.5, 6), ("4.5", "6")])
+def test_magnitudes_are_typed_or_given(given: object) -> None:
+    assert aramis.MAGNITUDES(given) == (4.5, 6.0)
+
+
+@pytest.mark.parametrize("given", ["6,4.5", "4.5", "a,b", (6, 4.5)])
+def test_magnitudes_that_are_none(given: object) -> None:
+    with pytest.raises(ValueError, match="the brightest first"):
+        aramis.MAGNITUDES(given)
+    assert aramis.MAGNITUDES("5,5") == (5.0, 5.0)
+
+
+# --- campaigns ------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("failing")
+def test_a_page_has_the_tables_and_figures_of_its_experiment(
+    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    list(run(folder, 1))
+    seen = list[Any]()
+
+    class Tested:
+        """An experiment with two sections."""
+
+        marks = ()
+
+        def sections(self, results: Iterator[Any]) -> Iterator[Section]:
+            seen.extend(results)
+            yield Section("by part & kind", ("part", "how often"), [("a<b", "7"), ("c", "9")])
+            yield Section("as a figure", png=b"\x89PNG figure")
+
+    monkeypatch.setattr(report, "experiment_of", lambda *_of: Tested())
+    page, *figures = report.write(folder)
+    text = page.read_text("utf-8")
+    assert "<h2>by part &amp; kind</h2>" in text
+    assert "<tr><th>part</th><th>how often</th></tr>" in text
+    assert "<tr><td>a&lt;b</td><td>7</td></tr>\n<tr><td>c</td><td>9</td></tr>" in text
+    assert figures[-1].name == "as-a-figure.png"
+    assert figures[-1].read_bytes() == b"\x89PNG figure"
+    assert 'alt="as-a-figure.png"' in text
+    assert len(seen) == len(list(folder.rows()))
+
+
+def test_of_one_outcome_the_largest_error_comes_first(
+    plan: Plan, tmp_path: Path, failing: set[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dataclasses import replace
+
+    from cubestack.host.studies.campaign import worst as module
+
+    failing.add(0.9)
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    rows = [
+        replace(row, outcome="right", result={"error_deg": error, "other": 99.0})
+        for row, error in zip(run(folder, 1), (0.5, -3.0, None, 1.0, 2.0), strict=False)
+    ]
+    monkeypatch.setattr(Folder, "rows", lambda _folder: iter(rows))
+    monkeypatch.setattr(module, "_picture", lambda *_of: b"")
+    cases = list(worst(folder, 4))
+    assert [case.number for case in cases] == [1, 4, 3, 0]
+    assert "error_deg 3" in cases[0].text
+    assert "other" not in cases[0].text
+    assert "false_stars = 0" in cases[0].text
+
+
+def test_what_fails_again_is_told_and_what_did_not_fail_raises(
+    plan: Plan, tmp_path: Path, failing: set[float]
+) -> None:
+    failing.add(0.5)
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    rows = list(run(folder, 1))
+    assert {"failed"} < {row.outcome for row in rows}
+    (case,) = worst(folder, 1)
+    assert case.text.startswith("failed; IndexError: drawn")
+    assert case.jpeg == b""
+    failing.add(-1.0)  # now all of them fail
+    with pytest.raises(IndexError):
+        list(worst(folder, len(rows)))
+
+
+# --- what is shipped ------------------------------------------------------------------------------
+
+
+def test_libraries_are_made_for_all_machines_and_others_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from cubestack.emulator.native import ready_made
+
+    folder = tmp_path / "native"
+    folder.mkdir()
+    (folder / "old").write_bytes(b"x")
+
+    def build(compiler: Any, scratch: Path, log: Path) -> Path:
+        assert scratch.is_dir()
+        assert log.parent == scratch
+        made = scratch / "library"
+        made.write_bytes(" ".join(compiler.command[-3:]).encode())
+        return made
+
+    wanted: Any = [SimpleNamespace(inputs=bytes([number]), build=build) for number in range(2)]
+    monkeypatch.setattr(libraries, "needed", lambda: wanted)
+    monkeypatch.setattr(ready_made, "FOLDER", folder)
+    told = list[str]()
+    monkeypatch.setattr(libraries, "print", told.append, raising=False)
+    libraries.main()
+    names = {path.name for path in folder.iterdir()}
+    assert len(names) == len(told) == 2 * len(ready_made.TARGETS)
+    assert "old" not in names
+    for path in folder.iterdir():
+        assert f"{path.name}: {path.stat().st_size} bytes" in told
+        assert any(path.name.startswith(machine) for machine in ready_made.TARGETS)
+
+
+def test_every_choice_of_every_device_is_tried_once() -> None:
+    found = [(name, *options.items()) for name, options in libraries.choices()]
+    assert len(set(found)) == len(found)
+    assert ("cubestar",) in found
+    assert ("cubestar", ("layout", "2")) in found
+    assert ("cubestar", ("firmware", "reference")) in found
+    assert ("cubesense", ("mcu_addressing", True)) in found
+    assert all(value is not None for _, *options in found for _, value in options)
+
+
+# --- the ball -------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+def test_a_ball_is_seen_where_the_stage_has_turned_it() -> None:
+    found = perform(Job("cubesense", "ball", "published", 1, 1.0))
+    for direction in ("right", "left", "down", "up"):
+        assert 0 < found[direction] < 0.5
+    assert 0 <= found["sigma"] < 0.3
+    assert np.isfinite(list(found.values())).all()

@@ -1,0 +1,145 @@
+"""Upsets of real boards: what must be harmless is, what is not shows, and a seed repeats it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from cubestack.emulator.boards.cubestar import stack
+from cubestack.emulator.native.compiler import find_compiler
+from cubestack.hdl.blocks import frame_writer
+from cubestack.host.devices.registry import device
+from cubestack.host.experiments.opener import Opener
+from cubestack.host.studies.cubesense import upsets as cubesense
+from cubestack.host.studies.cubestar import upsets as cubestar
+from cubestack.host.studies.upsets import experiment
+from cubestack.host.studies.upsets.sample import UpsetResult
+from tests.tiers import quick
+
+from .voted import VotedCounter
+
+STORES = ("storing", "between")
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+
+
+def measured(
+    name: str, tested: Any, board: Mapping[str, Any] | None = None, **options: Any
+) -> list[UpsetResult]:
+    chosen = tested.options(**options)
+    results = list(tested.run(Opener(device(name), board=board or {}), chosen))
+    assert len(results) == tested.count(chosen)
+    return results
+
+
+@pytest.fixture(scope="module")
+def counters() -> list[UpsetResult]:
+    return measured("cubestar", cubestar.EXPERIMENT, registers="*er.counter.row", memory_bits=1)
+
+
+@pytest.mark.slow
+def test_every_bit_is_hit_in_every_phase(counters: list[UpsetResult]) -> None:
+    hit = [(r.target, r.bit, r.phase) for r in counters if not r.memory]
+    registers = [f"{part}.counter.row" for part in ("writer", "reader")]
+    phases = ("idle", "storing", "between", "reading")
+    assert sorted(hit) == sorted(
+        (name, bit, phase) for name in registers for bit in range(9) for phase in phases
+    )
+    times = [result.time_s for result in counters]
+    assert times == sorted(times)
+
+
+@pytest.mark.slow
+def test_a_counter_matters_only_where_it_counts(counters: list[UpsetResult]) -> None:
+    for result in counters:
+        matters = {"writer.counter.row": "storing", "reader.counter.row": "reading"}
+        if result.memory:
+            continue
+        if result.phase == matters[result.target]:
+            assert result.effect in ("picture", "timing")
+        elif result.phase == "idle" or result.target == "reader.counter.row":
+            assert (result.effect, result.answer) == ("nothing", "right")
+    healed = sum(result.recovered in (0, 1) for result in counters)
+    assert healed > len(counters) / 2
+
+
+@pytest.mark.slow
+def test_a_seed_repeats_it() -> None:
+    options = {"registers": "writer.data", "memory_bits": 0, "seed": 5}
+    first, again = (measured("cubestar", cubestar.EXPERIMENT, **options) for _ in range(2))
+    assert first == again
+    stored = [result.effect for result in first if result.phase == "storing"]
+    assert set(stored) <= {"nothing", "pixel", "timing"}
+    assert "pixel" in stored
+
+
+@pytest.fixture
+def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    kept = stack._wiring, experiment._registers
+    monkeypatch.setattr(frame_writer, "MatrixCounter", VotedCounter)
+    for cached in kept:
+        cached.cache_clear()
+    yield
+    for cached in kept:
+        cached.cache_clear()
+
+
+@pytest.mark.slow
+def test_a_voted_counter_is_immune(voted: None) -> None:
+    rig = replace(cubestar.EXPERIMENT.rig(cubestar.CubeStarUpsetOptions()), phases=STORES)
+    tested = replace(cubestar.EXPERIMENT, rig=lambda _options: rig)
+    results = measured("cubestar", tested, registers="writer.counter.*", memory_bits=0)
+    assert len({result.target for result in results}) == 6
+    assert {result.effect for result in results} <= {"nothing", "left over"}
+    assert {result.answer for result in results} == {"right"}
+
+
+@pytest.mark.parametrize("layout", quick(["2", "3", "two-boards"], 1))
+def test_each_layout_has_its_registers(layout: str) -> None:
+    results = measured(
+        *("cubestar", cubestar.EXPERIMENT),
+        **{"layout": layout, "registers": "*store", "memory_bits": 1},
+        **{"flux": 4.0, "cross_section": 0.25},
+    )
+    assert {result.phase for result in results} == {"storing", "between", "reading"}
+    assert len({one.target for one in results if one.memory}) == (1 if layout == "2" else 2)
+    assert {one.effect for one in results if one.phase == "storing"} - {"nothing"}
+    for result in results:
+        assert sum(result.phases_s.values()) == pytest.approx(result.period_s)
+        assert result.hits_a_day == 24 * 60 * 60
+
+
+@pytest.mark.parametrize("gateware", quick(["as-flown", "corrected"], 1))
+def test_two_linked_fpgas(gateware: str) -> None:
+    results = measured(
+        *("cubesense", cubesense.EXPERIMENT),
+        **{"gateware": gateware, "registers": "*_writer.ack", "memory_bits": 0},
+    )
+    phases = cubesense.EXPERIMENT.rig(cubesense.CubeSenseUpsetOptions()).phases
+    assert {result.phase for result in results} == set(phases)
+    assert {result.effect for result in results if result.phase == "idle"} == {"nothing"}
+    assert {result.effect for result in results} > {"nothing"}
+
+
+def test_a_register_that_is_not_there_is_told() -> None:
+    with pytest.raises(ValueError, match=r"no register is like 'writer.roww'; there are .*writer"):
+        measured("cubestar", cubestar.EXPERIMENT, registers="writer.roww")
+
+
+def test_a_memory_that_is_not_there_is_told() -> None:
+    with pytest.raises(ValueError, match=r"no memory 'flash'; there are .*SRAM, external"):
+        measured("cubestar", cubestar.EXPERIMENT, memories="flash")
+
+
+@pytest.mark.slow
+def test_own_firmware_s_memories_are_hit_and_each_answer_asked_for() -> None:
+    results = measured(
+        *("cubestar", cubestar.EXPERIMENT, {"firmware": "reference"}),
+        **{"memories": "ram,flash", "memory_bits": 2, "registers": "bank"},
+    )
+    assert {(one.target, one.bits) for one in results} == {
+        *(("bank", 1), ("ram", 8 * (128 << 10)), ("flash", 8 * (1 << 20)))
+    }
+    assert {one.effect for one in results if one.memory} == {"left over"}
+    assert sum(one.right for one in results) > len(results) / 2
