@@ -1,7 +1,8 @@
-"""Draws the diagrams of the sensors' pages, into docs/images: `python docs/make_diagrams.py`.
+"""Draws the diagrams of the documents, into docs/images: `python -m docs.make_diagrams`.
 
-Timing diagrams are of runs of the emulated devices: what `--trace` writes, and where that is too
-coarse, what a scope at the FPGA's pins sees. Every run is seeded, so the files repeat to the byte.
+Timing diagrams show runs of the emulated devices: what `--trace` writes, or, where that is too
+coarse, what a scope at the FPGA's pins samples. Every run is seeded, so the files repeat to the
+byte.
 """
 
 import argparse
@@ -14,8 +15,9 @@ from cubestack.emulator.rtl.pixel_clock import LoadedSegment
 from cubestack.host.cli.waveform import read
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import start_trace
-from cubestack.host.pictures.blocks import Block, Line, blocks
-from cubestack.host.pictures.timing import Lane, levels, timing, values
+from docs.diagrams.architecture import architecture
+from docs.diagrams.blocks import Block, Line, blocks
+from docs.diagrams.timing import Lane, levels, timing, values
 
 SEED, ASKED_S, NS, MS = 2, 0.5, 1000, 10**9
 """Of all runs; when the telecommand comes; in ps."""
@@ -203,8 +205,8 @@ BLOCKS = {
             "fpga": Block(1, 0, "IGLOO nano", "FPGA, frame buffer"),
             "mcu": Block(2, 0, "EFM32GG", "microcontroller"),
             "host": Block(3, 0, "host", "on-board computer"),
-            "sram": Block(1, 1, "SRAM", "a whole picture"),
-            "ram": Block(2, 1, "RAM", "the copy to work on"),
+            "sram": Block(1, 1, "SRAM", "a whole image"),
+            "ram": Block(2, 1, "RAM", "the working copy"),
         },
         [
             Line("camera", "fpga", "PIXDATA, PIXCLK\nHSYNC, VSYNC"),
@@ -218,10 +220,10 @@ BLOCKS = {
         {
             "sun": Block(0, 1, "OV7620", "Sun camera"),
             "nadir": Block(0, 2, "OV7620", "nadir camera"),
-            "sun sram": Block(1, 0, "SRAM", "a picture"),
+            "sun sram": Block(1, 0, "SRAM", "an image"),
             "sun fpga": Block(1, 1, "FPGA", "of the Sun camera"),
             "nadir fpga": Block(1, 2, "FPGA", "of the nadir camera"),
-            "nadir sram": Block(1, 3, "SRAM", "a picture"),
+            "nadir sram": Block(1, 3, "SRAM", "an image"),
             "mcu": Block(2, 1, "PIC18F45K20", "microcontroller", rows=2),
             "host": Block(3, 1, "host", "on-board computer", rows=2),
         },
@@ -242,7 +244,7 @@ BLOCKS = {
             "camera": Block(0, 1, "MT9M001", "image sensor"),
             "mcu": Block(1, 1, "Blackfin", "processor, PPI, DMA"),
             "host": Block(2, 1, "host", "on-board computer"),
-            "sdram": Block(1, 2, "SDRAM", "pictures, catalogue"),
+            "sdram": Block(1, 2, "SDRAM", "images, catalogue"),
         },
         [
             Line("flash", "mcu", "bytes of the\ncoded catalogue"),
@@ -271,6 +273,7 @@ if __name__ == "__main__":
     chosen = parser.parse_args()
     for kept in (chosen.out, chosen.traces):
         kept.mkdir(parents=True, exist_ok=True)
+    (IMAGES / "architecture.svg").write_text(architecture(), encoding="utf-8")
     for file, text in diagrams(chosen.traces).items():
         (chosen.out / file).write_text(text, encoding="utf-8")
         print(chosen.out / file)

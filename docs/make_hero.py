@@ -1,4 +1,4 @@
-"""Draws README's picture and writes its caption: `python docs/make_hero.py`.
+"""Draws README's picture and writes its caption: `python -m docs.make_hero`.
 
 Both come from one run of the demonstration that `make run` shows. The caption is kept inside the
 PNG file (its text chunk "Description"), so that picture and caption can not drift apart.

@@ -1,8 +1,11 @@
 """The command as a shell sees it; properties are tested with the same examples everywhere."""
 
 import gc
-from collections.abc import Callable
-from typing import NamedTuple
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -71,3 +74,22 @@ def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
         return Outcome(code, *capsys.readouterr())
 
     return call
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """A real browser, without a window; skips where there is none."""
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        pytest.skip("chromium is not installed")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    # Its own program may lack a library of the system, such as libatomic1.
+    call = [sys.executable, "-m", "playwright", "--version"]
+    tried = subprocess.run(call, capture_output=True, text=True)
+    if tried.returncode != 0:
+        pytest.skip(f"playwright does not start: {tried.stderr.strip()}")
+    with api.sync_playwright() as playwright:
+        # In a container there is no sandbox to be had, and only our own pages are opened.
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()

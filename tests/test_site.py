@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -14,6 +15,8 @@ from cubestack.host.cli.commands import commands
 from cubestack.host.cli.reports import reports
 
 ROOT = Path(__file__).parent.parent
+
+DIAGRAMS = ("architecture.html", "sensor-cubesense.html")
 
 LOADED = re.compile(
     r"<(?:script|img|iframe|source|video)[^>]*\ssrc=\"(https?:)?//"
@@ -64,3 +67,23 @@ def test_every_command_and_every_public_name_is_described(site: Path) -> None:
     for name in (name for name in cubestack.__all__ if not name.startswith("_")):
         assert f'id="{name.lower()}"' in names
     assert "\nNone\n</code>" not in names  # a docstring that is missing
+
+
+def test_search_works_from_a_file(site: Path, chromium: Any) -> None:
+    page = chromium.new_page()
+    page.goto(f"{(site / 'index.html').as_uri()}?q=pseudo-terminal")
+    results = page.wait_for_selector(".md-search-result__item >> text=Serve a serial port")
+    assert results is not None
+    page.close()
+
+
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_diagrams_scroll_on_a_narrow_screen(site: Path, chromium: Any, name: str) -> None:
+    page = chromium.new_page(viewport={"width": 390, "height": 800})
+    page.goto((site / name).as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    widths = page.eval_on_selector_all(
+        ".md-content img[src$='.svg']", "all => all.map(one => one.clientWidth)"
+    )
+    assert min(widths) >= 900
+    page.close()

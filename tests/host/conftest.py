@@ -1,10 +1,7 @@
 """Nodes in memory, driven by the interface tables: what host code talks to in these tests."""
 
-import shutil
-import subprocess
-import sys
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import cycle
 from typing import Any
 
@@ -17,25 +14,6 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE, AckError
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
-
-
-@pytest.fixture(scope="session")
-def chromium() -> Iterator[Any]:
-    """A real browser, without a window; skips where there is none."""
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    if program is None:
-        pytest.skip("chromium is not installed")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    # Its own program may lack a library of the system, such as libatomic1.
-    call = [sys.executable, "-m", "playwright", "--version"]
-    tried = subprocess.run(call, capture_output=True, text=True)
-    if tried.returncode != 0:
-        pytest.skip(f"playwright does not start: {tried.stderr.strip()}")
-    with api.sync_playwright() as playwright:
-        # In a container there is no sandbox to be had, and only our own pages are opened.
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 class FakeNode:

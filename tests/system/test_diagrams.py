@@ -1,36 +1,38 @@
-"""The diagrams of the sensors' pages are those of the runs that are made anew."""
+"""The committed diagrams are those that today's runs draw, and their pages show them."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
 
+from docs.diagrams.architecture import FLOORS, architecture
+from docs.make_diagrams import IMAGES, diagrams
+
 from .conftest import ROOT
 
-IMAGES = ROOT / "docs" / "images" / "sensors"
+SENSORS = IMAGES / "sensors"
+STALE = "is stale: python -m docs.make_diagrams"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    path = ROOT / "docs" / "make_diagrams.py"
-    spec = importlib.util.spec_from_file_location("make_diagrams", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    found: dict[str, str] = module.diagrams(tmp_path_factory.mktemp("traces"))
-    return found
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    return diagrams(tmp_path_factory.mktemp("traces"))
 
 
-def test_committed_diagrams_are_today_s(made: dict[str, str]) -> None:
-    assert {path.name for path in IMAGES.glob("*.svg")} == {*made}
-    for name, text in made.items():
-        assert (IMAGES / name).read_text(encoding="utf-8") == text, (
-            f"{name} is not of today: python docs/make_diagrams.py"
-        )
+def test_committed_diagrams_are_up_to_date(drawn: dict[str, str]) -> None:
+    assert {path.name for path in SENSORS.glob("*.svg")} == {*drawn}
+    for name, text in drawn.items():
+        assert (SENSORS / name).read_text(encoding="utf-8") == text, f"{name} {STALE}"
 
 
-def test_every_diagram_is_on_its_sensor_s_page(made: dict[str, str]) -> None:
-    for name in made:
+def test_every_diagram_is_on_its_sensor_s_page(drawn: dict[str, str]) -> None:
+    for name in drawn:
         page = Path(ROOT / "docs" / f"sensor-{name.split('-')[0]}.md").read_text(encoding="utf-8")
         assert f"](images/sensors/{name})" in page
+
+
+def test_the_picture_of_the_architecture_shows_folders_that_exist() -> None:
+    for floor, boxes in FLOORS.items():
+        for box in boxes:
+            assert (ROOT / floor / box.folder).is_dir(), f"{floor}/{box.folder}"
+    stored = (IMAGES / "architecture.svg").read_text(encoding="utf-8")
+    assert stored == architecture(), f"architecture.svg {STALE}"

@@ -191,8 +191,17 @@ def test_links_lead_somewhere() -> None:
         text = document.read_text(encoding="utf-8")
         for target in re.findall(r"\]\(([^)#:]+)\)", text):
             assert (document.parent / target).exists(), f"{document.name}: {target}"
-        for file in re.findall(r"`(tests/[\w/]+\.py)\b", text):
-            assert (ROOT / file).is_file(), f"{document.name}: {file}"
+
+
+#: A path in backticks, from the root of the repository or from the document's folder.
+PATH = re.compile(r"`((?:docs|emulator|examples|firmware_model|hdl|host|tests)/[\w/.*?-]*)")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_files_that_a_document_names_exist(document: Path) -> None:
+    named = PATH.findall(document.read_text(encoding="utf-8"))
+    folders = ROOT, document.parent
+    assert [path for path in named if not any(any(one.glob(path)) for one in folders)] == []
 
 
 def test_make_has_the_targets_that_are_promised() -> None:

@@ -4,17 +4,18 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NamedTuple
 
+from docs.diagrams.style import head
+
 ACROSS, DOWN, BOX_WIDTH, BOX_HEIGHT, MARGIN = 296, 128, 156, 68, 16
 """Pixels: from one column and row of the grid to the next, a box, and around all."""
 
-STYLE = (
-    "text{fill:#111;text-anchor:middle;font-size:16px}.title{font-weight:bold}"
-    ".label{font-size:13px;fill:#444}.box{fill:#eef3fb;stroke:#1a4f9c}"
-    ".line{stroke:#333;stroke-width:1.3;fill:none}"
+SHAPES = (
+    "text{text-anchor:middle;font-size:16px}.title{font-weight:bold}"
+    ".label{font-size:13px}.line{stroke-width:1.3;fill:none}"
 )
-HEAD = (
+ARROW = (
     '<defs><marker id="head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="7" '
-    'markerHeight="7" orient="auto-start-reverse"><path d="M0 0L8 4L0 8z" fill="#333"/>'
+    'markerHeight="7" orient="auto-start-reverse"><path class="head" d="M0 0L8 4L0 8z"/>'
     "</marker></defs>"
 )
 
@@ -58,11 +59,7 @@ def blocks(boxes: Mapping[str, Block], lines: Sequence[Line]) -> str:
     rows = max(box.last for box in boxes.values())
     width = 2 * MARGIN + columns * ACROSS + BOX_WIDTH
     height = 2 * MARGIN + rows * DOWN + BOX_HEIGHT
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
-        f'font-family="sans-serif"><style>{STYLE}</style>{HEAD}',
-        f'<rect width="{width:g}" height="{height:g}" fill="white"/>',
-    ]
+    parts = [*head(width, height, SHAPES), ARROW]
     for line in lines:
         parts += _line(boxes[line.source], boxes[line.target], line)
     for box in boxes.values():
@@ -72,7 +69,7 @@ def blocks(boxes: Mapping[str, Block], lines: Sequence[Line]) -> str:
             f'<rect class="box" x="{x:g}" y="{y:g}" width="{BOX_WIDTH}" height="{box.height:g}" '
             'rx="6"/>',
             _text("title", middle, level + (-4 if box.label else 6), box.title),
-            _text("label", middle, level + 18, box.label),
+            _text("label soft", middle, level + 18, box.label),
         ]
     return "\n".join([*parts, "</svg>", ""])
 
@@ -92,8 +89,8 @@ def _line(source: Block, target: Block, line: Line) -> list[str]:
         level, middle = y + BOX_HEIGHT / 2, (start + end) / 2
         return [
             f'<path class="line" d="M{start:g} {level:g}H{end:g}" {heads}/>',
-            _text("label", middle, level - 7, above),
-            _text("label", middle, level + 18, below),
+            _text("label soft", middle, level - 7, above),
+            _text("label soft", middle, level + 18, below),
         ]
     if source.column == target.column:
         down = to_y > y
@@ -101,12 +98,12 @@ def _line(source: Block, target: Block, line: Line) -> list[str]:
         middle, level = x + BOX_WIDTH / 2, (start + end) / 2
         return [
             f'<path class="line" d="M{middle:g} {start:g}V{end:g}" {heads}/>',
-            f'<text class="label" x="{middle + 8:g}" y="{level:g}" style="text-anchor:start">'
+            f'<text class="label soft" x="{middle + 8:g}" y="{level:g}" style="text-anchor:start">'
             f"{escape(above)}</text>",
-            f'<text class="label" x="{middle + 8:g}" y="{level + 16:g}" '
+            f'<text class="label soft" x="{middle + 8:g}" y="{level + 16:g}" '
             f'style="text-anchor:start">{escape(below)}</text>',
         ]
-    raise ValueError(f"{line.source} and {line.target} stand neither in one row nor one column")
+    raise ValueError(f"{line.source} and {line.target} are neither in one row nor in one column")
 
 
 def _text(kind: str, x: float, y: float, text: str) -> str:

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import pytest
 
-from cubestack.host.pictures.blocks import BOX_HEIGHT, BOX_WIDTH, Block, Line, blocks
-from cubestack.host.pictures.timing import LEFT, PS_PER, WIDTH, levels, timing, values
+from docs.diagrams.blocks import BOX_HEIGHT, BOX_WIDTH, Block, Line, blocks
+from docs.diagrams.style import DARK, LIGHT
+from docs.diagrams.timing import LEFT, PS_PER, WIDTH, levels, timing, values
 
 SVG = "{http://www.w3.org/2000/svg}"
 LETTER = 7.5
@@ -22,9 +23,9 @@ class Drawing:
         left, top, self.width, self.height = map(float, self.root.attrib["viewBox"].split())
         assert left == top == 0
 
-    def all(self, tag: str, kind: str | None = None) -> list[ElementTree.Element]:
-        """Elements of a tag and class; without a class those that have none."""
-        return [one for one in self.root.iter(SVG + tag) if one.get("class") == kind]
+    def all(self, tag: str, kind: str) -> list[ElementTree.Element]:
+        """Elements of a tag and class."""
+        return [one for one in self.root.iter(SVG + tag) if kind in one.get("class", "").split()]
 
     def texts(self, kind: str) -> list[tuple[str, float, float]]:
         """Texts of a class, with their places."""
@@ -44,7 +45,7 @@ class Box(NamedTuple):
         return self.left <= x <= self.right and self.top <= y <= self.bottom
 
 
-def boxes(drawing: Drawing, kind: str | None) -> list[Box]:
+def boxes(drawing: Drawing, kind: str) -> list[Box]:
     found = []
     for one in drawing.all("rect", kind):
         x, y = float(one.get("x", 0)), float(one.get("y", 0))
@@ -70,7 +71,7 @@ def wave(one: ElementTree.Element) -> list[tuple[float, float]]:
 LANES = [
     levels("ACK", [(0, 1), (1_250, 0), (1_750, 1)]),
     values("state", [(0, 7), (1_500, "B")], {"7": "seven"}),
-    values("late", [(1_600, "C"), (1_800, "D")]),
+    values("late", [(1_600, "C"), (1_800, "D<E")]),
     levels("low", [(500, 0)]),
     values("empty", []),
 ]
@@ -98,13 +99,13 @@ def test_levels_are_high_and_low_at_their_times(drawing: Drawing) -> None:
 
 
 def test_a_value_has_its_box_until_the_next_one(drawing: Drawing) -> None:
-    found = [(one.left, one.right) for one in boxes(drawing, "bus")]
+    found = [(one.left, one.right) for one in boxes(drawing, "box")]
     ends = [(1000, 1500), (1500, 2000), (1000, 1600), (1600, 1800), (1800, 2000)]
     for (left, right), (begin, end) in zip(found, ends, strict=True):
         assert (left, right) == pytest.approx((at(begin), at(end)), abs=0.11)
     told = drawing.texts("value")
-    assert [text for text, *_ in told] == ["seven", "B", "C", "C", "D"]
-    for (_, x, y), box in zip(told, boxes(drawing, "bus"), strict=True):
+    assert [text for text, *_ in told] == ["seven", "B", "C", "C", "D<E"]
+    for (_, x, y), box in zip(told, boxes(drawing, "box"), strict=True):
         assert x == pytest.approx((box.left + box.right) / 2, abs=0.11)
         assert box.holds(x, y)
 
@@ -117,7 +118,7 @@ def test_names_stand_left_of_their_lanes(drawing: Drawing) -> None:
     steps = {round(after - before, 3) for before, after in pairwise(heights)}
     assert len(steps) == 1
     assert steps.pop() > 20
-    (first, last) = (box for box in boxes(drawing, "bus")[:2])
+    (first, last) = (box for box in boxes(drawing, "box")[:2])
     assert first.top == last.top
     assert first.top < heights[1] < first.bottom
     curve = wave(drawing.all("path", "wave")[0])
@@ -134,12 +135,12 @@ def test_the_axis_has_marks_from_the_start_on(drawing: Drawing) -> None:
     for (_, x, y), line in zip(marks, lines, strict=True):
         place, (top, bottom) = line[1:].split()[0], line.split()[1].split("V")
         assert float(place) == pytest.approx(x, abs=0.1)
-        assert y < float(top) < boxes(drawing, "bus")[0].top
-        assert boxes(drawing, "bus")[-1].bottom < float(bottom) <= drawing.height
+        assert y < float(top) < boxes(drawing, "box")[0].top
+        assert boxes(drawing, "box")[-1].bottom < float(bottom) <= drawing.height
 
 
-def test_all_of_it_is_in_the_picture_on_white(drawing: Drawing) -> None:
-    (paper,) = boxes(drawing, None)
+def test_everything_is_on_the_paper(drawing: Drawing) -> None:
+    (paper,) = boxes(drawing, "paper")
     assert paper == (0, 0, drawing.width, drawing.height)
     assert drawing.width > LEFT + WIDTH
     for kind in ("axis", "name", "value"):
@@ -159,7 +160,7 @@ def test_a_word_is_written_where_it_fits(length: int, told: bool) -> None:
     lane = values("x", [(0, "w" * length), (80, "")])
     drawing = Drawing(timing([lane], 0, WIDTH, "ns", 1))
     assert bool(drawing.texts("value")) == told
-    assert len(boxes(drawing, "bus")) == 1
+    assert len(boxes(drawing, "box")) == 1
 
 
 @pytest.mark.parametrize(("start", "end", "step"), [(5, 5, 1), (6, 5, 1), (0, 5, 0), (0, 5, -1)])
@@ -196,7 +197,7 @@ def test_boxes_are_on_a_grid_and_apart(parts: Drawing) -> None:
     }
     assert a.left == d.left < a.right < b.left == c.left
     assert a.top == b.top < a.bottom < c.top == d.top
-    (paper,) = boxes(parts, None)
+    (paper,) = boxes(parts, "paper")
     assert paper == (0, 0, parts.width, parts.height)
     # As far from one side as from the other.
     assert a.left == parts.width - b.right > 0
@@ -251,5 +252,22 @@ def test_no_text_is_over_another_or_a_line(parts: Drawing) -> None:
 
 
 def test_what_is_neither_beside_nor_below_is_refused() -> None:
-    with pytest.raises(ValueError, match="a and c stand neither in one row nor one column"):
+    with pytest.raises(ValueError, match="a and c are neither in one row nor in one column"):
         blocks(PARTS, [Line("a", "c", "")])
+
+
+def test_a_tall_box_has_its_lines_in_the_rows_of_the_others() -> None:
+    tall = {"a": Block(0, 0, "A"), "b": Block(0, 1, "B"), "tall": Block(1, 0, "T", rows=2)}
+    drawing = Drawing(blocks(tall, [Line("a", "tall", ""), Line("tall", "b", "")]))
+    a, b, high = boxes(drawing, "box")
+    levels = [one.attrib["d"].split("H")[0].split()[1] for one in drawing.all("path", "line")]
+    assert [float(y) for y in levels] == [(a.top + a.bottom) / 2, (b.top + b.bottom) / 2]
+    assert (high.top, high.bottom) == (a.top, b.bottom)
+
+
+def test_both_colour_schemes_have_the_same_rules() -> None:
+    assert LIGHT.keys() == DARK.keys()
+    style = Drawing(blocks(PARTS, LINES)).root.findtext(SVG + "style") or ""
+    usual, night = style.split("@media(prefers-color-scheme:dark)")
+    assert all(f"{one}{{{rule}}}" in usual for one, rule in LIGHT.items())
+    assert all(f"{one}{{{rule}}}" in night for one, rule in DARK.items())

@@ -5,6 +5,8 @@ from html import escape
 from itertools import pairwise
 from typing import NamedTuple
 
+from docs.diagrams.style import head
+
 LANE, HIGH, LEFT, WIDTH, TOP = 34, 18, 150, 840, 34
 """Pixels: height of a lane and of a level in it, names, time axis, and above the lanes."""
 
@@ -13,11 +15,10 @@ CHARACTER = 8
 
 PS_PER = {"s": 10**12, "ms": 10**9, "us": 10**6, "ns": 10**3}
 
-STYLE = (
-    "text{fill:#111;font-size:14px}.name{text-anchor:end;font-family:monospace}"
-    ".value{text-anchor:middle;font-size:13px}.axis{text-anchor:middle;fill:#555;font-size:13px}"
-    ".wave{fill:none;stroke:#1a4f9c;stroke-width:1.4}.bus{fill:#eef3fb;stroke:#1a4f9c}"
-    ".grid{stroke:#ddd}"
+SHAPES = (
+    "text{font-size:14px}.name{text-anchor:end;font-family:monospace}"
+    ".value{text-anchor:middle;font-size:13px}.axis{text-anchor:middle;font-size:13px}"
+    ".wave{fill:none;stroke-width:1.4}"
 )
 
 
@@ -57,17 +58,13 @@ def timing(lanes: Sequence[Lane], start_ps: int, end_ps: int, unit: str, step: f
         raise ValueError(f"nothing to show from {start_ps} to {end_ps} ps in steps of {step}")
     scale = WIDTH / (end_ps - start_ps)
     height = TOP + LANE * len(lanes) + 10
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {LEFT + WIDTH + 20} {height}" '
-        f'font-family="sans-serif"><style>{STYLE}</style>',
-        f'<rect width="{LEFT + WIDTH + 20}" height="{height}" fill="white"/>',
-    ]
+    parts = head(LEFT + WIDTH + 20, height, SHAPES)
     marks = int((end_ps - start_ps) / (step * PS_PER[unit])) + 1
     for mark in range(marks):
         x = LEFT + mark * step * PS_PER[unit] * scale
         label = f"{mark * step:g}" + (f" {unit}" if mark == marks - 1 else "")
         parts.append(f'<path class="grid" d="M{x:.1f} {TOP - 8}V{height - 6}"/>')
-        parts.append(f'<text class="axis" x="{x:.1f}" y="{TOP - 14}">{label}</text>')
+        parts.append(f'<text class="axis soft" x="{x:.1f}" y="{TOP - 14}">{label}</text>')
     for number, lane in enumerate(lanes):
         bottom = TOP + LANE * number + (LANE + HIGH) / 2
         parts.append(
@@ -101,7 +98,7 @@ def _drawn(at: Sequence[tuple[float, int | str]], bottom: float) -> list[str]:
         if what == "":
             continue
         parts.append(
-            f'<rect class="bus" x="{x:.1f}" y="{bottom - HIGH:.1f}" width="{end - x:.1f}" '
+            f'<rect class="box" x="{x:.1f}" y="{bottom - HIGH:.1f}" width="{end - x:.1f}" '
             f'height="{HIGH}" rx="2"/>'
         )
         text = str(what)

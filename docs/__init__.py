@@ -1,0 +1,1 @@
+"""Scripts that draw the pictures of these documents, and hooks of their site."""
