@@ -1,1 +1,1 @@
-"""Where the outside world plugs in: in-process links, pseudo-terminals, TCP sockets, RFC 2217."""
+"""Ports for other programs: in-process links, pseudo-terminals, TCP sockets, RFC 2217, GDB."""

@@ -1,8 +1,8 @@
-"""A port by which other threads act on a running emulation: between two of its events, in its
-own thread, so that nothing is ever half done.
+"""A port through which other threads control a running emulation.
 
-Held, virtual time stands: an act that changes something has its effect when time goes on. It goes
-on for good, for so many events, or up to a time.
+Calls run in the emulation's thread, between two of its events, so they never see a partial event.
+While virtual time is held, a change takes effect when time continues: permanently, for a number of
+events, or up to a given time.
 """
 
 import os
@@ -24,13 +24,12 @@ if TYPE_CHECKING:
     from cubestack.emulator.ports.realtime import RealtimeScheduler
 
 HOLDER = "control"
-"""Who holds the kernel."""
 
 SLICE_NS = 20_000_000
-"""Wall time that is worked towards a time before the other ports are looked at."""
+"""Wall time that ``run_to`` takes before the other ports are served."""
 
 MOST_EVENTS = 100_000
-"""Of one step: some seconds of wall time."""
+"""Limit of one step: some seconds of wall time."""
 
 FASTEST, SLOWEST = 1000.0, 0.001
 
@@ -40,68 +39,64 @@ T = TypeVar("T")
 
 
 class ControlPort(Endpoint):
-    """Attributes:
-    kernel: virtual time.
-    scheduler: that serves this port; set by who makes it.
-    """
+    """The port; its creator must set ``scheduler`` to the scheduler that serves it."""
 
     name = "control"
 
     def __init__(self, kernel: Kernel) -> None:
-        """Control ``kernel``."""
         self.kernel = kernel
         self.scheduler: RealtimeScheduler | None = None
         self._calls = SimpleQueue[Callable[[], None]]()
-        self._hears, self._rings = os.pipe()
-        os.set_blocking(self._hears, False)
-        os.set_blocking(self._rings, False)
+        self._wake_reader, self._wake_writer = os.pipe()
+        os.set_blocking(self._wake_reader, False)
+        os.set_blocking(self._wake_writer, False)
         self._until_ps: int | None = None
         self._arrived = Future[int]()
         self._waiting = set[Future[Any]]()
         self._lock = Lock()
         self._closed = False
 
-    # --- for any thread -------------------------------------------------------------------------
+    # --- called by any thread -------------------------------------------------------------------
 
     def call(self, act: Callable[[], T]) -> "Future[T]":
-        """What ``act`` gives between two events; RuntimeError when the emulation has ended."""
+        """Run ``act`` between two events; RuntimeError if the emulation has ended."""
         future = Future[T]()
         with self._lock:
             if self._closed:
                 future.set_exception(RuntimeError(ENDED))
             else:
-                self._calls.put(partial(_settle, future, act))
+                self._calls.put(partial(_run_call, future, act))
                 self._waiting.add(future)
-                self._ring()
+                self._wake()
         future.add_done_callback(self._waiting.discard)
         return future
 
-    # --- for what is called ---------------------------------------------------------------------
+    # --- called within ``call`` -----------------------------------------------------------------
 
     @property
     def held(self) -> bool:
-        """Whether virtual time stands: held here, or by a debugger."""
+        """Whether virtual time is held, here or by a debugger."""
         return self.kernel.paused
 
     def pause(self) -> None:
         """Hold virtual time."""
-        self._forget("held")
+        self._cancel_run("held")
         self.kernel.hold(HOLDER)
 
     def resume(self) -> None:
-        """Let it go on from here."""
-        self._forget("resumed")
+        """Release virtual time."""
+        self._cancel_run("resumed")
         self._release()
 
     def step(self, events: int = 1) -> int:
-        """Let so many events happen, then hold; returns how many there were.
+        """Run ``events`` events, then hold; returns their number, fewer if there are no more.
 
-        Raises ValueError for a number out of 1 to `MOST_EVENTS`, and where a debugger holds it.
+        Raises ValueError for a number outside 1..``MOST_EVENTS``, and while a debugger holds time.
         """
         if not 1 <= events <= MOST_EVENTS:
             raise ValueError(f"a step is 1 to {MOST_EVENTS} events, not {events}")
         self._check_debugger()
-        self._forget("stepped")
+        self._cancel_run("stepped")
         self._release()
         done = 0
         while done < events and self.kernel.horizon() is not None and not self.held:
@@ -111,60 +106,58 @@ class ControlPort(Endpoint):
         return done
 
     def run_to(self, time_ps: int) -> "Future[int]":
-        """Go on as fast as it gets up to ``time_ps``, then hold; the time when that is.
+        """Run as fast as possible up to ``time_ps``, then hold; the future returns the time.
 
-        Whoever wants something else meanwhile ends it there. Raises ValueError for a past time,
-        and where a debugger holds it.
+        Any other command cancels the run. Raises ValueError for a past time, and while a debugger
+        holds time.
         """
         if time_ps < self.kernel.now:
             now_s, wanted_s = self.kernel.now / PS_PER_S, time_ps / PS_PER_S
-            raise ValueError(f"it is {now_s:.6f} s already, after {wanted_s:.6f} s")
+            raise ValueError(f"can not run to {wanted_s:.6f} s: the time is already {now_s:.6f} s")
         self._check_debugger()
-        self._forget("sent elsewhere")
+        self._cancel_run("replaced by another run")
         self.kernel.hold(HOLDER)
         self._until_ps, self._arrived = time_ps, Future[int]()
-        self._arrived.set_running_or_notify_cancel()  # who asked may be gone by then
-        self._ring()
+        self._arrived.set_running_or_notify_cancel()  # the caller may be gone by then
+        self._wake()
         return self._arrived
 
     def set_pace(self, mode: Mode, speed: float = 1.0) -> None:
-        """See ``Pace.change``; ValueError for a speed out of range."""
+        """Change pace and speed, see ``Pace.change``; ValueError for a speed out of range."""
         if not SLOWEST <= speed <= FASTEST:
             raise ValueError(f"a speed is {SLOWEST:g} to {FASTEST:g}, not {speed:g}")
         assert self.scheduler is not None
         self.scheduler.pace.change(mode, speed)
 
-    # --- for the scheduler ----------------------------------------------------------------------
+    # --- called by the scheduler ----------------------------------------------------------------
 
     def watched(self) -> list[tuple[int, int]]:
-        """What is rung when there is something to do."""
-        return [(self._hears, select.POLLIN)]
+        return [(self._wake_reader, select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Do what has been asked for."""
+        """Run the queued calls, and continue a ``run_to``."""
         with suppress(BlockingIOError):
-            os.read(self._hears, 1 << 16)
+            os.read(self._wake_reader, 1 << 16)
         while True:
             try:
                 act = self._calls.get_nowait()
             except Empty:
                 break
             act()
-        self._go_on()
+        self._continue_run()
 
     def close(self) -> None:
-        """Nothing can be asked for any more; who still waits is told."""
+        """Reject further calls; pending ones raise RuntimeError."""
         with self._lock:
             self._closed = True
-            os.close(self._hears)
-            os.close(self._rings)
-        self._forget("ended")
+            os.close(self._wake_reader)
+            os.close(self._wake_writer)
+        self._cancel_run("ended")
         for future in list(self._waiting):
             if future.set_running_or_notify_cancel():
                 future.set_exception(RuntimeError(ENDED))
 
-    def _go_on(self) -> None:
-        """Towards the time that was asked for."""
+    def _continue_run(self) -> None:
         if self._until_ps is None:
             return
         self._release()
@@ -177,7 +170,7 @@ class ControlPort(Endpoint):
             self.kernel.step()
             if time.monotonic_ns() > end_ns:
                 self.kernel.hold(HOLDER)
-                self._ring()  # the other ports first, then more of it
+                self._wake()  # continue after the other ports were served
                 return
         self.kernel.hold(HOLDER)
         arrived, self._until_ps = self._arrived, None
@@ -191,24 +184,24 @@ class ControlPort(Endpoint):
     def _check_debugger(self) -> None:
         others = self.kernel.holders - {HOLDER}
         if others:
-            raise ValueError(f"{', '.join(sorted(others))} holds it: go on from there")
+            raise ValueError(f"held by the {', '.join(sorted(others))}; continue from there")
 
-    def _forget(self, why: str) -> None:
-        """End what was under way towards a time."""
+    def _cancel_run(self, why: str) -> None:
+        """End a ``run_to`` that is under way."""
         if self._until_ps is not None:
             self._until_ps = None
-            self._arrived.set_exception(RuntimeError(f"it was {why} before it got there"))
+            self._arrived.set_exception(RuntimeError(f"the run was {why} before its end"))
 
-    def _ring(self) -> None:
-        with suppress(BlockingIOError):  # it has been rung thousands of times
-            os.write(self._rings, b"\0")
+    def _wake(self) -> None:
+        with suppress(BlockingIOError):  # the pipe is full of wake-ups already
+            os.write(self._wake_writer, b"\0")
 
 
-def _settle(future: "Future[T]", act: Callable[[], T]) -> None:
-    """Do what was asked for, unless nobody waits for it any more."""
+def _run_call(future: "Future[T]", act: Callable[[], T]) -> None:
+    """Run ``act``, unless the caller has cancelled ``future``."""
     if not future.set_running_or_notify_cancel():
         return
     try:
         future.set_result(act())
-    except BaseException as error:  # for who asked
+    except BaseException as error:  # raised in the caller
         future.set_exception(error)

@@ -1,7 +1,7 @@
 """In-process serial link: a host in the same Python process drives virtual time by waiting.
 
-It has the transport interface of `cubestack.host` (write, read, close). Waiting for an answer runs
-the simulation; nothing else does, so a run is repeatable to the byte.
+It has the transport interface of `cubestack.host` (write, read, close). Only waiting for an answer
+advances virtual time, so a run is reproducible to the byte.
 """
 
 from cubestack.emulator.bus.uart import Uart
@@ -13,13 +13,12 @@ class DirectSerial:
     """The host's end of a UART line."""
 
     def __init__(self, env: Kernel, uart: Uart) -> None:
-        """Plug into ``uart``; what was sent before is lost, as on a wire."""
+        """Connect to ``uart``; bytes that it sent before are lost."""
         self._env = env
         self._line = HostLine(uart)
 
     @property
     def now_ps(self) -> int:
-        """Virtual time."""
         return self._env.now
 
     def write(self, data: bytes) -> None:
@@ -27,7 +26,7 @@ class DirectSerial:
         self._line.uart.host_writes(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """Wait at most ``timeout_s`` of virtual time for a byte; return those that have arrived."""
+        """Wait up to ``timeout_s`` of virtual time for a byte; returns those that have arrived."""
         deadline = self._env.now + int(timeout_s * PS_PER_S)
         while (arrival := self._line.arrival_ps()) is None or arrival > self._env.now:
             target = deadline if arrival is None else min(deadline, arrival)
@@ -41,5 +40,5 @@ class DirectSerial:
         return self._line.take(self._env.now, max_bytes)
 
     def close(self) -> None:
-        """Unplug; later output is lost."""
+        """Disconnect; later output of the device is lost."""
         self._line.unplug()

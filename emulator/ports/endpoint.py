@@ -1,28 +1,28 @@
-"""What a port is that other programs can open."""
+"""Base class of the ports that a scheduler serves."""
 
 import select
 from abc import ABC, abstractmethod
 
 HUNG_UP: int = getattr(select, "POLLRDHUP", select.POLLHUP)
-"""Event of a client that sends nothing more; where there is none, of one that has gone."""
+"""Event of a client that has shut down its side; on other systems, of one that has closed."""
 
 
 class PortError(OSError):
-    """A port can not be opened; the text names it and what would be right."""
+    """A port can not be opened; the text names the port and a remedy."""
 
 
 class Endpoint(ABC):
     """A port that a scheduler serves.
 
     Attributes:
-        name: for messages.
+        name: name in messages.
     """
 
     name: str
 
     @property
     def congested(self) -> bool:
-        """Whether the client reads more slowly than the device's output is released."""
+        """Whether the client reads more slowly than the device's output arrives."""
         return False
 
     def watched(self) -> list[tuple[int, int]]:
@@ -31,19 +31,18 @@ class Endpoint(ABC):
 
     @abstractmethod
     def exchange(self, now_ps: int) -> None:
-        """Move what can be moved at virtual time ``now_ps``, without blocking."""
+        """Send and receive what is possible at virtual time ``now_ps``, without blocking."""
 
     def release_ps(self, count: int) -> int | None:
         """When the next ``count`` bytes from the device, or all, have arrived; None without any."""
         return None
 
     @abstractmethod
-    def close(self) -> None:
-        """Release the port."""
+    def close(self) -> None: ...
 
 
 def poll_now(fileno: int, events: int) -> int:
-    """Events of one descriptor now, POLLHUP and POLLERR always among them."""
+    """Current events of one descriptor; POLLHUP and POLLERR are always included."""
     poller = select.poll()
     poller.register(fileno, events)
     ready = poller.poll(0)

@@ -1,11 +1,10 @@
 """A port on which GDB debugs a processor: `target remote :PORT`.
 
-It listens on this machine only. One client at a time: a second one is refused. When a client
-leaves, by whichever way, its breakpoints are removed and the processor runs on.
+It listens on this machine only, and accepts one client at a time. When a client leaves, in whatever
+way, its breakpoints are removed and the processor continues.
 """
 
 import contextlib
-import os
 import select
 import socket
 import time
@@ -13,52 +12,39 @@ from collections.abc import Callable
 
 from cubestack.emulator.iss.gdb.session import Session
 from cubestack.emulator.iss.gdb.target import Target
-from cubestack.emulator.ports.endpoint import HUNG_UP, Endpoint, PortError, poll_now
+from cubestack.emulator.ports.endpoint import HUNG_UP, Endpoint, poll_now
+from cubestack.emulator.ports.tcp import listen
 
 LOOPBACK = "127.0.0.1"
 LARGEST_READ = 1 << 16
-LOOK_NS = 20_000_000
-"""Wall time between two looks at the client while nobody serves this port but the kernel."""
+POLL_NS = 20_000_000
+"""Wall time between two polls of the client while only the kernel serves this port."""
 
 
 class GdbEndpoint(Endpoint):
-    """A listening socket that leads to one target.
+    """A listening socket for one target.
 
     Attributes:
-        address: host and port.
+        address: host and port of the socket.
         on_close: called at the end of ``close``.
     """
 
     def __init__(self, port: int, target: Target) -> None:
-        """Listen on ``port`` (0: any free one) of this machine.
-
-        Raises:
-            PortError: it is taken, or none.
-        """
-        if not 0 <= port <= 0xFFFF:
-            raise PortError(f"TCP port {port} is not in 0..65535")
-        try:
-            self._server = socket.create_server((LOOPBACK, port))
-        except OSError as error:
-            told = os.strerror(error.errno or 0)
-            text = f"can not listen on {LOOPBACK}:{port}: {told}; choose another port"
-            raise PortError(text) from error
-        self._server.setblocking(False)
+        """Listen on ``port`` (0: any free one) of this machine; raises PortError."""
+        self._server = listen(LOOPBACK, port)
         self.address: tuple[str, int] = self._server.getsockname()
         self.name = f"{self.address[0]}:{self.address[1]}"
         self._target = target
         self._client: socket.socket | None = None
         self._session: Session | None = None
-        self._looked_ns = 0
+        self._polled_ns = 0
         self.on_close: Callable[[], None] = lambda: None
 
     @property
     def connected(self) -> bool:
-        """Whether a client is there."""
         return self._client is not None
 
     def watched(self) -> list[tuple[int, int]]:
-        """The server socket, and the client's."""
         watched = [(self._server.fileno(), select.POLLIN)]
         if self._client is not None and self._session is not None:
             writing = select.POLLOUT if self._session.output else 0
@@ -66,7 +52,7 @@ class GdbEndpoint(Endpoint):
         return watched
 
     def exchange(self, now_ps: int) -> None:
-        """Take a client, act on what it sent, tell it of a stop."""
+        """Accept a client, handle its packets, and report a stop to it."""
         self._accept()
         if self._client is None or self._session is None:
             return
@@ -85,14 +71,14 @@ class GdbEndpoint(Endpoint):
             self._drop()
 
     def visit(self) -> None:
-        """Exchange when it is time again; cheap, for a loop."""
+        """Call ``exchange`` if that is due; cheap enough for a loop."""
         now_ns = time.monotonic_ns()
-        if now_ns >= self._looked_ns + LOOK_NS:
-            self._looked_ns = now_ns
+        if now_ns >= self._polled_ns + POLL_NS:
+            self._polled_ns = now_ns
             self.exchange(0)
 
     def serve(self, timeout_s: float) -> None:
-        """Wait for the client, at most so long, and exchange."""
+        """Wait for the client up to ``timeout_s`` of wall time, then call ``exchange``."""
         poller = select.poll()
         for fileno, events in self.watched():
             poller.register(fileno, events)
@@ -100,7 +86,6 @@ class GdbEndpoint(Endpoint):
         self.exchange(0)
 
     def close(self) -> None:
-        """Drop the client and stop listening."""
         self._drop()
         self._server.close()
         self.on_close()
@@ -108,7 +93,7 @@ class GdbEndpoint(Endpoint):
     def _accept(self) -> None:
         try:
             newcomer = self._server.accept()[0]
-        except OSError:  # nobody, or gone again
+        except OSError:  # no client, or it has gone again
             return
         if self._client is not None and not poll_now(self._client.fileno(), HUNG_UP):
             newcomer.close()

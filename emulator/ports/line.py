@@ -1,4 +1,4 @@
-"""The host's end of a UART line: bytes from the device, each at the time of its arrival."""
+"""The host's end of a UART line, with the arrival time of each byte from the device."""
 
 from collections import deque
 
@@ -7,19 +7,19 @@ from cubestack.emulator.bus.uart import Uart
 
 
 class HostLine:
-    """Plugged into a UART; the line that was there before is unplugged by that.
+    """Connected to a UART, in place of the line that was connected before.
 
-    The format of this end is the device's unless ``form`` is set; with another one, what arrives is
-    what a receiver makes of the levels, characters with errors included.
+    The format of this end is the device's unless ``form`` is set; with another one, a receiver
+    decodes the levels on the line, and characters with errors arrive too.
 
     Attributes:
-        uart: the device's end; what is written goes there.
-        framing_errors: characters with a low stop bit.
-        parity_errors: characters with a wrong parity bit.
+        uart: the device's end; write to it directly.
+        framing_errors: number of characters with a low stop bit.
+        parity_errors: number of characters with a wrong parity bit.
     """
 
     def __init__(self, uart: Uart) -> None:
-        """Plug into ``uart``; what it sent before is lost, as on a wire."""
+        """Connect to ``uart``; bytes that it sent before are lost."""
         self.uart = uart
         self._blocks: deque[tuple[bytes, int, int]] = deque()
         self._sampler: LineSampler | None = None
@@ -29,7 +29,7 @@ class HostLine:
 
     @property
     def form(self) -> LineFormat:
-        """Format of this end; setting another one loses what is on the wire to it."""
+        """Format of this end; another one drops the bytes that are on the wire to it."""
         return self.uart.host_form
 
     @form.setter
@@ -40,10 +40,7 @@ class HostLine:
             self._blocks.clear()
 
     def arrival_ps(self, count: int = 1) -> int | None:
-        """When ``count`` of the bytes not taken yet have arrived, or all if there are fewer.
-
-        None when there are none.
-        """
+        """When the next ``count`` bytes, or all if fewer, have arrived; None without any."""
         arrival = None if self._sampler is None else self._sampler.next_ps()
         for data, first_ps, byte_ps in self._blocks:
             arrival = first_ps + (min(count, len(data)) - 1) * byte_ps
@@ -53,9 +50,9 @@ class HostLine:
         return arrival
 
     def take(self, now_ps: int, max_bytes: int | None = None) -> bytes:
-        """Bytes that have arrived by ``now_ps``, at most ``max_bytes`` of them."""
+        """Return and remove at most ``max_bytes`` bytes that have arrived by ``now_ps``."""
         if self._sampler is not None:
-            self._settle(self._sampler, now_ps)
+            self._decode(self._sampler, now_ps)
         taken = bytearray()
         while self._blocks and (max_bytes is None or len(taken) < max_bytes):
             data, first_ps, byte_ps = self._blocks[0]
@@ -70,7 +67,7 @@ class HostLine:
         return bytes(taken)
 
     def move(self, uart: Uart) -> None:
-        """Into another device's ``uart``, with the format of this end."""
+        """Connect to another device's ``uart``, with the same format of this end."""
         form = self.uart.host_form
         self.unplug()
         self.uart = uart
@@ -79,7 +76,7 @@ class HostLine:
         self._sampler = None if form == uart.form else LineSampler(form)
 
     def unplug(self) -> None:
-        """Take the plug out: what the device sends from now on is lost."""
+        """Disconnect; what the device sends from now on is lost."""
         self._blocks.clear()
         if self.uart.line == self._deliver:
             self.uart.line = lambda _data, _first_ps, _byte_ps: None
@@ -87,15 +84,14 @@ class HostLine:
 
     def _deliver(self, data: bytes, first_ps: int, byte_ps: int) -> None:
         if self._sampler is None and self.uart.form != self.uart.host_form:
-            self._sampler = LineSampler(self.uart.host_form)  # the device has changed its own
+            self._sampler = LineSampler(self.uart.host_form)  # the device changed its format
         if self._sampler is None:
             self._blocks.append((data, first_ps, byte_ps))
             return
         for index, byte in enumerate(data):
             self._sampler.put(byte, first_ps + (index - 1) * byte_ps, self.uart.form)
 
-    def _settle(self, sampler: LineSampler, now_ps: int) -> None:
-        """Turn what has been found on the line into bytes."""
+    def _decode(self, sampler: LineSampler, now_ps: int) -> None:
         for character in sampler.take(now_ps):
             self._blocks.append((bytes([character.value]), character.time_ps, 1))
             self.framing_errors += character.framing_error

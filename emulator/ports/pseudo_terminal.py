@@ -25,16 +25,16 @@ from cubestack.emulator.ports.terminal_settings import (
 class PtyEndpoint(SerialPort):
     """A pseudo-terminal whose slave is reachable under a symbolic link.
 
-    A client is there while any program has the slave open. When the last one closes, what was not
-    read is dropped, raw mode is restored and exclusive use ends, so the next client finds the port
-    like new; bytes from the device that nobody is there for are dropped as well. The scheduler
-    notices the end at once and the beginning at its next look. A client that closes and opens again
-    before that is taken for one that stayed.
+    A client is connected while any program has the slave open. When the last one closes it, unread
+    bytes are dropped, raw mode is restored and exclusive use ends, so the next client finds a fresh
+    port. Bytes from the device are dropped while there is no client. The scheduler notices the end
+    of a client at once and its beginning at the next exchange; a client that closes and reopens the
+    terminal before that counts as one.
 
-    No bit of it has a length, so a client is understood whatever it sets of baud rate, parity and
-    stop bits; of another format than the device's it is told, with the first bytes that it writes.
-    A strict terminal has the client's format, with what becomes of bytes then. A client that sets
-    nothing finds the device's baud rate.
+    Bits have no duration on a pseudo-terminal, so bytes arrive intact whatever baud rate, parity
+    and stop bits a client sets; a format that differs from the device's is reported once per
+    client, with the first bytes that it writes. A strict terminal uses the client's format, so
+    bytes are garbled as on a real line. The initial baud rate is the device's.
     """
 
     def __init__(
@@ -47,12 +47,12 @@ class PtyEndpoint(SerialPort):
     ) -> None:
         """Open it; ``path`` must be free or a stale link of an earlier run, else PortError.
 
-        ``report`` gets one line for each client whose format is not the device's.
+        ``report`` receives one line per client whose format differs from the device's.
         """
         if path.is_symlink() and not path.exists():
             path.unlink()
         if path.is_symlink() or path.exists():
-            raise PortError(f"{path} exists already: choose another --pty path or remove it")
+            raise PortError(f"pty path '{path}' already exists; choose another or remove it")
         self._baud, self._strict, self._report = uart.form.baud, strict, report
         self._reported = False
         self._master, self._terminal = _open_terminal(self._baud)
@@ -63,7 +63,7 @@ class PtyEndpoint(SerialPort):
             path.symlink_to(self._terminal)
         except OSError as error:
             os.close(self._master)
-            raise PortError(f"can not make the link {path}: {error.strerror}") from error
+            raise PortError(f"can not create the link {path}: {error.strerror}") from error
         self._connected = False
         super().__init__(uart)
 
@@ -72,21 +72,21 @@ class PtyEndpoint(SerialPort):
         return [(self._master, self._events(reading=True))] if self._connected else []
 
     def close(self) -> None:
-        """Remove the link, if it is still ours, and the terminal."""
+        """Remove the terminal, and the link if it still leads there."""
         super().close()
         with contextlib.suppress(OSError):
             if self._path.readlink() == Path(self._terminal):
                 self._path.unlink()
         os.close(self._master)
 
-    def _look(self) -> object | None:
+    def _find_client(self) -> object | None:
         hung_up = poll_now(self._master, 0) & select.POLLHUP
-        # A client may come and go between two looks, and leave other settings.
+        # A client may come and go between two exchanges, and leave other settings.
         if hung_up and (self._connected or read_settings(self._master) != self._raw):
             self._renew()
         self._connected = not hung_up
         if self._strict:
-            self._follow(told=True)
+            self._apply_format(reported=True)
         return self._master if self._connected else None
 
     def _read(self, max_bytes: int) -> bytes:
@@ -97,7 +97,7 @@ class PtyEndpoint(SerialPort):
                 raise
             return b""
         if data and (self._strict or not self._reported):
-            self._follow(told=self._reported)
+            self._apply_format(reported=self._reported)
         return data
 
     def _write(self, data: bytearray) -> int:
@@ -106,24 +106,24 @@ class PtyEndpoint(SerialPort):
         except BlockingIOError:
             return 0
 
-    def _follow(self, *, told: bool) -> None:
-        """Have the client's format, where that counts; tell of one that is not the device's."""
+    def _apply_format(self, *, reported: bool) -> None:
+        """Use the client's format if strict; report one that differs from the device's."""
         device = self._line.uart.form
         form = line_format(read_settings(self._master)) or device
         if self._strict:
             self._line.form = form
-        if form != device and not told:
+        if form != device and not reported:
             effect = "both get garbage" if self._strict else "a real line would carry garbage"
             self._report(f"{self.name}: a client has set {form}, the device has {device}: {effect}")
             self._reported = True
 
     def _renew(self) -> None:
-        """Undo what the last client left behind."""
+        """Reset the terminal after its last client."""
         self._reported = False
         try:
             slave = os.open(self._terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError:
-            # Locked by TIOCEXCL, which outlives its client: only a new terminal helps.
+            # Locked by TIOCEXCL, which outlives its client: a new terminal is needed.
             self._replace()
             return
         fcntl.ioctl(slave, termios.TIOCNXCL)
@@ -132,7 +132,7 @@ class PtyEndpoint(SerialPort):
         os.close(slave)
 
     def _replace(self) -> None:
-        """Put a new terminal under the same link."""
+        """Create a new terminal under the same link."""
         master, self._terminal = _open_terminal(self._baud)
         os.dup2(master, self._master, inheritable=False)
         os.close(master)
@@ -143,7 +143,7 @@ class PtyEndpoint(SerialPort):
 
 
 def _open_terminal(baud: int) -> tuple[int, str]:
-    """Open a raw pseudo-terminal: its master, and the path of its slave, which is closed."""
+    """Open a raw pseudo-terminal; returns its master, and the path of its closed slave."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     write_settings(slave, with_baud(read_settings(slave), baud))

@@ -1,11 +1,11 @@
 """The scheduler that alternates between virtual time and the open ports.
 
-Paced "real", virtual time follows wall time; when the machine can not keep up, the scheduler says
-by how much. Paced "fast", virtual time runs ahead as long as the device has work or bytes are on a
+With pace "real", virtual time follows wall time; the scheduler reports the lag when the machine is
+too slow. With pace "fast", virtual time runs ahead while the device has work or bytes are on a
 wire, and follows wall time while everything waits for the host, or a client reads too slowly.
 
-While the kernel is paused, virtual time stands and the ports stay open; that wall time does not
-count, so nothing catches up afterwards.
+While the kernel is paused, virtual time stops and the ports stay open. Paused wall time does not
+count, so the emulation does not catch up afterwards.
 """
 
 import select
@@ -17,17 +17,17 @@ from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
 SLICE_S = 0.005
-"""Wall time between two looks at the ports while events are worked off."""
+"""Wall time between two exchanges of the ports while there are events."""
 
 IDLE_S = 0.02
-"""Longest wait: a client that opens a pseudo-terminal and ``stop`` are noticed within it."""
+"""Longest wait; a new client of a pseudo-terminal and ``stop`` are noticed within it."""
 
 BURST_BYTES = 4096
-"""Bytes from the device between two looks at its client, to notice in time that it is slow."""
+"""Bytes from the device between two exchanges, to notice in time that a client is slow."""
 
-LAG_WORTH_SAYING_S = 0.5
+LAG_REPORTED_S = 0.5
 LAG_REPORT_S = 5.0
-"""Wall time between two reports of a lag."""
+"""Shortest wall time between two reports of a lag."""
 
 NS_PER_S = 10**9
 
@@ -37,7 +37,7 @@ Watched = Sequence[tuple[int, int]]
 def wait_ready(watched: Watched, timeout_s: float) -> None:
     """Wait until one of the ``watched`` (descriptor, events) is ready, at most ``timeout_s``.
 
-    Rounded up to a millisecond, which keeps a line at work from costing a wake-up per byte.
+    The time-out is rounded up to a millisecond, so an active line does not cost a wake-up per byte.
     """
     poller = select.poll()
     for fileno, events in watched:
@@ -50,12 +50,10 @@ class RealtimeScheduler:
     """Runs an environment against endpoints until it is stopped.
 
     Attributes:
-        env: kernel; its time is in ps.
-        endpoints: open ports.
         busy: whether the device has work, or bytes are on a wire.
-        pace: how virtual time follows wall time (text of the module).
+        pace: relation of virtual time to wall time (see the module).
         report: receives a line when pace "real" can not be kept.
-        wait: waits for descriptors, at most so many s, as ``wait_ready`` does.
+        wait: waits for descriptors with a time-out in s, as ``wait_ready``.
     """
 
     env: Kernel
@@ -66,16 +64,14 @@ class RealtimeScheduler:
     wait: Callable[[Watched, float], None] = wait_ready
 
     def __post_init__(self) -> None:
-        """Prepare to serve."""
         self._stopped = False
         self._reported_ns = self.pace.clock_ns()
 
     def stop(self) -> None:
-        """Make ``run`` return soon; for other threads, and for signal handlers."""
+        """Make ``run`` return soon; may be called by other threads and signal handlers."""
         self._stopped = True
 
     def run(self) -> None:
-        """Serve until ``stop``."""
         self.pace.align()
         while not self._stopped:
             ahead = self.pace.fast and self._run_ahead()
@@ -93,9 +89,9 @@ class RealtimeScheduler:
         return self.pace.clock_ns() + int(SLICE_S * NS_PER_S)
 
     def _run_ahead(self) -> bool:
-        """Work for a slice of wall time, or until everything waits for the host.
+        """Run for a slice of wall time, or until everything waits for the host.
 
-        Returns False when there was nothing to do, or no client to take the output in time.
+        Returns False if there was nothing to do, or a client reads too slowly.
         """
         if any(endpoint.congested for endpoint in self.endpoints):
             return False
@@ -106,7 +102,7 @@ class RealtimeScheduler:
             if release is None and not self.busy():
                 break
             if release is not None and release <= self.env.now:
-                break  # to the clients with it
+                break  # deliver these bytes first
             if horizon is not None and (release is None or horizon <= release):
                 self.env.step()
             elif release is not None:
@@ -122,7 +118,7 @@ class RealtimeScheduler:
         return min((ps for ps in releases if ps is not None), default=None)
 
     def _follow(self) -> None:
-        """Bring virtual time up to wall time, as far as a slice of wall time allows."""
+        """Advance virtual time to wall time, at most for a slice of wall time."""
         target_ps = self.pace.now_ps()
         end_ns = self._slice_end_ns()
         while (horizon := self.env.horizon()) is not None and horizon <= target_ps:
@@ -136,12 +132,12 @@ class RealtimeScheduler:
     def _report_lag(self, lag_s: float) -> None:
         now_ns = self.pace.clock_ns()
         due_ns = self._reported_ns + int(LAG_REPORT_S * NS_PER_S)
-        if lag_s > LAG_WORTH_SAYING_S and now_ns >= due_ns:
+        if lag_s > LAG_REPORTED_S and now_ns >= due_ns:
             self._reported_ns = now_ns
             self.report(f"can not keep real time: {lag_s:.1f} s behind")
 
     def _until_next_s(self) -> float:
-        """Wall time until something is due, at most ``IDLE_S``."""
+        """Wall time until the next event, at most ``IDLE_S``."""
         if self.env.paused:
             return IDLE_S
         times = [ps for ps in (self._release_ps(1), self.env.horizon()) if ps is not None]

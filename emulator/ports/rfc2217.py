@@ -1,10 +1,10 @@
 """A serial port on TCP whose client chooses baud rate and format: RFC 2217, through pyserial.
 
-The device's end keeps its format. A client that chooses another one hears garbage and is not
-understood, as on a real line (``emulator.bus.line_format``). Bytes with errors reach the client
-as they were received, as Linux's serial drivers hand them on; who asks for line states is told of
-them. A client that says nothing of a format has the device's. Accepted without effect: flow
-control and modem lines, as the line has neither.
+The device's end keeps its format. If a client chooses another one, bytes are garbled in both
+directions, as on a real line (``emulator.bus.line_format``). The client receives bytes with errors
+as decoded, like those of Linux's serial drivers, and a notification if it requested line states.
+The default format is the device's. Flow control and modem lines are accepted without effect, as the
+line has neither.
 """
 
 import select
@@ -22,22 +22,22 @@ from cubestack.emulator.ports.line import HostLine
 from cubestack.emulator.ports.tcp import TcpEndpoint
 
 CHUNK_BYTES = 4096
-"""Bytes handed to the socket at once, and of unsent replies before a client is not read from."""
+"""Bytes per write to the socket; a client with more unsent replies is not read."""
 
 MAX_SUBOPTION = 512
-"""Bytes between IAC SB and IAC SE; RFC 2217 needs 255 and some."""
+"""Limit of the bytes between IAC SB and IAC SE; RFC 2217 needs a little over 255."""
 
 FRAMING_ERROR, PARITY_ERROR = 8, 4
 """Bits of NOTIFY-LINESTATE, RFC 2217 section 3."""
 
 
 class Rfc2217Endpoint(TcpEndpoint):
-    """One client at a time, as ``TcpEndpoint``; one that breaks the protocol is dropped."""
+    """As ``TcpEndpoint``; a client that violates the protocol is disconnected."""
 
     scheme = "rfc2217"
 
     def __init__(self, host: str, port: int, uart: Uart, *, allow_remote: bool = False) -> None:
-        """Listen on ``host``:``port``, as :class:`TcpEndpoint` does; same errors."""
+        """Listen on ``host``:``port``; arguments and errors as for :class:`TcpEndpoint`."""
         self._device_form = uart.form
         self._written = bytearray()
         self._replies = bytearray()
@@ -46,7 +46,7 @@ class Rfc2217Endpoint(TcpEndpoint):
         super().__init__(host, port, uart, allow_remote=allow_remote)
 
     def exchange(self, now_ps: int) -> None:
-        """Also tells a client that asked for it of errors on the line, and sends what was left."""
+        """Also notifies the client of errors on the line, and sends pending replies."""
         self._now_ps = now_ps
         errors = self._line.framing_errors, self._line.parity_errors
         super().exchange(now_ps)
@@ -68,7 +68,7 @@ class Rfc2217Endpoint(TcpEndpoint):
                 self._written += byte
             if len(manager.suboption or b"") <= MAX_SUBOPTION:
                 return self._take_written()
-        # What pyserial raises for options that are cut short, unknown or out of place.
+        # pyserial raises these for truncated, unknown or misplaced options.
         except (struct.error, KeyError, TypeError, ValueError):
             pass
         self._drop()
@@ -104,7 +104,7 @@ class Rfc2217Endpoint(TcpEndpoint):
         return data
 
     def _change_form(self, form: LineFormat) -> None:
-        """What was written before keeps the form that it had then."""
+        """Change the format; bytes written before are sent with the old one."""
         self._line.uart.host_writes(self._take_written())
         self._line.form = form
 
@@ -124,7 +124,7 @@ class Rfc2217Endpoint(TcpEndpoint):
 
 
 def _setting(name: str) -> property:
-    """A field of the line's format; one that can not be raises ValueError, the old one stays."""
+    """A field of the line's format; an invalid value raises ValueError and changes nothing."""
 
     def change(settings: "_Settings", value: object) -> None:
         settings.change(LineFormat(**(vars(settings.line.form) | {name: value})))
@@ -134,7 +134,7 @@ def _setting(name: str) -> property:
 
 @dataclass
 class _Settings:
-    """The line's end, as PortManager wants a port: named like pyserial's Serial."""
+    """The line's end for PortManager, with the attribute names of pyserial's Serial."""
 
     line: HostLine
     change: Callable[[LineFormat], None]

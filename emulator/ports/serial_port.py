@@ -1,13 +1,12 @@
-"""What all serial ports that other programs can open have in common.
+"""Base class of the serial ports that other programs can open.
 
 A serial port moves bytes between a client's descriptor and a UART line; neither side can flood it:
 
-- What comes from the device is released when the wire would have delivered it, and goes to the
-  client that is there then. Of what a client leaves unread, the newest ``MAX_UNREAD`` bytes wait
-  here, behind what the operating system keeps for it. A client never gets what was released for
-  the one before.
-- What a client writes waits in the operating system while ``MAX_UNSENT`` bytes wait for the wire,
-  so a client that writes faster than the baud rate is slowed down, as by a real port.
+- A byte from the device goes to the present client at the time when it has arrived on the wire.
+  The newest ``MAX_UNREAD`` bytes that a client does not read are kept here, in addition to the
+  operating system's buffer. A client never receives bytes for an earlier client.
+- While ``MAX_UNSENT`` bytes wait for the wire, further ones wait in the operating system, so a
+  client that writes faster than the baud rate is slowed down, as by a real port.
 """
 
 import select
@@ -21,14 +20,13 @@ MAX_UNREAD = 1 << 16
 """Bytes that wait for a slow client before the oldest are dropped."""
 
 MAX_UNSENT = 4096
-"""Bytes that wait for the wire to the device: the size of Linux's own buffer of a serial port."""
+"""Bytes that may wait for the wire to the device: the size of Linux's serial buffer."""
 
 
 class SerialPort(Endpoint):
-    """The buffers, and the order of an exchange; a subclass knows the descriptors."""
+    """The buffers, and the order of an exchange; subclasses have the descriptors."""
 
     def __init__(self, uart: Uart) -> None:
-        """Plug into ``uart``."""
         self._line = HostLine(uart)
         self._unread = bytearray()
         self._served: object = None
@@ -36,17 +34,17 @@ class SerialPort(Endpoint):
 
     @property
     def congested(self) -> bool:
-        """Whether released bytes wait here for the client."""
+        """Whether bytes wait here for the client."""
         return bool(self._unread)
 
     def exchange(self, now_ps: int) -> None:
-        """Client to line as far as there is room; line to the client that is there."""
+        """Move bytes from the client to the line while there is room, and back."""
         if not self._plugged:
             return
         while (room := self._room()) > 0 and (data := self._read(room)):
             self._line.uart.host_writes(data)
         arrived = self._line.take(now_ps)
-        client = self._look()
+        client = self._find_client()
         if client is None or client is not self._served:
             self._served = client
             self._unread.clear()
@@ -57,22 +55,20 @@ class SerialPort(Endpoint):
             del self._unread[: self._write(self._unread)]
 
     def pull(self) -> None:
-        """Take the plug out: clients stay, and what they write waits, until ``plug``."""
+        """Disconnect the line until ``plug``; clients stay, and what they write waits."""
         self._line.unplug()
         self._unread.clear()
         self._plugged = False
 
     def plug(self, uart: Uart) -> None:
-        """Plug into another device's ``uart``; what was on the wire is lost."""
+        """Connect to another device's ``uart``; bytes that were on the wire are lost."""
         self._line.move(uart)
         self._plugged = True
 
     def release_ps(self, count: int) -> int | None:
-        """When the line has delivered the next ``count`` bytes, or all; None without any."""
         return self._line.arrival_ps(count)
 
     def close(self) -> None:
-        """Take the line's plug out."""
         self._line.unplug()
 
     def _room(self) -> int:
@@ -84,13 +80,13 @@ class SerialPort(Endpoint):
         return events | (select.POLLOUT if self._unread else 0)
 
     @abstractmethod
-    def _look(self) -> object | None:
-        """Notice clients that came and went; the one that is there now, None without one."""
+    def _find_client(self) -> object | None:
+        """Accept and drop clients; returns the present one, or None."""
 
     @abstractmethod
     def _read(self, max_bytes: int) -> bytes:
-        """What the client wrote, as far as it is there; also a client that has gone since."""
+        """At most ``max_bytes`` that the client wrote; also from one that has gone since."""
 
     @abstractmethod
     def _write(self, data: bytearray) -> int:
-        """Hand ``data`` to the client; returns how many bytes it could take."""
+        """Send ``data`` to the client; returns the number of bytes that it accepted."""

@@ -11,17 +11,17 @@ from cubestack.emulator.ports.endpoint import HUNG_UP, PortError, poll_now
 from cubestack.emulator.ports.serial_port import SerialPort
 
 TCP_RECEIVE_BUFFER = 4096
-"""Bytes. Small, so that little of a client that floods the port and dies is still delivered."""
+"""Bytes. Small, so that little is left to deliver of a client that floods the port and ends."""
 
 REFUSAL = b"cubestack: this port has a client already\r\n"
-"""Plain text, so that no decoder of frames, and no telnet, finds anything in it."""
+"""Plain text, which contains no frame and no telnet command."""
 
 
 class TcpEndpoint(SerialPort):
     """A listening socket that serves one client at a time; a second one is refused with a line.
 
-    A client that has shut down or closed its side still gets the device's output while it takes
-    any, but makes room for the next one, and what it sent last is lost if the wire was too slow.
+    A client that has shut down its side still receives the device's output, but a new client
+    replaces it; bytes that the old one sent last are lost if the wire was too slow for them.
     """
 
     scheme = "tcp"
@@ -36,9 +36,10 @@ class TcpEndpoint(SerialPort):
             allow_remote: permit addresses that other machines can reach; there is no protection.
 
         Raises:
-            PortError: the address is unknown, taken, or not a loopback address.
+            PortError: the address is unknown, in use, or not a loopback address.
         """
-        self._server = _listen(host, port, allow_remote=allow_remote)
+        self._server = listen(host, port, allow_remote=allow_remote)
+        self._server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
         self._client: socket.socket | None = None
         self._input_ended = False
         self.address: tuple[str, int] = self._server.getsockname()[:2]
@@ -47,28 +48,26 @@ class TcpEndpoint(SerialPort):
         super().__init__(uart)
 
     def watched(self) -> list[tuple[int, int]]:
-        """The server socket, and the client's while it can do something."""
         watched = [(self._server.fileno(), select.POLLIN)]
         if self._client is not None:
-            # Without an event to wait for, a client that has gone would still be reported.
+            # Even with no events to wait for, poll would report a client that has gone.
             events = self._events(reading=not self._input_ended)
             if events:
                 watched.append((self._client.fileno(), events))
         return watched
 
     def close(self) -> None:
-        """Drop the client and stop listening."""
         super().close()
         self._drop()
         self._server.close()
 
-    def _look(self) -> object | None:
+    def _find_client(self) -> object | None:
         try:
             newcomer = self._server.accept()[0]
-        except OSError:  # nobody, or gone again
+        except OSError:  # no client, or it has gone again
             return self._client
         newcomer.setblocking(False)
-        # Hang-ups and errors are always told.
+        # poll reports hang-ups and errors in any case.
         if self._client is not None and not poll_now(self._client.fileno(), HUNG_UP):
             with contextlib.suppress(OSError):
                 newcomer.send(REFUSAL)
@@ -81,7 +80,7 @@ class TcpEndpoint(SerialPort):
         return self._client
 
     def _welcome(self) -> None:
-        """A client has come."""
+        """Called for a new client."""
 
     def _read(self, max_bytes: int) -> bytes:
         if self._client is None or self._input_ended:
@@ -114,20 +113,22 @@ class TcpEndpoint(SerialPort):
         self._unread.clear()
 
 
-def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
+def listen(host: str, port: int, *, allow_remote: bool = False) -> socket.socket:
+    """A non-blocking server socket at ``host``:``port``; raises PortError."""
     if not 0 <= port <= 0xFFFF:
         raise PortError(f"TCP port {port} is not in 0..65535")
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except (socket.gaierror, UnicodeError) as error:
-        raise PortError(f"no address of this machine is called {host!r}; try 127.0.0.1") from error
+        raise PortError(f"{host!r} is not an address of this machine; try 127.0.0.1") from error
     if not allow_remote and not ipaddress.ip_address(address[0]).is_loopback:
-        raise PortError(f"{host} is open to other machines: listen on 127.0.0.1 or --allow-remote")
+        raise PortError(f"{host} is open to other machines; use 127.0.0.1 or --allow-remote")
     try:
         server = socket.create_server((str(address[0]), port), family=family)
     except OSError as error:
-        told = os.strerror(error.errno) if error.errno else error
-        raise PortError(f"can not listen on {host}:{port}: {told}; choose another port") from error
+        reason = os.strerror(error.errno) if error.errno else error
+        raise PortError(
+            f"can not listen on {host}:{port}: {reason}; choose another port"
+        ) from error
     server.setblocking(False)
-    server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TCP_RECEIVE_BUFFER)
     return server

@@ -1,9 +1,9 @@
-"""What a program has set of a terminal's line, as Linux keeps it.
+"""Line settings of a terminal under Linux.
 
-Read through termios2, which has every baud rate as a number (asm-generic/termbits.h; x86, ARM and
-RISC-V have these request numbers). Of a pseudo-terminal the kernel keeps the rate, the stop bits,
-and of the parity that it is odd, mark or space; it clears the bit that turns parity on and always
-sets 8 data bits (drivers/tty/pty.c). So even parity and fewer bits can not be seen.
+They are read through termios2, which has every baud rate as a number (asm-generic/termbits.h; x86,
+ARM and RISC-V have these request numbers). For a pseudo-terminal the kernel stores the rate, the
+stop bits, and whether parity is odd, mark or space; it clears the bit that enables parity and
+always sets 8 data bits (drivers/tty/pty.c). Even parity and fewer bits are therefore not visible.
 """
 
 import fcntl
@@ -18,12 +18,11 @@ _RATE, _OTHER_RATE, _MARK_OR_SPACE = 0o10017, 0o10000, 0o10000000000  # CBAUD, B
 
 
 def read_settings(terminal: int) -> bytes:
-    """All settings of an open terminal, to be compared and written; of a master, its slave's."""
+    """All settings of an open terminal, as bytes to compare and write; of a master, its slave's."""
     return fcntl.ioctl(terminal, _GET, bytes(_TERMIOS2.size))
 
 
 def write_settings(terminal: int, settings: bytes) -> None:
-    """Set all of them."""
     fcntl.ioctl(terminal, _SET, settings)
 
 
@@ -35,7 +34,7 @@ def with_baud(settings: bytes, baud: int) -> bytes:
 
 
 def line_format(settings: bytes) -> LineFormat | None:
-    """What they are for a line, as far as it can be seen; None for a rate that no UART has."""
+    """The line format in ``settings``, as far as visible; None for a rate that no UART has."""
     _, _, flags, *_, baud = _TERMIOS2.unpack(settings)
     parity: Parity = "O" if flags & termios.PARODD else "N"
     if flags & _MARK_OR_SPACE:

@@ -19,7 +19,7 @@ class Client:
 class Port(SerialPort):
     client: Client | None = None
 
-    def _look(self) -> Client | None:
+    def _find_client(self) -> Client | None:
         return self.client
 
     def _read(self, max_bytes: int) -> bytes:

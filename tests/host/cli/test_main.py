@@ -200,7 +200,7 @@ def test_paths_that_can_not_be_served(run: Run, tmp_path: Path) -> None:
     taken.write_text("a file of the user's", encoding="utf-8")
     outcome = run("emulate", "cubestar", "--pty", taken)
     assert outcome.code in (FAILED, WRONG_CALL)
-    assert "ttyCUBESTAR exists already" in outcome.line
+    assert "ttyCUBESTAR' already exists" in outcome.line
     assert "choose another" in outcome.line
     assert taken.read_text(encoding="utf-8") == "a file of the user's"
     outcome = run("emulate", "cubestar", "--pty", tmp_path / "nowhere" / "tty")

@@ -35,7 +35,7 @@ FAILED, WRONG_CALL = 1, 2
         ),
         (
             ("emulate", "aramis", "--pty", "{folder}/none/tty"),
-            "can not make the link {folder}/none/tty: No such file or directory",
+            "can not create the link {folder}/none/tty: No such file or directory",
         ),
         (
             ("emulate", "aramis", "--tcp", "0", "--listen", "192.0.2.1", "--allow-remote"),
@@ -43,7 +43,7 @@ FAILED, WRONG_CALL = 1, 2
         ),
         (
             ("emulate", "aramis", "--tcp", "0", "--listen", "0.0.0.0"),
-            "0.0.0.0 is open to other machines: listen on 127.0.0.1 or --allow-remote",
+            "0.0.0.0 is open to other machines; use 127.0.0.1 or --allow-remote",
         ),
         (
             ("emulate", "aramis", "--control", "0", "--listen", "0.0.0.0"),
