@@ -1,4 +1,4 @@
-"""The host's I2C adapter: puts transfers on the emulated bus and reports them as Linux does."""
+"""The host's I2C adapter: performs transfers on the emulated bus, with Linux's results."""
 
 import errno
 from collections import deque
@@ -12,7 +12,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Function
 
 EVENTS = 8
-"""Of the kernel; fewer than in a transfer of a few bytes."""
+"""Kernel events between two calls of ``goes_on``; fewer than in a transfer of a few bytes."""
 
 Done = Callable[[int], None]
 
@@ -33,22 +33,21 @@ FUNCTIONS = (
     | Function.READ_I2C_BLOCK
     | Function.WRITE_I2C_BLOCK
 )
-"""All of plain I2C and SMBus; no 10-bit addresses, no messages without a start, no mangling."""
+"""Plain I2C and SMBus; no 10-bit addresses, messages without a start or protocol mangling."""
 
 
 class I2cAdapter:
     """One master on a bus.
 
-    A transfer is a process of the kernel, which whoever runs virtual time need not know of; or it
-    is ``driven``: whoever runs virtual time takes the kernel through it, which costs less.
+    By default a transfer is a process of the kernel. If ``driven``, the scheduler runs the kernel
+    through each transfer by ``drive``, which is faster.
 
     Attributes:
-        env: kernel.
-        retries: how often a transfer is tried again that lost the bus to another master.
-        timeout_ps: time after which it is not tried again.
-        told: transfers whose end was told.
-        holding: whether the end of a transfer is told only when ``release`` is called: for who runs
-            virtual time ahead and knows when wall time gets there.
+        retries: number of retries of a transfer that lost the bus to another master.
+        timeout_ps: time after which it is not retried.
+        answered: number of transfers whose result was returned.
+        holding: whether results wait for ``release``, for a scheduler whose virtual time is ahead
+            of wall time.
         driven: whether transfers wait for ``drive``.
     """
 
@@ -65,13 +64,13 @@ class I2cAdapter:
         Args:
             env: kernel of the bus.
             bus: the bus.
-            address_errno: error of an address that nobody acknowledges; drivers differ.
-            data_errno: error of a byte that is not acknowledged; drivers differ.
+            address_errno: error of an address that is not acknowledged; Linux's drivers differ.
+            data_errno: error of a byte that is not acknowledged; Linux's drivers differ.
         """
         self.env = env
         self.retries = 0
         self.timeout_ps = PS_PER_S
-        self.told = 0
+        self.answered = 0
         self.holding = False
         self.driven = False
         self._bus = bus
@@ -84,32 +83,32 @@ class I2cAdapter:
 
     @property
     def busy(self) -> bool:
-        """Whether a transfer is under way or waits for the wire."""
+        """Whether a transfer is under way or waits for the bus."""
         return len(self._open) > len(self._held)
 
     @property
     def beginning(self) -> bool:
-        """Whether ``drive`` would begin a transfer, not go on with one."""
+        """Whether ``drive`` would begin a transfer, not continue one."""
         return bool(self._waiting) and (self._driven is None or self._driven.ended)
 
     def submit(self, messages: list[I2cMessage], done: Done) -> None:
-        """Start a transfer; ``done`` gets 0 at its end in virtual time, or a negative errno.
+        """Start a transfer; at its end in virtual time, ``done`` receives 0 or a negative errno.
 
-        Read data lands in the messages.
+        The messages then hold the data read.
         """
         self._open.append(done)
         if self._gone:
-            self._tell(-errno.EIO, done)
+            self._answer(-errno.EIO, done)
         elif self.driven:
             self._waiting.append((messages, done))
         else:
             self.env.process(self._perform(messages, done))
 
     def drive(self, goes_on: Callable[[], bool]) -> None:
-        """Take the kernel through the transfer under way, else through the oldest that waits.
+        """Run the kernel through the current transfer, else through the oldest that waits.
 
-        Not to be called by what the kernel runs. Ends early when ``goes_on``, asked every
-        ``EVENTS`` events, says no; whoever runs the kernel then takes the transfer on.
+        Must not be called by a process of the kernel. ``goes_on`` is called every ``EVENTS``
+        events; when it returns False, the transfer continues as part of the kernel.
         """
         if self._driven is None or self._driven.ended:
             if not self._waiting:
@@ -123,11 +122,11 @@ class I2cAdapter:
             result = yield from self._try(messages)
             if result != -errno.EAGAIN or self.env.now > give_up_ps:
                 break
-            yield self.env.timeout(self._bus.bit_ps)  # so that it does give up
+            yield self.env.timeout(self._bus.bit_ps)  # so that the time-out is reached
         if self.holding:
             self._held.append((self.env.now, result, done))
         else:
-            self._tell(result, done)
+            self._answer(result, done)
 
     def _try(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, int]:
         try:
@@ -137,54 +136,53 @@ class I2cAdapter:
             return -self._errors.get(number, number)
         return 0
 
-    def _tell(self, result: int, done: Done) -> None:
-        self.told += 1
+    def _answer(self, result: int, done: Done) -> None:
+        self.answered += 1
         self._open.remove(done)
         done(result)
 
     def pull(self) -> None:
-        """Leave the bus: what is under way fails, and whatever comes, until ``plug``."""
+        """Leave the bus: current and later transfers fail with EIO, until ``plug``."""
         self._gone, self._driven = True, None
         self._waiting.clear()
         self._held.clear()
         for done in list(self._open):
-            self._tell(-errno.EIO, done)
+            self._answer(-errno.EIO, done)
 
     def plug(self, bus: I2cBus) -> None:
         """Become a master of another bus of the same kernel."""
         self._gone, self._bus = False, bus
 
     def release(self, time_ps: int) -> None:
-        """Tell of the transfers that ended by ``time_ps``."""
+        """Return the results of the transfers that ended by ``time_ps``."""
         while self._held and self._held[0][0] <= time_ps:
             _, result, done = self._held.popleft()
-            self._tell(result, done)
+            self._answer(result, done)
 
     def release_ps(self) -> int | None:
-        """When the first transfer ended that was not told of; None without any."""
+        """When the first transfer with a held result ended; None without any."""
         return self._held[0][0] if self._held else None
 
 
 class _Driven:
-    """Steps that are no process of the kernel, but between two drives.
+    """A generator of events that ``drive`` runs; between two drives, the kernel runs it.
 
     Attributes:
-        ended: whether the last one was done.
+        ended: whether the generator has ended.
     """
 
     def __init__(self, steps: Generator[simpy.Event, Any, None]) -> None:
-        """Prepare; ``steps`` yields the events that it waits for."""
         self.ended = False
         self._steps = steps
         self._event: simpy.Event | None = None
 
     def drive(self, kernel: Kernel, goes_on: Callable[[], bool]) -> None:
-        """Take ``kernel`` through the steps, as long as ``goes_on`` says so."""
+        """Run ``kernel`` and the steps, until ``goes_on`` returns False."""
         event, left = self._event, 0
         if event is None:
-            event, left = self._go_on(None), EVENTS
+            event, left = self._next_event(None), EVENTS
         else:
-            event.callbacks.remove(self._happened)
+            event.callbacks.remove(self._continue)
         while event is not None:
             while not event.processed:
                 if not left:
@@ -194,9 +192,9 @@ class _Driven:
                     left = EVENTS
                 kernel.step()
                 left -= 1
-            event = self._go_on(event)
+            event = self._next_event(event)
 
-    def _go_on(self, event: simpy.Event | None) -> simpy.Event | None:
+    def _next_event(self, event: simpy.Event | None) -> simpy.Event | None:
         try:
             return self._steps.send(None if event is None else event.value)
         except StopIteration:
@@ -204,12 +202,12 @@ class _Driven:
             return None
 
     def _wait_for(self, event: simpy.Event | None) -> None:
-        """Let the kernel go on, whoever runs it, when ``event`` has happened."""
+        """Continue the steps from the kernel when ``event`` has happened."""
         while event is not None and event.processed:
-            event = self._go_on(event)
+            event = self._next_event(event)
         self._event = event
         if event is not None:
-            event.callbacks.append(self._happened)
+            event.callbacks.append(self._continue)
 
-    def _happened(self, event: simpy.Event) -> None:
-        self._wait_for(self._go_on(event))
+    def _continue(self, event: simpy.Event) -> None:
+        self._wait_for(self._next_event(event))

@@ -1,7 +1,7 @@
-"""An opened /dev/i2c-N: what Linux's i2c-dev does with a program's calls.
+"""An opened /dev/i2c-N: handles a program's calls as Linux's i2c-dev.
 
-A call comes as a packed request (see ``firmware_model/formats/linux_i2c.py``) and ends in a
-packed reply, at once or when its transfer ends in virtual time.
+Calls are packed requests (see ``firmware_model/formats/linux_i2c.py``); each returns a packed
+reply, at once or when its transfer ends in virtual time.
 """
 
 import errno
@@ -30,23 +30,19 @@ class DeviceFile:
     """One opened device file; copies of its descriptor share it.
 
     Attributes:
-        address: address for read, write and SMBus.
-        ten_bit: whether that is a 10-bit address; no transfer with one is supported.
+        address: target address for read, write and SMBus.
+        ten_bit: whether that is a 10-bit address; transfers to one are not supported.
         checksums: whether SMBus transactions carry a packet error code.
     """
 
     def __init__(self, adapter: I2cAdapter) -> None:
-        """Open."""
         self.address = 0
         self.ten_bit = False
         self.checksums = False
         self._adapter = adapter
 
     def perform(self, call: Call, body: bytes, done: Reply) -> None:
-        """Do ``call``; ``done`` gets the reply.
-
-        Raises ValueError when the body is not one of this call.
-        """
+        """Perform ``call``; ``done`` receives the reply. ValueError for a malformed body."""
         try:
             match call:
                 case Call.OPEN:
@@ -65,7 +61,7 @@ class DeviceFile:
             done(_failed(error))
 
     def close(self) -> None:
-        """Close; nothing is left behind."""
+        """Nothing to release."""
 
     def _ioctl(self, number: int, argument: int) -> bytes:
         match number:
@@ -148,7 +144,7 @@ def _failed(error: OSError) -> bytes:
 
 def _plain(message: linux.RdwrMessage) -> I2cMessage:
     if message.length > linux.MAX_MESSAGE_BYTES:
-        raise OSError(errno.EINVAL, f"a message has {linux.MAX_MESSAGE_BYTES} bytes at most")
+        raise OSError(errno.EINVAL, f"a message has at most {linux.MAX_MESSAGE_BYTES} bytes")
     if message.flags & ~_KNOWN_FLAGS:
         raise OSError(errno.EOPNOTSUPP, f"flags {message.flags:#06x}: only reading is supported")
     if message.address > _LAST_7_BIT:
@@ -157,7 +153,7 @@ def _plain(message: linux.RdwrMessage) -> I2cMessage:
     if message.flags & MessageFlag.RECEIVE_LENGTH:
         extra = message.data[0] if message.data else 0
         if not reads or not 1 <= extra <= message.length - linux.MAX_BLOCK_BYTES:
-            raise OSError(errno.EINVAL, "the buffer of such a read has 32 bytes beyond its first")
+            raise OSError(errno.EINVAL, "a block read needs 32 bytes of buffer after the first")
         return I2cMessage(message.address, read=extra, block=True)
     if reads:
         return I2cMessage(message.address, read=message.length, probe_read=not message.length)

@@ -1,4 +1,4 @@
-"""The name /dev/i2c-N: which paths mean it, and what a program sees that looks at it."""
+"""The device node /dev/i2c-N: the paths that name it, and its file status."""
 
 import os
 import stat
@@ -9,7 +9,7 @@ I2C_MAJOR = 89
 """Device number of Linux's I2C devices; the minor number is the bus."""
 
 LISTING = "/proc/bus/i2c"
-"""Where i2c-tools look for the busses first; no kernel of this century has that file."""
+"""The file in which i2c-tools look for busses first; kernels since 2.6 do not have it."""
 
 MODE = stat.S_IFCHR | 0o660
 PAGE_BYTES = 4096
@@ -18,36 +18,35 @@ _BASIC_STATX = 0x07FF
 
 
 class Found(Enum):
-    """What a path means."""
+    """The emulated file that a path names."""
 
     DEVICE = auto()
     LISTING = auto()
 
 
 class DeviceNode:
-    """A device file that is not there.
+    """A device file that does not exist in the file system.
 
     Attributes:
-        bus: its number.
-        path: its path.
-        listing: text that lists it, for i2c-tools.
+        bus: number of the bus.
+        path: path of the device file.
+        listing: content of ``LISTING``, for i2c-tools.
     """
 
     def __init__(self, bus: int) -> None:
-        """Name bus number ``bus``."""
         self.bus = bus
         self.path = f"/dev/i2c-{bus}"
         self.listing = f"i2c-{bus}\ti2c       \tcubestack emulated bus            \tI2C adapter\n"
         self._name = f"i2c-{bus}"
 
     def may_be(self, path: str) -> bool:
-        """Whether ``path`` ends as ours does, so that ``find`` is worth the effort."""
+        """Whether ``path`` may name an emulated file; a fast check before ``find``."""
         return path.endswith(self._name) or path == LISTING
 
     def find(self, path: str, pid: int, folder: int | None) -> Found | None:
-        """What ``path`` means to process ``pid``; a relative one starts at descriptor ``folder``.
+        """The emulated file that ``path`` names in process ``pid``, or None.
 
-        None for ``folder``, or AT_FDCWD, is the process's working folder.
+        A relative path starts at descriptor ``folder``; None and AT_FDCWD mean the working folder.
         """
         if path == LISTING:
             return Found.LISTING
@@ -63,7 +62,7 @@ class DeviceNode:
         return None
 
     def stat(self, *, compact: bool) -> bytes:
-        """A struct stat; ``compact`` as in asm-generic/stat.h, else that of x86-64."""
+        """A struct stat; ``compact``: as in asm-generic/stat.h, else as on x86-64."""
         device = os.makedev(I2C_MAJOR, self.bus)
         dev, inode, owner, group = self._place()
         if compact:
@@ -73,7 +72,6 @@ class DeviceNode:
         return head + struct.pack("=qqq", 0, PAGE_BYTES, 0) + bytes(9 * 8)
 
     def statx(self) -> bytes:
-        """A struct statx."""
         dev, inode, owner, group = self._place()
         head = struct.pack("=IIQIII", _BASIC_STATX, PAGE_BYTES, 0, 1, owner, group)
         size = struct.pack("=HHQQQQ", MODE, 0, inode, 0, 0, 0)
@@ -82,5 +80,5 @@ class DeviceNode:
         return (head + size + times + numbers).ljust(256, b"\0")
 
     def _place(self) -> tuple[int, int, int, int]:
-        """Device and inode, made up beside those of /dev, and the owner: whoever runs this."""
+        """Device and inode, which continue those of /dev, and the owner: this process's user."""
         return os.stat("/dev").st_dev, (1 << 31) + self.bus, os.getuid(), os.getgid()

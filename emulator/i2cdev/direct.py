@@ -1,8 +1,8 @@
 """In-process I2C link: a host in the same Python process drives virtual time by waiting.
 
-It has the one method of smbus2 that carries any transfer (i2c_rdwr); for all others give it to
-``cubestack.host.transport.smbus.CubeSMBus``. Only waiting runs the simulation, so a run is
-repeatable.
+Of smbus2 it has the one method that carries any transfer (i2c_rdwr);
+``cubestack.host.transport.smbus.CubeSMBus`` adds the others. Only waiting advances virtual time, so
+a run is reproducible.
 """
 
 import errno
@@ -15,14 +15,13 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
 I2C_M_RD = 0x0001
-"""Flag of a message that reads, as in linux/i2c.h; no other flag is supported."""
+"""Flag of a reading message in linux/i2c.h, the only one that is supported."""
 
 
 class DirectI2c:
-    """The host's end of an I2C bus, with smbus2's ``i2c_rdwr``; also one opened device file."""
+    """The host's end of an I2C bus: smbus2's ``i2c_rdwr``, and calls of a device file."""
 
     def __init__(self, env: Kernel, bus: I2cBus) -> None:
-        """Become a master of ``bus``."""
         self._env = env
         self._bus = bus
         self._file = DeviceFile(I2cAdapter(env, bus))
@@ -30,8 +29,8 @@ class DirectI2c:
     def i2c_rdwr(self, *messages: Any) -> None:
         """Perform one combined transfer of smbus2 ``i2c_msg`` objects.
 
-        Raises OSError: I2cError when something is not acknowledged, EOPNOTSUPP for a message
-        with other flags than that for reading.
+        Raises OSError: I2cError if a byte is not acknowledged, EOPNOTSUPP for flags other than
+        I2C_M_RD.
         """
         plain = [_to_plain(message) for message in messages]
         self._env.run(until=self._env.process(self._bus.transfer(plain)))
@@ -41,7 +40,7 @@ class DirectI2c:
                     message.buf[index] = bytes([byte])
 
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        """Do a packed call of the device file (``firmware_model/formats/linux_i2c.py``).
+        """Perform a packed call of the device file (``firmware_model/formats/linux_i2c.py``).
 
         Returns the result, 0 or more or a negative errno, and data.
         """
@@ -52,10 +51,9 @@ class DirectI2c:
         return split_reply(replies[0])
 
     def close(self) -> None:
-        """Nothing is left behind."""
+        """Nothing to release."""
 
     def wait(self, seconds: float) -> None:
-        """Let ``seconds`` of virtual time pass."""
         self._env.advance_to(self._env.now + int(seconds * PS_PER_S))
 
 
@@ -66,5 +64,5 @@ def _to_plain(message: Any) -> I2cMessage:
         )
     if message.flags & I2C_M_RD:
         return I2cMessage(message.addr, read=message.len)
-    # Not bytearray(message): that is the structure itself, by the buffer protocol of ctypes.
+    # Not bytearray(message): through the buffer protocol, that is the ctypes structure itself.
     return I2cMessage(message.addr, bytearray(bytes(message)))

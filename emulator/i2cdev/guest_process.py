@@ -1,9 +1,10 @@
 """Starts a program that sees the emulated /dev/i2c-N, by one of two routes.
 
-seccomp  the kernel sends the program's calls to a supervisor in this process: any program, also one
-         that is linked statically, and no compiler. Needs Linux 5.9, and leave to filter.
-preload  a library in the program takes the calls: programs that are linked dynamically with glibc.
-         Needs a C compiler, once; it works where a container refuses the other.
+seccomp  The kernel sends the program's calls to a supervisor in this process. Works with any
+         program, including static ones, and without a compiler. Needs Linux 5.9, and permission
+         to install a filter.
+preload  A library in the program intercepts the calls. Works with programs that are linked
+         dynamically with glibc. Needs a C compiler, once; works in containers that forbid seccomp.
 """
 
 import contextlib
@@ -32,32 +33,28 @@ LAUNCHER = Path(__file__).parent / "seccomp" / "launcher.py"
 MESSAGE_BYTES = 4096
 PR_SET_CHILD_SUBREAPER = 36
 SEPARATORS = frozenset(": \t\n")
-"""What separates libraries in LD_PRELOAD."""
+"""Separators between libraries in LD_PRELOAD."""
 
 SIGNALLED = 128
-"""Exit code of a program that a signal ended, less the signal: as shells have it."""
+"""Exit code of a program that a signal ended, minus the signal's number, as in shells."""
 
 
 class RouteError(RuntimeError):
-    """A route is not there on this machine; the text says why."""
+    """A route is not available on this machine; the text has the reason."""
 
 
 def bus_environment(bus: int, path: str) -> dict[str, str]:
-    """What a program finds in its environment: the bus, and the socket that serves it."""
+    """Environment variables for a program: number of the bus, and path of its socket."""
     return {"CUBESTACK_I2C_BUS": str(bus), "CUBESTACK_I2C_SOCKET": path}
 
 
 class GuestProcess(Endpoint):
-    """A running program; as a port of a scheduler it wakes that when the program ends.
-
-    Attributes:
-        name: what was started.
-    """
+    """A running program; as a port of a scheduler, it reports the program's end."""
 
     def __init__(
         self, process: "subprocess.Popen[bytes]", name: str, *, adopts: bool = False
     ) -> None:
-        """Watch ``process``; ``adopts`` says that what it leaves behind becomes ours."""
+        """Watch ``process``; with ``adopts``, this process is the reaper of its orphans."""
         self.name = name
         self._adopts = adopts
         self._process = process
@@ -65,12 +62,12 @@ class GuestProcess(Endpoint):
 
     @property
     def ended(self) -> bool:
-        """Whether it has ended, as far as ``exchange`` has seen."""
+        """Whether it has ended, as of the latest ``exchange``."""
         return self._process.returncode is not None
 
     @property
     def exit_code(self) -> int:
-        """Its exit code as a shell would give it; waits for the end."""
+        """Exit code as in a shell; waits for the end."""
         code = self._process.wait()
         return code if code >= 0 else SIGNALLED - code
 
@@ -79,34 +76,33 @@ class GuestProcess(Endpoint):
         self._process.send_signal(number)
 
     def watched(self) -> list[tuple[int, int]]:
-        """Its end, which comes once."""
         return [] if self.ended else [(self._pidfd, select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Note its end; afterwards bury what it left behind."""
+        """Notice its end, and reap its orphans."""
         if not self.ended:
             if poll_now(self._pidfd, select.POLLIN):
                 self._process.poll()
         elif self._adopts:
-            _bury_children()
+            _reap_children()
 
     def close(self) -> None:
-        """Watch it no longer; it goes on."""
+        """Stop watching; the program continues."""
         os.close(self._pidfd)
 
 
 def start_filtered(
     command: Sequence[str], environment: dict[str, str], node: DeviceNode, files: Files
 ) -> tuple[GuestProcess, Supervisor]:
-    """Start ``command`` under a supervisor, which must be served from now on.
+    """Start ``command`` under a supervisor, which the caller must serve from now on.
 
-    Raises RouteError when the kernel, or whoever runs this container, does not allow it.
+    Raises RouteError if the kernel or the container does not allow it.
     """
     abi = native_abi()
     if abi is None:
-        raise RouteError(f"no table of system calls for {os.uname().machine}")
+        raise RouteError(f"system calls of {os.uname().machine} are not supported")
     numbers = descriptor_range()
-    # A kernel that lets a process look into its descendants only (yama) shall let us.
+    # With yama, a process may read only the memory of its descendants.
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with ours, theirs:
@@ -115,7 +111,7 @@ def start_filtered(
         process = subprocess.Popen(
             [*launch, str(abi.seccomp), *command],
             env=os.environ | environment,
-            close_fds=False,  # what was handed to us is for the program
+            close_fds=False,  # the program inherits our descriptors
         )
         theirs.close()
         _check_access(process)
@@ -131,15 +127,15 @@ def start_filtered(
 def start_preloaded(
     command: Sequence[str], environment: dict[str, str], library: Path
 ) -> GuestProcess:
-    """Start ``command`` with the shim ``library``; the socket that it will use must be served.
+    """Start ``command`` with the shim ``library``; the caller must serve the socket it uses.
 
-    Raises RouteError when nothing can be loaded into it.
+    Raises RouteError if no library can be loaded into it.
     """
     program = shutil.which(command[0])
     if program is not None and is_static(Path(program)):
         raise RouteError(f"{program} is linked statically, so no library can be loaded into it")
     if SEPARATORS & set(str(library)):
-        raise RouteError(f"{library} has a blank or colon; XDG_CACHE_HOME names another folder")
+        raise RouteError(f"{library} has a blank or colon; set XDG_CACHE_HOME to another folder")
     others = os.environ.get("LD_PRELOAD")
     preload = f"{library} {others}" if others else str(library)
     process = subprocess.Popen(
@@ -149,18 +145,18 @@ def start_preloaded(
 
 
 def _check_access(process: "subprocess.Popen[bytes]") -> None:
-    """Raise RouteError unless we may read the memory of ``process``, which is ended then."""
+    """Raise RouteError, and end ``process``, unless its memory is readable."""
     try:
         read_memory(process.pid, 0, 1)
     except OSError as error:
-        if error.errno != errno.EFAULT:  # which says that we may, but that nothing is there
+        if error.errno != errno.EFAULT:  # EFAULT: access is permitted, but the page is unmapped
             process.kill()
             process.wait()
             raise RouteError(f"no access to the program's memory ({error.strerror})") from None
 
 
-def _bury_children() -> None:
-    """Let processes that have ended go: only then does the kernel let their filter go."""
+def _reap_children() -> None:
+    """Reap ended processes, which makes the kernel release their filter."""
     with contextlib.suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass

@@ -1,4 +1,4 @@
-"""Waiting for descriptors: not at all, or to the microsecond, as a byte takes 22.5 of them."""
+"""Waits for descriptors to the microsecond, as a byte on the bus takes 22.5 us."""
 
 import ctypes
 import os
@@ -15,16 +15,16 @@ PR_SET_TIMERSLACK = 29
 NS_PER_S = 10**9
 
 EARLY_S = 150e-6
-"""Waking up takes that long on an idle machine; who is early asks again."""
+"""Time to wake up on an idle machine; a caller that wakes early waits again."""
 
 NAP_NS = 50_000
-"""What it takes at most on a busy one, with real-time priority."""
+"""Longest time to wake up on a busy machine with real-time priority."""
 
 CROWDED_NS = 300_000
-"""Who gives the processor away for a moment and gets it back so late is not alone on it."""
+"""Duration of a yield from which the processor counts as shared with other processes."""
 
 ALONE_AGAIN_NS = NS_PER_S
-"""So long nobody without priority waits awake after that."""
+"""After that, a process without priority does not busy-wait for this time."""
 
 _ENTRY = struct.Struct("=ihh")  # struct pollfd
 _TIMEOUT = struct.Struct("=qq")  # struct timespec
@@ -32,30 +32,30 @@ _TIMEOUT = struct.Struct("=qq")  # struct timespec
 
 @cache
 def _libc() -> ctypes.CDLL:
-    """The C library; only Linux's has what is asked for here."""
+    """The C library; loaded late, as only Linux's has these functions."""
     library = ctypes.CDLL(None)
     library.ppoll.argtypes = (ctypes.c_char_p, ctypes.c_ulong, ctypes.c_char_p, ctypes.c_void_p)
     return library
 
 
 class Watch:
-    """Waits for ports, mostly for the same ones again and again."""
+    """Waits for ports; fast when these are mostly the same ones."""
 
     def __init__(self, ports: Sequence[Endpoint], *, always_asleep: bool = False) -> None:
-        """Watch ``ports``; ``always_asleep`` where callers wake this process quickly."""
+        """Watch ``ports``; ``always_asleep`` disables busy-waiting, if callers wake us quickly."""
         self._ports = ports
         self._poller = select.epoll()
         self._watched: dict[int, Endpoint] = {}
         self._always_asleep = always_asleep
-        # Then nobody of less importance gets the processor while we wait awake.
-        self._first = has_priority()
+        # With priority, no other process takes the processor while we busy-wait.
+        self._has_priority = has_priority()
         self._crowded_until_ns = 0
 
     def wait(self, timeout_ns: int, *, awake: bool = False) -> list[Endpoint]:
-        """Wait until some are ready, or a signal comes, at most ``timeout_ns``; which are ready.
+        """Wait until ports are ready, or a signal comes, at most ``timeout_ns``; the ready ports.
 
-        With ``awake``, waking up may not take time; that is for processes with real-time priority
-        and for idle machines.
+        With ``awake``, it busy-waits, if this process has real-time priority or the processor to
+        itself.
         """
         watched = {fileno: port for port in self._ports for fileno, _ in port.watched()}
         if watched != self._watched:
@@ -64,7 +64,7 @@ class Watch:
         end_ns = now_ns + timeout_ns
         ready: list[tuple[int, int]] = []
         if awake and not self._always_asleep:
-            while (self._first or now_ns >= self._crowded_until_ns) and now_ns < end_ns:
+            while (self._has_priority or now_ns >= self._crowded_until_ns) and now_ns < end_ns:
                 if ready := self._poller.poll(0):
                     break
                 os.sched_yield()
@@ -83,27 +83,26 @@ class Watch:
         self._watched = watched
 
     def nap(self, duration_ns: int) -> None:
-        """Sleep less than ``duration_ns``, where waking up is quick."""
-        if self._first and duration_ns > NAP_NS:
+        """Sleep for less than ``duration_ns``, if waking up is fast."""
+        if self._has_priority and duration_ns > NAP_NS:
             time.sleep((duration_ns - NAP_NS) / NS_PER_S)
 
     def close(self) -> None:
-        """Watch no longer; the ports are their owner's."""
+        """Stop watching; the ports stay open."""
         self._poller.close()
 
 
 def has_priority() -> bool:
-    """Whether this process has real-time priority."""
     return os.sched_getscheduler(0) in (os.SCHED_FIFO, os.SCHED_RR)
 
 
 def sharpen_timers() -> None:
-    """Ask the kernel to wake this process in time, not up to 50 us late as it usually does."""
+    """Have the kernel wake this process in time, not up to 50 us late as by default."""
     _libc().prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
 def wait_precisely(watched: Watched, timeout_s: float) -> None:
-    """Like the scheduler's ``wait_ready``, but never too late: it may end ``EARLY_S`` early."""
+    """As ``realtime.wait_ready``, but never late: it may end ``EARLY_S`` early."""
     entries = b"".join(_ENTRY.pack(fileno, events, 0) for fileno, events in watched)
     timeout_ns = max(0, int((timeout_s - EARLY_S) * NS_PER_S))
     _libc().ppoll(entries, len(watched), _TIMEOUT.pack(*divmod(timeout_ns, NS_PER_S)), None)

@@ -1,4 +1,4 @@
-"""The bus of an emulation in another process, through its socket, for a supervisor here."""
+"""The bus of an emulation in another process, reached through its socket."""
 
 import errno
 import select
@@ -16,14 +16,10 @@ Done = Callable[[bytes], None]
 
 
 class RemoteBus(Endpoint):
-    """Its answers, as a port of a scheduler.
-
-    Attributes:
-        name: path of the socket.
-    """
+    """Opens device files of the bus; as a port of a scheduler, it receives their replies."""
 
     def __init__(self, path: Path) -> None:
-        """Use the socket at ``path``; raises PortError when nobody serves it."""
+        """Use the socket at ``path``; raises PortError if no emulation serves it."""
         self.name = str(path)
         self._files: dict[int, _RemoteFile] = {}
         self._poller = select.epoll()
@@ -56,11 +52,9 @@ class RemoteBus(Endpoint):
         return link
 
     def watched(self) -> list[tuple[int, int]]:
-        """All connections at once."""
         return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Send and receive on the connections that are ready."""
         for fileno, _ in self._poller.poll(0):
             if fileno in self._files:
                 self._files[fileno].exchange()
@@ -73,12 +67,12 @@ class RemoteBus(Endpoint):
 
 
 class _RemoteFile:
-    """One connection: the other side keeps the file's state."""
+    """A device file; the other process has its state."""
 
     def __init__(
         self, link: socket.socket, watch: Callable[[int], None], drop: Callable[[], None]
     ) -> None:
-        """Use ``link``, watched for input; ``watch`` gets other events, ``drop`` ends it."""
+        """``watch`` changes the events that are polled for ``link``, ``drop`` stops that."""
         self._link = link
         self._watch = watch
         self._drop = drop
@@ -89,7 +83,7 @@ class _RemoteFile:
         self.gone = False
 
     def perform(self, call: Call, body: bytes, done: Done) -> None:
-        """Send a call; ``done`` gets the packed reply, EIO when the emulation has gone."""
+        """Send a call; ``done`` receives the packed reply, EIO if the emulation has ended."""
         if self.gone:
             done(reply(-errno.EIO))
             return
@@ -99,7 +93,7 @@ class _RemoteFile:
         self._send()
 
     def close(self) -> None:
-        """Hang up; calls that are not answered yet fail with EIO."""
+        """Disconnect; pending calls fail with EIO."""
         if self.gone:
             return
         self.gone = True

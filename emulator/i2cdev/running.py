@@ -1,4 +1,4 @@
-"""A program with an emulated bus: where the bus comes from, by which route, until it ends."""
+"""Runs a program with an emulated bus, from its start to its end."""
 
 import gc
 import signal
@@ -30,12 +30,11 @@ class HostBus:
     """A bus for programs.
 
     Attributes:
-        kernel: what to drive.
-        busy: whether its devices have work of their own.
-        adapter: its master; None when that is in another process.
-        port: to be served by the scheduler.
-        files: opens a device file of it.
-        path: of the socket that serves it.
+        busy: whether its devices have work without the host.
+        adapter: the master of the bus; None if that is in another process.
+        port: the port that a scheduler must serve.
+        files: opens a device file of the bus.
+        path: path of its socket.
     """
 
     kernel: Kernel
@@ -49,7 +48,7 @@ class HostBus:
 def emulated_bus(
     kernel: Kernel, busy: Callable[[], bool], adapter: I2cAdapter, path: Path
 ) -> HostBus:
-    """The bus of an emulation in this process, served at ``path`` as well; raises PortError."""
+    """The bus of an emulation in this process; also serves it at ``path``. Raises PortError."""
     server = I2cServer(path, adapter)
     return HostBus(kernel, busy, adapter, server, lambda: DeviceFile(adapter), server.name)
 
@@ -71,11 +70,11 @@ def run_program(
 ) -> int:
     """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit code.
 
-    Without a ``route``, seccomp is tried, then preload; ``say`` gets which one and why. Processes
-    that the program leaves behind are served until they end as well.
+    Without a ``route``, seccomp is tried, then preload; ``say`` receives the route and the reason.
+    Processes that the program leaves behind are also served until they end.
 
     Raises:
-        RouteError: the kernel refuses the route.
+        RouteError: the route is not available.
         CompilerError: the library of the preload route can not be built.
     """
     running: list[_Run] = []
@@ -85,7 +84,7 @@ def run_program(
         if running:
             running[0].signalled(number)
         else:
-            early.append(number)  # perhaps the program runs, and we do not know it yet
+            early.append(number)  # the program may have started, but _start has not returned
 
     handlers = {number: signal.signal(number, end) for number in (*FORWARDED, signal.SIGINT)}
     try:
@@ -93,7 +92,7 @@ def run_program(
         running.append(run := _Run(program, supervisor))
         for each in early:
             run.signalled(each)
-        say(f"/dev/i2c-{number} by way of {reason}")
+        say(f"/dev/i2c-{number} is served by {reason}")
         _serve(bus, run, pace=pace, say=say)
     finally:
         for signal_number, handler in handlers.items():
@@ -106,7 +105,7 @@ def run_program(
 def _serve(
     bus: HostBus, run: "_Run", *, pace: Literal["real", "fast"], say: Callable[[str], None]
 ) -> None:
-    """Serve ``run`` until it ends; no scheduler where the bus is in another process."""
+    """Serve ``run`` until it ends; without a scheduler if the bus is in another process."""
     ports = [bus.port, *run.ports]
     if bus.adapter is None:
         sharpen_timers()
@@ -128,7 +127,7 @@ def _serve(
         report=say,
     ) as scheduler:
         run.on_end = scheduler.stop
-        gc.freeze()  # the catalogue need not be looked through for garbage between two transfers
+        gc.freeze()  # keeps collections between transfers short: the catalogue is large
         try:
             scheduler.run()
         finally:
@@ -136,12 +135,11 @@ def _serve(
 
 
 class _Run(Endpoint):
-    """A program under way; as a port of the scheduler it notices the end.
+    """A running program; as a port of the scheduler, it notices the end.
 
     Attributes:
-        name: of the program.
-        ports: what has to be served for it.
-        on_end: called when there is nobody left to serve.
+        ports: ports that must be served for it.
+        on_end: called when no process is left.
     """
 
     def __init__(self, program: guest_process.GuestProcess, supervisor: Supervisor | None) -> None:
@@ -154,32 +152,32 @@ class _Run(Endpoint):
 
     @property
     def ended(self) -> bool:
-        """Whether nobody is left who could call."""
+        """Whether no process is left that could call."""
         served = self._supervisor is not None and not self._supervisor.ended
         return self._dropped or (self._program.ended and not served)
 
     @property
     def hands_over(self) -> bool:
-        """Whether program and supervisor share a processor, so that no call takes time to get here.
+        """Whether program and supervisor share a processor, so that calls arrive without delay.
 
-        Then waiting awake would only keep the program from it.
+        Busy-waiting would then only delay the program.
         """
         return self._supervisor is not None and self._supervisor.hands_over
 
     def signalled(self, number: int) -> None:
-        """Pass a signal on, but for Ctrl-C: that comes to the program as well, and it decides."""
+        """Forward a signal; not Ctrl-C, which the terminal sends to the program as well."""
         if self._program.ended:
-            self._dropped = True  # only what the program left behind was still served
+            self._dropped = True  # only orphans of the program were still served
         elif number != signal.SIGINT:
             self._program.send(number)
 
     def exchange(self, now_ps: int) -> None:
-        """Tell of the end; ``ports`` are served by themselves."""
+        """Call ``on_end`` at the end; ``ports`` are served separately."""
         if self.ended:
             self.on_end()
 
     def close(self) -> None:
-        """Release program and supervisor; the bus is the caller's."""
+        """Close the ports of program and supervisor; the bus stays open."""
         for port in self.ports:
             port.close()
 
@@ -187,7 +185,7 @@ class _Run(Endpoint):
 def _start(
     command: Sequence[str], number: int, bus: HostBus, route: guest_process.Route | None
 ) -> tuple[guest_process.GuestProcess, Supervisor | None, str]:
-    """The program, its supervisor if it has one, and the route with the reason for it."""
+    """Start the program: it, its supervisor or None, and the route with its reason."""
     environment = guest_process.bus_environment(number, bus.path)
     refused = ""
     if route != "preload":
@@ -198,12 +196,12 @@ def _start(
         except guest_process.RouteError as error:
             if route == "seccomp":
                 raise guest_process.RouteError(f"seccomp: {error}; try --route preload") from None
-            refused = f", as seccomp is not there: {error}"
+            refused = f", as seccomp is not available: {error}"
         else:
-            asked = "as asked" if route else "which any program can take"
-            return program, supervisor, f"seccomp, {asked}"
+            reason = "as requested" if route else "which works with any program"
+            return program, supervisor, f"seccomp, {reason}"
     try:
         program = guest_process.start_preloaded(command, environment, shim_library())
     except guest_process.RouteError as error:
         raise guest_process.RouteError(f"preload: {error}{refused}") from None
-    return program, None, f"preload{refused or ', as asked'}"
+    return program, None, f"preload{refused or ', as requested'}"

@@ -1,17 +1,18 @@
-"""Serves programs on a bus: their calls come in, transfers run, answers go out in time.
+"""Serves programs on a bus: receives their calls, runs transfers, and answers on time.
 
-The scheduler of all ports looks at each event, and at all ports between two of them. A transfer of
-one byte takes less time on the wire than that, so here transfers are done in one go, and the next
-call is awaited at once. Paced, virtual time runs ahead for that, and each answer is held back until
-wall time gets to the end of its transfer.
+The scheduler of all ports serves every port between two events. A transfer of one byte takes less
+time on the wire than that. This scheduler therefore runs each transfer in one step, and then waits
+for the next call at once. With pace "real", virtual time runs ahead for that, and each answer is
+held back until wall time reaches the end of its transfer.
 
-When a transfer begins, paced: the way of a call to us and of the answer back is no part of a bus.
+With pace "real", the start of a transfer excludes the travel of calls and answers between the
+processes, which no real bus has:
 
-- A call within ``TURNAROUND_NS`` of the last transfer's answer begins where that transfer ended,
-  so in the mean transfers one after the other take the wire's time. Answers that were late are made
-  up for, up to ``MAX_DEBT_NS``; what a program itself does between two such calls is not counted.
-- Any other call begins before it came: by the quickest way there and back that was seen so far, up
-  to ``TURNAROUND_NS``, and by what the last answer was late, up to ``MAX_DEBT_NS``.
+- A call within ``TURNAROUND_NS`` of the last transfer's answer begins at the end of that transfer,
+  so consecutive transfers take the wire's time on average. Late answers are compensated, up to
+  ``MAX_DEBT_NS``; the program's own time between two such calls is not counted.
+- Any other call begins before its arrival: by the shortest round trip so far, up to
+  ``TURNAROUND_NS``, and by the delay of the last answer, up to ``MAX_DEBT_NS``.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,31 +26,26 @@ from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, Kernel
 
 AHEAD_PS = 2 * PS_PER_MS
-"""How far virtual time may be ahead of wall time during a transfer, when it is paced."""
+"""Limit of virtual time ahead of wall time during a transfer, with pace "real"."""
 
 TURNAROUND_NS = 200_000
-"""How soon after an answer the next call belongs to the same loop of a program."""
+"""Time after an answer within which the next call counts as consecutive."""
 
 MAX_DEBT_NS = 1_000_000
-"""Lateness that is made up for; what is beyond it was lost to other work on this machine."""
+"""Limit of compensated delay; more was lost to other processes on this machine."""
 
 SPIN_NS = 200_000
-"""An answer that is due so soon is waited for without sleep, and waking comes that early."""
+"""An answer that is due within this time is awaited without sleep."""
 
 SPARE_NS = 30_000
-"""Answers that are ready no longer than this before they are due are worth the processor time
-that it takes to be quicker."""
+"""If answers are ready less than this before they are due, busy-waiting for calls is worthwhile."""
 
 VISIT_NS = 5_000_000
-"""Wall time between two looks at the other ports."""
+"""Wall time between two exchanges of the other ports."""
 
 
 class I2cScheduler(Endpoint):
-    """Ports that lead to one bus, as one port of the scheduler of all ports.
-
-    Attributes:
-        name: what it serves.
-    """
+    """The ports of one bus, as one port of the scheduler of all ports."""
 
     def __init__(
         self,
@@ -64,13 +60,13 @@ class I2cScheduler(Endpoint):
         """Serve ``ports``, whose calls go to ``adapter``.
 
         Args:
-            name: for messages.
-            adapter: the master of the bus; from now on driven.
-            ports: where calls come from; closed by their owner.
-            busy: whether devices have work of their own.
-            pace: how virtual time follows wall time; all other ports are so far back on its scale
-                that a call may begin before it came.
-            always_asleep: whether the next call is never waited for awake.
+            name: name in messages.
+            adapter: the master of the bus, which becomes ``driven``.
+            ports: sources of calls; the caller closes them.
+            busy: whether devices have work without the host.
+            pace: relation of virtual time to wall time. All other ports are behind on its scale, so
+                that a call may begin before its arrival.
+            always_asleep: whether to wait for calls without busy-waiting.
         """
         self.name = name
         self._kernel = adapter.env
@@ -79,16 +75,15 @@ class I2cScheduler(Endpoint):
         self._busy = busy
         self._pace = pace
         self._watch = Watch(ports, always_asleep=always_asleep)
-        self._came_ns = self._answered_ns = self._told_ns = self._late_ns = self._spare_ns = 0
+        self._came_ns = self._answered_ns = self._ended_ns = self._late_ns = self._spare_ns = 0
         self._quickest_ns = TURNAROUND_NS
         adapter.driven = True
 
     def _ahead_ps(self) -> int:
-        """How far this port is ahead of the others on the scale of virtual time."""
+        """Lead of this port over the others on the scale of virtual time."""
         return 0 if self._pace.fast else round(TURNAROUND_NS * PS_PER_NS * self._pace.speed)
 
     def watched(self) -> list[tuple[int, int]]:
-        """Those of all its ports."""
         return [item for port in self._ports for item in port.watched()]
 
     def release_ps(self, count: int) -> int | None:
@@ -97,11 +92,11 @@ class I2cScheduler(Endpoint):
         return None if due_ps is None else due_ps - self._ahead_ps()
 
     def close(self) -> None:
-        """Watch no longer; the ports are their owner's."""
+        """Stop watching; the ports stay open."""
         self._watch.close()
 
     def exchange(self, now_ps: int) -> None:
-        """Serve calls; goes on as long as they come one after the other, up to ``VISIT_NS``."""
+        """Serve calls; continues for up to ``VISIT_NS`` while they are consecutive."""
         if self._kernel.paused:
             return
         self._adapter.holding = not self._pace.fast
@@ -112,7 +107,7 @@ class I2cScheduler(Endpoint):
             pass
 
     def _serve(self, ports: Iterable[Endpoint], *, came: bool) -> None:
-        """Look at ``ports``; ``came`` says whether there is something to see."""
+        """Exchange ``ports``; ``came``: whether any of them is ready."""
         if came:
             self._came_ns = self._pace.now_ns()
             self._quickest_ns = min(self._quickest_ns, self._came_ns - self._answered_ns)
@@ -127,13 +122,13 @@ class I2cScheduler(Endpoint):
         return self._adapter.busy or self._adapter.release_ps() is not None
 
     def _turn(self) -> bool:
-        """Go on with a transfer or give an answer; returns whether it came to an end."""
+        """Continue a transfer or return an answer; whether one ended."""
         adapter = self._adapter
         if adapter.busy:
-            told = adapter.told
+            answered = adapter.answered
             self._drive()
-            if adapter.told > told:
-                self._answered_ns = self._told_ns = self._pace.now_ns()
+            if adapter.answered > answered:
+                self._answered_ns = self._ended_ns = self._pace.now_ns()
                 return True
             if adapter.busy and not adapter.beginning:
                 return False
@@ -141,7 +136,7 @@ class I2cScheduler(Endpoint):
         return due_ps is not None and self._release(due_ps)
 
     def _drive(self) -> None:
-        """Run transfers as far as virtual time may."""
+        """Run transfers as far as virtual time may go."""
         kernel, adapter = self._kernel, self._adapter
         clock = self._pace.clock_ns
         end_ns = clock() + VISIT_NS
@@ -159,18 +154,18 @@ class I2cScheduler(Endpoint):
                 return clock() < end_ns and not ahead and not kernel.paused
 
         adapter.drive(goes_on)
-        while kernel.horizon() == kernel.now and not kernel.paused:  # what is left of it
+        while kernel.horizon() == kernel.now and not kernel.paused:  # remaining events at this time
             kernel.step()
 
     def _start_ns(self) -> int:
-        """When a call that has come begins on the wire, unless that is busy still."""
-        if self._came_ns - self._told_ns <= TURNAROUND_NS:
+        """When an arrived call begins on the wire, unless that is still busy."""
+        if self._came_ns - self._ended_ns <= TURNAROUND_NS:
             return self._came_ns - MAX_DEBT_NS
         way_ns = self._quickest_ns if self._quickest_ns < TURNAROUND_NS else 0
         return self._came_ns - way_ns - min(self._late_ns, MAX_DEBT_NS)
 
     def _release(self, due_ps: int) -> bool:
-        """Give the answer that is due next, unless that is too far away."""
+        """Return the next answer, unless it is due too late."""
         clock_ns, due_ns = self._pace.now_ns, self._pace.ns_at(due_ps - self._ahead_ps())
         left_ns = 0 if self._pace.fast else due_ns - clock_ns()
         if left_ns > SPIN_NS:
@@ -182,11 +177,11 @@ class I2cScheduler(Endpoint):
         now_ns = clock_ns()
         self._late_ns = max(0, now_ns - due_ns)
         self._adapter.release(max(due_ps, self._pace.ps_at(now_ns) + self._ahead_ps()))
-        self._answered_ns = self._told_ns = self._pace.now_ns()
+        self._answered_ns = self._ended_ns = self._pace.now_ns()
         return True
 
     def _await_call(self) -> bool:
-        """Virtual time stands still for a moment: most programs call again at once."""
+        """Stop virtual time for a moment, as most programs call again at once."""
         if self._pending() or (self._pace.fast and self._busy()):
             return False
         left_ns = self._answered_ns + TURNAROUND_NS - self._pace.now_ns()
@@ -211,24 +206,24 @@ def open_scheduler(
     always_asleep: bool = False,
     report: Callable[[str], None] = lambda _text: None,
 ) -> Iterator[RealtimeScheduler]:
-    """A scheduler for ``endpoints`` and a bus, to be run in a ``with`` block.
+    """A scheduler for ``endpoints`` and a bus, for a ``with`` block.
 
-    Serial ports alone are served by a :class:`RealtimeScheduler`. With an I2C bus, an
-    :class:`I2cScheduler` stands before it: it takes the bus's calls as they come. ``run()`` serves
-    until ``stop()``, which a thread, a signal handler or a port may call::
+    A :class:`RealtimeScheduler` serves the ports; with an I2C bus, one of its ports is an
+    :class:`I2cScheduler`, which handles calls as they come. ``run()`` serves until ``stop()``,
+    which a thread, a signal handler or a port may call::
 
         with open_scheduler(board.kernel, [endpoint], board.busy, pace="fast") as scheduler:
             signal.signal(signal.SIGINT, lambda _number, _frame: scheduler.stop())
             scheduler.run()
 
     Args:
-        kernel: that of the boards; its time is in ps.
-        endpoints: open ports other than those of the bus; closed by their owner, as all ports.
-        busy: whether the boards have work of their own.
+        kernel: kernel of the boards.
+        endpoints: open ports other than those of the bus; the caller closes all ports.
+        busy: whether the boards have work without the host.
         pace: "real" (virtual time is wall time) or "fast" (ahead of it while there is work).
-        i2c: master of the boards' I2C bus; None when no program can reach that.
-        i2c_ports: where the calls for ``i2c`` come from, for instance an I2cServer.
-        always_asleep: whether the next call is never waited for awake, as the caller needs this
+        i2c: master of the boards' I2C bus; None if no program can reach that.
+        i2c_ports: sources of calls for ``i2c``, for instance an I2cServer.
+        always_asleep: whether to wait for calls without busy-waiting, as the program needs this
             processor.
         report: receives a line when pace "real" can not be kept.
     """

@@ -1,9 +1,9 @@
 """The I2C bus of a running emulation on a Unix socket: a port for any number of clients.
 
-A client's calls are done one after the other, in virtual time; those of several clients queue for
-the wire, whole transfers at a time. What a client sends too early waits in the operating system,
-and so does a new client beyond ``MAX_CLIENTS``. One that sends nonsense is hung up on. One that
-goes away while its transfer is on the wire misses the answer, that is all.
+A client's calls run one after the other, in virtual time; transfers of several clients queue for
+the wire. Calls that a client sends too early wait in the operating system, and so does a new client
+beyond ``MAX_CLIENTS``. A client that sends malformed calls is disconnected. If a client disconnects
+during its transfer, the transfer completes.
 """
 
 import contextlib
@@ -22,23 +22,19 @@ from cubestack.emulator.ports.endpoint import Endpoint, PortError
 from cubestack.firmware_model.formats import linux_i2c as linux
 
 MAX_CLIENTS = 64
-"""Connections at one time; a program takes one, and one for each device file it has open."""
+"""Limit of connections; a program uses one, and one per open device file."""
 
 CHUNK_BYTES = 1 << 16
 HUNG_UP = select.EPOLLHUP | select.EPOLLERR
 
 
 class I2cServer(Endpoint):
-    """All connections, as one port of a scheduler.
-
-    Attributes:
-        name: path of the socket.
-    """
+    """All connections, as one port of a scheduler; ``name`` is the path of the socket."""
 
     def __init__(self, path: Path, adapter: I2cAdapter) -> None:
-        """Listen at ``path``, whose folder is made for this user alone.
+        """Listen at ``path``; creates its folder, accessible to this user only.
 
-        Raises PortError when something lives there already, or the folder is open to others.
+        Raises PortError if ``path`` is in use, or the folder is accessible to others.
         """
         path = path.absolute()
         self.name = str(path)
@@ -52,7 +48,7 @@ class I2cServer(Endpoint):
             self._socket.bind(self.name)
         except OSError as error:
             self._socket.close()
-            raise PortError(f"can not make {path}: {_reason(error)}") from error
+            raise PortError(f"can not create {path}: {_reason(error)}") from error
         self._socket.listen(MAX_CLIENTS)
         self._socket.setblocking(False)
         self._poller = select.epoll()
@@ -60,15 +56,14 @@ class I2cServer(Endpoint):
 
     @property
     def clients(self) -> int:
-        """Connections that are open now."""
+        """Number of open connections."""
         return len(self._clients)
 
     def watched(self) -> list[tuple[int, int]]:
-        """All connections at once, and whoever comes."""
         return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Takes calls; answers go out at the end of their transfer, whenever that is."""
+        """Receive calls; answers are sent at the end of their transfers."""
         for fileno, events in self._poller.poll(0):
             client = self._clients.get(fileno)
             if client is None:
@@ -81,7 +76,7 @@ class I2cServer(Endpoint):
     def _accept(self) -> None:
         try:
             connection, _ = self._socket.accept()
-        except OSError:  # gone again
+        except OSError:  # it has gone again
             return
         fileno = connection.fileno()
         self._poller.register(fileno, select.EPOLLIN)
@@ -98,7 +93,7 @@ class I2cServer(Endpoint):
         self._clients.pop(fileno).close()
 
     def close(self) -> None:
-        """Hang up on all clients, and remove the socket."""
+        """Disconnect all clients, and remove the socket."""
         for client in self._clients.values():
             client.close()
         self._clients.clear()
@@ -109,7 +104,7 @@ class I2cServer(Endpoint):
 
 
 class _Client:
-    """One connection, with the file that it stands for."""
+    """One connection, and its device file."""
 
     def __init__(
         self,
@@ -118,7 +113,7 @@ class _Client:
         files: dict[int, DeviceFile],
         watch: Callable[[int], None],
     ) -> None:
-        """Serve ``connection``, which is watched for input; ``watch`` gets other events."""
+        """``watch`` changes the events that are polled for ``connection``."""
         self._socket = connection
         self._socket.setblocking(False)
         self._files = files
@@ -132,10 +127,9 @@ class _Client:
         self.gone = False
 
     def exchange(self, *, hung_up: bool) -> None:
-        """Send what was left, then take the next call.
+        """Send pending data, then handle the next call.
 
-        While an answer is due or unsent nothing is taken; input that comes nevertheless is not
-        watched for from then on.
+        No call is handled, and input is not polled, while an answer is due or unsent.
         """
         if self._unsent:
             self._send(b"")
@@ -149,7 +143,7 @@ class _Client:
                 continue
             if received or not self._receive():
                 break
-            received = True  # once: a client that asks as fast as it is answered is not alone
+            received = True  # once per exchange, so that a fast client does not starve others
         if not self._waiting:
             self._watch_for(select.EPOLLOUT if self._unsent else select.EPOLLIN)
 
@@ -159,7 +153,7 @@ class _Client:
             self._watch(events)
 
     def _receive(self) -> bool:
-        """Read what is there; returns whether anything came."""
+        """Read what is available; returns whether anything came."""
         try:
             data = self._socket.recv(CHUNK_BYTES)
         except BlockingIOError:
@@ -171,7 +165,7 @@ class _Client:
         return bool(data)
 
     def _take_call(self) -> bool:
-        """Start the oldest whole call; returns whether there was one."""
+        """Start the oldest complete call; returns whether there was one."""
         try:
             data = linux.take_packet(self._received, linux.MAX_REQUEST_BYTES)
             if data is None:
@@ -195,7 +189,7 @@ class _Client:
         self._waiting = False
         if not self.gone:
             self._send(linux.LENGTH.pack(len(data)) + data)
-            # There is room to write, so with a further call here it is looked at again at once.
+            # The socket is writable, so if another call was received, exchange is called at once.
             more = self._unsent or self._received
             self._watch_for(select.EPOLLOUT if more else select.EPOLLIN)
 
@@ -216,23 +210,23 @@ class _Client:
 
 
 def _make_private(folder: Path) -> None:
-    """Make ``folder`` with mode 0700, or see that it is one; raises PortError."""
+    """Create ``folder`` with mode 0700, or check an existing one; raises PortError."""
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
     except OSError as error:
-        raise PortError(f"can not make {folder}: {_reason(error)}") from error
+        raise PortError(f"can not create {folder}: {_reason(error)}") from error
     private = stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o077
     if not private or found.st_uid != os.getuid():
-        raise PortError(f"{folder} must be a folder of this user alone: chmod 700 {folder}")
+        raise PortError(f"{folder} must be a folder of this user only: chmod 700 {folder}")
 
 
 def _remove_dead(path: Path) -> None:
-    """Remove the socket of an emulation that has gone; raises PortError when it has not."""
+    """Remove the socket of an emulation that has ended; PortError for any other file."""
     if not os.path.lexists(path):
         return
     if not path.is_socket():
-        raise PortError(f"{path} exists and is no socket; choose another one")
+        raise PortError(f"{path} exists and is not a socket; choose another path")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         try:
             probe.connect(str(path))
@@ -240,11 +234,13 @@ def _remove_dead(path: Path) -> None:
             with contextlib.suppress(FileNotFoundError):
                 path.unlink()
         except OSError as error:
-            raise PortError(f"can not look at {path}: {_reason(error)}") from error
+            raise PortError(f"can not connect to {path}: {_reason(error)}") from error
         else:
-            raise PortError(f"{path} is served already; choose another bus number, or end that one")
+            raise PortError(
+                f"{path} is already in use; choose another bus number, or stop that emulation"
+            )
 
 
 def _reason(error: OSError) -> str:
-    """Its reason; Python itself raises some without an error number."""
+    """Python raises some of these errors without a number."""
     return error.strerror or str(error)

@@ -1,7 +1,7 @@
-"""SMBus transactions as I2C messages, as Linux does it for adapters that know I2C only.
+"""SMBus transactions as I2C messages, as Linux performs them on adapters with plain I2C only.
 
 SMBus 2.0, section 5.5, and its packet error code (section 5.4.1: x^8 + x^2 + x + 1, over all bytes
-of the transaction, addresses included).
+of the transaction, including addresses).
 """
 
 import errno
@@ -34,8 +34,8 @@ class Transaction:
     """One SMBus transaction.
 
     Attributes:
-        messages: what goes over the bus.
-        answers: whether the caller's data are replaced afterwards.
+        messages: the messages on the bus.
+        answers: whether the transaction returns data to the caller.
     """
 
     def __init__(self, address: int, call: SmbusCall, *, with_checksum: bool) -> None:
@@ -45,12 +45,12 @@ class Transaction:
         except ValueError:
             raise OSError(errno.EINVAL, f"SMBus size {call.size} is unknown") from None
         data = bytearray(call.data or bytes(SMBUS_DATA_BYTES))
-        if size is SmbusSize.I2C_BLOCK_BROKEN:  # a read of old programs: always 32 bytes
+        if size is SmbusSize.I2C_BLOCK_BROKEN:  # the read of old programs, always 32 bytes
             size = SmbusSize.I2C_BLOCK_DATA
             if call.direction:
                 data[0] = MAX_BLOCK_BYTES
         if size in _BLOCKS and data[0] > MAX_BLOCK_BYTES and self._sends_length(size, call):
-            raise OSError(errno.EINVAL, f"an SMBus block has 32 bytes at most, not {data[0]}")
+            raise OSError(errno.EINVAL, f"an SMBus block has at most 32 bytes, not {data[0]}")
         self._size = size
         self._data = data
         self._address = address
@@ -90,7 +90,7 @@ class Transaction:
         return [write, read]
 
     def _payload(self) -> bytearray:
-        """The caller's data, as far as they are sent."""
+        """The part of the caller's data that is sent."""
         match self._size:
             case SmbusSize.BYTE_DATA:
                 return self._data[:1]
@@ -112,15 +112,15 @@ class Transaction:
         """The caller's data after the transfer; raises OSError EBADMSG for a wrong checksum."""
         received = self.messages[-1].data
         if self._with_checksum and self.messages[-1].reading:
-            given = received.pop()
-            if checksum(self._seen(received)) != given:
+            expected = received.pop()
+            if checksum(self._wire_bytes(received)) != expected:
                 raise OSError(errno.EBADMSG, "the packet error code is wrong")
         start = 1 if self._size is SmbusSize.I2C_BLOCK_DATA else 0
         if self.answers:
             self._data[start : start + len(received)] = received
         return bytes(self._data)
 
-    def _seen(self, received: bytearray) -> Iterable[int]:
+    def _wire_bytes(self, received: bytearray) -> Iterable[int]:
         """All bytes of the transaction on the wire."""
         for message in self.messages[:-1]:
             yield message.address << 1

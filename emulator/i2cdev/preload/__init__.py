@@ -1,1 +1,1 @@
-"""A program's calls, taken by a library that is loaded into it."""
+"""Handles a program's calls by a library that is loaded into it."""

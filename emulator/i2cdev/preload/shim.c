@@ -1,10 +1,10 @@
-/* Gives a program that is linked dynamically an emulated /dev/i2c-N, by LD_PRELOAD.
+/* Provides an emulated /dev/i2c-N to a dynamically linked program, by LD_PRELOAD.
  *
- * The environment names the bus (CUBESTACK_I2C_BUS) and the emulation's socket
- * (CUBESTACK_I2C_SOCKET). An opened device file is a connection of its own, so the kernel keeps
- * count of its copies; its inode is the key under which the emulation knows it, whichever process
- * uses whichever copy. Calls go over another connection that each process makes for itself. The
- * numbers in capitals come from firmware_model/formats/linux_i2c.py when this is compiled.
+ * The environment has the number of the bus (CUBESTACK_I2C_BUS) and the emulation's socket
+ * (CUBESTACK_I2C_SOCKET). Each opened device file is a separate connection, so the kernel counts its
+ * copies; the emulation identifies it by its inode, in all processes. Calls use another connection,
+ * one per process. Constants such as MAX_MESSAGE_BYTES are defined by shim.py, from
+ * firmware_model/formats/linux_i2c.py.
  */
 
 #define _GNU_SOURCE
@@ -31,7 +31,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#define HIGH_NUMBER 500 /* where a connection of ours does not take a number that a program expects */
+#define HIGH_NUMBER 500 /* first descriptor of our connections, above those that programs expect */
 #define LISTING "/proc/bus/i2c"
 #define I2C_MAJOR 89
 
@@ -77,13 +77,13 @@ static ssize_t (*real_lgetxattr)(const char *, const char *, void *, size_t);
 static int inode_of(int fd, ino_t *inode, mode_t *mode)
 {
     struct stat found;
-    if (syscall(SYS_fstat, fd, &found)) return -1; /* fstat is ours, and old C libraries have none */
+    if (syscall(SYS_fstat, fd, &found)) return -1; /* fstat is overridden here */
     *inode = found.st_ino;
     *mode = found.st_mode;
     return 0;
 }
 
-/* The key of a device file; 0 for any other descriptor. */
+/* Key of a device file; 0 for any other descriptor. */
 static uint64_t key_of(int fd)
 {
     ino_t inode;
@@ -101,7 +101,7 @@ static uint64_t key_of(int fd)
     return key;
 }
 
-/* Whether the connection is still there: a program may close it, and use its number again. */
+/* Whether the connection still exists: a program may close it, and reuse its number. */
 static bool channel_is_ours(void)
 {
     ino_t inode;
@@ -146,7 +146,7 @@ __attribute__((constructor)) static void prepare(void)
     pthread_atfork(hold, release, forget_channel);
 }
 
-/* Whether a path, relative to a folder's descriptor, means the device file. */
+/* Whether a path, relative to a folder's descriptor, names the device file. */
 static bool is_device(int folder, const char *path)
 {
     prepare();
@@ -212,7 +212,7 @@ static int receive_all(int fd, void *buffer, size_t count)
     return 0;
 }
 
-/* This process's connection; made anew when the program closed it or took its number. */
+/* This process's connection; opened again if the program closed it or reused its number. */
 static int open_channel(void)
 {
     if (channel_is_ours()) return channel;
@@ -229,7 +229,7 @@ static int open_channel(void)
     return channel = fd;
 }
 
-/* Where the data of a reply go: message by message, or into one buffer. */
+/* Destination of a reply's data: the buffers of messages, or one buffer. */
 struct sink {
     void *buffer;
     struct i2c_msg *messages;
@@ -263,7 +263,7 @@ static int receive_data(int fd, const struct sink *sink, size_t left)
     return 0;
 }
 
-/* One call on the bus; parts[0] is left free for its head. Returns as a system call does. */
+/* Performs a call on the bus; parts[0] is reserved for its head. Returns as a system call. */
 static int perform(uint64_t key, int call, struct iovec *parts, size_t count, struct sink sink)
 {
     struct head head = {.key = key, .call = (uint8_t)call};
@@ -278,7 +278,7 @@ static int perform(uint64_t key, int call, struct iovec *parts, size_t count, st
                 !receive_data(fd, &sink, tail.length - sizeof tail.result);
     int failure = errno;
     if (!done && fd >= 0) {
-        close(fd); /* whatever is left on it belongs to this call */
+        close(fd); /* it may still carry data of this call */
         channel = -1;
         if (failure == EPIPE || failure == ECONNRESET) failure = EIO;
     }
@@ -373,7 +373,7 @@ static void describe(struct stat *found)
     found->st_blksize = 4096;
 }
 
-/* --- what programs call ----------------------------------------------------------------------- */
+/* --- overridden functions --------------------------------------------------------------------- */
 
 #define MODE_OF(flags, last)                                                                       \
     mode_t mode = 0;                                                                               \
@@ -451,7 +451,7 @@ ssize_t __read_chk(int fd, void *buffer, size_t count, size_t size)
     return read(fd, buffer, count);
 }
 
-/* i2c-tools look here for the busses. */
+/* i2c-tools read the list of busses with fopen. */
 FILE *fopen(const char *path, const char *how)
 {
     prepare();

@@ -1,4 +1,4 @@
-"""Builds the library for LD_PRELOAD once, in the user's cache folder; and what can not load it."""
+"""Builds the library for LD_PRELOAD, once, in the user's cache folder."""
 
 import hashlib
 import importlib.util
@@ -21,7 +21,7 @@ from cubestack.firmware_model.formats.linux_i2c import MAX_MESSAGE_BYTES, SMBUS_
 SOURCE = Path(__file__).with_name("shim.c")
 FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-Wall")
 LIBRARIES = ("-ldl", "-lpthread")
-"""Before glibc 2.34 these two are libraries of their own."""
+"""Separate libraries before glibc 2.34."""
 
 PT_INTERP = 3
 CLASS_64 = 2
@@ -33,7 +33,7 @@ _TYPE = struct.Struct("<I")
 
 
 def find_c_compiler() -> list[str] | None:
-    """Take ``$CC``, else one on the PATH, else the one of the ziglang wheel, else None."""
+    """``$CC``, else a compiler on the PATH, else that of the ziglang wheel, else None."""
     for candidate in (shlex.split(os.environ.get("CC", "")), ["cc"], ["gcc"], ["clang"]):
         program = shutil.which(candidate[0]) if candidate else None
         if program is not None:
@@ -47,8 +47,8 @@ def shim_library(folder: Path | None = None) -> Path:
     """The shared library, from the cache or built now; ``folder`` replaces the cache folder.
 
     Raises:
-        NoCompilerError: it is not there, and there is no C compiler.
-        CompilerError: it failed; the message names the log.
+        NoCompilerError: there is no C compiler.
+        CompilerError: the compiler failed; the message names the log.
     """
     folder = cache_folder() if folder is None else folder
     compiler = find_c_compiler()
@@ -66,13 +66,13 @@ def shim_library(folder: Path | None = None) -> Path:
     except OSError as error:
         raise CompilerError(
             f"can not use the cache folder {folder} ({error.strerror}); "
-            "XDG_CACHE_HOME names another one"
+            "set XDG_CACHE_HOME to another one"
         ) from error
     return library
 
 
 def _definitions() -> list[str]:
-    """What the source takes from the tables."""
+    """Constants of the protocol, for the C source."""
     listing = DeviceNode(0).listing.replace("i2c-0", "i2c-%d", 1)
     text = listing.replace("\t", "\\t").replace("\n", "\\n")
     return [
@@ -104,7 +104,7 @@ def _compile(compiler: list[str], library: Path, log: Path) -> None:
 def is_static(program: Path) -> bool:
     """Whether a 64-bit ``program`` has no interpreter (System V ABI, chapter 5: PT_INTERP).
 
-    False for scripts, and for whatever can not be read: the kernel will say what it thinks of it.
+    False for scripts and unreadable files; the kernel reports their errors.
     """
     try:
         with program.open("rb") as file:

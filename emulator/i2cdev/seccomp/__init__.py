@@ -1,1 +1,1 @@
-"""A program's calls, taken by seccomp user notification."""
+"""Handles a program's calls by seccomp user notification."""

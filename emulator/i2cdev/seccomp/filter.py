@@ -1,8 +1,8 @@
 """The seccomp filter that sends a program's calls to its supervisor, as classic BPF.
 
-Only what may concern the device file is sent: calls with a path in them, the ioctl requests of
-Linux's I2C devices, and calls on descriptors in the range that the supervisor gives out. All else
-runs at full speed.
+It sends only calls that may concern the device file: those with a path, the ioctl requests of
+Linux's I2C devices, and calls on descriptors in the supervisor's range. All others run at full
+speed.
 """
 
 import platform
@@ -26,7 +26,7 @@ ON_DESCRIPTOR = ("read", "write", "readv", "writev", "fstat", "dup")
 
 @dataclass(frozen=True)
 class Abi:
-    """What differs between processors.
+    """System call interface of a processor architecture.
 
     Attributes:
         audit_arch: AUDIT_ARCH_* of linux/audit.h.
@@ -42,7 +42,6 @@ class Abi:
 
 
 def _calls(table: str) -> dict[str, int]:
-    """System call numbers by name, of a text of both."""
     words = table.split()
     return {name: int(number) for name, number in zip(words[::2], words[1::2], strict=True)}
 
@@ -57,7 +56,7 @@ _GENERIC = _calls("""
     writev 66 readlinkat 78 newfstatat 79 fstat 80 statx 291 openat2 437 faccessat2 439
 """)
 
-#: By the name that the kernel gives the machine.
+#: By the kernel's name of the machine.
 ABIS = {
     "x86_64": Abi(0xC000_003E, _X86_64, 317, compact_stat=False),
     "aarch64": Abi(0xC000_00B7, _GENERIC, 277, compact_stat=True),
@@ -71,16 +70,16 @@ _X32_BIT = 0x4000_0000
 _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 _NUMBER, _ARCH, _ARGUMENT = 0, 4, 16
 
-Step = tuple[int, int, str, str]  # code, operand, label if true, label if false ("" is: go on)
+Step = tuple[int, int, str, str]  # code, operand, label if true, label if false; "": next step
 
 
 def native_abi() -> Abi | None:
-    """The ABI of this machine; None when it is not known here."""
+    """The ABI of this machine; None if it is not supported."""
     return ABIS.get(platform.machine())
 
 
 def make_filter(abi: Abi, descriptors: range) -> bytes:
-    """The program, as an array of struct sock_filter."""
+    """The filter program, as an array of struct sock_filter."""
     steps: list[Step | str] = [
         (_LOAD, _ARCH, "", ""),
         (_EQUAL, abi.audit_arch, "", "allow"),
@@ -116,7 +115,7 @@ def _each(names: Iterable[str], abi: Abi, label: str) -> list[Step | str]:
 
 
 def _low(argument: int) -> int:
-    """Offset of the low half of an argument; every machine known here is little-endian."""
+    """Offset of the low half of an argument; all supported machines are little-endian."""
     return _ARGUMENT + 8 * argument
 
 

@@ -1,8 +1,8 @@
-"""Becomes the program under a seccomp filter; run as a script, with nothing of this package.
+"""Installs a seccomp filter and becomes the program; a script without imports of this package.
 
-Arguments: descriptor of a socket, number of the seccomp call, the program and its arguments. Over
-the socket comes the filter; back go the listener's descriptor, or the text of an error. The socket
-closes when the program starts.
+Arguments: descriptor of a socket, number of the seccomp call, the program and its arguments. The
+script receives the filter on the socket, and sends back the listener's descriptor or the text of an
+error. The socket closes when the program starts.
 """
 
 import ctypes
@@ -14,7 +14,7 @@ import sys
 NO_NEW_PRIVS = 38
 SET_MODE_FILTER = 1
 NEW_LISTENER = 8
-WAIT_KILLABLE = 32  # Linux 5.19: a signal does not make the program repeat a transfer
+WAIT_KILLABLE = 32  # Linux 5.19: a signal does not restart the call, and so repeat a transfer
 FILTER_BYTES = 4096
 BYTES_PER_STEP = 8
 
@@ -26,7 +26,7 @@ class _Program(ctypes.Structure):
 def install(libc: ctypes.CDLL, number: int, steps: bytes) -> int:
     """Install the filter on this process; returns the listener's descriptor, raises OSError."""
     if libc.prctl(NO_NEW_PRIVS, 1, 0, 0, 0):
-        raise OSError(ctypes.get_errno(), "can not give up new privileges")
+        raise OSError(ctypes.get_errno(), "can not set no_new_privs")
     program = _Program(len(steps) // BYTES_PER_STEP, steps)
     for flags in (NEW_LISTENER | WAIT_KILLABLE, NEW_LISTENER):
         fd = int(libc.syscall(number, SET_MODE_FILTER, flags, ctypes.byref(program)))
@@ -37,12 +37,12 @@ def install(libc: ctypes.CDLL, number: int, steps: bytes) -> int:
 
 
 def main(link_fd: str, number: str, *command: str) -> None:
-    """Install the filter, hand the listener over, become the program."""
+    """Install the filter, send the listener, execute the program."""
     link = socket.socket(fileno=int(link_fd))
     link.set_inheritable(False)
     libc = ctypes.CDLL(None, use_errno=True)
     steps = link.recv(FILTER_BYTES)
-    for name in ("SIGPIPE", "SIGXFSZ"):  # Python ignores them
+    for name in ("SIGPIPE", "SIGXFSZ"):  # Python sets these to be ignored
         signal.signal(getattr(signal, name), signal.SIG_DFL)
     try:
         listener = install(libc, int(number), steps)

@@ -1,4 +1,4 @@
-"""A program's calls on a device file, fetched from its memory and put back into it."""
+"""Reads the arguments of a program's calls from its memory, and writes the results back."""
 
 import errno
 import struct
@@ -10,7 +10,7 @@ from cubestack.emulator.i2cdev.seccomp.notify import Notification, read_memory, 
 from cubestack.firmware_model.formats import linux_i2c as linux
 
 MAX_PARTS = 1024
-"""Parts of a vector: UIO_MAXIOV."""
+"""Limit of the parts of a vector: UIO_MAXIOV."""
 
 _RDWR = struct.Struct("=QI4x")
 _MESSAGE = struct.Struct("=HHH2xQ")
@@ -22,10 +22,10 @@ class Marshalled(NamedTuple):
     """A call for the emulated bus.
 
     Attributes:
-        call: which one.
+        call: kind of call.
         body: its packed body.
-        finish: takes result and data of the reply, puts the data into the program and returns what
-            the call returns there; raises OSError.
+        finish: receives result and data of the reply, writes the data to the program's memory and
+            returns the result of the call; raises OSError.
     """
 
     call: linux.Call
@@ -50,14 +50,14 @@ def ioctl(call: Notification) -> Marshalled:
 
 
 def read(call: Notification, *, vector: bool = False) -> Marshalled:
-    """A read; that of a ``vector`` ends short, after its first part; raises OSError."""
+    """A read; of a ``vector``, only the first part is read, as a short read. Raises OSError."""
     place, count = _first_part(call) if vector else call.arguments[1:3]
     body = linux.pack_read(min(count, linux.MAX_MESSAGE_BYTES))
     return Marshalled(linux.Call.READ, body, partial(_put, call.pid, place))
 
 
 def write(call: Notification, *, vector: bool = False) -> Marshalled:
-    """A write; that of a ``vector`` ends short, after its first part; raises OSError."""
+    """A write; of a ``vector``, only the first part is written. Raises OSError."""
     place, count = _first_part(call) if vector else call.arguments[1:3]
     data = read_memory(call.pid, place, min(count, linux.MAX_MESSAGE_BYTES))
     return Marshalled(linux.Call.WRITE, data, _nothing)
@@ -79,9 +79,7 @@ def _rdwr(call: Notification, argument: int) -> Marshalled:
     places: list[int] = []
     table = read_memory(call.pid, array, count * _MESSAGE.size)
     for address, flags, length, place in _MESSAGE.iter_unpack(table):
-        sent = (
-            length if length <= linux.MAX_MESSAGE_BYTES else 0
-        )  # too long: refused without a look
+        sent = length if length <= linux.MAX_MESSAGE_BYTES else 0  # longer ones are rejected later
         if flags & linux.MessageFlag.READ:
             sent = min(sent, 1) if flags & linux.MessageFlag.RECEIVE_LENGTH else 0
         data = read_memory(call.pid, place, sent)
@@ -106,7 +104,7 @@ def _smbus(call: Notification, argument: int) -> Marshalled:
 
 
 def _given_bytes(direction: int, size: int) -> int:
-    """How much of its data an SMBus transaction looks at before it starts, as i2c-dev does."""
+    """Number of data bytes that an SMBus transaction sends, as in i2c-dev."""
     plain_read = (
         direction == 1
         and size <= linux.SmbusSize.BLOCK_DATA

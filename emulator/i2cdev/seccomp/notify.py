@@ -1,6 +1,6 @@
-"""Seccomp user notification: the calls of a filtered process, and what it gets back.
+"""Seccomp user notification: the calls of a filtered process, and their results.
 
-linux/seccomp.h; needs Linux 5.9 for descriptors that are put into the process.
+See linux/seccomp.h; installing descriptors in the process needs Linux 5.9.
 """
 
 import ctypes
@@ -35,13 +35,13 @@ CHUNK_BYTES = 256  # most paths are shorter
 
 
 class Notification(NamedTuple):
-    """A call that waits.
+    """A pending call.
 
     Attributes:
-        id: for the answer.
-        pid: thread that called.
-        number: of the system call.
-        arguments: six of them.
+        id: identifies the call in the answer.
+        pid: calling thread.
+        number: number of the system call.
+        arguments: its six arguments.
     """
 
     id: int
@@ -54,20 +54,20 @@ class Listener:
     """The supervisor's end of a filter.
 
     Attributes:
-        fd: descriptor; readable while a call waits, hung up when all processes have ended.
-        hands_over: a caller and this process wake each other on one processor. Waking another one
-            up takes longer than the rest of a call, unless we wait there awake, as we do with
-            real-time priority.
+        fd: descriptor; readable while a call is pending, hung up when all processes have ended.
+        hands_over: whether a caller and this process wake each other on the same processor. Waking
+            up on another one would take longer than the rest of a call, except for a process that
+            busy-waits with real-time priority.
     """
 
     def __init__(self, fd: int) -> None:
-        """Take over ``fd``."""
+        """Own ``fd``."""
         self.fd = fd
         self._one_step = True
         self.hands_over = not has_priority() and self._hand_over()
 
     def _hand_over(self) -> bool:
-        """Have callers and us wake each other on one processor; returns whether it can be had."""
+        """Request wake-ups on the same processor; returns whether that is supported."""
         try:
             fcntl.ioctl(self.fd, _SET_FLAGS, _SAME_PROCESSOR)
         except OSError:  # before Linux 6.6
@@ -75,7 +75,7 @@ class Listener:
         return True
 
     def receive(self) -> Notification | None:
-        """The next call; waits for one. None when its process was killed meanwhile."""
+        """Wait for the next call; None if its process was killed meanwhile."""
         buffer = bytearray(_NOTIFICATION.size)
         try:
             fcntl.ioctl(self.fd, _RECEIVE, buffer, True)
@@ -87,7 +87,7 @@ class Listener:
         return Notification(identifier, pid, number, tuple(arguments))
 
     def waits(self, call: Notification) -> bool:
-        """Whether the caller still waits, so that its number names nobody else."""
+        """Whether the caller still waits, so that its process ID is still valid."""
         try:
             fcntl.ioctl(self.fd, _VALID, _ID.pack(call.id))
         except OSError:
@@ -95,7 +95,7 @@ class Listener:
         return True
 
     def let_pass(self, call: Notification) -> None:
-        """Let the kernel do the call as if there were no filter."""
+        """Let the kernel perform the call as without a filter."""
         self._send(_RESPONSE.pack(call.id, 0, 0, _CONTINUE))
 
     def answer(self, call: Notification, result: int) -> None:
@@ -105,7 +105,7 @@ class Listener:
     def answer_with_descriptor(
         self, call: Notification, fd: int, number: int, *, close_on_exec: bool
     ) -> None:
-        """Put a copy of ``fd`` into the process as ``number``, and let the call return that."""
+        """Install a copy of ``fd`` in the process as ``number``, which the call returns."""
         how = _AT_NUMBER | _AND_SEND if self._one_step else _AT_NUMBER
         flags = os.O_CLOEXEC if close_on_exec else 0
         try:
@@ -141,7 +141,7 @@ for _function in (_readv, _writev):
 
 
 class _Window:
-    """Moves bytes between this process and another one; its buffer is made once."""
+    """Copies bytes between this process and another one, with a reused buffer."""
 
     SIZE = 1 << 14
 
@@ -153,13 +153,13 @@ class _Window:
         self._parts = ctypes.byref(self._here), ctypes.byref(self._there)
 
     def read(self, pid: int, address: int, count: int) -> bytes:
-        """``count`` bytes of a process, at most ``SIZE``; raises OSError, EFAULT without them."""
+        """At most ``SIZE`` bytes of a process's memory; raises OSError, EFAULT if unmapped."""
         if count:
             self._move(_readv, pid, address, count)
         return self._view[:count].tobytes()
 
     def write(self, pid: int, address: int, data: bytes) -> None:
-        """Put ``data``, at most ``SIZE`` bytes, into a process; raises OSError as ``read``."""
+        """Write at most ``SIZE`` bytes to a process's memory; raises OSError as ``read``."""
         if data:
             self._view[: len(data)] = data
             self._move(_writev, pid, address, len(data))
@@ -171,7 +171,7 @@ class _Window:
         done = function(pid, here, 1, there, 1, 0)
         if done < 0:
             number = ctypes.get_errno()
-            raise OSError(number, f"can not reach process {pid}: {os.strerror(number)}")
+            raise OSError(number, f"no access to process {pid}: {os.strerror(number)}")
         if done != count:
             raise OSError(errno.EFAULT, f"process {pid} has no {count} bytes at {address:#x}")
 

@@ -1,8 +1,8 @@
-"""Answers a filtered program's calls on /dev/i2c-N; everything else the kernel does as ever.
+"""Answers a filtered program's calls on /dev/i2c-N; the kernel performs all others.
 
-An opened device file is one end of a socket pair in the program, at a number that the filter knows.
-The kernel keeps count of its copies: whichever process uses whichever copy, the inode says which
-file it is, and when the last copy is closed the other end, kept here, is hung up on.
+An opened device file is one end of a socket pair in the program, with a descriptor in the filter's
+range. The kernel counts its copies in all processes: the inode identifies the file, and when the
+last copy is closed, the other end, which is kept here, is hung up.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ from cubestack.emulator.ports.endpoint import Endpoint
 from cubestack.firmware_model.formats.linux_i2c import Call, split_reply
 
 DESCRIPTORS = 64
-"""Device files that one process can have open."""
+"""Limit of open device files per process."""
 
 PATH_BYTES = 4096
 PIDFD_GETFD = 438  # the same on all machines
@@ -44,10 +44,9 @@ class OpenFile(Protocol):
     """An opened device file on the emulated bus."""
 
     def perform(self, call: Call, body: bytes, done: Callable[[bytes], None]) -> None:
-        """Do a call; ``done`` gets the packed reply, now or later."""
+        """Perform a call; ``done`` receives the packed reply, now or later."""
 
-    def close(self) -> None:
-        """Close it."""
+    def close(self) -> None: ...
 
 
 Files = Callable[[], OpenFile]
@@ -55,7 +54,7 @@ Files = Callable[[], OpenFile]
 
 
 def descriptor_range() -> range:
-    """Where device files go: the last numbers that a process may use, and select can."""
+    """Descriptors for device files: the last ones of a process, and below select's 1024."""
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     end = 1024 if soft == resource.RLIM_INFINITY else min(soft, 1024)
     return range(max(3, end - DESCRIPTORS), end)
@@ -65,9 +64,8 @@ class Supervisor(Endpoint):
     """The filtered program's calls, as a port of a scheduler.
 
     Attributes:
-        name: what it serves.
         ended: whether every process under the filter has ended.
-        hands_over: whether callers wake this process on their own processor, and wait for it.
+        hands_over: see ``Listener``.
     """
 
     def __init__(
@@ -92,11 +90,10 @@ class Supervisor(Endpoint):
         }
 
     def watched(self) -> list[tuple[int, int]]:
-        """What the kernel tells the listener, until all processes have ended."""
         return [] if self.ended else [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Takes calls; answers go out at the end of their transfer, whenever that is."""
+        """Receive calls; answers are sent at the end of their transfers."""
         while not self.ended and (ready := self._poller.poll(0)):
             for fd, events in ready:
                 if fd != self._listener.fd:
@@ -106,10 +103,10 @@ class Supervisor(Endpoint):
                 elif (call := self._listener.receive()) is not None:
                     self._handle(call)
             if self._transfers:
-                break  # which is what the caller waits for
+                break  # the scheduler has to run the transfer
 
     def close(self) -> None:
-        """Close all device files, and let the kernel fail what is called from now on."""
+        """Close all device files; the kernel fails later calls."""
         for file, end in self._opened.values():
             end.close()
             file.close()
@@ -117,7 +114,7 @@ class Supervisor(Endpoint):
         os.close(self._listener.fd)
 
     def _forget(self, fd: int) -> None:
-        """Close the file whose last copy has been closed."""
+        """Close the file whose last copy was closed."""
         self._poller.unregister(fd)
         for inode, (file, end) in list(self._opened.items()):
             if end.fileno() == fd:
@@ -126,7 +123,7 @@ class Supervisor(Endpoint):
                 file.close()
 
     def _handle(self, call: Notification) -> None:
-        """Answer ``call``, or let it pass; whatever is wrong with it is its own problem."""
+        """Answer ``call``, or let it pass; an error is returned to the program."""
         try:
             self._handlers[call.number](call)
         except OSError as error:
@@ -165,11 +162,11 @@ class Supervisor(Endpoint):
         path: int,
         handle: Callable[[Notification, Found], None],
     ) -> None:
-        """Handle a call whose path is ours; arguments number ``path`` and ``folder`` say it."""
+        """Handle a call if its path is ours; ``path`` and ``folder`` are argument numbers."""
         try:
             text = os.fsdecode(read_text(call.pid, call.arguments[path], PATH_BYTES))
         except OSError:
-            text = ""  # the kernel will say what is wrong
+            text = ""  # the kernel will report the error
         found = None
         if self._node.may_be(text):
             start = None if folder is None else _signed(call.arguments[folder])
@@ -180,12 +177,12 @@ class Supervisor(Endpoint):
             handle(call, found)
 
     def _open(self, call: Notification, found: Found, place: int, *, how: bool = False) -> None:
-        """Argument number ``place`` has the flags, or says ``how``: where they are."""
+        """Argument number ``place`` has the flags, or with ``how`` their address."""
         flags = call.arguments[place]
         if how:
             (flags,) = _FLAGS.unpack(read_memory(call.pid, flags, _FLAGS.size))
         if flags & os.O_DIRECTORY:
-            raise OSError(errno.ENOTDIR, f"{self.name} is no folder")
+            raise OSError(errno.ENOTDIR, f"{self.name} is not a folder")
         close_on_exec = bool(flags & os.O_CLOEXEC)
         number = self._free_number(call.pid)
         if found is Found.LISTING:
@@ -202,11 +199,11 @@ class Supervisor(Endpoint):
             raise OSError(errno.ENODEV, str(error)) from error
         mine, theirs = socket.socketpair()
         with theirs:
-            # Calls that the filter can not tell (on a copy with a low number) fail, not hang.
+            # Calls that the filter does not catch (on a copy with a low number) fail, not hang.
             mine.shutdown(socket.SHUT_RD)
             theirs.setblocking(False)
             self._opened[os.fstat(theirs.fileno()).st_ino] = file, mine
-            self._poller.register(mine, 0)  # only for its hang-up
+            self._poller.register(mine, 0)  # reports only the hang-up
             self._listener.answer_with_descriptor(
                 call, theirs.fileno(), number, close_on_exec=close_on_exec
             )
@@ -214,13 +211,13 @@ class Supervisor(Endpoint):
     def _free_number(self, pid: int) -> int:
         free = set(self._descriptors) - {int(name) for name in os.listdir(f"/proc/{pid}/fd")}
         if not free:
-            raise OSError(errno.EMFILE, f"{DESCRIPTORS} device files are open already")
+            raise OSError(errno.EMFILE, f"{DESCRIPTORS} device files are already open")
         return min(free)
 
     def _stat(
         self, call: Notification, found: Found, buffer: int, *, extended: bool = False
     ) -> None:
-        if found is Found.LISTING:  # nobody looks before reading it
+        if found is Found.LISTING:  # i2c-tools only read it
             self._listener.let_pass(call)
             return
         node = self._node
@@ -231,7 +228,7 @@ class Supervisor(Endpoint):
     def _stat_at(
         self, call: Notification, flags: int, handle: Callable[[Notification, Found], None]
     ) -> None:
-        """A stat of a path, or of a descriptor when the path is empty."""
+        """A stat of a path, or of a descriptor if the path is empty."""
         if call.arguments[flags] & AT_EMPTY_PATH:
             with contextlib.suppress(OSError):
                 if not read_text(call.pid, call.arguments[1], 1):
@@ -264,7 +261,7 @@ class Supervisor(Endpoint):
     def _on_file(
         self, call: Notification, handle: Callable[[Notification, OpenFile], None]
     ) -> None:
-        """Handle a call whose descriptor, argument 0, is one of ours."""
+        """Handle a call if its descriptor, argument 0, is ours."""
         try:
             inode = os.stat(f"/proc/{call.pid}/fd/{_signed(call.arguments[0])}").st_ino
         except OSError:
@@ -297,7 +294,7 @@ class Supervisor(Endpoint):
         file.perform(marshalled.call, marshalled.body, done)
 
     def _duplicate(self, call: Notification, _file: OpenFile) -> None:
-        """Give a copy a number that the filter knows, whatever number was asked for."""
+        """Give a copy a descriptor in the filter's range, whatever number was requested."""
         fd = _take_descriptor(call.pid, _signed(call.arguments[0]))
         try:
             with_command = call.number == self._abi.calls["fcntl"]
@@ -309,7 +306,7 @@ class Supervisor(Endpoint):
 
 
 def _take_descriptor(thread: int, fd: int) -> int:
-    """A copy, here, of descriptor ``fd`` there; raises OSError."""
+    """A copy in this process of descriptor ``fd`` of ``thread``; raises OSError."""
     with open(f"/proc/{thread}/status", encoding="ascii", errors="replace") as lines:
         leader = next(int(line.split()[1]) for line in lines if line.startswith("Tgid:"))
     libc = ctypes.CDLL(None, use_errno=True)

@@ -26,7 +26,7 @@ def test_ends_are_told_in_virtual_time(kernel, adapter):
     kernel.run()
     transfer = (1 + 2 * 9 + 1) * BIT_PS
     assert told == [(0, transfer), (0, 2 * transfer)]
-    assert (adapter.busy, adapter.told) == (False, 2)
+    assert (adapter.busy, adapter.answered) == (False, 2)
 
 
 def test_ends_that_are_held(kernel, adapter):

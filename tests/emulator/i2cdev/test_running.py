@@ -19,4 +19,4 @@ def test_a_program_without_supervisor_is_served_until_it_ends(
     with closing(bus.port):
         code = running.run_program(command, 7, bus, pace="fast", route="preload", say=said.append)
     assert code == 3
-    assert said[0] == "/dev/i2c-7 by way of preload, as asked"
+    assert said[0] == "/dev/i2c-7 is served by preload, as requested"

@@ -234,10 +234,10 @@ def test_only_a_free_place_in_a_folder_of_ones_own_is_taken(served, tmp_path, se
     file = bus.with_name("file")
     file.write_text("precious")
     for path, message in (
-        (tmp_path / "open" / "bus", "of this user alone: chmod 700"),
-        (tmp_path / "link" / "new", "of this user alone"),
-        (bus, "is served already"),
-        (file, "is no socket"),
+        (tmp_path / "open" / "bus", "of this user only: chmod 700"),
+        (tmp_path / "link" / "new", "of this user only"),
+        (bus, "is already in use"),
+        (file, "is not a socket"),
         (tmp_path / ("x" * 120) / "bus", "too long"),
     ):
         with pytest.raises(PortError, match=message):

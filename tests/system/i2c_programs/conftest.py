@@ -88,7 +88,7 @@ def route(request: pytest.FixtureRequest, served: Path) -> str:
     found = start("--route", name, "--attach", served, "--", "true")
     if found.code:
         pytest.skip(f"no {name} route here: {found.err.strip()}")
-    assert found.err == f"/dev/i2c-7 by way of {name}, as asked\n"
+    assert found.err == f"/dev/i2c-7 is served by {name}, as requested\n"
     return name
 
 

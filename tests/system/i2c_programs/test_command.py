@@ -59,7 +59,7 @@ def test_preload_takes_over_where_seccomp_is_refused(route: str, served: Path) -
     outcome = start("--quiet", "--route", "seccomp", "--attach", served, "--", *inner)
     assert outcome.code == 0
     assert outcome.out.startswith("i2c-7")  # cat does not use fopen, so the outer one answers
-    assert "by way of preload, as seccomp is not there: the kernel refuses" in outcome.err
+    assert "is served by preload, as seccomp is not available: the kernel refuses" in outcome.err
 
 
 def test_processes_left_behind_are_served(run: Run, route: str, tmp_path: Path) -> None:

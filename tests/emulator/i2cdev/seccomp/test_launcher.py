@@ -50,7 +50,7 @@ def test_the_kernel_gets_the_steps_and_gives_a_listener(
 
 
 def test_what_the_kernel_refuses_is_told() -> None:
-    with pytest.raises(OSError, match="can not give up new privileges") as caught:
+    with pytest.raises(OSError, match="can not set no_new_privs") as caught:
         install(Libc("prctl"))
     assert caught.value.errno == errno.EACCES
     with pytest.raises(OSError, match=r"the kernel refuses a seccomp listener \(.*busy") as caught:
