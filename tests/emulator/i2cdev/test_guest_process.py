@@ -20,7 +20,7 @@ def start(*command: str) -> None:
 
 def test_an_unknown_machine(monkeypatch):
     monkeypatch.setattr(program, "native_abi", lambda: None)
-    with pytest.raises(program.RouteError, match="system calls of .* are not supported"):
+    with pytest.raises(program.RouteError, match=r"system calls of .* are not supported"):
         start("true")
 
 

@@ -100,7 +100,7 @@ def test_it_runs_to_a_time_and_stands_there(running: Running) -> None:
     assert arrived.result(SOON_S) == goal_ps
     assert running.ask(lambda: (running.port.held, running.kernel.now)) == (True, goal_ps)
     assert running.ticks[-1] == goal_ps - PS_PER_MS  # what happens at that time comes after it
-    with pytest.raises(ValueError, match=r"can not run to 1\.000000 s: the time is already 30\.000000 s"):
+    with pytest.raises(ValueError, match=r"the time is already 30\.000000 s"):
         running.ask(lambda: running.port.run_to(PS_PER_S))
 
 

@@ -240,7 +240,7 @@ def test_pty_takes_no_path_that_exists_and_leaves_the_line_alone(device, path, k
         path.symlink_to("/dev/null")
     heard = []
     device.uart.line = lambda data, _first, _step: heard.append(data)
-    with pytest.raises(PortError, match="pty path '.*ttyTEST' already exists; choose another"):
+    with pytest.raises(PortError, match=r"pty path '.*ttyTEST' already exists; choose another"):
         PtyEndpoint(path, device.uart)
     device.uart.send(b"x")
     assert heard == [b"x"]
@@ -274,7 +274,7 @@ def test_pty_replaces_the_link_of_a_run_that_died_and_removes_its_own_only(devic
         (LOOPBACK, 65536, r"TCP port 65536 is not in 0\.\.65535"),
         ("0.0.0.0", 0, "0.0.0.0 is open to other machines"),
         ("::", 0, ":: is open to other machines"),
-        *((host, 0, "is not an address of this machine") for host in ("", "no.such.invalid", "a" * 70)),
+        *((host, 0, "is not an address of") for host in ("", "no.such.invalid", "a" * 70)),
     ],
 )
 def test_tcp_address_that_can_not_be(device, host, port, text):
