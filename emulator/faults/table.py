@@ -233,7 +233,7 @@ def make_fault(kind: str, /, **parameters: object) -> Fault:
 
 
 def markdown_table() -> str:
-    """Every fault with its parameters, as a Markdown table: docs/faults.md holds it."""
+    """Every fault with its parameters, as a Markdown table: docs/fault-kinds.md holds it."""
     head = ("kind", "hits a", "what it does", "parameters, with range and default")
     rows = [head, ("---",) * len(head)]
     for kind, fault in FAULTS.items():

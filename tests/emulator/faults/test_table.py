@@ -11,7 +11,7 @@ from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError, Parameter
 from cubestack.emulator.faults.table import FAULTS, make_fault, markdown_table
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "faults.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "fault-kinds.md"
 PARAMETERS = [(kind, name) for kind, fault in FAULTS.items() for name in fault.parameters()]
 
 

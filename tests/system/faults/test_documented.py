@@ -1,4 +1,4 @@
-"""Every kind on every device that has it: a test shows it, and docs/faults.md says what happens."""
+"""Every kind on every device that has it: a test shows it, and docs/fault-kinds.md says what happens."""
 
 from itertools import product
 from pathlib import Path
@@ -11,7 +11,7 @@ from cubestack.emulator.faults.table import FAULTS
 from .bench import BENCHES, powered
 
 HERE = Path(__file__).parent
-DOCUMENT = HERE.parents[2] / "docs" / "faults.md"
+DOCUMENT = HERE.parents[2] / "docs" / "fault-kinds.md"
 
 Pair = tuple[str, str]
 
@@ -62,4 +62,4 @@ def test_the_document_says_what_happens_to_every_kind_on_every_device(
             injected = supported.get((kind, device))
             if FAULTS[kind].site is Site.CORE and device == "cubestar":
                 injected = True  # with own firmware, which no bench has
-            assert (bool(cell), cell == "Refused.") == (injected is not None, injected is False)
+            assert (bool(cell), cell == "Rejected.") == (injected is not None, injected is False)
