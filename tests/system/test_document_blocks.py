@@ -71,6 +71,7 @@ OTHERS |= {"", "gdb-multiarch"}  # the first one is `.`
 NOT_HERE = LEFT | {
     SERVES: "serves until Ctrl-C",
     LONG: "minutes to hours",
+    "^run --attach": "the bus of the command above it: tests/system/pasted.py",
     "--image out/": "a picture of make run: tests/system/pasted.py",
 }
 

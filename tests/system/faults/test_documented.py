@@ -1,4 +1,4 @@
-"""Every kind on every device that has it: a test shows it, and docs/fault-kinds.md says what happens."""
+"""A test shows every kind on every device that has it; docs/fault-kinds.md describes the reaction."""
 
 from itertools import product
 from pathlib import Path
