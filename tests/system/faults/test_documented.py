@@ -1,4 +1,4 @@
-"""A test shows every kind on every device that has it; docs/fault-kinds.md describes the reaction."""
+"""A test shows every kind on every device that has it; docs/fault-kinds.md says what follows."""
 
 from itertools import product
 from pathlib import Path
