@@ -67,7 +67,7 @@ def section(text: str, heading: str) -> str:
     ],
 )
 def test_every_key_of_a_scene_is_documented(tmp_path: Path, heading: str, scene: str) -> None:
-    part = section(text_of("docs/scenes.md"), heading)
+    part = section(text_of("docs/scene-keys.md"), heading)
     firsts = [row.split("|")[1] for row in part.splitlines() if row.startswith("| `")]
     with pytest.raises(SceneError, match="unknown key 'colour'; allowed are") as raised:
         load(tmp_path, f"{scene}\ncolour = 1")
@@ -85,7 +85,7 @@ def test_every_key_of_a_scene_is_documented(tmp_path: Path, heading: str, scene:
     ],
 )
 def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ...]) -> None:
-    part = section(text_of("docs/scenes.md"), heading)
+    part = section(text_of("docs/scene-keys.md"), heading)
     checked = 0
     for row in part.splitlines():
         cells = [cell.strip() for cell in row.split("|")]
@@ -117,7 +117,7 @@ def hazard_rows(hazard: type[Hazard]) -> list[str]:
 
 
 def test_every_key_of_every_hazard_is_documented() -> None:
-    part = section(text_of("docs/scenes.md"), "Keys of `hazards`")
+    part = section(text_of("docs/scene-keys.md"), "Keys of `hazards`")
     light = [*SKY_HAZARDS.values(), *EARTH_HAZARDS.values()]
     hazards: list[type[Hazard]] = [*light, *SENSOR_HAZARDS.values()]
     expected = [row for hazard in hazards for row in hazard_rows(hazard)]
@@ -140,7 +140,7 @@ def test_the_curves_of_hazards_are_of_their_scales() -> None:
 
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
     examples = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
-    device, sky, night, hard, picture, earth, ball = examples
+    sky, night, hard, picture, earth, ball, device = examples
     scene = load(tmp_path, device + sky).scene
     assert {*tomllib.loads(device)} == {*DEVICE_KEYS}
     assert isinstance(scene, SkyScene)

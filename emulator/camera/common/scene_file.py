@@ -10,7 +10,7 @@
     [atmosphere]                   # what the stars are seen through
     latitude_deg = -33.9
     sidereal_deg = 200.0           # right ascension of the zenith at time 0
-    [hazards.moon]                 # see docs/scenes.md
+    [hazards.moon]                 # see docs/scene-keys.md
     direction = [90.0, -10.0]
 
     kind = "picture"

@@ -24,7 +24,7 @@ DOCUMENT = Path(__file__).parents[3] / "docs" / "scenes.md"
 EXAMPLES = [
     one
     for one in re.findall(r"```toml\n(.*?)```", DOCUMENT.read_text("utf-8"), re.DOTALL)
-    if "kind" in one and '"picture"' not in one
+    if "kind =" in one and '"picture"' not in one
 ]
 HARD = """kind = "earth-sun"
 moon = [0.2, 0.5, 1.0]
