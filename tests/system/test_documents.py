@@ -261,10 +261,10 @@ def test_reasons_of_aramis_page_are_those_of_the_interface() -> None:
     assert {*named} <= Reason.__members__.keys()
 
 
-def test_cubesense_s_memory_is_that_of_its_profiles_page(run: Run) -> None:
+def test_cubesense_s_memory_is_that_of_the_page_of_switches(run: Run) -> None:
     table = run("memory", "cubesense", "--profile", "published").out
     ram, flash = re.findall(r"\*\*all, of \d+\*\* \| \*\*(\d+)", table)
-    assert f"{ram} of 1536 bytes of RAM in use, and {flash} bytes" in text_of("docs/profiles.md")
+    assert f"{ram} of 1536 bytes of RAM in use, and {flash} bytes" in text_of("docs/switches.md")
 
 
 def test_figures_of_cubesense_s_page() -> None:
