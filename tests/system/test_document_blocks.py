@@ -218,5 +218,5 @@ def test_faults_are_made_as_their_page_says() -> None:
 @pytest.mark.slow
 def test_hazards_are_measured_as_their_page_says() -> None:
     names: dict[str, Any] = {"cubestack": cubestack}
-    exec(python_of("hazards.md", "frames = "), names)
+    exec(python_of("hard-skies.md", "frames = "), names)
     assert len(names["frames"]) == 20
