@@ -111,7 +111,7 @@ class CompiledEngine(RtlEngine):
     @property
     def driver(self) -> Driver | None:
         """The driver's functions, always the same object; None while an upset is pending."""
-        return None if self._later else self._functions
+        return None if self._upsets else self._functions
 
     @cached_property
     def _functions(self) -> Driver:
