@@ -21,25 +21,28 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from cubestack.emulator.boards.contract import SerialLine
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.scheduler import open_scheduler
+from cubestack.emulator.i2cdev.server import I2cServer
+from cubestack.emulator.ports.control import ControlPort
+from cubestack.emulator.ports.lifeline import Lifeline
+from cubestack.emulator.ports.serial_port import SerialPort
+from cubestack.emulator.scene.orbit_file import load_orbit
 from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from cubestack.host.emulation.history import Past
+from cubestack.host.emulation.orbit import follow
 from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.options import flag
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import busy, progress, say
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.contract import SerialLine
-    from cubestack.emulator.ports.control import ControlPort
-    from cubestack.emulator.ports.serial_port import SerialPort
-    from cubestack.firmware_model.formats.setup import Setup
 
 ONE_DEVICE = (
     *("scene", "faults", "record", "trace", "set"),
@@ -99,11 +102,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.i2cdev.scheduler import open_scheduler
-    from cubestack.emulator.i2cdev.server import I2cServer
-    from cubestack.emulator.ports.lifeline import Lifeline
-
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
     if len(args.devices) > 1:
@@ -192,9 +190,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _fly(path: Path, opened: list[AnyEmulated]) -> None:
     """Have all see what there is on the orbit of a file."""
-    from cubestack.emulator.scene.orbit_file import load_orbit
-    from cubestack.host.emulation.orbit import follow
-
     orbit = load_orbit(path)
     try:
         follow(orbit, opened)
@@ -215,7 +210,7 @@ def _listen(emulated: AnyEmulated) -> None:
 
 
 def _past(
-    args: argparse.Namespace, opened: list[AnyEmulated], setups: "Sequence[Setup]", stack: ExitStack
+    args: argparse.Namespace, opened: list[AnyEmulated], setups: Sequence[Setup], stack: ExitStack
 ) -> Past | str:
     """What is kept of all that is done; or why nothing is by which one could go back."""
     given = [flag(name) for name in FORWARD_ONLY if getattr(args, name) is not None]
@@ -233,14 +228,13 @@ def _past(
 def _control(
     args: argparse.Namespace,
     opened: Sequence[AnyEmulated],
-    served: "Sequence[tuple[AnyEmulated, SerialLine, SerialPort]]",
+    served: Sequence[tuple[AnyEmulated, SerialLine, SerialPort]],
     past: Past | str,
     stack: ExitStack,
-) -> "ControlPort | None":
+) -> ControlPort | None:
     """The control port, served in a thread, if there is to be one."""
     if args.control is None:
         return None
-    from cubestack.emulator.ports.control import ControlPort
     from cubestack.host.ground.control_api import control_app
     from cubestack.host.ground.emulation import Emulation
     from cubestack.host.ground.guard import Guard, new_token

@@ -13,14 +13,17 @@ examples:
 import argparse
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from cubestack.hdl.flow.area_report import area_json, area_table, areas
+from cubestack.hdl.flow.top import TopTable, counted, tops_in
+from cubestack.hdl.flow.verilog import verilog_file
+from cubestack.hdl.proofs.prover import Proof
+from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
 from cubestack.host.cli.arguments import Parser
+from cubestack.host.cli.waveform import find, show
 from cubestack.host.devices.registry import devices
-
-if TYPE_CHECKING:
-    from cubestack.hdl.flow.top import TopTable
-    from cubestack.hdl.proofs.prover import Proof
+from cubestack.host.terminal import progress, tell
 
 Entry = TypeVar("Entry")
 
@@ -65,18 +68,18 @@ examples:
   cubestack hdl wave whole_frame --text --internal --last 50"""
 
 
-def _all_tops() -> "TopTable":
+def _all_tops() -> TopTable:
     return {name: top for device in devices() for name, top in device.tops().items()}
 
 
-def _all_proofs() -> "Mapping[str, Proof]":
+def _all_proofs() -> Mapping[str, Proof]:
     return {name: proof for device in devices() for name, proof in device.proofs().items()}
 
 
 def add_arguments(
     parser: argparse.ArgumentParser,
-    tops: "Callable[[], TopTable]" = _all_tops,
-    proofs: "Callable[[], Mapping[str, Proof]]" = _all_proofs,
+    tops: Callable[[], TopTable] = _all_tops,
+    proofs: Callable[[], Mapping[str, Proof]] = _all_proofs,
 ) -> None:
     """Declare the subcommands and their options, for these tops and proofs."""
     parser.set_defaults(tops=tops, proofs=proofs)
@@ -128,10 +131,6 @@ def _chosen(table: Mapping[str, Entry], names: list[str], kind: str) -> dict[str
 
 
 def _area(args: argparse.Namespace) -> int:
-    from cubestack.hdl.flow.area_report import area_json, area_table, areas
-    from cubestack.hdl.flow.top import counted
-    from cubestack.host.terminal import progress
-
     table = _chosen(counted(args.tops()), args.names, "design of one FPGA")
     counting = areas(table, args.ice40, args.fmax)
     rows = list(progress(counting, len(table), "designs", quiet=args.json))
@@ -140,9 +139,6 @@ def _area(args: argparse.Namespace) -> int:
 
 
 def _verilog(args: argparse.Namespace) -> int:
-    from cubestack.hdl.flow.top import tops_in
-    from cubestack.hdl.flow.verilog import verilog_file
-
     (top,) = _chosen(tops_in(args.tops()), [args.top], "top").values()
     text = verilog_file(args.top, top)
     if args.out is None:
@@ -153,9 +149,6 @@ def _verilog(args: argparse.Namespace) -> int:
 
 
 def _prove(args: argparse.Namespace) -> int:
-    from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
-    from cubestack.host.terminal import progress, tell
-
     chosen = _chosen(args.proofs(), args.names, "proof")
     done = []
     for verdict in progress(verdicts(chosen), len(chosen), "proofs", quiet=args.json):
@@ -174,8 +167,6 @@ def _count(text: str) -> int:
 
 
 def _wave(args: argparse.Namespace) -> int:
-    from cubestack.host.cli.waveform import find, show
-
     for line in show(find(args.folder, args.test), args.last, args.internal, args.text):
         print(line)
     return 0

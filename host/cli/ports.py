@@ -5,16 +5,16 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from cubestack.emulator.boards.contract import SerialLine
+from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
+from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
+from cubestack.emulator.ports.serial_port import SerialPort
+from cubestack.emulator.ports.tcp import TcpEndpoint
 from cubestack.host.cli.arguments import whole
 from cubestack.host.devices.registry import device_names
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.terminal import say
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.contract import SerialLine
-    from cubestack.emulator.ports.serial_port import SerialPort
 
 LOOPBACK = "127.0.0.1"
 LAST_PORT = 65535
@@ -66,16 +66,12 @@ def check_linux() -> None:
 
 def open_ports(
     args: argparse.Namespace, devices: Sequence[AnyEmulated], stack: ExitStack
-) -> "list[tuple[AnyEmulated, SerialLine, SerialPort]]":
+) -> list[tuple[AnyEmulated, SerialLine, SerialPort]]:
     """A port for each serial line of each device, in order; ``stack`` closes them.
 
     Raises ValueError when there are not enough ports from the given one on, or a strict line is
     wanted of a TCP port; PortError when one does not open.
     """
-    from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
-    from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
-    from cubestack.emulator.ports.tcp import TcpEndpoint
-
     if args.strict_line and args.tcp is not None:
         raise ValueError("--strict-line: a TCP client sets no baud rate; use --pty or --rfc2217")
     if args.listen != LOOPBACK and args.tcp is args.rfc2217 is args.control is None:

@@ -19,6 +19,7 @@ import json
 from contextlib import ExitStack
 from pathlib import Path
 
+from cubestack.emulator.recording.replay import SETTLE_PS, Replay
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.cli.arguments import typed
 from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
@@ -46,8 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay and report."""
-    from cubestack.emulator.recording.replay import SETTLE_PS, Replay
-
     span = _span(args)
     recording = load_recording(args.recording)
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)

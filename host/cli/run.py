@@ -18,8 +18,11 @@ import shutil
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.i2cdev.guest_process import RouteError
+from cubestack.emulator.i2cdev.running import HostBus, attached_bus, emulated_bus, run_program
+from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.host.cli import device_options
 from cubestack.host.cli.arguments import whole
@@ -27,9 +30,6 @@ from cubestack.host.cli.ports import check_linux
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.terminal import busy, say
-
-if TYPE_CHECKING:
-    from cubestack.emulator.i2cdev.running import HostBus
 
 DEFAULT_BUS = 7
 STANDARD_HZ = 100_000
@@ -97,9 +97,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the program; returns its exit code."""
-    from cubestack.emulator.i2cdev.guest_process import RouteError
-    from cubestack.emulator.i2cdev.running import attached_bus, run_program
-
     check_linux()
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")
@@ -122,12 +119,8 @@ def run(args: argparse.Namespace) -> int:
             raise OSError(str(error)) from None
 
 
-def _emulated(args: argparse.Namespace, stack: ExitStack) -> "HostBus":
+def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
     """Power up the devices on one bus."""
-    from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.i2cdev.running import emulated_bus
-    from cubestack.emulator.sim.virtual_time import PS_PER_S
-
     names = args.device or device_names()[:1]
     if len(names) > 1 and (args.scene or args.faults):
         raise ValueError("--scene and --faults are of one device, and several are on the bus")

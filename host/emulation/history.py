@@ -7,8 +7,13 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.emulator.faults.plan import Plan, parse_plan
+from cubestack.emulator.i2cdev.adapter import I2cAdapter
+from cubestack.emulator.ports.serial_port import SerialPort
+from cubestack.emulator.recording.recorder import Recorder
+from cubestack.emulator.recording.replay import Replay
 from cubestack.firmware_model.formats.recording import BusTransfer, Recording, load_recording
 from cubestack.firmware_model.formats.setup import Setup
 from cubestack.host.devices.device import AnyDevice, Engine
@@ -18,13 +23,6 @@ from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from cubestack.host.emulation.records import create_file, start_recorder
 from cubestack.host.recording.setups import written
 from cubestack.host.terminal import say
-
-if TYPE_CHECKING:
-    from cubestack.emulator.faults.plan import Plan
-    from cubestack.emulator.i2cdev.adapter import I2cAdapter
-    from cubestack.emulator.ports.serial_port import SerialPort
-    from cubestack.emulator.recording.recorder import Recorder
-    from cubestack.emulator.recording.replay import Replay
 
 
 @dataclass(frozen=True)
@@ -41,8 +39,6 @@ class Recipe:
     @classmethod
     def of(cls, recording: Recording, setup: Setup) -> Recipe:
         """From a recording's header and the ``setup`` to take; ValueError for what is unknown."""
-        from cubestack.emulator.faults.plan import parse_plan
-
         found = device(recording.device)
         options: dict[str, Any] = dict(setup.options)
         made = recording.setup
@@ -192,8 +188,6 @@ def _replay(
     recording: Recording, made: AnyEmulated, act: Callable[[Any], None], *, alone: bool
 ) -> Replay:
     """Play a recording's host; of a shared bus, all have its transfers, and one plays them."""
-    from cubestack.emulator.recording.replay import Replay
-
     if not alone:
         own = tuple(one for one in recording.events if not isinstance(one, BusTransfer))
         recording = replace(recording, events=own)

@@ -13,14 +13,14 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.emulator.native.cache import Wanted, noted
+from cubestack.emulator.native.compiler import Compiler
+from cubestack.emulator.native.ready_made import FOLDER, TARGETS, keep
 from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.emulation.emulated import open_device
-
-if TYPE_CHECKING:
-    from cubestack.emulator.native.cache import Wanted
 
 
 def choices() -> Iterator[tuple[str, dict[str, Any]]]:
@@ -36,8 +36,6 @@ def choices() -> Iterator[tuple[str, dict[str, Any]]]:
 
 def needed() -> list[Wanted]:
     """The libraries that the devices ask for, each once."""
-    from cubestack.emulator.native.cache import noted
-
     with noted() as wanted:
         for name, options in choices():
             with suppress(ValueError), open_device(name, **options):  # some make no sense alone
@@ -47,8 +45,6 @@ def needed() -> list[Wanted]:
 
 def make(wanted: Iterable[Wanted], folder: Path, tell: Callable[[str], None]) -> None:
     """Build all for all machines into ``folder``, and remove what else is there."""
-    from cubestack.emulator.native.ready_made import TARGETS
-
     folder.mkdir(exist_ok=True)
     with ThreadPoolExecutor() as threads:
         jobs = [(machine, one) for one in wanted for machine in TARGETS]
@@ -61,9 +57,6 @@ def make(wanted: Iterable[Wanted], folder: Path, tell: Callable[[str], None]) ->
 
 
 def _make(folder: Path, job: tuple[str, Wanted]) -> Path:
-    from cubestack.emulator.native.compiler import Compiler
-    from cubestack.emulator.native.ready_made import TARGETS, keep
-
     machine, wanted = job
     target = (sys.executable, "-m", "ziglang", "c++", "-target", TARGETS[machine], "-s")
     with tempfile.TemporaryDirectory() as scratch:
@@ -74,8 +67,6 @@ def _make(folder: Path, job: tuple[str, Wanted]) -> Path:
 
 def main() -> None:
     """Make them all."""
-    from cubestack.emulator.native.ready_made import FOLDER
-
     make(needed(), FOLDER, print)
 
 

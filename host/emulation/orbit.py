@@ -1,11 +1,13 @@
 """Devices on one satellite: what their cameras see follows its orbit, in virtual time."""
 
 from collections.abc import Generator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from cubestack.emulator.scene.orbit import Orbit
-    from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.emulator.scene.earth_sun import EarthSunScene
+from cubestack.emulator.scene.orbit import Orbit
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.host.emulation.emulated import AnyEmulated
 
 INTERVAL_S = 0.125
 """Virtual time from one look at the orbit to the next.
@@ -15,7 +17,7 @@ half an interval's 0.06 deg/s at most: 0.004 deg, far below what a sun and nadir
 """
 
 
-def follow(orbit: "Orbit", devices: "Sequence[AnyEmulated]") -> None:
+def follow(orbit: Orbit, devices: Sequence[AnyEmulated]) -> None:
     """Have all ``devices``, which share their virtual time, see what there is on ``orbit``.
 
     ValueError names a device that looks at neither sky nor Earth, a mounting without a device, and
@@ -33,25 +35,20 @@ def follow(orbit: "Orbit", devices: "Sequence[AnyEmulated]") -> None:
 
 
 def _following(
-    orbit: "Orbit", devices: "Sequence[AnyEmulated]", kernel: Any
-) -> "Generator[Any, Any, None]":
-    from cubestack.emulator.sim.virtual_time import PS_PER_S
-
+    orbit: Orbit, devices: Sequence[AnyEmulated], kernel: Any
+) -> Generator[Any, Any, None]:
     while True:
         yield kernel.timeout(round(INTERVAL_S * PS_PER_S))
         _look(orbit, devices)
 
 
-def _look(orbit: "Orbit", devices: "Sequence[AnyEmulated]") -> None:
+def _look(orbit: Orbit, devices: Sequence[AnyEmulated]) -> None:
     for one in devices:
         one.scene = _seen(orbit, one)
 
 
-def _seen(orbit: "Orbit", device: "AnyEmulated") -> Any:
+def _seen(orbit: Orbit, device: AnyEmulated) -> Any:
     """What a device sees from now on, with all else of its scene as it is."""
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
-    from cubestack.emulator.scene.sky import SkyScene
-
     given = device.scene
     scene = getattr(given, "scene", given)  # a view's
     if isinstance(scene, SkyScene):

@@ -8,11 +8,20 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+from cubestack.emulator.scene.attitude import (
+    attitude_error_deg,
+    matrix_from_quaternion,
+    quaternion_from_matrix,
+    random_quaternion,
+)
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.clients.quality import AttitudeQuality
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result, Section
@@ -21,9 +30,6 @@ from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
 from cubestack.host.pictures.campaigns import sky_map
-
-if TYPE_CHECKING:
-    from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3
@@ -67,19 +73,15 @@ class SkyOptions(MeasureOptions):
 
 def random_view(
     options: SkyOptions,
-    condition: "SkyCondition",
+    condition: SkyCondition,
     rng: np.random.Generator,
     time_s: float = 0.0,
     **more: Any,
-) -> "SkyView":
+) -> SkyView:
     """A sky as the options say, at a random pose, and the camera; ``more`` as the scene has it.
 
     ``time_s`` is about when it will be exposed.
     """
-    from cubestack.emulator.camera.common.view import SkyView
-    from cubestack.emulator.scene.attitude import random_quaternion
-    from cubestack.emulator.scene.sky import SkyScene
-
     scene = SkyScene(
         quaternion=random_quaternion(rng),
         mag_limit=options.mag_limit,
@@ -95,8 +97,6 @@ def rough_boresight(
     truth: NDArray[np.float64], error_deg: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """A boresight (3,) at most ``error_deg`` from the true attitude's, uniform over that cap."""
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion
-
     matrix = matrix_from_quaternion(truth)
     away = np.radians(error_deg) * np.sqrt(rng.random())
     side = rng.random() * 2 * np.pi
@@ -106,8 +106,6 @@ def rough_boresight(
 
 def errors(measured: NDArray[np.floating[Any]], truth: NDArray[np.float64]) -> tuple[float, float]:
     """Errors across and about the boresight, degrees; of quaternions (4,), scalar last."""
-    from cubestack.emulator.scene.attitude import attitude_error_deg
-
     return attitude_error_deg(measured, truth)
 
 
@@ -140,8 +138,6 @@ def axis_errors_deg(
     measured: NDArray[np.floating[Any]], truth: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Rotation vector (3,) from reported to true camera axes, of quaternions (4,); 0 to 180 deg."""
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_matrix
-
     turn = matrix_from_quaternion(truth) @ matrix_from_quaternion(measured).T
     *axis, cosine = quaternion_from_matrix(turn)
     sine = float(np.linalg.norm(axis))
@@ -176,9 +172,6 @@ def count_wrong(hipparcos: Sequence[int], directions: ArrayLike, truth: NDArray[
         directions: where they were seen, shape (n, 3), any length, in camera axes.
         truth: quaternion (4,).
     """
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion
-    from cubestack.emulator.scene.hipparcos import load_sky
-
     if not hipparcos:
         return 0
     sky = load_sky()

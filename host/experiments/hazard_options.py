@@ -2,19 +2,27 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.camera.common.exposure import looking_along
+from cubestack.emulator.camera.common.hazards import HAZARDS
+from cubestack.emulator.camera.common.hazards.contract import SensorHazard
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.ov7620.light import looking_with
+from cubestack.emulator.camera.ov7620.view import EarthSunView
+from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.hazards import (
+    EARTH_HAZARDS,
+    SKY_HAZARDS,
+    EarthHazard,
+    Looking,
+    SkyHazard,
+)
+from cubestack.emulator.scene.hazards.hazard import Hazard
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.options import Kind, option
-
-if TYPE_CHECKING:
-    from cubestack.emulator.camera.common.hazards.contract import SensorHazard
-    from cubestack.emulator.camera.common.view import SkyView
-    from cubestack.emulator.camera.ov7620.view import EarthSunView
-    from cubestack.emulator.scene.earth_sun import Target
-    from cubestack.emulator.scene.hazards import Looking, SkyHazard
-    from cubestack.emulator.scene.hazards.hazard import Hazard
 
 
 @dataclass(frozen=True)
@@ -53,11 +61,8 @@ def hazard_option() -> Any:
     )
 
 
-def known() -> "Mapping[str, type[Hazard]]":
+def known() -> Mapping[str, type[Hazard]]:
     """All hazards of light, of sensor and lens, and of an Earth below, by name."""
-    from cubestack.emulator.camera.common.hazards import HAZARDS
-    from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
-
     return {**SKY_HAZARDS, **EARTH_HAZARDS, **HAZARDS}
 
 
@@ -67,7 +72,6 @@ def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
     """
     if not asked:
         return
-    from cubestack.emulator.scene.hazards import EARTH_HAZARDS
 
     kinds = {name: kind for name, kind in known().items() if earth or name not in EARTH_HAZARDS}
     for one in asked:
@@ -83,12 +87,9 @@ def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
 
 
 def _placed(
-    asked: Sequence[Asked], looking: "Looking", rng: np.random.Generator
-) -> "tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]":
+    asked: Sequence[Asked], looking: Looking, rng: np.random.Generator
+) -> tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]:
     """Hazards of light, and those of sensor and lens, drawn for one frame."""
-    from cubestack.emulator.camera.common.hazards.contract import SensorHazard
-    from cubestack.emulator.scene.hazards.contract import SkyHazard
-
     kinds = known()
     placed = [
         kinds[one.name].placed(
@@ -102,12 +103,9 @@ def _placed(
 
 
 def with_hazards(
-    view: "SkyView", asked: Sequence[Asked], rng: np.random.Generator, time_s: float = 0.0
-) -> "SkyView":
+    view: SkyView, asked: Sequence[Asked], rng: np.random.Generator, time_s: float = 0.0
+) -> SkyView:
     """The view of a sky with these hazards; ``time_s`` is about when it will be exposed."""
-    from cubestack.emulator.camera.common.exposure import looking_along
-    from cubestack.emulator.scene.sky import SkyScene
-
     scene, condition = view.scene, view.condition
     if not asked or not isinstance(scene, SkyScene):
         return view
@@ -121,12 +119,9 @@ def with_hazards(
 
 
 def around_earth(
-    view: "EarthSunView", camera: "Target", asked: Sequence[Asked], rng: np.random.Generator
-) -> "EarthSunView":
+    view: EarthSunView, camera: Target, asked: Sequence[Asked], rng: np.random.Generator
+) -> EarthSunView:
     """The view of Earth and Sun with these hazards, as far as they concern ``camera``."""
-    from cubestack.emulator.camera.ov7620.light import looking_with
-    from cubestack.emulator.scene.hazards import EarthHazard
-
     if not asked:
         return view
     scene, condition = view.scene, view.condition

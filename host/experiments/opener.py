@@ -3,15 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic
+from typing import Any, Generic
 
+from cubestack.emulator.faults.plan import Plan, load_plan
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, Switches
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device, Engine, Shown
 from cubestack.host.emulation.emulated import EmulatedDevice, power_up
 from cubestack.host.options import PLAN, SCENE, Options, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.faults.plan import Plan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +19,7 @@ class MeasureOptions(Options):
     scene: Any = option(None, "TOML scene; default: a random one", SCENE, metavar="FILE")
     frames: int = option(1, "number of frames (default 1)", whole(1))
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    faults: "Path | Plan | None" = option(
+    faults: Path | Plan | None = option(
         None, "TOML plan of faults, with their seed (see docs/faults.md)", PLAN, metavar="FILE"
     )
 
@@ -60,15 +58,13 @@ class Opener(Generic[BoardT_co, ClientT_co]):
         return not self.board.get("firmware") and self.switches.profile != DEFAULT_PROFILE
 
     def __call__(
-        self, scene: Any, *, seed: int, faults: "Path | Plan | None" = None, **options: Any
+        self, scene: Any, *, seed: int, faults: Path | Plan | None = None, **options: Any
     ) -> EmulatedDevice[BoardT_co, ClientT_co]:
         """The device, looking at ``scene``, with a plan of faults, or that in a file, injected.
 
         ``options`` are keywords of its board that the experiment decides. Raises ValueError for a
         scene or a plan that makes no sense.
         """
-        from cubestack.emulator.faults.plan import load_plan
-
         plan = load_plan(faults) if isinstance(faults, Path) else faults
         emulated = power_up(
             self.device, scene, seed=seed, engine=self.engine, **{**self.board, **options}

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.scene.attitude import matrix_from_quaternion
+from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.host.pictures.images import TrueStar
 from cubestack.host.pictures.sheet import Lens
 
@@ -21,9 +23,6 @@ def true_stars(
         shape: of the picture.
         within_deg: angle from the boresight beyond which a shade keeps light away, at most 90.
     """
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion
-    from cubestack.emulator.scene.hipparcos import load_sky
-
     sky = load_sky(mag_limit=BRIGHT)
     seen = sky.vectors @ matrix_from_quaternion(quaternion).T
     ahead = seen[:, 2] > max(0.0, float(np.cos(np.radians(within_deg))))

@@ -2,19 +2,20 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.scene.form import SceneForm
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.sky import EPOCHS
+from cubestack.emulator.scene.toml_text import toml_text
 from cubestack.firmware_model.formats.setup import Document
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.errors import TargetError
 from cubestack.host.pictures.star_names import is_named, star_name
 from cubestack.host.recording.setups import written
-
-if TYPE_CHECKING:
-    from cubestack.emulator.scene.form import SceneForm
 
 JsonObject = dict[str, Any]
 
@@ -56,8 +57,6 @@ def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:
 
 def text_of(table: Mapping[str, Any]) -> str:
     """The text of a scene file that has ``table``; ValueError for what no file has."""
-    from cubestack.emulator.scene.toml_text import toml_text
-
     return toml_text(table)
 
 
@@ -68,9 +67,6 @@ def stars(mag_limit: float, epoch: float) -> JsonObject:
 
     ValueError for a limit above `FAINTEST`, or an epoch that scenes can not have.
     """
-    from cubestack.emulator.scene.hipparcos import load_sky
-    from cubestack.emulator.scene.sky import EPOCHS
-
     if not mag_limit <= FAINTEST:
         raise ValueError(f"mag_limit is {FAINTEST:g} at most, not {mag_limit:g}")
     if not EPOCHS[0] <= epoch <= EPOCHS[1]:
@@ -93,7 +89,7 @@ def stars(mag_limit: float, epoch: float) -> JsonObject:
     }
 
 
-def _form(device: AnyDevice) -> "SceneForm[Any]":
+def _form(device: AnyDevice) -> SceneForm[Any]:
     if device.scene_form is None:
         raise TargetError(f"{device.title} does not tell the keys of its scenes")
     return device.scene_form()

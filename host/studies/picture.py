@@ -15,10 +15,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from cubestack.emulator.camera.common.star_sensor import StarSensor
+from cubestack.emulator.camera.common.view import View
+from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.cli.arguments import typed, whole
+from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.options import between
+from cubestack.host.pictures.images import save_picture
+from cubestack.host.pictures.stretch import SKY, stretched
 from cubestack.host.terminal import say
 
 ANGLES = {
@@ -45,11 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make it; returns 0."""
-    from cubestack.emulator.camera.common.star_sensor import StarSensor
-    from cubestack.host.clients.quaternions import pointing_deg
-    from cubestack.host.pictures.images import save_picture
-    from cubestack.host.pictures.stretch import SKY, stretched
-
     if args.out.suffix.lower() != ".png":
         raise ValueError(f"--out must end in .png, not be {args.out}")
     with open_device(args.device, _scene(args), seed=args.seed) as emulated:
@@ -73,10 +75,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _scene(args: argparse.Namespace) -> Any:
     """The scene, with the pose that was asked for; ValueError where there is none."""
-    from cubestack.emulator.camera.common.view import View
-    from cubestack.emulator.scene.attitude import quaternion_from_pointing
-    from cubestack.emulator.scene.sky import SkyScene
-
     if (args.ra is None) != (args.dec is None) or (args.ra is None and args.roll is not None):
         raise ValueError("a pose needs both --ra and --dec")
     if args.ra is None and args.scene is None:

@@ -19,11 +19,20 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.aramis.board import AramisBoard
+from cubestack.emulator.boards.aramis.catalogue import onboard_database
+from cubestack.emulator.camera.common.scene_file import load_scene
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView, View
+from cubestack.emulator.camera.mt9m001.lens import double_gauss
+from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
+from cubestack.emulator.scene.attitude import matrix_from_quaternion
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras import mt9m001
 from cubestack.host.clients.aramis.client import Aramis, Star
@@ -32,10 +41,6 @@ from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.aramis.board import AramisBoard
-    from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 
 AramisOpener: TypeAlias = "Opener[AramisBoard, Aramis]"
 _Emulated: TypeAlias = "EmulatedDevice[AramisBoard, Aramis]"
@@ -166,11 +171,6 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
         yield f"wrong by appendix E's criterion, a triangle more than a field away: {far:.1f} %"
 
     def run(self, opened: AramisOpener, options: AramisOptions) -> Iterator[AramisResult]:
-        from cubestack.emulator.boards.aramis.catalogue import onboard_database
-        from cubestack.emulator.camera.common.view import SkyCondition
-        from cubestack.emulator.camera.mt9m001.lens import double_gauss
-        from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
-
         rng = np.random.default_rng(options.seed)
         condition = SkyCondition(double_gauss(options.field))
         with opened(
@@ -198,12 +198,8 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
 
 
 def _view(
-    options: AramisOptions, condition: "SkyCondition", rng: np.random.Generator, time_s: float = 0.0
-) -> "SkyView":
-    from cubestack.emulator.camera.common.scene_file import load_scene
-    from cubestack.emulator.camera.common.view import SkyView, View
-    from cubestack.emulator.scene.sky import PictureScene
-
+    options: AramisOptions, condition: SkyCondition, rng: np.random.Generator, time_s: float = 0.0
+) -> SkyView:
     if isinstance(options.scene, Path):
         return load_scene(options.scene, condition)
     if isinstance(options.scene, View):
@@ -277,8 +273,6 @@ def _count_wrong(
     emulated: _Emulated, named: Sequence[Star], truth: NDArray[np.float64] | None
 ) -> int | None:
     """Identified stars that the truth puts elsewhere; None without a truth."""
-    from cubestack.emulator.scene.sky import SkyScene
-
     camera = emulated.board.camera
     if truth is None or not isinstance(camera.scene, SkyScene):
         return None
@@ -291,9 +285,6 @@ def _is_far(
     named: Sequence[Star], field_deg: float, truth: NDArray[np.float64] | None
 ) -> bool | None:
     """Appendix E's criterion of a wrong result; None where it can not be told."""
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion
-    from cubestack.emulator.scene.hipparcos import load_sky
-
     triangle = [star.hipparcos or 0 for star in named[:3]]
     if truth is None or len(triangle) < 3:
         return None

@@ -16,10 +16,13 @@ examples:
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.devices.experiment import Experiment, Mark, Result
@@ -27,11 +30,6 @@ from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import MeasureOptions, Opener
 from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
-    from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-    from cubestack.emulator.scene.earth_sun import SensorTruth
 
 CubeSenseOpener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 
@@ -286,11 +284,8 @@ def _degrees(value: float | None, digits: int = 2) -> str:
 
 def random_view(
     options: CubeSenseOptions, sensor: Camera, rng: np.random.Generator
-) -> "EarthSunView":
+) -> EarthSunView:
     """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
-    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-    from cubestack.emulator.scene.earth_sun import Target
-
     reach = _or(options.sun_angle, 90.0) if sensor is Camera.SUN else _or(options.tilt, 30.0)
     radius, towards = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random()
     angles = (float(radius * np.cos(towards)), float(radius * np.sin(towards)))
@@ -306,13 +301,10 @@ def random_view(
 def view_of(
     sensor: Camera,
     angles: tuple[float, float],
-    condition: "FisheyeCondition",
+    condition: FisheyeCondition,
     altitude_km: float = 750.0,
-) -> "EarthSunView":
+) -> EarthSunView:
     """A sensor's target at its angles alpha and beta, and the Earth at noon."""
-    from cubestack.emulator.camera.ov7620.view import EarthSunView
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
-
     others: dict[str, Any] = {"altitude_km": altitude_km, "seed": condition.seed}
     if sensor is Camera.SUN:
         scene = EarthSunScene.facing(sun_deg=angles, **others)
@@ -326,7 +318,7 @@ def _or(given: float | None, default: float) -> float:
 
 
 def measure_once(
-    emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]",
+    emulated: EmulatedDevice[CubeSenseBoard, CubeSense],
     sensor: Camera,
     sram: Sram,
     *,
@@ -371,7 +363,7 @@ def measure_once(
 
 
 def is_right(
-    emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]", sensor: Camera, measured: Measurement
+    emulated: EmulatedDevice[CubeSenseBoard, CubeSense], sensor: Camera, measured: Measurement
 ) -> bool:
     """Whether what was detected is as near to the truth as the thesis aimed at."""
     truth = emulated.board.truth(sensor) if measured.capture.stored else None
@@ -382,7 +374,7 @@ def is_right(
 
 
 def _tolerance_deg(
-    sensor: Camera, truth: "SensorTruth | None", claimed: tuple[float, float] | None
+    sensor: Camera, truth: SensorTruth | None, claimed: tuple[float, float] | None
 ) -> float:
     """Goals of sections 7.1 and 7.2, or three of the standard deviations that are claimed."""
     wide = truth is not None and float(truth.vector[2]) < np.cos(np.radians(SUN_WIDE_DEG))
@@ -390,7 +382,7 @@ def _tolerance_deg(
     return max(goal, 3 * max(claimed or (0.0,)))
 
 
-def _error_deg(measured: Measurement, truth: "SensorTruth") -> float | None:
+def _error_deg(measured: Measurement, truth: SensorTruth) -> float | None:
     if not measured.detected:
         return None
     vector = direction(measured.alpha_deg, measured.beta_deg)

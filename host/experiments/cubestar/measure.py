@@ -26,11 +26,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode, MatchMode, TaskStatus
 from cubestack.firmware_model.interface.cubestar.codes import Reason
 from cubestack.host.calibration.camera import load_camera
@@ -44,9 +47,6 @@ from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
 CubeStarOpener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 CubeStarEmulated: TypeAlias = "EmulatedDevice[CubeStarBoard, CubeStar]"
@@ -155,9 +155,6 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
     )
 
     def run(self, opened: CubeStarOpener, options: CubeStarOptions) -> Iterator[CubeStarResult]:
-        from cubestack.emulator.camera.mlx75412.lens import CONDITION
-        from cubestack.emulator.scene.sky import PictureScene
-
         rng = np.random.default_rng(options.seed)
         camera, picture_truth = None, None
         if options.camera is not None:
@@ -225,8 +222,6 @@ def _adapts(opened: CubeStarOpener) -> bool:
 
 def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[None]:
     """What a threshold is searched with: some random skies, or what the camera looks at."""
-    from cubestack.emulator.camera.mlx75412.lens import CONDITION
-
     if not options.is_random:
         yield
         return
@@ -326,8 +321,6 @@ def _prime_tracking(
     emulated: CubeStarEmulated, offset_deg: float, rng: np.random.Generator
 ) -> None:
     """Let the device find an attitude at most ``offset_deg`` from the one it will track from."""
-    from cubestack.emulator.scene.sky import SkyScene
-
     scene = emulated.scene
     if not isinstance(scene, SkyScene):
         raise ValueError("--mode tracking needs a sky scene: a picture has no frame before it")

@@ -1,34 +1,30 @@
 """What it costs to emulate an AraMiS star tracker."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from cubestack.emulator.boards.aramis.board import AramisBoard
+from cubestack.emulator.boards.aramis.catalogue import onboard_database
+from cubestack.emulator.camera.common.register_file import RegisterFile
+from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
+from cubestack.emulator.camera.mt9m001.registers import read_settings
+from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
 from cubestack.firmware_model.interface.aramis import MeasurementMode
 from cubestack.firmware_model.interface.cameras.mt9m001 import REGISTERS
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.devices.device import Device
 from cubestack.host.emulation.emulated import power_up
 from cubestack.host.studies.bench.contract import Benchmark
 from cubestack.host.studies.bench.timing import LOOP_S, best_ms, simulated_ratio
 
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.aramis.board import AramisBoard
-
 HIGHEST_GAIN = 15.0
 
 
-def _figures(device: "Device[AramisBoard, Aramis]") -> dict[str, float]:
+def _figures(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
     """The loop, and the wall times of what it spends them on."""
-    from cubestack.emulator.boards.aramis.catalogue import onboard_database
-    from cubestack.emulator.camera.common.register_file import RegisterFile
-    from cubestack.emulator.camera.mt9m001.imager import Mt9m001Imager
-    from cubestack.emulator.camera.mt9m001.lens import CONDITION
-    from cubestack.emulator.camera.mt9m001.registers import read_settings
-    from cubestack.firmware_model.aramis.detection.background import Background
-    from cubestack.firmware_model.aramis.pipeline import VERIFIED, solve
-    from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-    from cubestack.firmware_model.mcu.costs import Meter
-
     database = onboard_database()
     with power_up(device) as emulated:
         emulated.client.activate()

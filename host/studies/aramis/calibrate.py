@@ -11,10 +11,15 @@ examples:
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.boards.aramis.catalogue import onboard_database
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.scene_file import load_scene
+from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
 from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.host.calibration.camera import Camera
@@ -22,31 +27,20 @@ from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.clients.contract import FoundStar
 from cubestack.host.studies.calibrate.experiment import CalibrateOptions, StarCalibration
 
-if TYPE_CHECKING:
-    from cubestack.emulator.camera.common.optics import Optics
-    from cubestack.emulator.camera.common.view import SkyCondition
-
 
 class _Experiment(StarCalibration[Aramis]):
     description = __doc__
     size = (COLUMNS, ROWS)
     free = ("f_px", "cx_px", "cy_px")
 
-    def tables(self) -> "Optics":
-        from cubestack.emulator.camera.mt9m001.lens import CONDITION
-
+    def tables(self) -> Optics:
         return CONDITION.optics
 
-    def condition(self, options: CalibrateOptions) -> "SkyCondition":
-        from cubestack.emulator.camera.common.scene_file import load_scene
-        from cubestack.emulator.camera.mt9m001.lens import CONDITION
-
+    def condition(self, options: CalibrateOptions) -> SkyCondition:
         own = options.scene
         return CONDITION if own is None else load_scene(own, CONDITION).condition
 
     def board(self, camera: Camera) -> Mapping[str, Any]:
-        from cubestack.emulator.boards.aramis.catalogue import onboard_database
-
         del camera
         return {"catalogue": onboard_database()}
 

@@ -9,14 +9,16 @@ import hashlib
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.emulator.boards.aramis.catalogue import (
+    PUBLISHED,
+    CatalogueParameters,
+    cached_database,
+)
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.options import NUMBER, PATH, YEAR, Options, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +39,8 @@ class CatalogueOptions(Options):
     )
     output: Path | None = option(None, "write the flash image", PATH, metavar="FILE")
 
-    def parameters(self) -> "CatalogueParameters":
+    def parameters(self) -> CatalogueParameters:
         """As the compiler of the catalogue takes them; ValueError for what it can not do."""
-        from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
-
         given: dict[str, Any] = {
             "fov_deg": self.fov,
             "stars_per_field": self.stars_per_field,
@@ -59,8 +59,6 @@ class _Catalogue(Lookup[CatalogueOptions]):
     description = __doc__
 
     def look_up(self, options: CatalogueOptions, shown: Shown) -> dict[str, Any]:
-        from cubestack.emulator.boards.aramis.catalogue import PUBLISHED, cached_database
-
         parameters = options.parameters()
         start = time.monotonic()
         database = cached_database(parameters, shown)

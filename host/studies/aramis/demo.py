@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.aramis.board import AramisBoard
+from cubestack.emulator.camera.mt9m001.lens import CONDITION
+from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
 from cubestack.firmware_model.interface.aramis import INTERFACE
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.host.clients.aramis.client import Aramis, Attitude
@@ -17,9 +19,6 @@ from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.studies.demo.subject import Demo, download, tell_times
 from cubestack.host.terminal import tell
 
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.aramis.board import AramisBoard
-
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion
 ROUGHLY_OFF_DEG = 2.0
 MOST_STARS = int(INTERFACE.telecommand("SetDetection").reset_values()["MaxStars"])
@@ -27,16 +26,13 @@ MOST_STARS = int(INTERFACE.telecommand("SetDetection").reset_values()["MaxStars"
 
 
 def show(
-    device: "Device[AramisBoard, Aramis]",
+    device: Device[AramisBoard, Aramis],
     out: Path,
     seed: int,
     _photographs: Path | None,
     board: Sequence[str],
 ) -> bool:
     """Measure twice and download; returns whether both measurements were conclusive."""
-    from cubestack.emulator.camera.mt9m001.lens import CONDITION
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion, quaternion_from_pointing
-
     demo = Demo(out, "aramis-sky", "star tracker without FPGA: Orion, 21.5 deg, 2026")
     ra, dec, roll = POINTING_DEG
     truth = quaternion_from_pointing(ra, dec, roll)

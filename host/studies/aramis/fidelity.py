@@ -4,7 +4,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cubestack.emulator.boards.aramis.catalogue import (
+    CatalogueParameters,
+    cached_database,
+    onboard_database,
+)
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.firmware_model.aramis.matching.triangles import measure_triangle
+from cubestack.firmware_model.aramis.matching.triples import (
+    BOUND_SIGMAS,
+    find_triangles,
+    match_triple,
+)
+from cubestack.firmware_model.aramis.solution import Profile
 from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
+from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
+from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
 from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
 from cubestack.host.studies.fidelity.table import mean, measured
@@ -38,8 +53,6 @@ def _attitudes(results: Sequence[AramisResult]) -> Figures:
 
 def _catalogue(_opened: AramisOpener, _frames: int) -> Figures:
     """Stars and triangles of the published selection, and of its two variants."""
-    from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, cached_database
-
     figures: dict[str, float] = {}
     variants = {"six": CatalogueParameters(epoch=EPOCH)}
     variants["five"] = CatalogueParameters(epoch=EPOCH, stars_per_field=5)
@@ -57,18 +70,6 @@ def _lookups(_opened: AramisOpener, frames: int) -> Figures:
 
     Stars of random fields without noise, with the bounds of appendix E; means of main triangles.
     """
-    from cubestack.emulator.boards.aramis.catalogue import onboard_database
-    from cubestack.emulator.scene.hipparcos import load_sky
-    from cubestack.firmware_model.aramis.matching.triangles import measure_triangle
-    from cubestack.firmware_model.aramis.matching.triples import (
-        BOUND_SIGMAS,
-        find_triangles,
-        match_triple,
-    )
-    from cubestack.firmware_model.aramis.solution import Profile
-    from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
-    from cubestack.firmware_model.mcu.costs import Meter
-
     rng, meter = np.random.default_rng(LOOKUP_SEED), Meter(BLACKFIN_BF533)
     database, sigma_rad = onboard_database(), Profile().sigma_rad
     sky = load_sky(mag_limit=6.0)

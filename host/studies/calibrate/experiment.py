@@ -9,10 +9,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
+from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.view import SkyCondition, SkyView
+from cubestack.emulator.scene.attitude import random_quaternion
+from cubestack.emulator.scene.hipparcos import load_sky
+from cubestack.emulator.scene.picture import PictureScene, load_picture
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
 from cubestack.host.clients.contract import DeviceClient, FoundStar
@@ -20,11 +27,6 @@ from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import PATH, Options, option, whole
 from cubestack.host.pictures.residuals import save_residuals
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.contract import Board
-    from cubestack.emulator.camera.common.optics import Optics
-    from cubestack.emulator.camera.common.view import SkyCondition
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 DEFAULT_PICTURES = 20
@@ -144,11 +146,11 @@ class StarCalibration(
     mag_limit: float | None = None
 
     @abstractmethod
-    def tables(self) -> "Optics":
+    def tables(self) -> Optics:
         """The lens that the device's tables have."""
 
     @abstractmethod
-    def condition(self, options: CalibrateOptions) -> "SkyCondition":
+    def condition(self, options: CalibrateOptions) -> SkyCondition:
         """What the camera is like of the unit that takes emulated pictures."""
 
     @abstractmethod
@@ -198,11 +200,6 @@ class StarCalibration(
 
     def _looks(self, options: CalibrateOptions) -> list[_Look]:
         """All that the device looks at; large pictures in parts that do not overlap."""
-        from cubestack.emulator.camera.common.view import SkyView
-        from cubestack.emulator.scene.attitude import random_quaternion
-        from cubestack.emulator.scene.picture import PictureScene, load_picture
-        from cubestack.emulator.scene.sky import SkyScene
-
         if options.images is None:
             rng, own = np.random.default_rng(options.seed), self.condition(options)
             skies = [
@@ -224,8 +221,6 @@ class StarCalibration(
         self, opened: "_Opener[ClientT]", seed: int, looks: Sequence[_Look], camera: Camera
     ) -> Iterator[Sight]:
         """Each picture's identified stars, by a device that has ``camera`` loaded."""
-        from cubestack.emulator.scene.hipparcos import load_sky
-
         sky = load_sky()
         own = self.board(camera)
         with opened(looks[0].scene, seed=seed, profile="extended", **own) as emulated:
@@ -239,12 +234,12 @@ class StarCalibration(
                 rows = np.searchsorted(sky.hip, np.array([*named], np.int64))
                 yield Sight(places, sky.vectors[rows])
 
-    def _like(self, optics: "Optics") -> Camera:
+    def _like(self, optics: Optics) -> Camera:
         """The camera that is most like a lens over the picture."""
         f_px = 1000 * optics.focal_length_mm / optics.pixel_pitch_um
         return self._over_picture(optics, Camera(f_px, optics.cx, optics.cy), self.free).camera
 
-    def _over_picture(self, optics: "Optics", camera: Camera, free: Sequence[str]) -> Fit:
+    def _over_picture(self, optics: Optics, camera: Camera, free: Sequence[str]) -> Fit:
         """Fit a camera to a lens over the picture, at the best rotation."""
         sides = zip(self.size, GRID, strict=True)
         columns, rows = (np.linspace(0, side - 1, places) for side, places in sides)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.native.compiler import CompilerError
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import experiment_of, measure
 from cubestack.host.experiments.rates import outcome, why_refused
@@ -84,8 +85,6 @@ def _measured(
     block: Block, results: Iterator[Any], before: int, seed: int, a_frame: int
 ) -> Iterator[Row]:
     """Rows from one power-up on, up to the first frame that fails."""
-    from cubestack.emulator.native.compiler import CompilerError
-
     after = 0
     try:
         for result in results:

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.ball import ball_scene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.cubesense.measure import FRAME_S, CubeSenseOpener
@@ -82,9 +84,6 @@ class _Ball(Experiment[CubeSenseOpener, BallOptions, BallResult]):
         return len(DIRECTIONS)
 
     def run(self, opened: CubeSenseOpener, options: BallOptions) -> Iterator[BallResult]:
-        from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-        from cubestack.emulator.scene.ball import ball_scene
-
         rng, offset_mm = np.random.default_rng(options.seed), (0.0, 0.0, options.off_axis)
         with opened(ball_scene(), seed=options.seed) as emulated:
             for name, axis in DIRECTIONS.items():

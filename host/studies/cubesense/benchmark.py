@@ -1,7 +1,10 @@
 """What it costs to emulate a CubeSense."""
 
-from typing import TYPE_CHECKING
-
+from cubestack.emulator.boards.cubesense import benchmark
+from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
+from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
+from cubestack.emulator.rtl.benchmark import cold_build_s
+from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.device import Device
@@ -9,15 +12,8 @@ from cubestack.host.emulation.emulated import power_up
 from cubestack.host.studies.bench.contract import Benchmark
 from cubestack.host.studies.bench.timing import LOOP_S, simulated_ratio
 
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 
-
-def _figures(device: "Device[CubeSenseBoard, CubeSense]") -> dict[str, float]:
-    from cubestack.emulator.boards.cubesense import benchmark
-    from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-    from cubestack.emulator.rtl.benchmark import cold_build_s
-
+def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:
     figures = {"sensors_ratio": _loop_ratio(device)}
     for way in benchmark.STORES:
         stored_ms = benchmark.pair_store_ms(benchmark.pair_with_cameras(), way)
@@ -27,10 +23,8 @@ def _figures(device: "Device[CubeSenseBoard, CubeSense]") -> dict[str, float]:
     return figures
 
 
-def _loop_ratio(device: "Device[CubeSenseBoard, CubeSense]") -> float:
+def _loop_ratio(device: Device[CubeSenseBoard, CubeSense]) -> float:
     """Each second a host reads both results, which starts the next measurements."""
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
-
     with power_up(device, EarthSunScene(), engine="compiled") as emulated:
         client = emulated.client.client
 

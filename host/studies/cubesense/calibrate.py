@@ -17,10 +17,14 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
+from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
+from cubestack.emulator.scene.earth import angular_radius_deg
+from cubestack.emulator.scene.picture import load_picture
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.host.calibration.fisheye import Fisheye, FisheyeFit, Points, fit_fisheye, limb_angles
@@ -34,9 +38,6 @@ from cubestack.host.experiments.cubesense.measure import (
     view_of,
 )
 from cubestack.host.options import PATH, Options, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.camera.ov7620.view import EarthSunView
 
 FIELD = (PIXELS_PER_DEGREE, 95.0)
 """Pixels for a degree, undistorted, and the largest field angle, deg."""
@@ -163,9 +164,6 @@ def _bench(
     opened: CubeSenseOpener, options: CalibrateOptions, camera: Camera, tables: Fisheye
 ) -> FisheyeFit:
     """Fit to known poses, spread evenly over the field."""
-    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-    from cubestack.emulator.scene.earth import angular_radius_deg
-
     count = options.emulated or DEFAULT_POSES
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
     radius = REACH_DEG[camera] * np.sqrt((np.arange(count) + 0.5) / count)
@@ -227,11 +225,8 @@ def _checked(
     return means[0], means[1]
 
 
-def _unit(options: CalibrateOptions) -> "Callable[[EarthSunView], EarthSunView]":
+def _unit(options: CalibrateOptions) -> Callable[[EarthSunView], EarthSunView]:
     """Gives a view the lenses of the scene's cameras, if one is given."""
-    from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
-    from cubestack.emulator.camera.ov7620.view import EarthSunView
-
     if options.scene is None:
         return lambda view: view
     own = load_earth_sun_scene(options.scene).condition
@@ -245,8 +240,6 @@ def _unit(options: CalibrateOptions) -> "Callable[[EarthSunView], EarthSunView]"
 
 def _photographed(folder: Path, angles: Path, tables: Fisheye) -> FisheyeFit:
     """Fit to pictures of lights; ValueError names the line or the picture that is wrong."""
-    from cubestack.emulator.scene.picture import load_picture
-
     pixels, known = [], []
     try:
         lines = list(csv.DictReader(angles.read_text(encoding="utf-8").splitlines()))

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
@@ -18,9 +18,6 @@ from cubestack.host.studies.demo.subject import ANSWER_TIMEOUT_S, Demo, download
 from cubestack.host.terminal import tell
 from cubestack.host.transport.streams import open_transport
 
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
-
 SUN_DEG = (20.0, 10.0)
 NADIR_DEG = (-8.0, 12.0)
 SUN_TITLE = "CubeSense, sun camera: the Sun through a fisheye lens"
@@ -30,7 +27,7 @@ PUBLISHED_MS = {Camera.SUN: 70.4, Camera.NADIR: 245.0}
 
 
 def show(
-    device: "Device[CubeSenseBoard, CubeSense]",
+    device: Device[CubeSenseBoard, CubeSense],
     out: Path,
     seed: int,
     _photographs: Path | None,

@@ -2,18 +2,25 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
+from cubestack.emulator.camera.ov7620 import fisheye, lens_error, light
+from cubestack.emulator.camera.ov7620.view import FisheyeCondition
+from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
+from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.hdl.cubesense.tops import AREA_FILE
+from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
 from cubestack.host.experiments.measure import measure
+from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
 from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
 from cubestack.host.studies.fidelity.table import measured
-
-if TYPE_CHECKING:
-    from cubestack.emulator.scene.earth_sun import EarthSunScene
 
 ALTITUDE_KM = 750.0  # of the text
 SUN_BANDS = {
@@ -67,18 +74,14 @@ def _sensor(results: Sequence[SensorResult]) -> Figures:
 
 def _ball(opened: CubeSenseOpener, frames: int) -> Figures:
     """Mean offset in each direction, and the largest sigma, of ``frames`` pictures an angle."""
-    from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
-
     step = 5.0 if frames > 1 else 30.0
     results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=max(2, frames))))
     figures = {result.direction: result.offset_deg or np.nan for result in results}
     return {**figures, "sigma": max(result.sigma_deg or 0.0 for result in results)}
 
 
-def _scene(sensor: Camera, angle_deg: float) -> "EarthSunScene":
+def _scene(sensor: Camera, angle_deg: float) -> EarthSunScene:
     """Its target at an angle along the picture's rows."""
-    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-
     return view_of(sensor, (angle_deg, 0.0), FisheyeCondition(), ALTITUDE_KM).scene
 
 
@@ -99,10 +102,6 @@ def _scatter(
 
 def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """mW of the eight states of table 7.1."""
-    from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
-    from cubestack.emulator.sim.power import PowerModel
-    from cubestack.emulator.sim.virtual_time import Kernel
-
     power = PowerModel(Kernel(), CUBESENSE_POWER)
     for channel in CUBESENSE_POWER.channels:
         power.switch(channel, False)
@@ -128,9 +127,6 @@ def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """What follows from the measured polynomial, the Earth's size and the pixels."""
-    from cubestack.emulator.camera.ov7620 import fisheye, lens_error
-    from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
-
     a, b, c, d = fisheye.DISTORTION
     field_px = lens_error.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
     rim_px = float(fisheye.distorted(field_px))
@@ -165,9 +161,6 @@ def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
     """Tiles as they were last estimated: both FPGAs as built and with one search, and counters."""
-    from cubestack.hdl.cubesense.tops import AREA_FILE
-    from cubestack.hdl.flow.area_report import recorded_areas
-
     designs = recorded_areas(AREA_FILE)
     flown = "-as-flown" * (opened.board["profile"] == "published")
     names = {
@@ -181,11 +174,6 @@ def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
 
 def _light(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """Grey value of the Earth at noon, its threshold, and the Sun's radius in px."""
-    from cubestack.emulator.camera.ov7620 import light
-    from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-    from cubestack.emulator.scene.earth_sun import Target
-    from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
-
     bloom_px, space = FisheyeCondition().bloom_px, 34
     lines = light.USUAL_EXPOSURE[Target.NADIR] * EXPOSURE_LINES
     grey = lines * light.scene_light(_scene(Camera.NADIR, 0.0), Target.NADIR, bloom_px, 0)
@@ -200,8 +188,6 @@ def _light(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 def _memory(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """Share of the memory that pictures leave free, and that beyond their last address."""
-    from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
-
     size = 1 << 19
     stride = 1 << (COLUMNS - 1).bit_length()
     beyond = ROWS * stride + COLUMNS

@@ -8,17 +8,16 @@ example:
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.firmware_model.cubesense.memory import CAPACITY, budget, report, used
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
+from cubestack.firmware_model.mcu.memory_budget import Buffer
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Facts, Lookup
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Kind, Options, option
-
-if TYPE_CHECKING:
-    from cubestack.firmware_model.mcu.memory_budget import Buffer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +31,8 @@ class MemoryOptions(Options):
         """The switches must exist."""
         CubeSenseSwitches.of(self.profile, self.set)
 
-    def budget(self) -> "tuple[Buffer, ...]":
+    def budget(self) -> tuple[Buffer, ...]:
         """Buffers of the program that these describe."""
-        from cubestack.firmware_model.cubesense.memory import budget
-
         return budget(CubeSenseSwitches.of(self.profile, self.set))
 
 
@@ -45,8 +42,6 @@ class _Memory(Lookup[MemoryOptions]):
 
     def look_up(self, options: MemoryOptions, shown: Shown) -> dict[str, Any]:
         """Size in bytes, sum and buffers of each memory by its name."""
-        from cubestack.firmware_model.cubesense.memory import CAPACITY, used
-
         buffers = options.budget()
         return {
             memory.value: {
@@ -58,8 +53,6 @@ class _Memory(Lookup[MemoryOptions]):
         }
 
     def run(self, opened: Opener[Any, Any], options: MemoryOptions) -> Iterator[Facts]:
-        from cubestack.firmware_model.cubesense.memory import report
-
         yield Facts(self.look_up(options, opened.shown), (report(options.budget()),))
 
     def succeeded(self, results: Sequence[Facts]) -> bool:

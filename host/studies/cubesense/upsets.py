@@ -15,10 +15,13 @@ examples:
 
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.boards.cubesense.board import CubeSenseBoard, wiring_of
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.interface.cubesense.fpga import Action, actions
 from cubestack.firmware_model.interface.cubesense.pins import CONTROLS
@@ -26,17 +29,12 @@ from cubestack.firmware_model.interface.cubesense.switches import (
     DEFAULT_SWITCHES,
     CubeSenseSwitches,
 )
+from cubestack.host.clients.cubesense.client import CubeSense
+from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
 from cubestack.host.options import option
 from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
-    from cubestack.emulator.rtl.contract import RtlEngine
-    from cubestack.emulator.rtl.wiring import Wiring
-    from cubestack.host.clients.cubesense.client import CubeSense
-    from cubestack.host.emulation.emulated import EmulatedDevice
 
 LINKED, READING = "linked", "reading"
 
@@ -48,12 +46,12 @@ def _scene(rng: np.random.Generator) -> Any:
     return random_view(CubeSenseOptions(sun_angle=SUN_ANGLE_DEG), Camera.SUN, rng)
 
 
-def _start(sram: Sram, emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]") -> None:
+def _start(sram: Sram, emulated: EmulatedDevice[CubeSenseBoard, CubeSense]) -> None:
     for camera in Camera:
         emulated.client.client.command("CaptureAndDetect", Camera=camera, Sram=sram)
 
 
-def _judge(emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]") -> Verdict:
+def _judge(emulated: EmulatedDevice[CubeSenseBoard, CubeSense]) -> Verdict:
     reasons = []
     for camera in Camera:
         measured = emulated.client.wait_measured(camera)
@@ -66,7 +64,7 @@ def _judge(emulated: "EmulatedDevice[CubeSenseBoard, CubeSense]") -> Verdict:
     return Verdict("refused", ", ".join(reasons)) if reasons else Verdict("right")
 
 
-def _state(engine: "RtlEngine") -> str:
+def _state(engine: RtlEngine) -> str:
     commanded = actions(*(engine.get_pin(pin) for pin in CONTROLS))
     if Action.STORE_OTHER in commanded:
         return LINKED
@@ -86,9 +84,7 @@ class CubeSenseUpsetOptions(UpsetOptions):
     )
 
 
-def _wiring(gateware: str) -> "Wiring":
-    from cubestack.emulator.boards.cubesense.board import wiring_of
-
+def _wiring(gateware: str) -> Wiring:
     return wiring_of(gateware)
 
 

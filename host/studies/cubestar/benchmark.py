@@ -3,16 +3,23 @@
 import subprocess
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.emulator.boards.cubestar.benchmark import (
+    rtl_clocks_per_s,
+    strides_per_s,
+    strobes_per_s,
+)
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
+from cubestack.emulator.iss.benchmark import instructions_per_s
+from cubestack.emulator.rtl.benchmark import cold_build_s
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.devices.device import Device
 from cubestack.host.emulation.emulated import EmulatedDevice, power_up
 from cubestack.host.studies.bench.contract import Benchmark
 from cubestack.host.studies.bench.timing import LOOP_S, ROUNDS, simulated_ratio
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
 I2C_HZ = 400_000
 I2C_CLIENT = """
@@ -28,17 +35,7 @@ print(100 / times[len(times) // 2])
 """
 
 
-def _figures(device: "Device[CubeStarBoard, CubeStar]") -> dict[str, float]:
-    from cubestack.emulator.boards.cubestar.benchmark import (
-        rtl_clocks_per_s,
-        strides_per_s,
-        strobes_per_s,
-    )
-    from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
-    from cubestack.emulator.iss.benchmark import instructions_per_s
-    from cubestack.emulator.rtl.benchmark import cold_build_s
-    from cubestack.emulator.scene.sky import SkyScene
-
+def _figures(device: Device[CubeStarBoard, CubeStar]) -> dict[str, float]:
     figures: dict[str, float] = {
         "rtl_clocks_per_s": round(rtl_clocks_per_s()),
         "rtl_strides_clocks_per_s": round(strides_per_s()),
@@ -57,10 +54,8 @@ def _figures(device: "Device[CubeStarBoard, CubeStar]") -> dict[str, float]:
     return figures | _i2c()
 
 
-def _firmware_ratio(device: "Device[CubeStarBoard, CubeStar]") -> float:
+def _firmware_ratio(device: Device[CubeStarBoard, CubeStar]) -> float:
     """The 1 Hz loop of the reference firmware on the instruction-set simulator."""
-    from cubestack.emulator.scene.sky import SkyScene
-
     scene = SkyScene.pointing(84.0, -1.0)
     with power_up(device, scene, engine="compiled", firmware="reference") as emulated:
         client = emulated.client.client
@@ -70,7 +65,7 @@ def _firmware_ratio(device: "Device[CubeStarBoard, CubeStar]") -> float:
         return simulated_ratio(emulated, lambda: client.pause(float(LOOP_S)))
 
 
-def _capture(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> dict[str, float]:
+def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, float]:
     """Wall times of capture and transfer."""
     engine = emulated.board.engine
     strobe_read = engine.strobe_read

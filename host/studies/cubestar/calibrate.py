@@ -13,8 +13,11 @@ examples:
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.scene_file import drawn_optics, load_scene
+from cubestack.emulator.camera.common.view import SkyCondition
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IdMode
 from cubestack.host.calibration.camera import Camera
@@ -24,25 +27,16 @@ from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
 from cubestack.host.studies.calibrate.experiment import CalibrateOptions, StarCalibration
 
-if TYPE_CHECKING:
-    from cubestack.emulator.camera.common.optics import Optics
-    from cubestack.emulator.camera.common.view import SkyCondition
-
 
 class _Experiment(StarCalibration[CubeStar]):
     description = __doc__
     size = (COLUMNS, ROWS)
     mag_limit = 3.8  # the onboard list's own
 
-    def tables(self) -> "Optics":
-        from cubestack.emulator.camera.mlx75412.lens import LENS
-
+    def tables(self) -> Optics:
         return LENS
 
-    def condition(self, options: CalibrateOptions) -> "SkyCondition":
-        from cubestack.emulator.camera.common.scene_file import drawn_optics, load_scene
-        from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
-
+    def condition(self, options: CalibrateOptions) -> SkyCondition:
         if options.scene is None:
             return replace(CONDITION, optics=drawn_optics(LENS, UNCERTAIN, options.seed))
         return load_scene(options.scene, CONDITION, UNCERTAIN).condition

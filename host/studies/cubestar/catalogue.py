@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cubestack.emulator.boards.cubestar import catalogue as flown
 from cubestack.host.devices.device import Shown
 from cubestack.host.emulation.records import create_file
 from cubestack.host.experiments.facts import Lookup
@@ -34,8 +35,6 @@ class _Catalogue(Lookup[CatalogueOptions]):
     description = __doc__
 
     def look_up(self, options: CatalogueOptions, shown: Shown) -> dict[str, Any]:
-        from cubestack.emulator.boards.cubestar import catalogue as flown
-
         mag_limit = flown.MAG_LIMIT if options.mag_limit is None else options.mag_limit
         pair_limit = flown.PAIR_LIMIT_DEG if options.pair_limit is None else options.pair_limit
         catalogue = flown.onboard_catalogue(mag_limit, pair_limit, options.epoch)

@@ -2,17 +2,27 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+from cubestack.emulator.boards.cubestar.compiled import operations
+from cubestack.emulator.boards.cubestar.compiled.build import Build, compiled, compiler_version
+from cubestack.emulator.boards.cubestar.compiled.machine import Timing, started
+from cubestack.emulator.boards.cubestar.compiled.picture import charged, defaults, run
+from cubestack.emulator.camera.common.star_sensor import StarSensor
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from cubestack.firmware_model.interface.efm32gg.c_header import c_header
+from cubestack.firmware_model.mcu.compiled import FILE
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.host.devices.registry import device
+from cubestack.host.emulation.emulated import power_up
 from cubestack.host.studies.costs.contract import CostReport, Measurement
 from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from cubestack.emulator.boards.cubestar.compiled.build import Build
-    from cubestack.emulator.boards.cubestar.compiled.machine import Timing
 
 PUBLISHED_MS = 320.0
 """Detection and matching of 20 centroids: CubeStar thesis, figure 5.7."""
@@ -44,14 +54,11 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class _Case:
-    build: "Build"
-    timing: "Timing"
+    build: Build
+    timing: Timing
 
 
 def _cases(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[_Case]:
-    from cubestack.emulator.boards.cubestar.compiled.build import Build
-    from cubestack.emulator.boards.cubestar.compiled.machine import Timing
-
     chosen = [Build(*b) for b in _BUILDS if b[0] in levels and b[1] in precisions]
     for build in chosen:
         yield _Case(build, Timing())
@@ -61,14 +68,9 @@ def _cases(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[_Case]:
                 yield _Case(build, Timing(**waits))
 
 
-def picture() -> "NDArray[np.uint8]":
+def picture() -> NDArray[np.uint8]:
     """The picture that is processed, as the emulated camera takes it."""
     from dataclasses import replace
-
-    from cubestack.emulator.camera.common.star_sensor import StarSensor
-    from cubestack.emulator.scene.sky import SkyScene
-    from cubestack.host.devices.registry import device
-    from cubestack.host.emulation.emulated import power_up
 
     scene = replace(SkyScene.pointing(*POINTING_DEG), mag_limit=MAG_LIMIT)
     with power_up(device("cubestar"), scene) as emulated:
@@ -81,20 +83,11 @@ def picture() -> "NDArray[np.uint8]":
 
 def generated() -> dict[str, str]:
     """Sources and headers of the measuring program that are made of tables."""
-    from cubestack.emulator.boards.cubestar.compiled.picture import defaults
-    from cubestack.firmware_model.interface.efm32gg import LAYOUTS
-    from cubestack.firmware_model.interface.efm32gg.c_header import c_header
-
     return {**catalogue_tables(), "defaults.h": defaults(), "efm32gg.h": c_header(LAYOUTS)}
 
 
 def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
     """Each build in turn."""
-    from cubestack.emulator.boards.cubestar.compiled import operations
-    from cubestack.emulator.boards.cubestar.compiled.build import compiled, compiler_version
-    from cubestack.emulator.boards.cubestar.compiled.machine import started
-    from cubestack.emulator.boards.cubestar.compiled.picture import run
-
     compiler_version()
     pixels, sources, images = picture(), generated(), {}
     for case in _cases(levels, precisions):
@@ -109,11 +102,6 @@ def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measur
 
 def page(found: Sequence[Measurement], clock_hz: int) -> str:
     """The table of builds, in ms, beside what the Python program charges and what is published."""
-    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-    from cubestack.emulator.boards.cubestar.compiled.picture import charged
-    from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-    from cubestack.firmware_model.mcu.costs import Meter
-
     lines = [
         f"| build | memory | {' | '.join(COLUMNS)} | sum, ms |",
         "|-" * (len(COLUMNS) + 3) + "|",
@@ -133,27 +121,19 @@ def page(found: Sequence[Measurement], clock_hz: int) -> str:
 
 def as_data(found: Sequence[Measurement]) -> dict[str, Any]:
     """For the file of firmware_model/mcu."""
-    from cubestack.emulator.boards.cubestar.compiled.build import compiler_version
-
     return {"compiler": compiler_version(), "builds": [asdict(one) for one in found]}
 
 
 def _file() -> Any:
-    from cubestack.firmware_model.mcu.compiled import FILE
-
     return FILE
 
 
 def _defaults() -> Mapping[str, float]:
-    from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-
     return {name: cost.cycles for name, cost in CORTEX_M3.operations.items()}
 
 
 def costs() -> CostReport:
     """For ``Device.costs``."""
-    from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-
     return CostReport(
         levels=("O0", "O2", "Os"),
         precisions=("own", "float", "literals", "double"),

@@ -4,11 +4,18 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.scene.attitude import (
+    matrix_from_quaternion,
+    pointing_from_matrix,
+    quaternion_from_pointing,
+)
+from cubestack.firmware_model.cubestar.detection.background_search import MOST_STARS_FACTOR
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.calibration.camera import load_camera
 from cubestack.host.clients.cubestar.calibration import calibrate
@@ -21,9 +28,6 @@ from cubestack.host.pictures.images import annotate, save_picture
 from cubestack.host.pictures.sheet import Lens
 from cubestack.host.studies.demo.subject import Demo, download, tell_times
 from cubestack.host.terminal import tell
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion, with Sirius
 RENDERED = Path(__file__).parent / "rendered-sky.png"
@@ -61,13 +65,12 @@ class _Subject:
         """The lens that took the picture: the camera file's, or the emulated camera's own."""
         if self.camera is not None:
             return load_camera(self.camera).cropped(*CROP).directions
-        from cubestack.emulator.camera.mlx75412.lens import LENS
 
         return LENS.project
 
 
 def show(
-    device: "Device[CubeStarBoard, CubeStar]",
+    device: Device[CubeStarBoard, CubeStar],
     out: Path,
     seed: int,
     photographs: Path | None,
@@ -80,8 +83,6 @@ def show(
 
 
 def _sky(seed: int) -> _Subject:
-    from cubestack.emulator.scene.attitude import quaternion_from_pointing
-
     ra, dec, roll = POINTING_DEG
     return _Subject(
         "sky",
@@ -119,7 +120,7 @@ def _shipped() -> _Subject:
 
 
 def _show(
-    device: "Device[CubeStarBoard, CubeStar]", subject: _Subject, out: Path, board: Sequence[str]
+    device: Device[CubeStarBoard, CubeStar], subject: _Subject, out: Path, board: Sequence[str]
 ) -> bool:
     """Capture, solve and download one subject; returns whether it was solved."""
     demo = Demo(out, subject.name, subject.title)
@@ -160,8 +161,6 @@ def _show(
 
 def left_out_by(cubestar: CubeStar) -> list[str]:
     """What the latest detection saw and did not take, and why, for a picture's caption."""
-    from cubestack.firmware_model.cubestar.detection.background_search import MOST_STARS_FACTOR
-
     summary = cubestar.client.telemetry("DetectionSummary")
     found = int(summary["NumStarsDetected"])
     most = int(cubestar.client.telemetry("MaxStars")["maxStars"])
@@ -179,8 +178,6 @@ def left_out_by(cubestar: CubeStar) -> list[str]:
 
 
 def _report(found: Attitude, truth: NDArray[np.float64]) -> None:
-    from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
-
     if not found.valid:
         tell("no attitude found in this picture")
         return

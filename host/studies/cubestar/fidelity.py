@@ -6,9 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.boards.cubestar.board import BOOT_US
+from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
+from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
+from cubestack.emulator.scene.attitude import random_quaternion
+from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH, load_sky
+from cubestack.emulator.scene.sky import SkyScene
+from cubestack.emulator.sim.power import PowerModel
+from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
+from cubestack.host.studies.calibrate.experiment import CalibrateOptions
+from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
+from cubestack.host.studies.cubestar.layouts import attitudes_of_loop
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.shots import PICTURES, field_shots, slewing_shots
 from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
@@ -70,9 +81,6 @@ def _attitudes(results: Sequence[AttitudeResult]) -> Figures:
 
 
 def _catalogue(_opened: CubeStarOpener, _frames: int) -> Figures:
-    from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-    from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH
-
     flown, wider, text = (
         onboard_catalogue(pair_limit_deg=limit) for limit in (42.101, 42.105, 60.0)
     )
@@ -94,8 +102,6 @@ def _catalogue(_opened: CubeStarOpener, _frames: int) -> Figures:
 
 def _coverage(_opened: CubeStarOpener, frames: int) -> Figures:
     """Fields with three stars and five, and their mean number, by the faintest magnitude."""
-    from cubestack.emulator.scene.hipparcos import CATALOGUE_EPOCH, load_sky
-
     rng = np.random.default_rng(1)
     boresights = rng.standard_normal((frames, 3))
     boresights /= np.linalg.norm(boresights, axis=1, keepdims=True)
@@ -136,8 +142,6 @@ def _centroids(opened: CubeStarOpener, frames: int) -> Figures:
 
 def _loop(opened: CubeStarOpener, frames: int) -> Figures:
     """Phases of the 1 Hz loop's last turn in ms; over so many its power in mW, and ages in ms."""
-    from cubestack.host.studies.cubestar.layouts import attitudes_of_loop
-
     with opened(None, seed=0) as device:
         device.client.client.command("Trigger")
         begun, *found = attitudes_of_loop(device.board, frames)
@@ -151,9 +155,6 @@ def _loop(opened: CubeStarOpener, frames: int) -> Figures:
 
 def _spots(opened: CubeStarOpener, frames: int) -> Figures:
     """Pixels that stars of the list cover in pictures: 5th, 50th and 95th percentile."""
-    from cubestack.emulator.scene.attitude import random_quaternion
-    from cubestack.emulator.scene.sky import SkyScene
-
     rng, pixels = np.random.default_rng(1), list[int]()
     with opened(None, seed=1) as device:
         for seed in range(frames):
@@ -166,19 +167,12 @@ def _spots(opened: CubeStarOpener, frames: int) -> Figures:
 
 def _calibration(opened: CubeStarOpener, frames: int) -> Figures:
     """What pictures of a drawn unit, and of its star pairs, say of the lens; it has 6.28 mm."""
-    from cubestack.host.studies.calibrate.experiment import CalibrateOptions
-    from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
-
     (result,) = EXPERIMENT.run(opened, CalibrateOptions(emulated=frames, seed=0))
     return {"residual": result.after_px, "pairs_mm": (result.pairs_f_px or np.nan) * PIXEL_PITCH_MM}
 
 
 def _power(_opened: CubeStarOpener, _frames: int) -> Figures:
     """Currents in mA of the four modes of table 6.2."""
-    from cubestack.emulator.boards.cubestar.power import CUBESTAR_POWER
-    from cubestack.emulator.sim.power import PowerModel
-    from cubestack.emulator.sim.virtual_time import Kernel
-
     power, found = PowerModel(Kernel(), CUBESTAR_POWER), {}
     modes = {
         "idle": {},
@@ -220,7 +214,6 @@ def _rates(opened: CubeStarOpener, _frames: int) -> Figures:
 
 def _optics(_opened: CubeStarOpener, _frames: int) -> Figures:
     """Fields of view by equations 3.5.2 to 3.5.4, and what follows from the sensor's data."""
-    from cubestack.emulator.boards.cubestar.board import BOOT_US
 
     def angle(size_px: int, focal_mm: float) -> float:
         return float(np.degrees(2 * np.arctan(size_px * PIXEL_PITCH_MM / 2 / focal_mm)))

@@ -18,16 +18,16 @@ examples:
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
+from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.attitude import errors, is_right
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
 from cubestack.host.options import SCENE, Options, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 
 SETTLING = 2
 """Attitudes before the measurement."""
@@ -131,8 +131,6 @@ def _shown(value: float | None, digits: int = 0) -> str:
 
 def _measure(layout: Layout, opened: CubeStarOpener, options: LayoutOptions) -> LayoutResult:
     """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
-    from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
-
     with opened(options.scene, seed=options.seed, layout=layout.value) as emulated:
         emulated.client.client.command("Trigger")
         found = list(attitudes_of_loop(emulated.board, options.seconds))
@@ -180,13 +178,11 @@ class Found:
     right: bool | None
 
 
-def attitudes_of_loop(board: "CubeStarBoard", seconds: int) -> Iterator[Found]:
+def attitudes_of_loop(board: CubeStarBoard, seconds: int) -> Iterator[Found]:
     """What the loop finds after ``SETTLING`` attitudes: one, and those of ``seconds`` after it.
 
     When the first one does not come, its place is told without it.
     """
-    from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
-
     kernel, seen, end_ps = board.kernel, 0, board.kernel.now + (SETTLING + 3) * PS_PER_S
     begun = False
     while not begun or kernel.now < end_ps:

@@ -8,15 +8,13 @@ examples:
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cubestack.emulator.iss.insight.memory_report import MemoryUse, memory_use
 from cubestack.host.emulation.insight import own_firmware
 from cubestack.host.experiments.facts import Facts, Telling
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import POSITIVE, Options, option, whole
-
-if TYPE_CHECKING:
-    from cubestack.emulator.iss.insight.memory_report import MemoryUse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +33,6 @@ class _Memory(Telling[MemoryOptions]):
     decides = ("profile", "set", "layout")
 
     def run(self, opened: Opener[Any, Any], options: MemoryOptions) -> Iterator[Facts]:
-        from cubestack.emulator.iss.insight.memory_report import memory_use
-
         with opened(None, seed=options.seed) as emulated:
             observer = own_firmware(emulated, "memory").observer
             emulated.wait(options.seconds)
@@ -46,7 +42,7 @@ class _Memory(Telling[MemoryOptions]):
         yield Facts(asdict(use), tuple(_lines(use)))
 
 
-def _lines(use: "MemoryUse") -> Iterator[str]:
+def _lines(use: MemoryUse) -> Iterator[str]:
     def of(name: str, value: int | None, total: int) -> str:
         if value is None:
             return f"{name:>14}  not known: the program has no symbols for it"

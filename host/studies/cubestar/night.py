@@ -19,6 +19,11 @@ from functools import partial
 
 import numpy as np
 
+from cubestack.emulator.camera.common.optics import Distortion
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import LADDER
 from cubestack.host.devices.result_table import log_lines, scatter
@@ -42,12 +47,6 @@ def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
     turned. ``fewest`` and ``most`` stars that an attitude rests on, ``valid``, pictures with an
     attitude in percent, in the mean; and ``fields``, of how many.
     """
-    from cubestack.emulator.camera.common.optics import Distortion
-    from cubestack.emulator.camera.common.view import SkyView
-    from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
-    from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s
-    from cubestack.emulator.scene.sky import SkyScene
-
     condition = replace(CONDITION, optics=replace(LENS, distortion=Distortion.TOOLBOX))
     turned = np.random.default_rng(0).uniform(0, 360, len(SIDEREAL_DEG))
     fields = list(zip(SIDEREAL_DEG, turned, strict=True))

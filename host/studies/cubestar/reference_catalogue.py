@@ -13,6 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.boards.cubestar.catalogue import MAG_LIMIT, onboard_catalogue
+from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
+from cubestack.firmware_model.cubestar.matching import tracking, voting
+from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.export.c_arrays import c_arrays
 
 #: Directions, some 2.9 deg apart, in which the reduced pair list is counted; and the part by which
@@ -22,11 +26,6 @@ DIRECTIONS, SPARE = 5000, 0.03
 
 def catalogue_tables(epoch: float | None = None) -> dict[str, str]:
     """Texts of the two files by name; ``epoch`` is a Julian year, that of the device by default."""
-    from cubestack.emulator.boards.cubestar.catalogue import MAG_LIMIT, onboard_catalogue
-    from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
-    from cubestack.firmware_model.cubestar.matching import tracking, voting
-    from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
-
     published = CubeStarSwitches()
     epoch = DEFAULT_EPOCH if epoch is None else epoch
     widest = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))

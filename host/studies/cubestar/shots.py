@@ -3,18 +3,20 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.view import SkyView
+from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
+from cubestack.emulator.scene.attitude import random_quaternion
+from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar import measure
-
-if TYPE_CHECKING:
-    from cubestack.emulator.camera.common.optics import Optics
 
 WIDTH_DEG = 54.0
 DEFAULT_MARGIN_RAD = 0.001  # about a pixel (section 4.3.5)
@@ -63,10 +65,8 @@ def _shot(device: measure.CubeStarEmulated, *, judged: bool = False) -> Shot:
     return Shot(valid, right, tracked, cross_deg if right else math.nan, detected, matched, wrong)
 
 
-def published_optics() -> "Optics":
+def published_optics() -> Optics:
     """The field of table 4.4 in front of CubeStar's sensor: 54 x 28 degrees, no distortion."""
-    from cubestack.emulator.camera.mlx75412.lens import LENS
-
     focal_px = LENS.columns / 2 / math.tan(math.radians(WIDTH_DEG / 2))
     focal_mm = focal_px * LENS.pixel_pitch_um / 1000
     middle = replace(LENS, cx=LENS.columns / 2 - 0.5, cy=LENS.rows / 2 - 0.5)
@@ -86,11 +86,6 @@ def field_shots(
 
     ``margin_rad``: search tolerance. ``sky``: of a ``SkyScene``, as mag_limit and false_stars.
     """
-    from cubestack.emulator.camera.common.view import SkyView
-    from cubestack.emulator.camera.mlx75412.lens import CONDITION
-    from cubestack.emulator.scene.attitude import random_quaternion
-    from cubestack.emulator.scene.sky import SkyScene
-
     rng, optics = np.random.default_rng(SEED), published_optics()
     with opened(None, seed=SEED) as device:
         cubestar, client = device.client, device.client.client
@@ -110,9 +105,6 @@ def field_shots(
 
 def slewing_shots(opened: measure.CubeStarOpener, frames: int, rate_deg_s: float) -> Iterator[Shot]:
     """While turning across the boresight: section 6.2, on a mount that does not shake."""
-    from cubestack.emulator.scene.attitude import random_quaternion
-    from cubestack.emulator.scene.sky import SkyScene
-
     rng = np.random.default_rng(SEED)
     with opened(None, seed=SEED) as device:
         for number in range(frames):

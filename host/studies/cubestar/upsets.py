@@ -13,24 +13,24 @@ examples:
 
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.boards.cubestar.board import CubeStarBoard
+from cubestack.emulator.boards.cubestar.layouts import BOARDS
+from cubestack.emulator.camera.mlx75412.lens import CONDITION
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
+from cubestack.host.clients.cubestar.client import CubeStar
+from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar.measure import wait_started
 from cubestack.host.options import option
 from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
-
-if TYPE_CHECKING:
-    from cubestack.emulator.boards.cubestar.board import CubeStarBoard
-    from cubestack.emulator.rtl.contract import RtlEngine
-    from cubestack.emulator.rtl.wiring import Wiring
-    from cubestack.host.clients.cubestar.client import CubeStar
-    from cubestack.host.emulation.emulated import EmulatedDevice
 
 READING = "reading"
 
@@ -51,16 +51,14 @@ TIMEOUT_S = 20.0
 
 
 def _scene(rng: np.random.Generator) -> Any:
-    from cubestack.emulator.camera.mlx75412.lens import CONDITION
-
     return attitudes.random_view(attitudes.SkyOptions(), CONDITION, rng)
 
 
-def _start(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> None:
+def _start(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> None:
     emulated.client.client.command("CaptureAndProcess")
 
 
-def _judge(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> Verdict:
+def _judge(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> Verdict:
     cubestar = emulated.client
     cubestar.client.wait_processed(TIMEOUT_S)
     status = cubestar.task_status()
@@ -72,7 +70,7 @@ def _judge(emulated: "EmulatedDevice[CubeStarBoard, CubeStar]") -> Verdict:
     return Verdict("right" if right else "wrong")
 
 
-def _state(engine: "RtlEngine") -> str:
+def _state(engine: RtlEngine) -> str:
     boards = BOARD_PREFIXES if len(engine.wiring.acknowledges) > 1 else ("",)
     on = [board for board in boards if engine.get_pin(board + ENABLE)]
     if not on:
@@ -91,9 +89,7 @@ class CubeStarUpsetOptions(UpsetOptions):
     )
 
 
-def _wiring(layout: Layout) -> "Wiring":
-    from cubestack.emulator.boards.cubestar.layouts import BOARDS
-
+def _wiring(layout: Layout) -> Wiring:
     return BOARDS[layout].wiring()
 
 

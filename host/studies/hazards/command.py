@@ -21,7 +21,7 @@ from cubestack.firmware_model.interface.codec.switches import PROFILES
 from cubestack.host.cli.arguments import whole
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.studies.hazards import curves
+from cubestack.host.studies.hazards import album, curves
 from cubestack.host.studies.workers import cores
 from cubestack.host.terminal import progress, say, show
 
@@ -63,8 +63,6 @@ def run(args: argparse.Namespace) -> int:
         for job in curves.jobs_of(name, args.hazard, args.frames, args.seed, args.profile)
     ]
     if args.out:
-        from cubestack.host.studies.hazards import album
-
         album.check(args.out)
     workers = min(args.workers or cores(), len(jobs))
     points = []

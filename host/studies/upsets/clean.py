@@ -4,18 +4,16 @@ from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.emulator.faults.sites import Sites
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Subject, Verdict
 from cubestack.host.studies.upsets.watch import PortWatch
-
-if TYPE_CHECKING:
-    from cubestack.emulator.faults.sites import Sites
-    from cubestack.emulator.rtl.contract import RtlEngine
-    from cubestack.host.emulation.emulated import AnyEmulated
 
 PS_PER_S = 10**12
 
@@ -98,13 +96,13 @@ class _State(NamedTuple):
     camera: str | None
 
 
-def _state(now_ps: int, subject: Subject, engine: "RtlEngine") -> _State:
+def _state(now_ps: int, subject: Subject, engine: RtlEngine) -> _State:
     cameras = (name for name in engine.wiring.storing(engine.get_pin) if name)
     return _State(now_ps, subject.state(engine), next(iter(cameras), None))
 
 
 def clean_loop(
-    emulated: "AnyEmulated", subject: Subject, sites: "Sites", watch: PortWatch
+    emulated: AnyEmulated, subject: Subject, sites: Sites, watch: PortWatch
 ) -> CleanLoop:
     """Go through the loop that has been started, to its end; for use in a copy.
 
@@ -134,7 +132,7 @@ def clean_loop(
     return CleanLoop(intervals, over_ps, snapshot, subject.judge(emulated))
 
 
-def take(sites: "Sites", watch: PortWatch) -> Snapshot:
+def take(sites: Sites, watch: PortWatch) -> Snapshot:
     """What is there now; live views."""
     engine = sites.engine
     assert engine is not None
@@ -148,7 +146,7 @@ def take(sites: "Sites", watch: PortWatch) -> Snapshot:
     )
 
 
-def render(clean: CleanLoop, sites: "Sites") -> None:
+def render(clean: CleanLoop, sites: Sites) -> None:
     """Have the loop's pictures rendered, once for all copies."""
     for one in clean.intervals:
         if one.camera is None:
@@ -160,7 +158,7 @@ def render(clean: CleanLoop, sites: "Sites") -> None:
             now_ps = int(segment.start_ps + segment.clocks * source.period) + 1
 
 
-def _phases(state: _State, end_ps: int, sites: "Sites") -> Iterator[Interval]:
+def _phases(state: _State, end_ps: int, sites: Sites) -> Iterator[Interval]:
     """The intervals of one state; a camera's pauses between two pictures are apart."""
     if state.state != STORING or state.camera is None:
         yield Interval(state.state, state.start_ps, end_ps, state.camera)

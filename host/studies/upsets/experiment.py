@@ -5,11 +5,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from cubestack.emulator.faults.sites import Sites
+from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
+from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.host.devices.experiment import Experiment, Section
+from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.options import POSITIVE, TEXT, Options, option, whole
@@ -29,11 +33,6 @@ from cubestack.host.studies.upsets.sample import (
 )
 from cubestack.host.studies.upsets.subject import Rig, Subject
 from cubestack.host.studies.upsets.watch import PortWatch
-
-if TYPE_CHECKING:
-    from cubestack.emulator.faults.sites import Sites
-    from cubestack.emulator.rtl.wiring import Wiring
-    from cubestack.host.emulation.emulated import AnyEmulated
 
 AT_ONCE = 200
 """Upsets that one copy may follow."""
@@ -169,9 +168,9 @@ def _targets(rig: Rig, options: UpsetOptions) -> list[Target]:
 
 
 def _begin(
-    emulated: "AnyEmulated",
+    emulated: AnyEmulated,
     subject: Subject,
-    sites: "Sites",
+    sites: Sites,
     watch: PortWatch,
     rng: np.random.Generator,
 ) -> CleanLoop:
@@ -214,10 +213,8 @@ class _About:
 
 
 @cache
-def _registers(wiring: "Callable[[], Wiring]") -> Mapping[str, int]:
+def _registers(wiring: Callable[[], Wiring]) -> Mapping[str, int]:
     """Registers of a wiring's design and their bits."""
-    from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
-
     engine = CompiledEngine(wiring())
     try:
         return engine.registers

@@ -2,19 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
+from cubestack.emulator.faults.sites import Sites
 from cubestack.host.devices.experiment import Result
+from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.errors import HostError
 from cubestack.host.studies.upsets.clean import CleanLoop, Snapshot, take
 from cubestack.host.studies.upsets.subject import Answer, Subject, Verdict
 from cubestack.host.studies.upsets.watch import PortWatch
-
-if TYPE_CHECKING:
-    from cubestack.emulator.faults.sites import Sites
-    from cubestack.host.emulation.emulated import AnyEmulated
 
 AHEAD_PS = 2_000_000
 """So long before an upset a copy is made: no step of the processor's takes the FPGAs past it."""
@@ -100,9 +98,9 @@ class UpsetResult(Result):
 class Running:
     """A device in the middle of a loop of which the clean course is known."""
 
-    emulated: "AnyEmulated"
+    emulated: AnyEmulated
     subject: Subject
-    sites: "Sites"
+    sites: Sites
     watch: PortWatch
     clean: CleanLoop
 

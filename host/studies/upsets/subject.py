@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from cubestack.emulator.rtl.contract import RtlEngine
-    from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.emulator.rtl.contract import RtlEngine
+from cubestack.emulator.rtl.wiring import Wiring
 
 Answer = Literal["right", "refused", "wrong"]
 
@@ -46,7 +45,7 @@ class Subject:
     scene: Callable[[np.random.Generator], Any]
     start: Callable[[Any], None]
     judge: Callable[[Any], Verdict]
-    state: "Callable[[RtlEngine], str]"
+    state: Callable[[RtlEngine], str]
     row_bytes: int
     period_s: float = 1.0
     ready: Callable[[Any], None] = lambda _emulated: None
@@ -65,7 +64,7 @@ class Rig:
     """
 
     subjects: tuple[Subject, ...]
-    wiring: "Callable[[], Wiring]"
+    wiring: Callable[[], Wiring]
     phases: tuple[str, ...]
     memories: tuple[str, ...]
     board: Mapping[str, Any] = field(default_factory=dict)

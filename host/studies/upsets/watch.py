@@ -1,13 +1,11 @@
 """What the processor sees of its FPGAs: bytes, and acknowledges with their times."""
 
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from cubestack.emulator.sim.fpga_port import Driver, FpgaPort, Transactions
+from cubestack.emulator.sim.fpga_port import Driver, FpgaPort, Transactions
 
 
 class PortWatch:
@@ -18,7 +16,7 @@ class PortWatch:
         seen: times in ps, pins and levels at which acknowledges were looked at and had changed.
     """
 
-    def __init__(self, engine: "FpgaPort", acknowledges: tuple[str, ...]) -> None:
+    def __init__(self, engine: FpgaPort, acknowledges: tuple[str, ...]) -> None:
         """Stand before ``engine``."""
         self._engine = engine
         self._levels = dict.fromkeys(acknowledges, 0)
@@ -40,7 +38,7 @@ class PortWatch:
         return self._engine.running
 
     @property
-    def driver(self) -> "Driver | None":
+    def driver(self) -> Driver | None:
         """None: nobody may go past."""
         return None
 
@@ -70,7 +68,7 @@ class PortWatch:
         self.data += out[:done].tobytes()
         return done
 
-    def access(self, transactions: "Transactions", until_ps: int) -> int:
+    def access(self, transactions: Transactions, until_ps: int) -> int:
         """Make transactions on the external bus."""
         done = self._engine.access(transactions, until_ps)
         if not transactions.write:

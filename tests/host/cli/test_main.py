@@ -48,6 +48,19 @@ def test_a_command_loads_itself_alone(run: Run, monkeypatch: pytest.MonkeyPatch)
     assert len(loaded) == 1, "the list of commands loads none"
 
 
+@pytest.mark.parametrize("words", ["--help", "registers cubestar", "shell --help", "nonsense"])
+def test_a_command_without_emulation_loads_no_emulator(words: str) -> None:
+    script = (
+        "import sys; from cubestack.host.cli.main import main\n"
+        "try: main(sys.argv[1:])\nexcept SystemExit: pass\n"
+        "heavy = 'cubestack.emulator', 'amaranth'\n"
+        "found = [name for name in sys.modules if name.startswith(heavy)]\n"
+        "sys.exit(str(found) if found else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", script, *words.split()], capture_output=True)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("command", [None, *commands(), *reports()])
 def test_help(run: Run, command: str | None) -> None:
     outcome = run(*([command] if command else []), "--help")

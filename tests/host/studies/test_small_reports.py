@@ -58,11 +58,9 @@ class Observed:
 def test_memory_is_told_after_a_run(
     monkeypatch: pytest.MonkeyPatch, capture: bool, done: list[object]
 ) -> None:
-    from cubestack.emulator.iss.insight import memory_report
-
     one = Observed()
     monkeypatch.setattr(memory, "own_firmware", lambda *_words: SimpleNamespace(observer=None))
-    monkeypatch.setattr(memory_report, "memory_use", lambda _observer: USE)
+    monkeypatch.setattr(memory, "memory_use", lambda _observer: USE)
     options = memory.MemoryOptions(seconds=1.5, capture=capture)
     opened: Any = lambda _scene, *, seed: one  # noqa: E731
     (facts,) = memory.EXPERIMENT.run(opened, options)
@@ -224,7 +222,7 @@ def test_libraries_are_made_for_all_machines_and_others_removed(
 
     wanted: Any = [SimpleNamespace(inputs=bytes([number]), build=build) for number in range(2)]
     monkeypatch.setattr(libraries, "needed", lambda: wanted)
-    monkeypatch.setattr(ready_made, "FOLDER", folder)
+    monkeypatch.setattr(libraries, "FOLDER", folder)
     told = list[str]()
     monkeypatch.setattr(libraries, "print", told.append, raising=False)
     libraries.main()

@@ -186,17 +186,14 @@ def test_the_program_on_the_bus_tells_the_median_rate(
 
 
 def test_all_of_cubestar_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cubestack.emulator.boards.cubestar import benchmark as board
-    from cubestack.emulator.iss import benchmark as core
-    from cubestack.emulator.rtl import benchmark as rtl
 
     one, asked = Device(clock), list[dict[str, Any]]()
     monkeypatch.setattr(cubestar, "power_up", powered(one, asked))
-    monkeypatch.setattr(board, "rtl_clocks_per_s", lambda: 1000.4)
-    monkeypatch.setattr(board, "strides_per_s", lambda: 2000.6)
-    monkeypatch.setattr(board, "strobes_per_s", lambda: 3000.2)
-    monkeypatch.setattr(core, "instructions_per_s", lambda: 4000.7)
-    monkeypatch.setattr(rtl, "cold_build_s", lambda wiring: built(wiring, 5.678))
+    monkeypatch.setattr(cubestar, "rtl_clocks_per_s", lambda: 1000.4)
+    monkeypatch.setattr(cubestar, "strides_per_s", lambda: 2000.6)
+    monkeypatch.setattr(cubestar, "strobes_per_s", lambda: 3000.2)
+    monkeypatch.setattr(cubestar, "instructions_per_s", lambda: 4000.7)
+    monkeypatch.setattr(cubestar, "cold_build_s", lambda wiring: built(wiring, 5.678))
     monkeypatch.setattr(cubestar, "_capture", lambda _emulated: {"capture_wall_ms": 1.0})
     monkeypatch.setattr(cubestar, "_i2c", lambda: {"i2c_seccomp_fast": 7.0})
     assert cubestar.BENCHMARK.run(device("cubestar")) == {
@@ -218,13 +215,12 @@ def test_all_of_cubestar_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPat
 
 def test_all_of_cubesense_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     from cubestack.emulator.boards.cubesense import benchmark as board
-    from cubestack.emulator.rtl import benchmark as rtl
 
     monkeypatch.setattr(cubesense, "power_up", powered(Device(clock), []))
-    monkeypatch.setattr(board, "pair_with_cameras", lambda: "pair")
-    monkeypatch.setattr(board, "pair_store_ms", lambda _pair, way: len(way) + 0.06)
-    monkeypatch.setattr(board, "pair_scan_ms", lambda _pair: 1.44)
-    monkeypatch.setattr(rtl, "cold_build_s", lambda wiring: built(wiring, 9.04))
+    monkeypatch.setattr(cubesense, "pair_with_cameras", lambda: "pair")
+    monkeypatch.setattr(cubesense, "pair_store_ms", lambda _pair, way: len(way) + 0.06)
+    monkeypatch.setattr(cubesense, "pair_scan_ms", lambda _pair: 1.44)
+    monkeypatch.setattr(cubesense, "cold_build_s", lambda wiring: built(wiring, 9.04))
     found = cubesense.BENCHMARK.run(device("cubesense"))
     stored = {f"pair_{way}_ms": len(way) + 0.1 for way in board.STORES}
     assert found == {**stored, "sensors_ratio": 4.0, "pair_scan_ms": 1.4, "pair_build_s": 9.0}
