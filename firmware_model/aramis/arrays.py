@@ -1,4 +1,4 @@
-"""Names of the arrays that the processing passes on; their shapes stand where they are passed."""
+"""Types of the arrays in the processing; shapes are documented where they are used."""
 
 import numpy as np
 from numpy.typing import NDArray

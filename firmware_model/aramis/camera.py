@@ -1,7 +1,7 @@
-"""The camera unit as the program uses it: set-up, start and stop, pictures by DMA.
+"""The program's use of the camera unit: set-up, start and stop, images by DMA.
 
 AraMiS thesis, sections 2.4 and 2.5.2; registers are those of the sensor's own table. The camera
-sends frames without a break while the star tracker is active; a picture is the next whole frame.
+sends frames continuously while the star tracker is active; an image is the next whole frame.
 """
 
 from dataclasses import dataclass
@@ -18,25 +18,22 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, REGISTER
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, Sleep, pause
 
-SETTLE_US = 2_000
-"""From power-up to the first register access; assumed."""
-
+SETTLE_US = 2_000  #: from power-up to the first register access; assumed
 ROW_CLOCKS = COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
 BLANK_ROWS = REGISTERS["VERTICAL_BLANKING"].reset + 1
-MARGIN_US = 20_000
-"""Added to three frames before a picture is given up; assumed."""
+MARGIN_US = 20_000  #: added to three frames in the time-out of an image; assumed
 
 _ENABLE = REGISTERS["OUTPUT_CONTROL"].field("CHIP_ENABLE").mask
 
 
 @dataclass
 class Camera:
-    """Registers over the control bus, and pictures; set up as the settings in the state say.
+    """Registers over the control bus, and images; set up with the settings in the state.
 
     Attributes:
-        selected_register: address and value of the register read last; None: no answer.
+        selected_register: address and value of the register read last; value None: no answer.
         off: its supply was switched off by a latch-up action.
-        latest: which of the two places holds the latest picture; None before the first.
+        latest: which of the two places holds the latest image; None before the first.
     """
 
     _hardware: AramisHardware
@@ -48,7 +45,7 @@ class Camera:
     _set_up: tuple[int, int] | None = None
     _pending: int | None = None
     _ended: tuple[FrameEnd, int] | None = None
-    _exposure_rows: int = 0  # of the frame that is waited for
+    _exposure_rows: int = 0  # of the awaited frame
 
     def frame_ended(self, end: FrameEnd) -> None:
         """Interrupt: the transfer of a frame ended."""
@@ -71,7 +68,7 @@ class Camera:
         yield from pause(SETTLE_US)
 
     def start(self) -> Routine[Reason | None]:
-        """Let the sensor send frames as the settings say; why it does not."""
+        """Start the sensor with the settings; returns the reason of a failure."""
         if self.off:
             return self._fail(Reason.CAMERA_OFF, "CameraOff")
         gain = mt9m001.gain_register(float(self._state.settings.get("SetGain", "Gain")))
@@ -90,7 +87,6 @@ class Camera:
         return None
 
     def stop(self) -> Routine[None]:
-        """Let the sensor rest."""
         self._give_up()
         self._set_up = None
         if not self.off:
@@ -101,24 +97,24 @@ class Camera:
         return reason
 
     def picture(self, place: int) -> NDArray[np.uint8]:
-        """One of the two pictures in SDRAM, shape (1024, 1280), a live view."""
+        """One of the two images in SDRAM, shape (1024, 1280), a live view."""
         start = PICTURES_AT[place]
         return self._hardware.sdram[start : start + IMAGE_BYTES].reshape(ROWS, COLUMNS)
 
     def expose(self) -> None:
-        """Let the next whole frame come while the program goes on."""
+        """Start the transfer of the next whole frame; the program continues meanwhile."""
         self._ended = None
         self._pending = place = 0 if self.latest is None else 1 - self.latest
         self._exposure_rows = int(self._state.settings.get("SetExposure", "Rows"))
         self._hardware.start_capture(self.picture(place))
 
     def _give_up(self) -> None:
-        """The frame that was asked for is not wanted any longer."""
+        """Cancel the requested frame."""
         self._hardware.stop_capture()
         self._pending = None
 
     def take(self) -> Routine[Reason | None]:
-        """Wait for the frame, asking for it if ``expose`` did not; why there is none."""
+        """Wait for the frame, after ``expose`` if needed; returns the reason of a failure."""
         if self._pending is None:
             self.expose()
         rows = max(ROWS + BLANK_ROWS, self._exposure_rows + 1)
@@ -143,17 +139,17 @@ class Camera:
         return None
 
     def image_us(self) -> int:
-        """Uptime at mid-exposure of the middle row of the picture that was taken last."""
+        """Uptime at mid-exposure of the middle row of the latest image."""
         assert self._ended is not None
         clocks = ((ROWS - 1) / 2 + self._exposure_rows / 2) * ROW_CLOCKS + COLUMNS
         return self._ended[1] - round(clocks * 1_000_000 / mt9m001.PIXEL_CLOCK_HZ)
 
     def write(self, address: int, value: int) -> Routine[bool]:
-        """Write a register; False when the sensor does not acknowledge."""
+        """Write a register; False if the sensor does not acknowledge."""
         return (yield CameraTransfer(bytes([address, *value.to_bytes(2, "big")]))) is not None
 
     def forget_set_up(self) -> None:
-        """Registers were written by other means: set the sensor up again before a picture."""
+        """Registers were written by other means: set the sensor up again before an image."""
         self._set_up = None
 
     def select(self, address: int) -> Routine[None]:

@@ -1,7 +1,7 @@
-"""What each telecommand does, executed by the main loop one after the other.
+"""Effects of the telecommands, which the main loop executes one after the other.
 
 AraMiS thesis, section 2.2. A setting telecommand stores its parameters; the others act at once or
-take time. Only the supply is cut off in the interrupt itself: a latch-up does not wait.
+take time. Only the supply is cut off in the interrupt itself, because a latch-up cannot wait.
 """
 
 import numpy as np
@@ -40,7 +40,6 @@ class Commands(CommandExecutor):
         catalogue: CatalogueStore,
         measuring: Measuring,
     ) -> None:
-        """Act on the given parts of the program."""
         super().__init__(hardware, state.settings, state.switches)
         self._meter = meter
         self._state = state
@@ -78,7 +77,7 @@ class Commands(CommandExecutor):
         }
 
     def urgent(self, command: QueuedCommand) -> None:
-        """Interrupt: what of an accepted telecommand can not wait for the main loop."""
+        """Interrupt: the part of an accepted telecommand that cannot wait for the main loop."""
         latch_up = command.message.name == "LatchUpAction"
         if latch_up and command.values["Step"] == aramis.LatchUpStep.OFF:
             self._camera.cut()
@@ -101,7 +100,7 @@ class Commands(CommandExecutor):
 
     def _set_time(self, command: QueuedCommand) -> None:
         values = command.values
-        self._state.clock.set(values["JulianDay"], values["Millisecond"], command.came_us)
+        self._state.clock.set(values["JulianDay"], values["Millisecond"], command.received_us)
 
     def _latch_up_action(self, command: QueuedCommand) -> Routine[None]:
         if command.values["Step"] == aramis.LatchUpStep.OFF or not self._camera.off:
@@ -148,7 +147,7 @@ class Commands(CommandExecutor):
             self._state.raise_flag("CatalogueMissing")
 
     def reload_step(self) -> Routine[None]:
-        """A slice of a periodic reload, for the main loop's idle time."""
+        """Run a slice of a periodic reload, in the main loop's idle time."""
         if (yield from self._catalogue.load_step()):
             self._report_load()
 
@@ -188,7 +187,7 @@ class Commands(CommandExecutor):
         self._state.sensor = before
 
     def image_block(self) -> bytes:
-        """The selected block of the latest picture; zeros before the first."""
+        """The selected block of the latest image; zeros before the first."""
         number = int(self._settings.get("ImageBlockSet", "BlockNumber"))
         return self._block(number * BLOCK_BYTES)
 

@@ -1,7 +1,8 @@
-"""What AraMiS' program sees of its ADSP-BF533 beside the requests that take time.
+"""Peripherals of AraMiS' ADSP-BF533 that the program uses without a request.
 
-A frame comes by DMA while the processor does something else: the program starts the parallel
-peripheral interface, and the end of the frame is an interrupt (``AramisProgram.frame_ended``).
+A frame is transferred by DMA while the processor does something else: the program starts the
+parallel peripheral interface, and the end of the frame is an interrupt
+(``AramisProgram.frame_ended``).
 """
 
 from enum import IntEnum
@@ -15,13 +16,11 @@ from cubestack.firmware_model.node.hardware import NodeHardware
 
 
 class FrameEnd(IntEnum):
-    """How a frame's transfer ended, as the interface's status register tells it."""
+    """Result of a frame's transfer, from the interface's status register."""
 
     STORED = 0
-    TOO_SHORT = 1
-    """The frame ended before all lines came."""
-    WRONG_LINES = 2
-    """Lines were longer or shorter than programmed."""
+    TOO_SHORT = 1  #: the frame ended before all lines came
+    WRONG_LINES = 2  #: lines were longer or shorter than programmed
 
 
 class AramisHardware(NodeHardware, Protocol):
@@ -40,13 +39,12 @@ class AramisHardware(NodeHardware, Protocol):
     reset_cause: int
 
     def start_capture(self, target: NDArray[np.uint8]) -> None:
-        """Let the next whole frame come into ``target``, shape (rows, columns), part of SDRAM."""
+        """Transfer the next whole frame to ``target``, shape (rows, columns), part of SDRAM."""
 
     def stop_capture(self) -> None:
-        """Give up the frame that is waited for; no interrupt comes."""
+        """Cancel the awaited frame; no interrupt comes."""
 
-    def switch_camera(self, on: bool) -> None:
-        """Turn the camera unit's supply on or off."""
+    def switch_camera(self, on: bool) -> None: ...
 
     def camera_current_ma(self) -> float:
         """Current of the camera unit's supply, in mA."""

@@ -1,6 +1,6 @@
-"""AraMiS' link to the host: commands that can not wait, and directions that must be unit vectors.
+"""AraMiS' link to the host: urgent telecommands, and directions that must be unit vectors.
 
-An accepted telecommand of which something can not wait is acted upon as soon as it is queued.
+The urgent part of an accepted telecommand is executed as soon as it is queued.
 """
 
 import math
@@ -15,8 +15,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
 from cubestack.firmware_model.node.queue import QueuedCommand
 
-SEND_BUFFER_BYTES = 8 * BLOCK_BYTES
-"""What the UART may still have to send: assumed."""
+SEND_BUFFER_BYTES = 8 * BLOCK_BYTES  #: assumed
 
 _BUS = BusFlags("TcmdBufferOverflow", "TcmdLengthError", "TcmdLengthError", "TlmIdError")
 _FLAGS = LinkFlags(
@@ -34,11 +33,11 @@ _LENGTHS = {
     "GetAttitudeNearVector": (0.9, 1.1, "DirectionError"),
     "SetBodyRotation": (0.99, 1.01, "RotationError"),
 }
-"""Shortest and longest vector that a telecommand may carry, and the flag that others raise."""
+"""Shortest and longest vector of a telecommand, and the flag for others."""
 
 
 class AramisLink(QueueingLink):
-    """Decodes what the host sends and answers it."""
+    """Decodes the host's messages and answers them."""
 
     def __init__(
         self,
@@ -48,7 +47,7 @@ class AramisLink(QueueingLink):
         telemetry: Callable[[Message], dict[str, Any]],
         urgent: Callable[[QueuedCommand], None],
     ) -> None:
-        """Serve; ``urgent`` is told of each accepted telecommand at once."""
+        """``urgent`` is called at once for each accepted telecommand."""
         super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry)
         self._state = state
         self._urgent = urgent

@@ -1,8 +1,8 @@
-"""Where everything lies: the SDRAM, and the flash chips of the catalogue.
+"""Memory map: the SDRAM, and the flash chips of the catalogue.
 
 AraMiS thesis, sections 2.3.2 and 2.3.3 and appendix A: 32 MB of SDRAM (MT48LC16M16), flash parts of
-4 MB (M29W320D), of which three hold the coded catalogue (assumed: its size decides). RAM holds the
-picture, a second one that comes while the first is worked on, and the catalogue.
+4 MB (M29W320D), of which three hold the coded catalogue (assumed, from its size). RAM holds the
+image, a second one that is transferred while the first is processed, and the catalogue.
 """
 
 from cubestack.firmware_model.aramis.catalogue.hamming import coded_size
@@ -13,8 +13,7 @@ MB = 1 << 20
 SDRAM_BYTES = 32 * MB
 FLASH_BYTES = 12 * MB  # chosen: three of the published parts of 4 MB
 
-SECTOR_BYTES = 1 << 16
-"""Smallest part of the flash that can be erased."""
+SECTOR_BYTES = 1 << 16  #: smallest part of the flash that can be erased
 
 PICTURES_AT = (0, 2 * MB)
 CATALOGUE_AT = 4 * MB

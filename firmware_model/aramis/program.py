@@ -1,8 +1,8 @@
 """AraMiS' main program: telecommands, the loop, and the catalogue's periodic reload.
 
 AraMiS thesis, sections 2.1 (periodic reloading), 2.2 (use cases) and 7.3. The loop is an extension,
-1 Hz unless told otherwise; below a second the next frame comes while the last one is worked on. The
-catalogue is reloaded in slices while there is nothing else to do.
+1 Hz by default; below a second the next frame is transferred while the last one is processed. The
+catalogue is reloaded in slices in idle time.
 """
 
 from cubestack.firmware_model.aramis.camera import Camera
@@ -18,27 +18,24 @@ from cubestack.firmware_model.interface.aramis.switches import DEFAULT_SWITCHES,
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine, Sleep
 
-LATE_US = 10_000
-"""An iteration that starts later than this after its time is a timing error; assumed."""
-
+LATE_US = 10_000  #: an iteration that starts later by this is a timing error; assumed
 OVERLAP_BELOW_MS = 1000
-SLICE_US = 5_000
-"""More than a slice of a reload takes."""
+SLICE_US = 5_000  #: more than a slice of a reload takes
 
 
 class AramisProgram:
-    """One life of the program, from reset to reset.
+    """One run of the program, from reset to reset.
 
     Attributes:
         link: the satellite's interface; its methods are the UART and I2C interrupts.
         commands: the telecommands.
-        state: what the program remembers; traces read it.
+        state: the program's memory, also read by traces.
     """
 
     def __init__(
         self, hardware: AramisHardware, meter: Meter, switches: AramisSwitches = DEFAULT_SWITCHES
     ) -> None:
-        """Reset: settings from flash, ``switches`` of power-up, everything else anew."""
+        """Settings come from flash, ``switches`` are those of power-up."""
         self.state = state = State(hardware.flash, switches)
         self._camera = Camera(hardware, state, meter)
         self._catalogue = CatalogueStore(hardware, meter)
@@ -56,7 +53,6 @@ class AramisProgram:
         self._camera.frame_ended(end)
 
     def main(self) -> Routine[None]:
-        """Run until a reset."""
         yield from self._camera.restore()
         yield from self._camera.stop()
         while True:
@@ -68,7 +64,7 @@ class AramisProgram:
                 yield from self._idle(None)
 
     def _serve(self) -> Routine[bool]:
-        """Execute a telecommand, if any waits; False when none does."""
+        """Execute a waiting telecommand; False if there is none."""
         if not self.link.queue:
             return False
         self.commands.running = True
@@ -97,7 +93,7 @@ class AramisProgram:
         state.iterations += 1
 
     def _idle(self, deadline_us: int | None) -> Routine[None]:
-        """Reload a slice of the catalogue when that is due and fits, else sleep."""
+        """Reload a slice of the catalogue if it is due and fits, else sleep."""
         now_us: int = yield ReadTimer()
         reload_us = self._reload_due_us()
         fits = deadline_us is None or now_us + SLICE_US <= deadline_us
@@ -108,7 +104,7 @@ class AramisProgram:
         yield Sleep(min(times) if times else deadline_us)
 
     def _reload_due_us(self) -> int | None:
-        """When the next reload is to begin, or when one that has begun is to go on; None: never."""
+        """Time of the next reload, or of the next slice of the present one; None: never."""
         if not self.state.active:
             return None
         if self._catalogue.loading:

@@ -1,7 +1,7 @@
 """The settings that telecommands change, and their pages in flash.
 
-SaveConfig writes them to a flash page with their CRC-32 behind; the body rotation has a page of its
-own, written as soon as it is set (AraMiS thesis, section 2.2, inputAOCSparameters).
+SaveConfig writes them to a flash page followed by their CRC-32; the body rotation has its own page,
+written as soon as it is set (AraMiS thesis, section 2.2, inputAOCSparameters).
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 from cubestack.firmware_model.node.settings import Settings
 
-#: Telecommands whose parameters are kept.
+#: Telecommands whose parameters are stored.
 SETTING_COMMANDS = tuple(SETTINGS_SHOWN.values())
 
 CONFIG_PAGE = "config"
@@ -28,11 +28,11 @@ class StoredSettings(Settings):
     """Current parameters of every setting telecommand.
 
     Attributes:
-        damaged: whether a page in flash did not fit its checksum when it was read last.
+        damaged: a page in flash did not match its checksum when it was last read.
     """
 
     def __init__(self, flash: FlashStore) -> None:
-        """Take what ``flash`` holds, else the declared reset values."""
+        """Load the settings from ``flash``, else the declared reset values."""
         super().__init__(INTERFACE, SETTING_COMMANDS)
         self._flash = flash
         self.load()
@@ -48,12 +48,12 @@ class StoredSettings(Settings):
         self._write(CONFIG_PAGE, _SAVED)
 
     def erase(self) -> None:
-        """Erase what ``save`` wrote, and return to the reset values."""
+        """Erase the page of ``save``, and return to the reset values."""
         self._flash.erase(CONFIG_PAGE)
         self.load()
 
     def load(self) -> None:
-        """Read both pages; reset values where one is erased or damaged."""
+        """Read both pages; an erased or damaged one is replaced by reset values."""
         self.damaged = False
         self.clear()
         self._read(CONFIG_PAGE, _SAVED)

@@ -1,4 +1,4 @@
-"""Values of every telemetry frame, taken when it is asked for."""
+"""Values of every telemetry frame, computed at the request."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
 from cubestack.firmware_model.interface.codec.attitude_quality import (
     UNRATED,
-    covariance_told,
+    covariance_fields,
     log_false_alarm,
 )
 from cubestack.firmware_model.interface.codec.message import Message
@@ -51,7 +51,7 @@ def body_quaternion(rotation: Floats, attitude: Floats) -> Floats:
 
 
 def _parts(quaternion: Floats | None) -> Values:
-    """Its four fields; zeros without one."""
+    """The four fields of a quaternion; zeros without one."""
     return {f"Q{index}": 0.0 if quaternion is None else quaternion[index] for index in range(4)}
 
 
@@ -59,7 +59,7 @@ def _parts(quaternion: Floats | None) -> Values:
 class Telemetry:
     """Answers telemetry requests; interrupt context, so nothing here waits.
 
-    ``_link`` gives the host's link, which is made after this.
+    ``_link`` returns the host's link, which is created later.
     """
 
     _hardware: AramisHardware
@@ -71,7 +71,6 @@ class Telemetry:
     _link: Callable[[], AramisLink]
 
     def __post_init__(self) -> None:
-        """Say where each message's values come from."""
         hardware, state, commands = self._hardware, self._state, self._commands
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": lambda: identification(INTERFACE, NODE_TYPE, hardware.uptime_us()),
@@ -98,7 +97,6 @@ class Telemetry:
         }
 
     def values(self, message: Message) -> Values:
-        """Values of every field of ``message``."""
         if message.name in SETTINGS_SHOWN:
             return self._state.settings.all(SETTINGS_SHOWN[message.name])
         return self._sources[message.name]()
@@ -223,7 +221,7 @@ class Telemetry:
         self._meter.charge(f32_sqrt=3, f32_mul=3, f32_div=3, f32_atan2=1)
         return values | {
             "Valid": int(latest.valid),
-            **covariance_told(quality.covariance.tolist()),
+            **covariance_fields(quality.covariance.tolist()),
             "LogFalseAlarm": log_false_alarm(quality.false_alarm),
             "Matched": int((found.stars >= 0).sum()),
             "Expected": found.expected,

@@ -1,15 +1,15 @@
-"""Pictures and read-outs: commands to the FPGAs, the wait for ACK, bytes over the data lines.
+"""Images and read-outs: commands to the FPGAs, the wait for ACK, bytes over the data lines.
 
 CubeSense thesis, tables 6.3 and 6.4, sections 6.4.2, 6.5.1 and 6.6.2. The control lines are set in
-standby and the enables follow; standby lies between any two commands. A camera's picture goes to
-its own memory, or over the FPGAs' link to the other one; edge data come back the same way.
+standby and the enables follow; standby separates any two commands. A camera's image is stored in
+its own memory, or over the FPGAs' link in the other one; edge data return the same way.
 
-With address control from the microcontroller (section 9.2.2) single pixels can be read, from the
-memory of the FPGA that is enabled only.
+With address control from the microcontroller (section 9.2.2) single pixels can be read, but only
+from the memory of the enabled FPGA.
 
-FPGAs with one search each send the whole picture over the link, row after row, where the others
-send edge data. The program lets pass what it does not want, and lets the picture come anew for each
-column, as it has no room for ten of them; assumed, because no program for it is printed.
+FPGAs with one search each send the whole image over the link, row by row, where the others send
+edge data. The program discards what it does not need, and has the image sent again for each column,
+because it has no room for ten of them; assumed, because no program for it is printed.
 """
 
 from collections.abc import Generator, Iterable
@@ -26,23 +26,17 @@ from cubestack.firmware_model.interface.cubesense import codes, fpga, pins
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, SetPin, StrobeRead
 
-ACK_POLL_CYCLES = 9
-"""Port read (2) and loop step (7) of the cost table."""
+ACK_POLL_CYCLES = 9  #: port read (2) and loop step (7) of the cost table
 
+#: Longer than ACK can take, two frames of 33.37 ms less the gap between them: assumed.
 ACK_TIMEOUT_US = 70_000
-"""Longer than ACK can take, two frames of 33.37 ms less the gap between them: assumed."""
 
-CHUNK = fpga.FULL_SIZE.scan_step
-"""Bytes that a picture is read in at most: those of the scan's buffer."""
+CHUNK = fpga.FULL_SIZE.scan_step  #: largest piece of an image in bytes: the scan's buffer
+SAMPLE_BYTES = fpga.FULL_SIZE.columns  #: bytes between two readings of the supply currents
+SAMPLE_PIXELS = 64  #: the same for pixels that are addressed one by one
 
-SAMPLE_BYTES = fpga.FULL_SIZE.columns
-"""So many bytes are read from one look at the memories' currents to the next."""
-
+#: Target of bytes that are clocked and discarded; it takes none of the part's memory.
 _DISCARDED = np.zeros(SAMPLE_BYTES, np.uint8)
-"""Bytes that are clocked and not kept: none of the part's memory."""
-
-SAMPLE_PIXELS = 64
-"""The same for pixels that are addressed one by one."""
 
 _ROWS = {command.actions: command for command in fpga.COMMANDS + fpga.ADDRESSING_COMMANDS}
 
@@ -70,7 +64,7 @@ class Acquisition:
         self._meter = meter
         self._supply = supply
         self._window = np.zeros(window_bytes(), np.uint8)
-        self._buffer = self._window[:CHUNK]  # one place: never in use at the same time
+        self._buffer = self._window[:CHUNK]  # shared: never in use at the same time
         self._strobe_cycles = meter.table.operations["strobe_byte"].cycles
         self._scan_cycles = meter.table.operations["scan_byte"].cycles
         self._open: codes.Sram | None = None
@@ -79,15 +73,15 @@ class Acquisition:
 
     @property
     def buffers(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """For scanned pixels (64,), and for the Sun window (229,), of which they are a part."""
+        """For scanned pixels (64,), a part of the Sun window's (229,)."""
         return self._buffer, self._window
 
     def can_address(self, camera: codes.Camera, sram: codes.Sram) -> bool:
-        """Whether the program can choose the pixels that it reads of ``camera``'s picture."""
+        """Whether the program can address single pixels of ``camera``'s image."""
         return self._mcu_addressing and sram is codes.Sram(camera)
 
     def store(self, camera: codes.Camera, sram: codes.Sram) -> Routine[codes.CaptureResult]:
-        """Store the next whole picture of ``camera``; without one ``sram`` keeps what it holds."""
+        """Store the next whole image of ``camera``; on failure ``sram`` keeps its contents."""
         if not self._supply.available(sram):
             return codes.CaptureResult.SRAM_OVER_CURRENT
         own = sram is codes.Sram(camera)
@@ -102,15 +96,15 @@ class Acquisition:
         return codes.CaptureResult.STORED_OWN_SRAM if own else codes.CaptureResult.STORED_OTHER_SRAM
 
     def edge_data(self, camera: codes.Camera, sram: codes.Sram) -> fpga.ReadOut:
-        """What `scan` and `window` give of ``camera``'s picture in ``sram``."""
+        """Read-out of `scan` and `window` for ``camera``'s image in ``sram``."""
         return fpga.FULL_SIZE if self._picks(camera, sram) else self._read_out
 
     def _picks(self, camera: codes.Camera, sram: codes.Sram) -> bool:
-        """Whether it is the program that picks them out of a picture."""
+        """Whether the program must pick the edge data out of a whole image."""
         return self._read_out.one_search and sram is not codes.Sram(camera)
 
     def scan(self, sram: codes.Sram, lines: NadirLines) -> Routine[bool]:
-        """Let ``lines`` see the nadir picture in ``sram``; False when it was cut off meanwhile."""
+        """Pass the nadir image in ``sram`` to ``lines``; False if the memory was cut off."""
         if self._picks(codes.Camera.NADIR, sram):
             return (yield from self._pick_scan(sram, lines))
         yield from self._enter_edge(codes.Camera.NADIR, sram)
@@ -127,7 +121,7 @@ class Acquisition:
         return self._supply.available(sram)
 
     def window(self, sram: codes.Sram) -> Routine[NDArray[np.uint8] | None]:
-        """The Sun window's bytes (229,) in ``sram``, until the next call; None as for ``scan``."""
+        """The Sun window's bytes (229,) in ``sram``, valid until the next call, or None."""
         if self._picks(codes.Camera.SUN, sram):
             yield from self._pick_window(sram)
         else:
@@ -137,10 +131,10 @@ class Acquisition:
         yield from self._standby()
         return self._window if self._supply.available(sram) else None
 
-    # --- pictures over the link -----------------------------------------------------------------
+    # --- images over the link -------------------------------------------------------------------
 
     def _pick_scan(self, sram: codes.Sram, lines: NadirLines) -> Routine[bool]:
-        """As `scan`; the presets are any pixel."""
+        """Like `scan`; the presets are any pixel."""
         size = fpga.FULL_SIZE
         places = (at[0] + at[1] * size.columns if at else 0 for at in size.scan())
         while lines.wanted and self._supply.available(sram):
@@ -152,7 +146,7 @@ class Acquisition:
         return self._supply.available(sram)
 
     def _pick_window(self, sram: codes.Sram) -> Routine[None]:
-        """The coordinates are in the sun's FPGA, whichever memory has the picture."""
+        """The coordinates are in the sun's FPGA, whichever memory holds the image."""
         size, sun = fpga.FULL_SIZE, codes.Camera.SUN
         yield from self._enter_edge(sun, codes.Sram(sun))
         coordinates, pixels = np.split(self._window, [COORDINATE_BYTES])
@@ -170,7 +164,7 @@ class Acquisition:
         wanted: NDArray[np.int64],
         target: NDArray[np.uint8],
     ) -> Routine[None]:
-        """Pixels ``wanted`` (n,), counted row by row, into ``target`` (n,)."""
+        """Read pixels ``wanted`` (n,), counted row by row, into ``target`` (n,)."""
         starts = [0, *(np.flatnonzero(np.diff(wanted) != 1) + 1), len(wanted)]
         for start, end in pairwise(starts):
             if self._open is None or wanted[start] < self._position:
@@ -181,15 +175,15 @@ class Acquisition:
             yield from self._strobe(chunks, self._strobe_cycles)
             yield from self._strobe([target[start:end]], self._scan_cycles)
 
-    # --- pictures in sequence -------------------------------------------------------------------
+    # --- images in sequence ---------------------------------------------------------------------
 
     @property
     def picture_open(self) -> bool:
-        """Whether the FPGA still presents the picture of ``open_picture``, where reading ended."""
+        """Whether the FPGA still presents the image of ``open_picture``, where reading ended."""
         return self._open is not None and self._supply.available(self._open)
 
     def open_picture(self, sram: codes.Sram) -> Routine[bool]:
-        """Begin with the first pixel of the picture in ``sram``; False when the memory is off."""
+        """Go to the first pixel of the image in ``sram``; False if the memory is off."""
         if not self._supply.available(sram):
             return False
         if self._mcu_addressing:
@@ -201,12 +195,12 @@ class Acquisition:
         return True
 
     def read_bytes(self, target: NDArray[np.uint8]) -> Routine[None]:
-        """Read on into ``target`` (n,), for as long as ``picture_open``."""
+        """Continue reading into ``target`` (n,), as long as ``picture_open``."""
         chunks = (target[at : at + CHUNK] for at in range(0, len(target), CHUNK))
         yield from self._strobe(chunks, self._scan_cycles)
 
     def skip_bytes(self, count: int) -> Routine[None]:
-        """Pass ``count`` bytes: at once if the program can choose the address, else clocked."""
+        """Skip ``count`` bytes: at once if the program can set the address, else clocked."""
         if self._mcu_addressing and count > fpga.ADDRESS_BYTES and self.picture_open:
             self._position += count
             yield SetPin(pins.SHIFT, 0)
@@ -216,7 +210,7 @@ class Acquisition:
         yield from self._strobe(chunks, self._strobe_cycles)
 
     def _strobe(self, chunks: Iterable[NDArray[np.uint8]], cycles: int) -> Routine[None]:
-        """Clock bytes into ``chunks``, and look at the memories now and then."""
+        """Clock bytes into ``chunks``, and check the supply currents from time to time."""
         for chunk in chunks:
             if not self.picture_open:
                 return
@@ -232,10 +226,10 @@ class Acquisition:
     def answer(
         self, sram: codes.Sram, search: Generator[tuple[int, int], int, EdgeList]
     ) -> Routine[tuple[EdgeList, int] | None]:
-        """Read the pixels that ``search`` asks for, of the picture in ``sram``.
+        """Read the pixels that ``search`` requests from the image in ``sram``.
 
-        Returns what it found, and how many pixels it took; None as for ``scan``. Only for
-        FPGAs that ``can_address``.
+        Returns its result and the number of pixels read; None as for ``scan``. Only for FPGAs that
+        ``can_address``.
         """
         yield from self._enter(_actions(sram, fpga.Action.TAKE_ADDRESS))
         pixels, pixel = 0, self._buffer[:1]
@@ -258,7 +252,7 @@ class Acquisition:
         return found, pixels
 
     def _send_address(self, pixel: int) -> Routine[None]:
-        """Give the FPGA a pixel's address; the data lines are inputs again before it answers."""
+        """Send a pixel's address to the FPGA; before it answers, the data lines become inputs."""
         y, x = divmod(pixel, fpga.FULL_SIZE.columns)
         self._meter.charge(i16_add=2, port_write=2)
         for byte in fpga.address_bytes(x, y):
@@ -268,7 +262,7 @@ class Acquisition:
         yield SetPin(pins.SHIFT, 1)
 
     def _await_ack(self, sram: codes.Sram) -> Routine[bool]:
-        """Whether ACK came in time; returns at once when the memory is cut off."""
+        """Whether ACK came in time; returns at once if the memory is cut off."""
         now_us: int = yield ReadTimer()
         deadline_us = now_us + ACK_TIMEOUT_US
         stored = False
@@ -285,7 +279,7 @@ class Acquisition:
         yield from self._enter(_actions(camera, *doing))
 
     def _enter(self, wanted: fpga.Actions) -> Routine[None]:
-        """Through standby to the command that makes the FPGAs do ``wanted``."""
+        """Go through standby to the command with the actions ``wanted``."""
         if self._open is not None:
             yield from self._standby()
         row = _ROWS[wanted]

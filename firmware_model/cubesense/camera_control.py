@@ -1,12 +1,12 @@
 """Cameras: their supplies, and their registers over two pins each.
 
 CubeSense thesis, sections 3.2.1.1 and 6.4.1, appendix C.1: the program drives the serial bus itself
-and only ever writes: start, eight bits, a ninth in which the camera may answer, stop. Each line is
-pulled up; level 1 releases it. Charged cycles keep the clock below the bus' 400 kHz.
+and only writes: start, eight bits, a ninth in which the camera may acknowledge, stop. Each line has
+a pull-up; level 1 releases it. The charged cycles keep the clock below the bus' 400 kHz.
 
-The published program sets the nadir camera's exposure once. This one sets all registers again when
-a setting changed, or the camera lost its supply, before the next picture is taken. It can not see
-the latter, so a camera that sends no picture counts as such.
+The published program sets the nadir camera's exposure once. This one sets all registers again
+before the next image if a setting changed or the camera lost its supply. It cannot detect the
+latter, so it assumes it for a camera that sends no image.
 """
 
 from cubestack.firmware_model.cubesense.state import CameraSettings, State
@@ -17,19 +17,18 @@ from cubestack.firmware_model.interface.cubesense.pins import CAMERA_POWER, CAME
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadPin, ReadTimer, Routine, SetPin
 
-START_UP_US = 2_000
-"""From a camera's switch to the first write; assumed."""
+START_UP_US = 2_000  #: from a camera's switch to the first write; assumed
 
 _BLANKING_LINES = ov7620.LINES_PER_FRAME - ROWS
 _SETTLE_CLOCKS = (ov7620.LINES_PER_FRAME + _BLANKING_LINES) * ov7620.CLOCKS_PER_LINE
 
+#: From a write until the FPGA may store a frame: the current frame and the next one still have the
+#: old exposure. The blanking of the latter must be over, or it would be stored.
 EXPOSURE_SETTLE_US = _SETTLE_CLOCKS * 1_000_000 // ov7620.PIXEL_CLOCK_HZ + 100
-"""From a write to when the FPGA may look for a frame: the frame that runs then, and the next one,
-still have the exposure of before. The latter's blanking must be over, or it would be stored."""
 
 
 def register_values(settings: CameraSettings) -> dict[str, int]:
-    """What the camera's registers shall hold: the whole picture, one byte of grey for a pixel."""
+    """Values of the camera's registers: the whole image, one byte of grey per pixel."""
     automatic = settings.auto_adjust
     numbers = ("EXPOSURE", "GAIN", "BLUE_GAIN", "RED_GAIN")
     return {
@@ -47,16 +46,15 @@ def register_values(settings: CameraSettings) -> dict[str, int]:
 
 
 def _bits(register: str, **fields: int) -> int:
-    """Value of ``register`` with the named bit fields and all others 0."""
+    """Value of ``register`` with the named bit fields set and all others 0."""
     field = ov7620.REGISTERS[register].field
     return sum(value << field(name).lsb for name, value in fields.items())
 
 
 class CameraControl:
-    """Both cameras' supplies and registers."""
+    """Both cameras' supplies and registers; both are off at first, as at reset."""
 
     def __init__(self, meter: Meter, state: State, supply: Supply) -> None:
-        """Both cameras are off, as at reset."""
         self._meter = meter
         self._state = state
         self._supply = supply
@@ -64,11 +62,10 @@ class CameraControl:
         self._settled_us = dict.fromkeys(Camera, 0)
 
     def acknowledged(self, camera: Camera) -> bool:
-        """Whether ``camera`` answered every byte of its latest set-up."""
+        """Whether ``camera`` acknowledged every byte of its latest set-up."""
         return self._written[camera] is not None
 
     def start(self) -> Routine[None]:
-        """Switch both cameras on and set them up."""
         for camera in Camera:
             yield SetPin(CAMERA_SCL[camera], 1)
             yield SetPin(CAMERA_SDA[camera], 1)
@@ -78,7 +75,7 @@ class CameraControl:
             yield from self._configure(camera)
 
     def restart(self) -> Routine[None]:
-        """Cycle both cameras' power and set them up, as telecommand Reset of the cameras does."""
+        """Cycle both cameras' power and set them up, for telecommand Reset of the cameras."""
         for camera in Camera:
             yield SetPin(CAMERA_POWER[camera], 0)
             self._written[camera] = None
@@ -86,14 +83,13 @@ class CameraControl:
         yield from self.start()
 
     def forget_set_up(self, camera: Camera) -> None:
-        """It sent no picture, so it may have lost its supply: set it up again before the next."""
+        """It sent no image, so it may have lost its supply: set it up again next time."""
         self._written[camera] = None
 
     def prepare(self, camera: Camera) -> Routine[None]:
-        """Bring ``camera`` to its settings before a picture, and wait until they count.
+        """Apply the settings of ``camera`` before an image, and wait until they take effect.
 
-        A camera that does not answer is tried once for each picture; the picture shows whether it
-        is alive.
+        A camera that does not answer is tried once per image; the image shows whether it works.
         """
         yield from self._configure(camera)
         yield from self._supply.watch_until(self._settled_us[camera])
@@ -112,7 +108,7 @@ class CameraControl:
         self._written[camera] = values
 
     def _write(self, camera: Camera, address: int, value: int) -> Routine[bool]:
-        """One register; False when the camera left a byte unanswered."""
+        """Write one register; False if the camera did not acknowledge a byte."""
         scl, sda = CAMERA_SCL[camera], CAMERA_SDA[camera]
         self._meter.charge(call=1)
         yield SetPin(sda, 0)  # start
@@ -129,7 +125,7 @@ class CameraControl:
         return answered
 
     def _send(self, scl: str, sda: str, byte: int) -> Routine[bool]:
-        """Eight bits, highest first, and the answer; SCL is low before and after."""
+        """Send eight bits, highest first, and read the answer; SCL is low before and after."""
         level = None
         for bit in reversed(range(8)):
             if level != byte >> bit & 1:
@@ -145,7 +141,7 @@ class CameraControl:
         return not refused
 
     def _clock(self, scl: str) -> Routine[None]:
-        """Raise SCL after its low phase; the program goes on when its high phase may end."""
+        """Raise SCL after its low phase; the program continues when its high phase may end."""
         self._meter.charge(i8=1, loop=1)
         yield SetPin(scl, 1)
         self._meter.charge(i8=1)

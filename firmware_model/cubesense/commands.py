@@ -1,8 +1,8 @@
-"""What each job does, executed by the main loop one after the other.
+"""Effects of the jobs, which the main loop executes one after the other.
 
-A setting counts from the next measurement on. Telecommand Reset restarts the communication (its
-counters, its flags and the selected picture), the cameras, or the whole program; telecommands that
-still wait are lost with the latter.
+A setting takes effect from the next measurement on. Telecommand Reset restarts the communication
+(its counters, its flags and the selected image), the cameras, or the whole program; the latter
+discards waiting telecommands.
 """
 
 from collections.abc import Callable
@@ -25,8 +25,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 from cubestack.firmware_model.node.switches import SWITCH_COMMANDS
 
-SOFTWARE_RESET = 1
-"""Cause of the program's own reset."""
+SOFTWARE_RESET = 1  #: cause of the program's own reset
 
 _SETTINGS = {
     f"{name}{camera + 1}": (name, camera)
@@ -48,8 +47,8 @@ class Commands:
     """Executes jobs.
 
     Attributes:
-        reader: reads pictures, for every stream.
-        download: the frame that telemetry hands out.
+        reader: reads images, for every stream.
+        download: the frame that telemetry returns.
         handled: names of the telecommands that have an effect.
     """
 
@@ -61,7 +60,6 @@ class Commands:
     measurement: Measurement
 
     def __post_init__(self) -> None:
-        """No picture is selected."""
         self.reader = PictureReader(self.acquisition)
         self.download = Download(self.meter, self.reader)
         self._routines: dict[str, Callable[[TelecommandJob], Routine[int | None]]] = {
@@ -76,7 +74,7 @@ class Commands:
         self.handled = frozenset({*self._routines, *_SETTINGS, *SWITCH_COMMANDS})
 
     def execute(self, job: Job) -> Routine[int | None]:
-        """Do ``job``; returns a cause when the program has to end in a reset."""
+        """Execute ``job``; returns a cause if the program must reset."""
         cause = None
         match job:
             case TelecommandJob():
@@ -151,9 +149,9 @@ class Commands:
                 self._set_distortion(settings, distortion_of(values))
 
     def _set_distortion(self, settings: CameraSettings, factors: tuple[float, ...]) -> None:
-        """Keep factors of which any table can be made; the quick check may be wrong about some.
+        """Store factors that allow every table; the quick check may be wrong about some.
 
-        Making one is charged to the measurement that needs it first.
+        The measurement that needs a table first is charged for it.
         """
         try:
             for kind in CubeSenseSwitches.declared()["distortion"].choices:

@@ -1,12 +1,12 @@
-"""Pictures on their way to a host: a reader that goes on where it stopped, and frames of 128 bytes.
+"""Image transfer to a host: a reader that continues where it stopped, and frames of 128 bytes.
 
-An FPGA hands out a picture in sequence. `PictureReader` therefore leaves it open between two reads.
-What lies ahead is passed over; for what lies behind, and after somebody else needed the FPGAs, it
-begins anew. A download in the order of its frames reads the picture once.
+An FPGA presents an image in sequence, so `PictureReader` keeps it open between two reads. It skips
+to pixels ahead; for pixels behind, and after another use of the FPGAs, it starts again. A download
+in the order of its frames reads the image once.
 
-CubeSpace family with two cameras, interface generation 2: telecommands 64 and 65 ask for a frame,
-telemetry 65 says when it is ready, 64 has it. Assumed: while a frame is being prepared, telemetry
-64 has what its buffer holds; a frame that a later request has overtaken is not prepared.
+CubeSpace family with two cameras, interface generation 2: telecommands 64 and 65 request a frame,
+telemetry 65 reports when it is ready, 64 contains it. Assumed: while a frame is being prepared,
+telemetry 64 has the current content of its buffer; a frame with a later request is not prepared.
 """
 
 from collections.abc import Mapping
@@ -23,19 +23,19 @@ from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Routine
 
-#: Number of a pixel that lies outside of the picture.
+#: Number of a pixel outside of the image.
 OUTSIDE = -1
 
 
 def frame_pixels(size: codes.ImageSize, frame: int) -> NDArray[np.int32]:
-    """Where the 128 bytes of a frame come from, int32 (128,).
+    """Source of the 128 bytes of a frame, int32 (128,).
 
-    Each is a pixel's number in the picture, row after row from 0 to 307199, or ``OUTSIDE`` for a
-    byte that is zero. Numbers ascend within a frame and from frame to frame. Assumed: the picture
-    lies in the middle of 1024 x 1024 pixels, and a smaller square takes every 2nd, 4th, 8th or 16th
-    pixel of every such row, from the first on. The margins, 192 columns and 272 rows, are multiples
-    of 16, so every square takes the picture's first pixel. Nothing is averaged, because the
-    processor has neither the memory nor the time.
+    Each is a pixel's number in the image, row by row from 0 to 307199, or ``OUTSIDE`` for a byte
+    that is zero. Numbers ascend within a frame and from frame to frame. Assumed: the image lies in
+    the middle of 1024 x 1024 pixels, and a smaller square takes every 2nd, 4th, 8th or 16th pixel
+    of every such row, from the first on. The margins, 192 columns and 272 rows, are multiples of
+    16, so every square includes the image's first pixel. Nothing is averaged, because the processor
+    has neither the memory nor the time.
 
     Raises ValueError for a frame that ``size`` lacks.
     """
@@ -50,7 +50,7 @@ def frame_pixels(size: codes.ImageSize, frame: int) -> NDArray[np.int32]:
 
 @dataclass(eq=False)
 class PictureReader:
-    """Any pixels of a picture; in ascending order it is read once."""
+    """Reads any pixels of an image; in ascending order, the image is read once."""
 
     acquisition: Acquisition
     _sram: codes.Sram = field(default=codes.Sram.SRAM1, init=False)
@@ -59,7 +59,7 @@ class PictureReader:
     def read(
         self, sram: codes.Sram, pixels: NDArray[np.int32], target: NDArray[np.uint8]
     ) -> Routine[bool]:
-        """Read ``pixels`` (n,), which ascend, to ``target`` (n,); False when the memory is off."""
+        """Read ascending ``pixels`` (n,) into ``target`` (n,); False if the memory is off."""
         if not len(pixels):
             return True
         breaks = np.flatnonzero(np.diff(pixels) != 1) + 1
@@ -71,14 +71,14 @@ class PictureReader:
         return self.acquisition.picture_open
 
     def read_run(self, sram: codes.Sram, start: int, count: int) -> Routine[bytes | None]:
-        """``count`` pixels from ``start`` on; None as where ``read`` gives False."""
+        """``count`` pixels from ``start`` on; None if the memory is off."""
         data = np.zeros(count, np.uint8)
         pixels = np.arange(start, start + count, dtype=np.int32)
         done = yield from self.read(sram, pixels, data)
         return data.tobytes() if done else None
 
     def _seek(self, sram: codes.Sram, pixel: int) -> Routine[bool]:
-        """Go to ``pixel``; what lies behind is reached from the first one again."""
+        """Go to ``pixel``; one behind is reached from the first pixel again."""
         if not self.acquisition.picture_open or sram != self._sram or pixel < self._next:
             self._sram, self._next = sram, 0
             if not (yield from self.acquisition.open_picture(sram)):
@@ -94,12 +94,11 @@ class Download:
 
     Attributes:
         data: its bytes.
-        number: of the frame that is ready; ``EMPTY_FRAME`` when none is.
-        checksum: of ``data``, when a frame is ready, else 0.
+        number: of the ready frame, or ``EMPTY_FRAME``.
+        checksum: of ``data`` if a frame is ready, else 0.
     """
 
     def __init__(self, meter: Meter, reader: PictureReader) -> None:
-        """No picture is selected."""
         self._meter = meter
         self._reader = reader
         self._wanted: FrameRequest | None = None
@@ -108,11 +107,11 @@ class Download:
         self.checksum = 0
 
     def has(self, frame: int) -> bool:
-        """Whether a picture is selected and has so many frames."""
+        """Whether a selected image has frame ``frame``."""
         return self._wanted is not None and frame < self._wanted.size.frames
 
     def request(self, values: Mapping[str, Any]) -> FrameRequest:
-        """Interrupt: note which frame a telecommand asks for, one that the picture ``has``."""
+        """Interrupt: note the frame that a telecommand requests; the image must have it."""
         if "Frame" in values:
             assert self._wanted is not None
             wanted = FrameRequest(self._wanted.sram, self._wanted.size, values["Frame"])
@@ -122,11 +121,11 @@ class Download:
         return wanted
 
     def forget(self) -> None:
-        """No picture is selected any more."""
+        """Deselect the image."""
         self._select(None)
 
     def prepare(self, request: FrameRequest) -> Routine[None]:
-        """Fill the frame; none becomes ready when the memory is off."""
+        """Fill the frame; none becomes ready if the memory is off."""
         if request is not self._wanted:
             return
         pixels = frame_pixels(request.size, request.frame)

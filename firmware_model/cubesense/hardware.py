@@ -1,4 +1,4 @@
-"""What CubeSense's program sees of its PIC18F45K20 beside the requests that take time.
+"""Peripherals of CubeSense's PIC18F45K20 that the program uses without a request.
 
 Pins have the names of :mod:`cubestack.firmware_model.interface.cubesense.pins` and of the FPGAs'
 command table (RNW, CLK, EDGE, SHIFT; SUNACK and NADACK are inputs). At reset the enables are high
@@ -13,7 +13,7 @@ from cubestack.firmware_model.node.hardware import NodeHardware
 
 
 class Port(StrEnum):
-    """A serial port; the part has one, so either is in use, and the model serves both."""
+    """A serial port; the part has only one, so one of them is in use; the model serves both."""
 
     NODE = "node"
     BENCH = "bench"
@@ -23,7 +23,7 @@ class CubeSenseHardware(NodeHardware, Protocol):
     """Peripherals that the program uses without waiting for them; uptime starts with each reset.
 
     Attributes:
-        mcu_addressing: the FPGAs are built with the option that lets the program choose addresses.
+        mcu_addressing: the FPGAs have the option that lets the program set addresses.
         serial_number: ASCII, at most 6 characters.
     """
 
@@ -31,10 +31,10 @@ class CubeSenseHardware(NodeHardware, Protocol):
     serial_number: str
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
-        """Queue ``data`` for ``port``; the peripheral sends at its own pace."""
+        """Queue ``data`` for ``port``, which sends at its own pace."""
 
     def uart_backlog(self, port: Port = Port.NODE) -> int:
-        """Bytes that ``port`` still has to send."""
+        """Number of bytes that ``port`` still has to send."""
 
     def adc_counts(self, monitor: Monitor) -> int:
         """Result of a conversion, 0 to 1023; the program charges its time."""

@@ -1,8 +1,8 @@
-"""What waits for the main loop: telecommands, measurements, and streams that want to be fed.
+"""Jobs that wait for the main loop: telecommands, measurements, and pieces of streams.
 
-Links put jobs in interrupt context, the main loop takes them one after the other. Four wait at
-most, as the node protocol's hosts expect. Streams do not count among them: each has one place
-of its own, and gets its turn when nothing else waits.
+Links put jobs in interrupt context, the main loop takes them one after the other. At most four
+wait, as the node protocol's hosts expect. Streams are not counted: each has a separate place, and
+gets its turn when nothing else waits.
 """
 
 from collections import deque
@@ -18,7 +18,7 @@ from cubestack.firmware_model.node.queue import BoundedQueue
 
 @dataclass(frozen=True, eq=False)
 class FrameRequest:
-    """A frame that a host wants prepared, of the picture in ``sram`` as a square of ``size``."""
+    """A requested frame of the image in ``sram`` as a square of ``size``."""
 
     sram: Sram
     size: ImageSize
@@ -30,8 +30,8 @@ class TelecommandJob:
     """An accepted telecommand.
 
     Attributes:
-        frame: the frame that it asks for, if any.
-        latest: no telecommand came after it, so telemetry TcmdProcessed speaks of this one.
+        frame: the requested frame, if any.
+        latest: it is the latest telecommand, which telemetry TcmdProcessed describes.
     """
 
     message: Message
@@ -42,7 +42,7 @@ class TelecommandJob:
 
 @dataclass(frozen=True)
 class Measure:
-    """A measurement that a telemetry request or a register asked for."""
+    """A measurement requested by telemetry or a register."""
 
     camera: Camera
     sram: Sram
@@ -51,7 +51,7 @@ class Measure:
 
 @dataclass(frozen=True, eq=False)
 class Background:
-    """A piece of a stream: ``work`` does as much as there is room for, and returns."""
+    """A piece of a stream: ``work`` sends as much as there is room for, and returns."""
 
     work: Callable[[], Routine[None]]
 
@@ -63,25 +63,22 @@ class JobQueue:
     """Jobs in their order, then streams in turn."""
 
     def __init__(self) -> None:
-        """Make an empty queue."""
         self._jobs: BoundedQueue[TelecommandJob | Measure] = BoundedQueue()
         self._streams: deque[Background] = deque()
 
     def __len__(self) -> int:
-        """How many wait."""
         return len(self._jobs) + len(self._streams)
 
     @property
     def full(self) -> bool:
-        """Whether no further job is accepted."""
         return self._jobs.full
 
     def put(self, job: TelecommandJob | Measure) -> bool:
-        """Append ``job``; False when the queue is full."""
+        """Append ``job``; False if the queue is full."""
         return self._jobs.put(job)
 
     def request(self, stream: Background, *, next_turn: bool = False) -> bool:
-        """Let ``stream`` have a turn; ``next_turn``: the next one. False when it waits already."""
+        """Queue ``stream``, with ``next_turn`` as the first; False if it waits already."""
         if stream in self._streams:
             return False
         if next_turn:
@@ -91,5 +88,5 @@ class JobQueue:
         return True
 
     def pop(self) -> Job:
-        """Take the next; IndexError when none waits."""
+        """Remove and return the next job; raises IndexError if none waits."""
         return self._jobs.popleft() if self._jobs else self._streams.popleft()

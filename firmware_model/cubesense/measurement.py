@@ -1,11 +1,12 @@
-"""One measurement: take a picture, find the Earth's or the Sun's centre in it, and note the times.
+"""One measurement: capture an image, find the Earth's or the Sun's centre, record the times.
 
-CubeSense thesis, sections 6.5, 6.6 and 7.4. What a picture holds is looked at in the memory; it
-stays whole until the next one is stored there.
+CubeSense thesis, sections 6.5, 6.6 and 7.4. An image is examined in its memory, where it stays
+until the next one is stored.
 
 Times are those of the part's timer behind its prescaler of 256, from the command to the FPGAs on:
-time = ticks x 256 / 5 MHz, so a tick is 51.2 us and 16 bits hold 3.4 s. The FPGA shows a picture's
-end only. So the first row's time is ACK's, less the time in which a camera sends 480 rows.
+time = ticks x 256 / 5 MHz, so a tick is 51.2 us and 16 bits hold 3.4 s. The FPGA signals only the
+end of an image, so the time of the first row is that of ACK less the time in which a camera sends
+480 rows.
 """
 
 from functools import cache
@@ -31,12 +32,11 @@ _CYCLES_PER_US = INSTRUCTION_HZ // 1_000_000
 
 
 def ticks_of(us: int) -> int:
-    """Whole ticks in so many microseconds, not wrapped."""
     return us * _CYCLES_PER_US // PRESCALER
 
 
 def microseconds(ticks: int) -> int:
-    """Duration of so many ticks, rounded down."""
+    """Duration of ``ticks``, rounded down."""
     return ticks * PRESCALER // _CYCLES_PER_US
 
 
@@ -47,28 +47,27 @@ def read_ticks() -> Routine[int]:
 
 
 def ticks_since(started: int) -> Routine[int]:
-    """Ticks since the timer showed ``started``, right for up to 3.35 s."""
+    """Ticks since the timer showed ``started``, valid for up to 3.35 s."""
     now = yield from read_ticks()
     return now - started & 0xFFFF
 
 
+#: From an image's first row to its end: 30.5 ms.
 READ_OUT_TICKS = ticks_of(codes.ROWS * CLOCKS_PER_LINE * 1_000_000 // PIXEL_CLOCK_HZ)
-"""From a picture's first row to its end: 30.5 ms."""
 
 BETWEEN = {
     codes.NadirSearch.AROUND_SAMPLES: Between.BINARY,
     codes.NadirSearch.AROUND_SAMPLES_STEPPING: Between.SEQUENTIAL,
 }
 
-SCANNED_PIXELS = FULL_SIZE.scan_clocks - 2
-"""Two clocks present no pixel."""
+SCANNED_PIXELS = FULL_SIZE.scan_clocks - 2  #: two clocks present no pixel
 
+#: Blocks in which the part erases and writes its flash; it stops for each: 2 ms, assumed.
 FLASH_ERASE_BYTES, FLASH_WRITE_BYTES, FLASH_STEP_US = 64, 32, 2_000
-"""The part erases and writes its flash in such blocks, and stops for each: 2 ms, assumed."""
 
 
 def projection_of(camera: codes.Camera, switches: CubeSenseSwitches) -> distortion.Projection:
-    """Where the table of ``camera`` leads to."""
+    """Projection of the distortion table of ``camera``."""
     if camera is codes.Camera.NADIR and switches.distortion == "stereographic":
         return distortion.Projection.STEREOGRAPHIC
     return distortion.Projection.EQUIDISTANT
@@ -77,7 +76,7 @@ def projection_of(camera: codes.Camera, switches: CubeSenseSwitches) -> distorti
 def make_table(
     camera: codes.Camera, switches: CubeSenseSwitches, factors: tuple[float, ...], meter: Meter
 ) -> distortion.RadiusTable:
-    """The distortion table of ``camera`` for ``factors``; DistortionError when there is none."""
+    """The distortion table of ``camera`` for ``factors``; raises DistortionError if impossible."""
     if switches.distortion == "byte-table":
         return distortion.byte_table(meter, factors)
     return distortion.fine_table(meter, projection_of(camera, switches), factors)
@@ -85,22 +84,21 @@ def make_table(
 
 @cache
 def _constant_table(camera: codes.Camera, switches: CubeSenseSwitches) -> distortion.RadiusTable:
-    """Made of the reset values, by the compiler."""
+    """Table of the reset values, which the compiler computes."""
     factors = CameraSettings.at_reset(camera).distortion
     return make_table(camera, switches, factors, Meter(PIC18F45K20))
 
 
-#: What a table was made of: factors, and value of switch ``distortion``.
+#: Source of a table: factors, and value of switch ``distortion``.
 _Origin = tuple[tuple[float, ...], str]
 
 
 class Measurement:
-    """Measures with either camera, into ``State.results``."""
+    """Measures with either camera and the settings in ``state``, into ``State.results``."""
 
     def __init__(
         self, meter: Meter, state: State, cameras: CameraControl, acquisition: Acquisition
     ) -> None:
-        """Measure as the settings in ``state`` say."""
         self._meter = meter
         self._state = state
         self._cameras = cameras
@@ -108,7 +106,7 @@ class Measurement:
         self._tables: dict[codes.Camera, tuple[_Origin, distortion.RadiusTable]] = {}
 
     def measure(self, camera: codes.Camera, sram: codes.Sram, *, detect: bool) -> Routine[None]:
-        """Take a picture of ``camera`` into ``sram`` and, with ``detect``, measure in it."""
+        """Store an image of ``camera`` in ``sram`` and, with ``detect``, measure in it."""
         result = self._state.results[camera] = Result()
         self._state.schedule(camera, sram, detect=detect)
         if detect:
@@ -129,12 +127,12 @@ class Measurement:
         elif detect:
             measured = self._measure_nadir if camera == codes.Camera.NADIR else self._measure_sun
             found = yield from measured(result, started)
-            if not found:  # the memory was cut off under the search
+            if not found:  # the memory was cut off during the search
                 result.capture = codes.CaptureResult.SRAM_OVER_CURRENT
                 result.detect = codes.DetectResult.NONE_SCHEDULED
 
     def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
-        """The Earth; False when the memory was cut off."""
+        """The Earth's direction; False if the memory was cut off."""
         settings, switches = self._state.cameras[codes.Camera.NADIR], self._state.switches.now
         config = EdgeConfig(
             settings.threshold,
@@ -188,7 +186,7 @@ class Measurement:
         return lines.edges
 
     def _measure_sun(self, result: Result, started: int) -> Routine[bool]:
-        """The Sun; False when the memory was cut off."""
+        """The Sun's direction; False if the memory was cut off."""
         settings = self._state.cameras[codes.Camera.SUN]
         stored = yield from read_ticks()
         data = yield from self._acquisition.window(result.sram)
@@ -219,9 +217,9 @@ class Measurement:
         return True
 
     def _update_table(self, camera: codes.Camera) -> Routine[None]:
-        """Make the distortion table anew, in flash, when its coefficients or its kind changed.
+        """Compute the distortion table again, in flash, if its coefficients or its kind changed.
 
-        Those of the reset values lie there, one of each kind.
+        The tables of the reset values are in flash already, one of each kind.
         """
         factors, switches = self._state.cameras[camera].distortion, self._state.switches.now
         origin = factors, switches.distortion

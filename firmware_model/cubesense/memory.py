@@ -1,10 +1,10 @@
-"""Where everything lies, and whether it fits: the memories of the PIC18F45K20 on CubeSense.
+"""Memory budget of the PIC18F45K20 on CubeSense: size and place of every buffer.
 
 CubeSense thesis, appendix A.7 (1536 bytes of RAM, 32 kB of flash) and section 6.2 (pages of 256
-bytes). Sizes are derived from the constants that the program uses. Distortion tables lie in flash;
-the text leaves that open, but beside the node's messages RAM has no room even for its 227 bytes.
-Program code is not modelled, so flash must leave room for it. The Earth and the Sun are never
-looked for at the same time, so their buffers share their places.
+bytes). Sizes are derived from the constants that the program uses. Distortion tables are in flash;
+the text leaves that open, but beside the node's messages RAM has no room even for their 227 bytes.
+Program code is not modelled, so flash must leave room for it. The program never searches for the
+Earth and the Sun at the same time, so their buffers share memory.
 """
 
 from cubestack.firmware_model.cubesense.links.bench import LETTERS
@@ -28,12 +28,8 @@ __all__ = ["CAPACITY", "Buffer", "Memory", "budget", "report", "used"]
 
 INT, FLOAT = 2, 4
 
-STACK_BYTES = 256
-"""Software stack, one page: assumed, as C18 sets it up."""
-
-TASK_BYTES = 32
-"""What the links and the main loop remember between two bytes or two steps: assumed."""
-
+STACK_BYTES = 256  #: software stack, one page: assumed, the default of C18
+TASK_BYTES = 32  #: state of links and main loop between two bytes or two steps: assumed
 
 #: Size of each memory in bytes.
 CAPACITY = {Memory.RAM: 1536, Memory.FLASH: 32 * 1024}
@@ -92,7 +88,7 @@ def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]
 
 
 def _state_bytes() -> int:
-    """As many as telemetry shows of it, boresights, and what the cameras were told; switches."""
+    """Bytes of state in telemetry, boresights, the cameras' written settings, and switches."""
     shown = ["CommunicationStatus", "TcmdProcessed", "Configuration", "Power"]
     for number in (camera + 1 for camera in Camera):
         shown += [f"Result{number}", f"Details{number}", f"PhaseTimes{number}", f"Quality{number}"]
@@ -105,7 +101,7 @@ def _state_bytes() -> int:
 
 
 def report(buffers: tuple[Buffer, ...]) -> str:
-    """A budget as a Markdown table, one row for a buffer, with sums."""
+    """A budget as a Markdown table, one row per buffer, with sums."""
     rows = ["| Memory | Buffer | Bytes |", "|---|---|---:|"]
     for memory, total in used(buffers).items():
         rows += [

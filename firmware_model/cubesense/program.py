@@ -1,7 +1,7 @@
-"""CubeSense's main program: what the links ask for, one job after the other.
+"""CubeSense's main program: executes the links' requests, one job after the other.
 
-CubeSense thesis, section 6.4: the satellite's computer asks for a picture and for its measurement,
-nothing runs by itself. While nothing is asked for, the program watches the memories' currents.
+CubeSense thesis, section 6.4: the satellite's computer requests an image and its measurement;
+nothing runs by itself. While there is no request, the program monitors the memories' currents.
 """
 
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
@@ -25,22 +25,21 @@ from cubestack.firmware_model.interface.cubesense.switches import (
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Reset, Routine
 
+#: Longest wait of a reset for the UART, whose longest answer takes half of it: assumed.
 DRAIN_US = 100_000
-"""A reset waits so long at most for the UART; its longest answer takes half of it. Assumed."""
-
 DRAIN_STEP_US = 1_000
 
 
 class CubeSenseProgram:
-    """One life of the program, from reset to reset.
+    """One run of the program, from reset to reset.
 
     Attributes:
         node: the node protocol; its methods are the interrupts of its UART and I2C address.
-        registers: the register protocol; the same of its I2C address.
+        registers: the register protocol; likewise, for its I2C address.
         backup: the register protocol on the node's UART, where that is chosen.
-        bench: the bench protocol; the same of its UART.
-        idle: nothing waits to be done.
-        state: what the program remembers; traces read it.
+        bench: the bench protocol; likewise, for its UART.
+        idle: no job waits.
+        state: the program's memory, also read by traces.
     """
 
     def __init__(
@@ -49,7 +48,7 @@ class CubeSenseProgram:
         meter: Meter,
         switches: CubeSenseSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        """Reset: RAM starts with the declared reset values, and ``switches``."""
+        """RAM starts with the declared reset values, and ``switches``."""
         self.idle = False
         self._hardware = hardware
         self.state = state = State(switches)
@@ -67,7 +66,6 @@ class CubeSenseProgram:
         self.bench = BenchLink(hardware, meter, state, jobs, reader, measurement)
 
     def main(self) -> Routine[None]:
-        """Run until a reset."""
         yield from self._supply.start()
         yield from self.cameras.start()
         while True:
@@ -82,7 +80,7 @@ class CubeSenseProgram:
                 yield Reset(cause)
 
     def _drain(self) -> Routine[None]:
-        """Let the host have what was answered before, the acknowledge of its reset above all."""
+        """Let the UART send the pending answers, in particular the acknowledge of the reset."""
         now_us: int = yield ReadTimer()
         deadline_us = now_us + DRAIN_US
         while self._hardware.uart_backlog(Port.NODE) and now_us < deadline_us:

@@ -1,6 +1,6 @@
-"""What the node remembers: settings, the latest result of each camera, flags and counters.
+"""The node's memory: settings, the latest result of each camera, flags and counters.
 
-All of it is in RAM and starts anew with every reset. Settings start with the reset values that the
+All of it is in RAM and starts again with every reset. Settings start with the reset values that the
 telecommands declare.
 """
 
@@ -22,11 +22,11 @@ from cubestack.firmware_model.node.state import NodeState
 from cubestack.firmware_model.node.switches import RunningSwitches
 
 ERROR_FLAGS = ("TcmdBufferOverrun", "I2cTlmReadError", "UartProtocolError", "UartMsgIncomplete")
-"""Of telemetry CommunicationStatus."""
+"""Flags of telemetry CommunicationStatus."""
 
 
 def distortion_of(values: Mapping[str, Any]) -> tuple[float, ...]:
-    """Factors of the polynomial from the parameters of telecommand Distortion."""
+    """Factors of the polynomial, from the parameters of telecommand Distortion."""
     return tuple(
         codes.coefficient(values[f"Mantissa{power}"], values[f"Exponent{power}"])
         for power in range(telecommands.DISTORTION_TERMS)
@@ -44,7 +44,7 @@ class CameraSettings:
         gain: as sent; the camera gets at most 63.
         blue_gain, red_gain: as sent.
         boresight: (x, y) in px.
-        masks: areas that detection ignores; five, all 0 where there is none.
+        masks: five areas that detection ignores; unused ones are all 0.
         distortion: factors of the polynomial.
     """
 
@@ -60,7 +60,6 @@ class CameraSettings:
 
     @classmethod
     def at_reset(cls, camera: codes.Camera) -> "CameraSettings":
-        """The declared reset values."""
         number = camera + 1
 
         def reset(name: str) -> dict[str, Any]:
@@ -84,20 +83,20 @@ class Result:
     """The latest measurement of one camera.
 
     Attributes:
-        capture, detect: what became of it.
-        alpha, beta: 1/100 deg; they count with SUCCESS only.
+        capture, detect: outcome.
+        alpha, beta: 1/100 deg; valid with SUCCESS only.
         x, y: centre from the boresight, undistorted, 1/100 px.
         radius: of the fitted circle, undistorted, 1/100 px; 0 for the Sun.
         points: edges of the fit, or Sun pixels of the mean.
-        sigma: standard deviations of alpha and beta, 1/100 deg; 0: not known.
+        sigma: standard deviations of alpha and beta, 1/100 deg; 0: unknown.
         rms: of the edges' distances from the circle, 1/100 px.
         found: edges that the search found, or Sun pixels.
         reason: why the detection ended as it did.
         edges: pixels (n, 2) of the edges that the search found, in 1/32 px; none for the Sun.
-        sram: memory that held the picture.
+        sram: memory that holds the image.
         first: first Sun pixel (x, y); (0, 0) for the nadir camera.
         pixels_read: pixels that the processor read from the FPGA.
-        wait_us, store_us, search_us, centroid_us, total_us: as telemetry PhaseTimes has them.
+        wait_us, store_us, search_us, centroid_us, total_us: as in telemetry PhaseTimes.
     """
 
     capture: codes.CaptureResult = codes.CaptureResult.START_UP
@@ -127,18 +126,17 @@ class State(NodeState):
     """RAM of the program.
 
     Attributes:
-        switches: those that the program runs with.
+        switches: in use.
         cameras: settings of each camera.
         results: latest measurement of each camera.
-        over_current: by memory, drew too much since the flag was cleared; it is then kept off.
-        nadir_search: how the nadir camera's edges are looked for.
+        over_current: by memory: it drew too much since the flag was cleared, and is kept off.
+        nadir_search: search method for the nadir camera's edges.
         image_sram: memory that register IMAGE streams.
-        telecommands, telemetries: received, for CommunicationStatus.
+        telecommands, telemetries: number received, for CommunicationStatus.
         last_command, last_processed, last_error: for telemetry TcmdProcessed.
     """
 
     def __init__(self, switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> None:
-        """Start with the declared reset values, and ``switches`` of power-up."""
         super().__init__(ERROR_FLAGS)
         self.switches = RunningSwitches(switches)
         self.cameras = {camera: CameraSettings.at_reset(camera) for camera in codes.Camera}
@@ -149,7 +147,7 @@ class State(NodeState):
         self.reset_communication()
 
     def reset_communication(self) -> None:
-        """Clear counters and error flags, as telecommand Reset of the communication does."""
+        """Clear counters and error flags, for telecommand Reset of the communication."""
         self.telecommands = 0
         self.telemetries = 0
         self.flags.clear()

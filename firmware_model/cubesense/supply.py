@@ -1,9 +1,9 @@
 """Supplies: switches of memories and cameras, current monitors, latch-up of a memory.
 
-CubeSense thesis, section 3.2.1.1: a monitor and a switch for each memory, read by the converter. No
-comparator watches, so the program looks: every few milliseconds while it waits, and after every
-line that it reads. A memory that draws too much is cut at once and stays off until telecommand
-ClearOverCurrent, because whatever it held is lost.
+CubeSense thesis, section 3.2.1.1: a monitor and a switch for each memory, read by the converter.
+There is no comparator, so the program polls: every few milliseconds while it waits, and after every
+line that it reads. A memory that draws too much is cut off at once and stays off until telecommand
+ClearOverCurrent, because its contents are lost.
 """
 
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
@@ -13,18 +13,13 @@ from cubestack.firmware_model.interface.cubesense.pins import MA_PER_COUNT, SRAM
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, SetPin, Sleep
 
+#: Assumed: four times the current of a working memory here (15 mA; table 7.1 has some 5 mA at 5 V),
+#: and far below that of a latch-up.
 OVER_CURRENT_MA = 60.0
-"""Assumed, no limit is published: four times what a working memory draws here (15 mA, and table 7.1
-has some 5 mA at 5 V), and far below what a latch-up does."""
 
-SAMPLE_US = 5_000
-"""Longest time between two looks at the monitors while the program waits."""
-
-OFF_TIME_US = 100_000
-"""How long a supply stays off at least in a power cycle: assumed, the sources give no time."""
-
-SETTLE_US = 1_000
-"""From a supply's switch to its first use: assumed."""
+SAMPLE_US = 5_000  #: longest time between two readings of the monitors while the program waits
+OFF_TIME_US = 100_000  #: shortest off time of a supply in a power cycle: assumed
+SETTLE_US = 1_000  #: from a supply's switch to its first use: assumed
 
 _LIMIT_COUNTS = round(OVER_CURRENT_MA / MA_PER_COUNT)
 
@@ -32,10 +27,9 @@ _MONITORS = {Sram.SRAM1: Monitor.SRAM1, Sram.SRAM2: Monitor.SRAM2}
 
 
 class Supply:
-    """The memories' supplies, and everybody's monitors."""
+    """The memories' supplies, and all current monitors; at first all are off, as at reset."""
 
     def __init__(self, hardware: CubeSenseHardware, meter: Meter, state: State) -> None:
-        """Every switch is open, as at reset."""
         self._hardware = hardware
         self._meter = meter
         self._state = state
@@ -43,17 +37,15 @@ class Supply:
         self._cut_us = dict.fromkeys(Sram, 0)
 
     def start(self) -> Routine[None]:
-        """Switch both memories on."""
         for sram in Sram:
             yield from self._switch(sram, True)
         yield from self.pause(SETTLE_US)
 
     def available(self, sram: Sram) -> bool:
-        """Whether ``sram`` is on."""
         return self._on[sram]
 
     def sample(self) -> Routine[None]:
-        """Look at both memories that are on, and cut the one that draws too much."""
+        """Check both memories that are on, and cut off one that draws too much."""
         for sram in Sram:
             if not self._on[sram]:
                 continue
@@ -65,7 +57,7 @@ class Supply:
                 self._cut_us[sram] = yield ReadTimer()
 
     def watch_until(self, deadline_us: int) -> Routine[None]:
-        """Wait, and keep an eye on the memories."""
+        """Wait, and monitor the memories."""
         while True:
             yield from self.sample()
             now_us: int = yield ReadTimer()
@@ -74,7 +66,7 @@ class Supply:
             yield Sleep(min(deadline_us, now_us + SAMPLE_US), wakeable=False)
 
     def idle(self) -> Routine[None]:
-        """Look at the memories and sleep until woken, but not for long."""
+        """Check the memories and sleep until woken, at most ``SAMPLE_US``."""
         yield from self.sample()
         now_us: int = yield ReadTimer()
         yield Sleep(now_us + SAMPLE_US)
@@ -88,7 +80,7 @@ class Supply:
         }
 
     def clear_over_current(self, *memories: Sram) -> Routine[None]:
-        """Clear the flags of ``memories`` and switch on again what was cut; another one stays."""
+        """Clear the flags of ``memories`` and switch on those that were cut off."""
         cut = [sram for sram in memories if self._state.over_current[sram]]
         if not cut:
             return

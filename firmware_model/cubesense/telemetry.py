@@ -1,4 +1,4 @@
-"""Where the values of each telemetry frame come from; interrupt context, so nothing here waits."""
+"""Values of each telemetry frame; interrupt context, so nothing here waits."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,8 +18,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins,
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.identification import identification
 
-NODE_TYPE = 4
-"""Assumed; the public material names no number."""
+NODE_TYPE = 4  #: assumed
 
 SERIAL_BYTES = INTERFACE.telemetry("SerialNumber").length
 
@@ -42,7 +41,6 @@ class Telemetry:
     download: Download
 
     def __post_init__(self) -> None:
-        """List where each frame's values come from."""
         self._sources: dict[str, Callable[[], Values]] = {
             "Identification": lambda: identification(
                 INTERFACE, NODE_TYPE, self.hardware.uptime_us()

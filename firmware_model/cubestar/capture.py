@@ -15,16 +15,13 @@ from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import AwaitPin, ReadTimer, Routine, Sleep
 
-ACK_POLL_CYCLES = 8
-"""Port read (3) and loop step (5) of the cost table."""
-
-ACK_TIMEOUT_US = 2_000_000
-"""More than two frames at the lowest frame rate; the sources give no limit."""
+ACK_POLL_CYCLES = 8  #: port read (3) and loop step (5) of the cost table
+ACK_TIMEOUT_US = 2_000_000  #: more than two frames at the lowest frame rate; assumed
 
 
 @dataclass(eq=False)
 class ImageCapture:
-    """The capture functions, as the settings in ``state`` say."""
+    """The capture functions, with the settings in ``state``."""
 
     state: State
     supply: SupplyMonitor
@@ -32,10 +29,10 @@ class ImageCapture:
     pictures: Pictures
 
     def get_image(self, meanwhile: Routine[bool] | None = None) -> Routine[bool]:
-        """Capture a picture; False, with a flag raised, when it failed.
+        """Capture an image; raises a flag and returns False if it failed.
 
-        ``meanwhile`` runs while the FPGA waits for the frame, or at once when there will be none.
-        After a failure there is no picture to process.
+        ``meanwhile`` runs while the FPGA waits for the frame, or at once if no frame can come.
+        After a failure there is no image to process.
         """
         state = self.state
         failure = yield from self._enable_sensor()
@@ -47,7 +44,7 @@ class ImageCapture:
             started_us: int = yield ReadTimer()
             if (yield from self.pictures.fetch()):
                 yield from phases.end(self.state, "transfer_us", started_us)
-            if self.supply.cut:  # while the picture was on its way
+            if self.supply.cut:  # during the transfer
                 failure = "ImageCaptureError"
         if failure is not None:
             state.raise_flag(failure)
@@ -61,7 +58,7 @@ class ImageCapture:
         return True
 
     def replaced(self) -> Routine[bool]:
-        """The picture was made by other means than a capture; False: its supply was cut."""
+        """An upload or test pattern replaced the image; returns False if its supply was cut."""
         now_us: int = yield ReadTimer()
         self.state.retained.image_ms = now_us // 1000
         self.state.retained.image_present = int(not self.supply.cut)
@@ -69,7 +66,7 @@ class ImageCapture:
         return not self.supply.cut
 
     def _enable_sensor(self) -> Routine[str | None]:
-        """Start the sensor and let its first, invalid frame pass; returns a failure's flag."""
+        """Start the sensor and wait for its first, invalid frame; returns a failure's flag."""
         failure = yield from self.sensor.configure()
         if failure is not None:
             return failure
@@ -84,10 +81,9 @@ class ImageCapture:
         return None
 
     def _store_frame(self, meanwhile: Routine[bool] | None) -> Routine[str | None]:
-        """Have the FPGA store a frame (fpgaWriteToRam); returns a failure's flag.
+        """Let the FPGA store a frame (fpgaWriteToRam); returns a failure's flag.
 
-        The picture's time is that of ACK's poll: late by as much as ``meanwhile`` outlasts the
-        frame.
+        The image's time is that of ACK's poll, which is late if ``meanwhile`` outlasts the frame.
         """
         started_us: int = yield ReadTimer()
         yield from self.pictures.begin()
@@ -101,6 +97,6 @@ class ImageCapture:
         ended_us: int = yield ReadTimer()
         self.state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000
         if not (yield from self.sensor.enable(False)):
-            self.state.raise_flag("ISDisableError")  # the picture is good all the same
+            self.state.raise_flag("ISDisableError")  # the image is valid nevertheless
             self.sensor.forget_set_up()
         return None if stored else "ImageCaptureError"

@@ -1,12 +1,12 @@
-"""The star catalogue that CubeStar's flash holds: a star list and a list of star pairs.
+"""The star catalogue in CubeStar's flash: a star list and a list of star pairs.
 
 CubeStar thesis, sections 4.3.2 (Algorithm 1), 4.3.4 (reduced catalogue) and 5.3.2 (constant arrays
 in flash: 405 stars in 5.54 kB, 11 484 pairs in 89.7 kB). Two pairs are closer than the camera can
-split; the thesis leaves them in, and so do we. An extension: a companion within `COMPANION_RAD` of
+resolve; like the thesis, this list keeps them. An extension: a companion within `COMPANION_RAD` of
 a brighter star is left out, because the two would tie in every vote. With Hipparcos and V below 3.8
-that is alpha Centauri B alone, without which the published 405 stars remain. Magnitudes and
-Hipparcos numbers are not in flash (the published size leaves no room for them): they are kept here
-for the ground's reports.
+that is only alpha Centauri B, without which the published 405 stars remain. Magnitudes and
+Hipparcos numbers are not in flash (the published size leaves no room): they are kept here for the
+ground's reports.
 """
 
 import hashlib
@@ -19,23 +19,23 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.mcu.costs import Meter
 
-#: Angle in rad, half a pixel, below which the fainter of two stars is not listed. Chosen: it leaves
+#: Angle in rad, half a pixel, below which the fainter of two stars is omitted. Chosen: it leaves
 #: the published 405 stars, and the published two closest pairs.
 COMPANION_RAD = 0.0005
 
 
 class CatalogueError(ValueError):
-    """Arrays or limits from which no catalogue can be made."""
+    """Arrays or limits that allow no catalogue."""
 
 
 @dataclass(frozen=True, eq=False)
 class PairList:
-    """Pairs of stars, sorted by rising angle.
+    """Pairs of stars, sorted by ascending angle.
 
     Attributes:
         first: (m,) index of one star in the star list.
         second: (m,) index of the other star.
-        angle: (m,) angle between them in rad, single precision, rising.
+        angle: (m,) angle between them in rad, single precision, ascending.
     """
 
     first: NDArray[np.uint16]
@@ -44,11 +44,10 @@ class PairList:
 
     @cached_property
     def ends(self) -> NDArray[np.intp]:
-        """Second and first stars (2, m), ready to be looked up; for the model's speed."""
+        """Second and first stars (2, m) as indices; for the model's speed."""
         return np.stack((self.second, self.first)).astype(np.intp)
 
     def __len__(self) -> int:
-        """Number of pairs."""
         return len(self.angle)
 
 
@@ -74,12 +73,12 @@ class StarCatalogue:
 
     @cached_property
     def cosines(self) -> NDArray[np.float32]:
-        """Cosines (n, n) of the angles between stars; for the model's speed, the part has none."""
+        """Cosines (n, n) of the angles between stars, for the model's speed; the part has none."""
         return np.asarray(sum(np.outer(axis, axis) for axis in self.vectors.T), np.float32)
 
     @cached_property
     def _axes(self) -> NDArray[np.float32]:
-        """The vectors by axis (3, n), as the part has them."""
+        """The vectors by axis (3, n), as in the part."""
         return np.ascontiguousarray(self.vectors.T)
 
     @classmethod
@@ -97,12 +96,12 @@ class StarCatalogue:
             hip: (n,) distinct Hipparcos numbers, any order.
             unit_vectors: (n, 3) directions at the wanted epoch.
             v_mag: (n,) V magnitudes.
-            mag_limit: V magnitude below which a star is taken.
-            pair_limit_deg: angle in degrees, 0 to 180, below which a pair is taken.
+            mag_limit: V magnitude below which a star is selected.
+            pair_limit_deg: angle in degrees, 0 to 180, below which a pair is listed.
 
         Raises:
-            CatalogueError: when shapes disagree, vectors are not unit vectors, or the limits leave
-                fewer than two stars or more than a 16-bit index can number.
+            CatalogueError: for inconsistent shapes, vectors of another length than 1, or limits
+                that leave fewer than two stars or more than a 16-bit index can number.
         """
         count = len(hip)
         if unit_vectors.shape != (count, 3) or v_mag.shape != (count,):
@@ -131,17 +130,16 @@ class StarCatalogue:
         )
 
     def __len__(self) -> int:
-        """Number of stars."""
         return len(self.vectors)
 
     @property
     def star_bytes(self) -> int:
-        """Flash that the star list takes: a 16-bit name and three floats a star."""
+        """Flash for the star list: a 16-bit name and three floats per star."""
         return len(self) * (2 + 3 * 4)
 
     @property
     def pair_bytes(self) -> int:
-        """Flash that the pair list takes: two 16-bit names and a float a pair."""
+        """Flash for the pair list: two 16-bit names and a float per pair."""
         return len(self.pairs) * (2 + 2 + 4)
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
@@ -161,7 +159,7 @@ class StarCatalogue:
         }
 
     def to_bytes(self) -> bytes:
-        """`arrays` one after the other."""
+        """`arrays`, concatenated."""
         return b"".join(array.tobytes() for array in self.arrays().values())
 
     def sha256(self) -> str:
@@ -169,7 +167,7 @@ class StarCatalogue:
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
     def limited(self, pair_limit_deg: float) -> Self:
-        """This catalogue with a narrower pair list: the beginning of its own, as that is sorted."""
+        """This catalogue with a narrower pair list: the beginning of its own, which is sorted."""
         count = int(np.searchsorted(self.pairs.angle, np.float32(np.radians(pair_limit_deg))))
         first, second, angle = self.pairs.first, self.pairs.second, self.pairs.angle
         return replace(
@@ -181,14 +179,14 @@ class StarCatalogue:
     def near(
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter
     ) -> NDArray[np.uint16]:
-        """Indices of the stars within `radius_deg` of a unit vector (3,), rising."""
+        """Indices of the stars within `radius_deg` of a unit vector (3,), ascending."""
         least = np.float32(np.cos(np.radians(radius_deg)))
         return self.within(boresight, least, meter).astype(np.uint16)
 
     def within(
         self, boresight: NDArray[np.float32], least: np.float32, meter: Meter
     ) -> NDArray[np.intp]:
-        """Indices, rising, of the stars whose cosine with a unit vector is ``least`` or more."""
+        """Ascending indices of the stars whose cosine with a unit vector is ``least`` or more."""
         direction = boresight.astype(np.float32)
         x, y, z = self._axes
         cosine = x * direction[0] + y * direction[1] + z * direction[2]
@@ -207,7 +205,7 @@ class StarCatalogue:
     def reduced(
         self, boresight: NDArray[np.float32], radius_deg: float, meter: Meter
     ) -> tuple[NDArray[np.uint16], PairList]:
-        """The stars within `radius_deg` of a unit vector (3,), as `near` gives them; their pairs.
+        """The stars within `radius_deg` of a unit vector (3,), as from `near`, and their pairs.
 
         One pass over the star list marks the stars, one over the pair list copies the pairs of
         marked stars to RAM, still sorted (CubeStar thesis, section 4.3.4).
@@ -230,7 +228,7 @@ class StarCatalogue:
 
 
 def _companions(vectors: NDArray[np.float64], v_mag: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which stars (n,) stand within `COMPANION_RAD` of a brighter one."""
+    """Mask (n,) of the stars within `COMPANION_RAD` of a brighter one."""
     first, second = np.triu_indices(len(vectors), k=1)
     close = np.linalg.norm(vectors[first] - vectors[second], axis=1) < COMPANION_RAD
     first, second = first[close], second[close]
@@ -242,8 +240,8 @@ def _companions(vectors: NDArray[np.float64], v_mag: NDArray[np.float64]) -> NDA
 def _list_pairs(vectors: NDArray[np.float64], limit_rad: float) -> PairList:
     """All pairs closer than the limit, sorted by the stored angle and then by index.
 
-    Angles come from chords, which stay exact where an arc cosine would not; plain sums keep the
-    result independent of the matrix library in use.
+    Angles are computed from chords, which stay exact where an arc cosine would not; plain sums keep
+    the result independent of the matrix library.
     """
     first, second = np.triu_indices(len(vectors), k=1)
     difference = vectors[first] - vectors[second]

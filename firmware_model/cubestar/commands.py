@@ -1,7 +1,7 @@
-"""What each telecommand does, executed by the main loop one after the other.
+"""Effects of the telecommands, which the main loop executes one after the other.
 
 A setting telecommand stores its parameters. Others act at once, or take time; a few end in a reset,
-in which telecommands that still wait are lost.
+which discards waiting telecommands.
 """
 
 from collections.abc import Callable
@@ -18,9 +18,7 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
 from cubestack.firmware_model.node.commands import CommandExecutor
 from cubestack.firmware_model.node.queue import QueuedCommand
 
-WATCHDOG_US = 2_000_000
-"""Period of the watchdog; assumed, the sources give none."""
-
+WATCHDOG_US = 2_000_000  #: period of the watchdog; assumed
 STREAM_BACKLOG_BYTES = 512
 
 
@@ -28,15 +26,14 @@ class Commands(CommandExecutor):
     """Executes telecommands.
 
     Attributes:
-        processing: what they act on, with its camera and picture.
+        processing: target of the telecommands, with its camera and image.
         memory_test: result of the last TestSRAM.
-        next_block: upload block behind the latest one.
+        next_block: number after that of the latest upload block.
         blocks_received: upload blocks since UploadImage.
         second_half: the next ImageBlock of 256 bytes is the second half.
     """
 
     def __init__(self, processing: Processing) -> None:
-        """Act on ``processing``."""
         self.processing, self.state = processing, processing.state
         self._meter, self._capture = processing.meter, processing.capture
         super().__init__(self.state.hardware, self.state.settings, self.state.switches)
@@ -87,7 +84,7 @@ class Commands(CommandExecutor):
     def _reporting(
         self, name: str, routine: Callable[[QueuedCommand], Routine[Any]]
     ) -> Callable[[QueuedCommand], Routine[None]]:
-        """``routine`` with the states of telecommand ``name``; one that returns False failed."""
+        """``routine`` with the task states of telecommand ``name``; False from it means failed."""
         task = TASKS[name]
 
         def run(command: QueuedCommand) -> Routine[None]:
@@ -128,11 +125,11 @@ class Commands(CommandExecutor):
         self.memory_test = codes.MemoryTest.PASSED if passed else codes.MemoryTest.FAILED
 
     def _paged(self, command: QueuedCommand) -> int:
-        """Address of a register of the image sensor in the selected page."""
+        """Address of an image sensor register in the selected page."""
         page: int = self.state.settings.get("SetCameraRegisterPage", "Page")
         return page << 8 | int(command.values["Reg"])
 
-    # --- picture ------------------------------------------------------------------------------
+    # --- image --------------------------------------------------------------------------------
 
     def _test_pattern(self, command: QueuedCommand) -> Routine[bool]:
         row, column = np.ogrid[:ROWS, :COLUMNS]
@@ -158,7 +155,7 @@ class Commands(CommandExecutor):
         self._meter.charge(loop=UPLOAD_BLOCK_BYTES)
         self.next_block = number + 1
         self.blocks_received += 1
-        return bool(self.state.retained.image_present)  # else nothing was begun, or it was lost
+        return bool(self.state.retained.image_present)  # False: no upload has begun, or it was lost
 
     def _select_block(self, _command: QueuedCommand) -> Routine[None]:
         yield from ()

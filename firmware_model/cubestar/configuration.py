@@ -1,4 +1,4 @@
-"""What the algorithms are configured with, taken from the settings of telecommands 8 to 23."""
+"""Configuration of the algorithms, from the settings of telecommands 8 to 23."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def detection_config(
 ) -> DetectionConfig:
     """Region, thresholds and limits of the search; see ``DetectionConfig``.
 
-    Settings that this hardware can not follow act as the nearest that it can.
+    Settings that this hardware cannot follow are replaced by the nearest possible ones.
     """
     values = settings.all(
         "setDetectionRegion", "setDetectionThresholds", "setStarPixels", "setDetectionVariables"
@@ -54,12 +54,12 @@ def camera_parameters(settings: Settings) -> CameraParameters:
 
 
 def field(settings: Settings) -> Field:
-    """Which directions lie in the picture."""
+    """Directions inside the image."""
     return field_of(camera_parameters(settings), COLUMNS, ROWS)
 
 
 def field_cosine(camera: CameraParameters) -> np.float32:
-    """Cosine of the boresight's angle to the picture's farthest corner, distortion left out."""
+    """Cosine of the angle from boresight to the farthest image corner, without distortion."""
     one, cx, cy = np.float32(1), np.float32(camera.cx), np.float32(camera.cy)
     scale = np.float32(camera.pitch_mm) / np.float32(camera.focal_length_mm)
     x, y = max(cx, COLUMNS - cx) * scale, max(cy, ROWS - cy) * scale

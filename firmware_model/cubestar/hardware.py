@@ -1,4 +1,4 @@
-"""What CubeStar's program sees of its EFM32GG beside the requests that take time."""
+"""Peripherals of CubeStar's EFM32GG that the program uses without a request."""
 
 from typing import Protocol
 
@@ -16,8 +16,8 @@ class CubeStarHardware(NodeHardware, Protocol):
         external_ram: SRAM on the external bus, shape (bytes,), uint8.
         retention: battery-domain registers, kept over software resets, not over power-off.
         flash: non-volatile store.
-        reset_causes: register of what reset the processor since the program cleared it; one of
-            the single causes of ``ResetCause`` for each bit that is set.
+        reset_causes: the reset-cause register: one of the single causes of ``ResetCause`` for each
+            bit set since the program cleared it.
     """
 
     external_ram: NDArray[np.uint8]
@@ -25,17 +25,16 @@ class CubeStarHardware(NodeHardware, Protocol):
     flash: FlashStore
     reset_causes: set[int]
 
-    def switch_supply(self, channel: str, on: bool) -> None:
-        """Turn the load switch of supply ``channel`` on or off."""
+    def switch_supply(self, channel: str, on: bool) -> None: ...
 
     def bus_read(self, select: int, address: int, count: int) -> bytes:
-        """Load bytes over the external bus, in an interrupt: their cycles are still to be charged.
+        """Read bytes over the external bus, in an interrupt; the caller charges their cycles.
 
-        Only where that bus leads to the FPGA; see ``BusAccess``.
+        Only if that bus leads to the FPGA; see ``BusAccess``.
         """
 
     def supply_current_ma(self, channel: str) -> float:
-        """Current that the monitor of supply ``channel`` shows, in mA."""
+        """Current at the monitor of supply ``channel``, in mA."""
 
     def temperature_c(self) -> float:
         """On-chip temperature sensor, in degrees Celsius."""

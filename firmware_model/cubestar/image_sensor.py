@@ -1,4 +1,4 @@
-"""The image sensor as the firmware uses it: set-up for stars, enable, single registers.
+"""The firmware's use of the image sensor: set-up for stars, enable, single registers.
 
 CubeStar thesis, appendix D; register names and addresses are those of the sensor's own table.
 """
@@ -12,8 +12,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Routine, pause
 
-SETTLE_US = 2_000
-"""From power-up to the first register access; assumed."""
+SETTLE_US = 2_000  #: from power-up to the first register access; assumed
 
 
 def _bits(register: str, **fields: int) -> int:
@@ -38,8 +37,8 @@ class ImageSensor:
     """Register access over the camera's own control bus.
 
     Attributes:
-        state: its settings say how to set the sensor up.
-        selected_register: address and value of the register read last; None: no answer.
+        state: its settings determine the sensor's set-up.
+        selected_register: address and value of the register read last; value None: no answer.
     """
 
     state: State
@@ -51,15 +50,15 @@ class ImageSensor:
         self.state.retained.camera_setup = 0
 
     def forget_set_up(self) -> None:
-        """Something failed, so the sensor may have lost its supply: set it up again.
+        """After a failure the sensor may have lost its supply: set it up again next time.
 
-        Appendix D sets the registers up before pictures, and the software reset of section 5.3.6
-        leaves the published program no memory of having done so.
+        Appendix D sets the registers up before images, and the software reset of section 5.3.6
+        erases the published program's memory of it.
         """
         self.state.retained.camera_setup = 0
 
     def configure(self) -> Routine[str | None]:
-        """Set up for stars, unless that is done already; the flag of an unanswered write."""
+        """Set up for stars if needed; returns the flag of an unanswered write."""
         retained, settings = self.state.retained, self.state.settings
         rate = settings.get("SetFrameRate", "FrameRate")
         exposure = settings.get("Exposure", "exposure")
@@ -67,7 +66,7 @@ class ImageSensor:
         if retained.camera_setup == wanted:
             return None
         failure = "ConfigChangeError" if retained.camera_setup else "ISSetupError"
-        retained.camera_setup = 0  # until all is written
+        retained.camera_setup = 0  # until all registers are written
         set_up = {
             "MODE_SELECT": _REST,
             "HARDWARE_FEATURES": _ALL_BUT_SHARPENING,
@@ -96,7 +95,7 @@ class ImageSensor:
         return None
 
     def apply_settings(self) -> Routine[bool]:
-        """Set up as ``configure`` does, and raise its flag; False when there was no answer."""
+        """Run ``configure`` and raise its flag; False if there was no answer."""
         failure = yield from self.configure()
         if failure is not None:
             self.state.raise_flag(failure)
@@ -109,7 +108,7 @@ class ImageSensor:
         return True
 
     def enable(self, on: bool) -> Routine[bool]:
-        """Let the sensor gather images, or rest; False when it does not answer."""
+        """Enable or disable image capture; False if the sensor does not answer."""
         return (yield from self._write("MODE_SELECT", _GATHER if on else _REST))
 
     def _write(self, register: str, value: int) -> Routine[bool]:
@@ -119,7 +118,7 @@ class ImageSensor:
     def write_byte(self, address: int, value: int) -> Routine[None]:
         """Write any byte; an unanswered write raises ConfigChangeError.
 
-        The next capture sets the sensor up again only when a setting changed.
+        The next capture sets the sensor up again only if a setting changed.
         """
         if not (yield from self._transfer(address, bytes([value]))):
             self.state.raise_flag("ConfigChangeError")
@@ -137,7 +136,7 @@ class ImageSensor:
             self.state.raise_flag("ISSetupError")
 
     def age_at_frame_end_us(self) -> int:
-        """From the mid-exposure of the middle row to the end of a frame's read-out, in us.
+        """Time from the mid-exposure of the middle row to the end of a frame's read-out, in us.
 
         The sensor shortens an exposure that does not fit the frame.
         """

@@ -1,4 +1,4 @@
-"""CubeStar's link to the host: counters that survive resets, and nothing left unfinished by one."""
+"""CubeStar's link to the host: its counters survive resets, and no reset interrupts a message."""
 
 from collections.abc import Callable, Collection
 from typing import Any
@@ -10,8 +10,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
 
-SEND_BUFFER_BYTES = 2048
-"""What the UART may still have to send: assumed, a third of a second at the default baud rate."""
+SEND_BUFFER_BYTES = 2048  #: assumed: a third of a second at the default baud rate
 
 _FLAGS = LinkFlags(
     uart=BusFlags(
@@ -27,12 +26,12 @@ _FLAGS = LinkFlags(
 
 
 class CubeStarLink(QueueingLink):
-    """Decodes what the host sends and answers it."""
+    """Decodes the host's messages and answers them."""
 
     def __init__(
         self, meter: Meter, state: State, telemetry: Callable[[Message], dict[str, Any] | None]
     ) -> None:
-        """Serve; ``telemetry`` gives a message's values, or None when it is not supported."""
+        """``telemetry`` returns a message's values, or None if it is not supported."""
         super().__init__(
             state.hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry
         )
@@ -40,7 +39,7 @@ class CubeStarLink(QueueingLink):
 
     @property
     def idle(self) -> bool:
-        """Whether nothing is under way that a reset would cut short: a message or an answer."""
+        """True if a reset would interrupt neither a message nor an answer."""
         return not (self.receiving or self.queue or self._hardware.uart_backlog())
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:

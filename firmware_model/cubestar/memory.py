@@ -1,10 +1,10 @@
-"""Where everything lies, and whether it fits: the memory budget of the EFM32GG280F1024 on CubeStar.
+"""Memory budget of the EFM32GG280F1024 on CubeStar: size and place of every buffer.
 
 CubeStar thesis, sections 3.2 and 5.2.1 (128 kB of RAM, 1024 kB of flash, 1024 kB of SRAM on the
 external bus), appendix E (retention registers, 512 bytes), section 5.3.2 (catalogue as constant
-arrays in flash) and 5.3.4 (preassigned arrays). Sizes are those of the part's program: derived
-from the tables, the settings' limits and the catalogue, wherever these decide. Program code is not
-modelled, so flash and RAM must leave room for it.
+arrays in flash) and 5.3.4 (preallocated arrays). Sizes are those of the part's program: derived
+from the tables, the settings' limits and the catalogue where these determine them. Program code is
+not modelled, so flash and RAM must leave room for it.
 """
 
 import numpy as np
@@ -34,18 +34,15 @@ KB = 1024
 EXTERNAL_RAM_BYTES = 1024 * KB
 RETENTION_BYTES = 512
 
-FLASH_PAGE_BYTES = 4 * KB
-"""Smallest part of this flash that can be erased."""
+FLASH_PAGE_BYTES = 4 * KB  #: smallest part of this flash that can be erased
 
+#: Main program and nested interrupts, without the recursion of region growing: assumed.
 STACK_BYTES = 4 * KB
-"""Main program and nested interrupts, without the recursion of region growing: assumed."""
 
+#: One level of region growing: four registers and the return address, as in the cost table.
 GROW_FRAME_BYTES = 5 * 4
-"""One level of region growing: four registers and the return address, as the cost table has it."""
 
-DIRECTIONS = 500
-"""In which the reduced catalogue is tried, about 9 deg apart."""
-
+DIRECTIONS = 500  #: tested directions of the reduced catalogue, about 9 deg apart
 
 #: Size of each memory in bytes.
 CAPACITY = {
@@ -57,7 +54,6 @@ CAPACITY = {
 
 
 def _limit(command: str, field: str) -> int:
-    """Largest value that a telecommand's parameter may have."""
     declared = INTERFACE.telecommand(command).field(field)
     largest = declared.raw_range[1] if declared.maximum is None else declared.maximum
     return int(max(largest, declared.also or 0))
@@ -140,7 +136,7 @@ def _background_search() -> dict[str, int]:
 
 
 def _largest_reduction(catalogue: StarCatalogue) -> int:
-    """Pairs that the reduced catalogue holds where it holds most, of evenly spread directions."""
+    """Largest number of pairs in the reduced catalogue, over evenly spread directions."""
     step = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * step / DIRECTIONS  # on a spiral from pole to pole
     turn = step * np.pi * (3 - np.sqrt(5))

@@ -1,4 +1,4 @@
-"""How long each phase of the work took, by the processor's own timer: ``*_us`` of ``Retained``.
+"""Duration of each phase of the work, by the processor's own timer: ``*_us`` of ``Retained``.
 
 The phases are those of table 6.2 in the CubeStar thesis, and the steps of section 5.3.
 """
@@ -9,7 +9,7 @@ from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
 
 def started(state: State) -> Routine[None]:
-    """The main loop starts: how long that took since the reset counts as idle time."""
+    """Record the start of the main loop; the time since the reset counts as idle time."""
     now_us: int = yield ReadTimer()
     state.task_status = TaskStatus.POWERED_UP
     state.startup_us = now_us - state.retained.reset_us
@@ -17,12 +17,12 @@ def started(state: State) -> Routine[None]:
 
 
 def begin_capture(state: State) -> None:
-    """A capture begins: publish how long the node idled since the last one."""
+    """Record the start of a capture: publish the idle time since the last one."""
     state.retained.idle_us, state.retained.idling_us = state.retained.idling_us, 0
 
 
 def end(state: State, name: str, started_us: int) -> Routine[int]:
-    """Phase ``name`` that started at ``started_us`` is over; returns its duration in us."""
+    """Record the end of phase ``name``, which began at ``started_us``; returns its us."""
     now_us: int = yield ReadTimer()
     setattr(state.retained, name, now_us - started_us)
     return now_us - started_us

@@ -1,10 +1,10 @@
-"""Where pictures lie and how they get there, by memory layout (CubeStar thesis, section 3.3).
+"""Image memories and the program's access to them, by memory layout (CubeStar thesis, section 3.3).
 
-Published is option 1: the FPGA stores into its own SRAM, and the program copies the picture to the
-processor's. In options 2 and 3, and with two boards (section 7.2), nothing is copied: the program
-reaches the memories behind the FPGA over its external bus. Pins and addresses of these are those of
-``docs/gateware-cubestar-next.md``; assumed, as none of it was built. Visited pixels are zeroed and
-written back over the bus.
+The published layout is option 1: the FPGA stores into its own SRAM, and the program copies the
+image to the processor's. In options 2 and 3, and with two boards (section 7.2), nothing is copied:
+the program accesses the memories behind the FPGA over its external bus. Pins and addresses of these
+are those of ``docs/gateware-cubestar-next.md``; they are assumed, as none of it was built. Visited
+pixels are zeroed and written back over the bus.
 """
 
 from abc import ABC, abstractmethod
@@ -28,8 +28,7 @@ FAST_ITERATION_US = 500_000
 
 _ENABLED, _DISABLED = (pins.ENABLE, 1), (pins.ENABLE, 0)
 _READING, _STORING = (pins.RNW, 1), (pins.RNW, 0)
-_TAKE = (_DISABLED, _READING, _ENABLED)
-"""Pins that give the bus to the program."""
+_TAKE = (_DISABLED, _READING, _ENABLED)  #: levels that connect the bus to the memory
 
 
 def _drive(*levels: tuple[str, int], board: str = "") -> Routine[None]:
@@ -39,16 +38,16 @@ def _drive(*levels: tuple[str, int], board: str = "") -> Routine[None]:
 
 @dataclass(eq=False)
 class Pictures(ABC):
-    """The newest picture, and the way of the next one into memory.
+    """The newest image, and the storage of the next one.
 
-    All offsets count in the newest picture, of ``IMAGE_BYTES``. A place is where a picture can be;
-    ``Retained.image_place`` has that of the newest one.
+    All offsets are within the newest image, of ``IMAGE_BYTES``. A place is a position for an image;
+    ``Retained.image_place`` is that of the newest one.
 
     Attributes:
-        acknowledge: pin that tells that a picture is stored.
-        while_storing: the newest picture can be worked on while the next one is stored.
-        iteration_us: time of one turn of the loop.
-        selects: chip select of each memory of two pictures.
+        acknowledge: pin that signals a stored image.
+        while_storing: the newest image can be processed while the next one is stored.
+        iteration_us: period of the loop.
+        selects: chip select of each memory of two images.
     """
 
     state: State
@@ -61,8 +60,7 @@ class Pictures(ABC):
     selects: ClassVar[tuple[int, ...]] = (0,)
 
     @abstractmethod
-    def start(self) -> Routine[None]:
-        """Set the pins up after a reset."""
+    def start(self) -> Routine[None]: ...
 
     @abstractmethod
     def begin(self) -> Routine[None]:
@@ -70,11 +68,11 @@ class Pictures(ABC):
 
     @abstractmethod
     def end(self, stored: bool) -> Routine[None]:
-        """Let it stop; a frame that is ``stored`` becomes the newest picture."""
+        """Stop storing; a frame that is ``stored`` becomes the newest image."""
 
     @abstractmethod
     def fetch(self) -> Routine[bool]:
-        """Copy the stored frame to where the program works on it; False where nothing is copied."""
+        """Copy the stored frame to the processor's memory; False if the layout copies nothing."""
 
     @abstractmethod
     def search(self, config: detection.DetectionConfig) -> Routine[detection.Detection]:
@@ -82,19 +80,17 @@ class Pictures(ABC):
 
     @abstractmethod
     def read_now(self, start: int, count: int) -> bytes | None:
-        """Read bytes in an interrupt; None where they are out of reach."""
+        """Read bytes in an interrupt; None if they are not accessible."""
 
     def read(self, start: int, count: int) -> Routine[bytes]:
-        """Read bytes."""
         values = yield from self._reads(np.arange(start, start + count, dtype=np.int32))
         return values.tobytes()
 
     def write(self, start: int, data: NDArray[np.uint8]) -> Routine[None]:
-        """Write bytes (n,)."""
         yield from self._writes(np.arange(start, start + len(data), dtype=np.int32), data)
 
     def test_memory(self) -> Routine[bool]:
-        """Write a pattern and read it back, then its complement; the picture is lost."""
+        """Write a pattern and read it back, then its complement; the image is lost."""
         addresses = np.arange(2 * IMAGE_BYTES, dtype=np.int32)
         pattern = (addresses * 167 >> 3).astype(np.uint8)  # differs between rows
         passed = True
@@ -143,20 +139,20 @@ class Pictures(ABC):
 
     @abstractmethod
     def _perform(self, access: BusAccess, operation: str) -> Routine[int]:
-        """Answer ``access`` and count it as so many times ``operation``."""
+        """Perform ``access`` and charge ``operation`` for each transaction."""
 
     def _bank(self) -> int:
         return int(self.state.settings.get("SelectImageBank", "Bank"))
 
 
 class _CopiedPictures(Pictures):
-    """Pictures at the start of the processor's own external RAM."""
+    """Images at the start of the processor's own external RAM."""
 
     iteration_us = ITERATION_US
 
     @property
     def image(self) -> NDArray[np.uint8]:
-        """The newest picture, shape (512, 1024), a live view of the external RAM."""
+        """The newest image, shape (512, 1024), a live view of the external RAM."""
         return self.state.hardware.external_ram[:IMAGE_BYTES].reshape(ROWS, COLUMNS)
 
     def start(self) -> Routine[None]:
@@ -196,17 +192,16 @@ class _CopiedPictures(Pictures):
 
 
 class _BusPictures(Pictures):
-    """What the layouts without a copy share."""
+    """Base of the layouts without a copy."""
 
-    _open = False
-    """Whether the bus leads to the newest picture."""
+    _open = False  #: the bus leads to the newest image
 
     def fetch(self) -> Routine[bool]:
         yield from ()
         return False
 
     def search(self, config: detection.DetectionConfig) -> Routine[detection.Detection]:
-        """Find stars; a picture whose supply was cut meanwhile is lost, as pixels may stay zero."""
+        """Find stars; if the supply is cut meanwhile, the image is lost: pixels may stay zero."""
         search, answer = detection.search_stars(ROWS, COLUMNS, config, self.meter), None
         while True:
             try:
@@ -230,12 +225,12 @@ class _BusPictures(Pictures):
 
     def _perform(self, access: BusAccess, operation: str) -> Routine[int]:
         count: int = yield access
-        self.meter.book(**{operation: count})  # not charged: the time has passed
+        self.meter.charge_elapsed(**{operation: count})
         return count
 
 
 class _SharedPictures(_BusPictures):
-    """One memory of two banks, the places: either the FPGA stores, or the program has it."""
+    """One memory of two banks, the places: either the FPGA or the program accesses it."""
 
     while_storing = False
     iteration_us = ITERATION_US
@@ -254,14 +249,14 @@ class _SharedPictures(_BusPictures):
 
 
 class _TwoMemoryPictures(_BusPictures):
-    """Two memories of one picture each, the places, at one FPGA, in turn."""
+    """Two memories of one image each, the places, at one FPGA, used alternately."""
 
     def start(self) -> Routine[None]:
         yield from _drive(_READING, _ENABLED)
         self._open = True
 
     def begin(self) -> Routine[None]:
-        """Store into the other memory; the bus keeps the one of the newest picture."""
+        """Store into the other memory; the bus stays connected to the newest image."""
         yield from _drive((pins.INTO, 1 - self.state.retained.image_place), _STORING)
 
     def end(self, stored: bool) -> Routine[None]:
@@ -271,9 +266,9 @@ class _TwoMemoryPictures(_BusPictures):
 
 
 class _TwoBoardPictures(_BusPictures):
-    """Two boards with one memory of two banks each, in turn.
+    """Two boards with one memory of two banks each, used alternately.
 
-    The lower bit of a place is its board, the upper one its bank.
+    The low bit of a place is its board, the high bit its bank.
     """
 
     selects = (0, 1)
@@ -287,7 +282,7 @@ class _TwoBoardPictures(_BusPictures):
         self._open = True
 
     def begin(self) -> Routine[None]:
-        """Store at the other board; the bus keeps the one of the newest picture."""
+        """Store on the other board; the bus stays connected to the newest image."""
         self._choose()
         bank = (pins.BANK, self._into >> 1)
         yield from _drive(_DISABLED, bank, _STORING, _ENABLED, board=self._board)
@@ -298,7 +293,7 @@ class _TwoBoardPictures(_BusPictures):
             self.state.retained.image_place = self._into
 
     def _choose(self) -> None:
-        """Store into the board that has not got the newest picture."""
+        """Select the board that does not hold the newest image."""
         self._into = ~self.state.retained.image_place & 1 | self._bank() << 1
         self._board = pins.BOARD_PREFIXES[self._into & 1]
         self.acknowledge = self._board + pins.ACK
@@ -316,5 +311,4 @@ _KINDS: dict[Layout, type[Pictures]] = {
 
 
 def pictures_of(layout: Layout, state: State, meter: Meter, supply: SupplyMonitor) -> Pictures:
-    """The program's way to its pictures in ``layout``."""
     return _KINDS[layout](state, meter, supply)

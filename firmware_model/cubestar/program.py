@@ -1,10 +1,10 @@
 """CubeStar's main program: commands, and the 1 Hz pipeline.
 
-CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new picture, the processor
-works on the previous one; then the picture is transferred, and a software reset ends the iteration.
-With one shared memory (section 7.2) the processor works on a picture as soon as it is stored.
+CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new image, the processor
+works on the previous one; then the image is transferred, and a software reset ends the iteration.
+With one shared memory (section 7.2) the processor works on an image as soon as it is stored.
 Assumed: the reset waits until shortly before the next iteration, so that results can be read until
-then, and leaves out a turn when the host is in the middle of a message.
+then, and is skipped while the host is in the middle of a message.
 """
 
 from cubestack.firmware_model.cubestar import phases
@@ -26,21 +26,18 @@ from cubestack.firmware_model.interface.cubestar.switches import DEFAULT_SWITCHE
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Reset, Routine
 
-RESET_LEAD_US = 10_000
-"""From the reset to the next iteration: more than the few milliseconds that the reset takes."""
-
-LATE_US = 10_000
-"""An iteration that starts later than this after its time is a timing error; assumed."""
+RESET_LEAD_US = 10_000  #: from the reset, which takes a few milliseconds, to the next iteration
+LATE_US = 10_000  #: an iteration that starts later by this is a timing error; assumed
 
 
 class CubeStarProgram:
-    """One life of the program, from reset to reset.
+    """One run of the program, from reset to reset.
 
     Attributes:
         link: the satellite's interface; its methods are the UART and I2C interrupts.
         supply: supply monitor; its ``overcurrent`` is the comparators' interrupt.
         commands: the telecommands.
-        state: what the program remembers; traces read it.
+        state: the program's memory, also read by traces.
     """
 
     def __init__(
@@ -51,7 +48,7 @@ class CubeStarProgram:
         layout: Layout = Layout.COPIED,
         switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        """Reset: set up RAM from the retention registers and flash; ``switches``: of power-up."""
+        """Restore RAM from the retention registers and flash; ``switches``: at power-up."""
         self.state = state = State(hardware, meter, switches)
         state.reset_cause = cause_of(hardware.reset_causes)
         self.supply = SupplyMonitor(state)
@@ -63,7 +60,6 @@ class CubeStarProgram:
         self.link = CubeStarLink(meter, state, telemetry.values)
 
     def main(self) -> Routine[None]:
-        """Run until a reset."""
         yield from phases.started(self.state)
         yield from self._pictures.start()
         retained, causes = self.state.retained, self.state.hardware.reset_causes
@@ -79,7 +75,7 @@ class CubeStarProgram:
                 yield from phases.idle(self.state, None)
 
     def _serve(self) -> Routine[bool]:
-        """Restore a supply and execute a telecommand, if any waits; False when none does."""
+        """Restore a supply and execute a waiting telecommand; False if there was neither."""
         self.supply.sample()
         waiting = bool(self.supply.cut or self.link.queue)
         if self.supply.cut and (yield from self.supply.restore()):
@@ -97,7 +93,7 @@ class CubeStarProgram:
         yield Reset(cause)
 
     def _iteration(self) -> Routine[None]:
-        """One turn of the loop; it starts when the last one's second is over."""
+        """One turn of the loop, which starts at the end of the last turn's second."""
         retained = self.state.retained
         yield from self._wait_until(retained.loop_due_us)
         if not retained.looping:
@@ -124,9 +120,9 @@ class CubeStarProgram:
             yield from self._reset(ResetCause.SYSTEM_REQUEST)
 
     def _wait_until(self, due_us: int) -> Routine[None]:
-        """Idle until ``due_us``; what the host and the supplies want is done meanwhile.
+        """Idle until ``due_us``; serve the host and the supplies meanwhile.
 
-        Returns at once when the loop is stopped. Telecommands go before the next iteration.
+        Returns at once if the loop is stopped. Telecommands precede the next iteration.
         """
         while self.state.retained.looping:
             served = yield from self._serve()

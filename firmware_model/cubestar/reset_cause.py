@@ -1,7 +1,7 @@
-"""What the EFM32GG's register of reset causes means: its bits stay until the program clears them.
+"""Meaning of the EFM32GG's reset-cause register: its bits stay until the program clears them.
 
-The published list has numbers for two pairs of causes. The rest is assumed: what begins with a rise
-of the supply hides all else, and any other mixture is undetermined.
+The published list has numbers for two pairs of causes. The rest is assumed: a cause that includes a
+rise of the supply hides all others, and any other combination is undetermined.
 """
 
 from collections.abc import Collection
@@ -17,6 +17,6 @@ _MEANINGS: dict[frozenset[int], ResetCause] = {
 
 
 def cause_of(bits: Collection[int]) -> ResetCause:
-    """The published number for the causes whose bits are set, each by its own number."""
+    """The published number of the set bits, each given by its own number."""
     hiding = [cause for cause in _SUPPLY if cause in bits]
     return hiding[0] if hiding else _MEANINGS.get(frozenset(bits), ResetCause.UNDETERMINED)

@@ -1,4 +1,4 @@
-"""Telemetry of single stars; frames that step give the next star at each read, and wrap."""
+"""Telemetry of single stars; stepping frames return the next star at each read, and wrap."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -18,13 +18,13 @@ _NOTHING = {
     "StarNumber": NO_STAR,
     **dict.fromkeys(("Identity", "ID", "S1CatNum", "S2CatNum", "S3CatNum"), NOT_IDENTIFIED),
 }
-"""What is not 0 in a frame without a star."""
+"""Non-zero values in a frame without a star."""
 
 Values = dict[str, Any]
 
 
-def named(names: Iterable[str], vector: Iterable[Any]) -> Values:
-    """Each component by its name."""
+def by_name(names: Iterable[str], vector: Iterable[Any]) -> Values:
+    """Components of a vector by name."""
     return dict(zip(names, vector, strict=True))
 
 
@@ -36,7 +36,6 @@ class StarReports:
     """
 
     def __init__(self, processing: Processing) -> None:
-        """Report on the results of ``processing``."""
         self._processing = processing
         self._cursors: dict[str, tuple[Results, int]] = {}
         self.sources: dict[str, Callable[[], Values]] = {
@@ -76,22 +75,21 @@ class StarReports:
     def _stepping(
         self, frame: str, stars: Callable[[], Sequence[int]], values: Callable[[int], Values]
     ) -> Callable[[], Values]:
-        """Give ``values`` of the next of ``stars`` at each call. New results start over."""
+        """A source of ``values`` for the next of ``stars`` at each call; new results start over."""
 
         def source() -> Values:
-            if not (there := stars()):
-                return _nothing(frame)
+            if not (listed := stars()):
+                return _empty_frame(frame)
             results, position = self._cursors.get(frame, (self._results, 0))
-            position = position % len(there) if results is self._results else 0
+            position = position % len(listed) if results is self._results else 0
             self._cursors[frame] = (self._results, position + 1)
-            return {"StarNumber": there[position], **values(there[position])}
+            return {"StarNumber": listed[position], **values(listed[position])}
 
         return source
 
     # --- detected stars -----------------------------------------------------------------------
 
     def summary(self) -> Values:
-        """Telemetry DetectionSummary."""
         detection = self._results.detection
         return {
             "NumStarsDetected": len(self._results.vectors),
@@ -103,20 +101,20 @@ class StarReports:
     def _position(self, star: int) -> Values:
         corrected = ("X_CorrectedCoordinate", "Y_CorrectedCoordinate")
         return {
-            **named(("X_Coordinate", "Y_Coordinate"), self._detection.centroids[star]),
-            **named(corrected, self._results.points[star]),
+            **by_name(("X_Coordinate", "Y_Coordinate"), self._detection.centroids[star]),
+            **by_name(corrected, self._results.points[star]),
             "Size": self._detection.sizes[star],
             "Intensity": self._detection.intensities[star],
         }
 
     def _body_vector(self, star: int) -> Values:
-        return named(("VbX", "VbY", "VbZ"), self._results.vectors[star])
+        return by_name(("VbX", "VbY", "VbZ"), self._results.vectors[star])
 
     def _details(self, star: int) -> Values:
         return {
-            **named(("CCx", "CCy"), self._results.points[star]),
-            **named(("Vbx", "Vby", "Vbz"), UNIT_VECTOR_SCALE * self._results.vectors[star]),
-            **named(("ID", "ValidationVote", "confidance"), self._match(star)),
+            **by_name(("CCx", "CCy"), self._results.points[star]),
+            **by_name(("Vbx", "Vby", "Vbz"), UNIT_VECTOR_SCALE * self._results.vectors[star]),
+            **by_name(("ID", "ValidationVote", "confidance"), self._match(star)),
         }
 
     # --- identified stars ---------------------------------------------------------------------
@@ -139,7 +137,7 @@ class StarReports:
     def _inertial_vector(self, star: int) -> Values:
         identity, _, confidence = self._match(star)
         return {
-            **named(("ViX", "ViY", "ViZ"), self._processing.catalogue.vectors[identity]),
+            **by_name(("ViX", "ViY", "ViZ"), self._processing.catalogue.vectors[identity]),
             "Identity": identity,
             "Confidence": 100 * confidence,
         }
@@ -147,7 +145,7 @@ class StarReports:
     def _hipparcos(self, star: int) -> Values:
         return {
             "Hipparcos": int(self._processing.catalogue.hip[self._match(star)[0]]),
-            **named(("X", "Y"), self._detection.centroids[star]),
+            **by_name(("X", "Y"), self._detection.centroids[star]),
         }
 
     def _match_summary(self) -> Values:
@@ -163,24 +161,24 @@ class StarReports:
 
     def _best(self) -> Values:
         chosen = [*self._results.best, NO_STAR, NO_STAR, NO_STAR][:3]
-        return named(("Star1Index", "Star2Index", "Star3Index"), chosen)
+        return by_name(("Star1Index", "Star2Index", "Star3Index"), chosen)
 
     def _selected(self, number: int) -> Values:
         if number > len(self._results.best):
-            return _nothing(f"Star{number}Details")
+            return _empty_frame(f"Star{number}Details")
         star, prefix = self._results.best[number - 1], f"S{number}"
         identity, _, confidence = self._match(star)
         inertial = self._processing.catalogue.vectors[identity]
         return {
-            **named((f"{prefix}CentX", f"{prefix}CentY"), self._detection.centroids[star]),
+            **by_name((f"{prefix}CentX", f"{prefix}CentY"), self._detection.centroids[star]),
             f"{prefix}Mag": self._detection.intensities[star],
-            **named([f"{prefix}VB{axis}" for axis in "XYZ"], self._results.vectors[star]),
-            **named([f"{prefix}VI{axis}" for axis in "XYZ"], inertial),
+            **by_name([f"{prefix}VB{axis}" for axis in "XYZ"], self._results.vectors[star]),
+            **by_name([f"{prefix}VI{axis}" for axis in "XYZ"], inertial),
             f"{prefix}Conf": 100 * confidence,
             f"{prefix}CatNum": identity,
         }
 
 
-def _nothing(frame: str) -> Values:
+def _empty_frame(frame: str) -> Values:
     values = INTERFACE.telemetry(frame).reset_values()
     return {name: _NOTHING.get(name, value) for name, value in values.items()}

@@ -1,14 +1,14 @@
-"""What the node remembers: in RAM, in the retention registers, and in flash.
+"""The node's memory: RAM, retention registers and flash.
 
 CubeStar thesis, sections 5.3.4 to 5.3.6: the software reset that ends every iteration clears the
 RAM; only the newest image and the newest good attitude survive, the attitude and the mode flag in
-flash. Settings, flags and counters are kept as well (an extension); they live in the retention
-registers (appendix E: "retention registers in backup power domain").
+flash. Settings, flags and counters are kept as well (an extension) in the retention registers
+(appendix E: "retention registers in backup power domain").
 
-A page of this part's flash stands 20 000 erasures. The published firmware writes the attitude each
-second, which erases a page of 4 kB that often if each write takes a whole page: 5.6 hours. With
-switch `flash_store` that is paid: each write takes its time, and a worn page keeps its zeros
-(assumed; the data sheet promises no more than the number). ``FlashStore.writes`` counts them.
+A page of this part's flash endures 20 000 erasures. The published firmware writes the attitude each
+second; if each write erases a whole page of 4 kB, the page lasts 5.6 hours. Switch `flash_store`
+models this: each write takes its time, and a worn page keeps its zeros (assumed; the data sheet
+only states the number). ``FlashStore.writes`` counts the writes.
 """
 
 import struct
@@ -29,7 +29,7 @@ from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
 from cubestack.firmware_model.node.switches import RunningSwitches
 
-#: Telecommands whose parameters are kept.
+#: Telecommands whose parameters are stored.
 SETTING_COMMANDS = (
     "setDelayTimerTimeout",
     "Exposure",
@@ -58,15 +58,14 @@ CONFIG_PAGE = "config"
 ATTITUDE_PAGE = "attitude"
 MODE_PAGE = "mode"
 
-FLASH_ENDURANCE = 20_000
-"""Erasures that a page stands: chosen, the data sheet of the EFM32GG280."""
+FLASH_ENDURANCE = 20_000  #: erasures per page: chosen, from the data sheet of the EFM32GG280
 
 _FLAGS = INTERFACE.telemetry("ErrorFlags")
 _SWITCHES = INTERFACE.telemetry(switch_messages.SHOWN)
 _QUALITY = INTERFACE.telemetry("Quality")
 
 UNRATED: dict[str, Value] = _QUALITY.reset_values() | attitude_quality.UNRATED
-"""Values of telemetry Quality that say nothing."""
+"""Values of telemetry Quality for an unrated image."""
 
 _U32 = 0xFFFF_FFFF
 _U64 = 0xFFFF_FFFF_FFFF_FFFF
@@ -74,15 +73,15 @@ _U64 = 0xFFFF_FFFF_FFFF_FFFF
 
 @dataclass(frozen=True)
 class Attitude:
-    """A solved attitude as flash keeps it.
+    """A solved attitude as stored in flash.
 
     Attributes:
         quaternion: float32 (4,), scalar last, inertial to camera.
-        frame: number of the picture since power-up, modulo 2^32.
-        image_ms: uptime at the picture's mid-exposure, in ms, modulo 2^32.
+        frame: number of the image since power-up, modulo 2^32.
+        image_ms: uptime at the image's mid-exposure, in ms, modulo 2^32.
         matched: stars used.
         mode: MatchMode by which they were identified.
-        rotation: float32 (3, 3), the direction cosine matrix, if that is stored as well.
+        rotation: float32 (3, 3), the direction cosine matrix, if it is stored too.
     """
 
     quaternion: NDArray[np.float32]
@@ -103,7 +102,6 @@ class Attitude:
 
     @classmethod
     def unpack(cls, page: bytes) -> "Attitude":
-        """The attitude in a flash page."""
         matrix, rest = page[: -cls.LAYOUT.size], page[-cls.LAYOUT.size :]
         *quaternion, frame, image_ms, matched, mode = cls.LAYOUT.unpack(rest)
         rotation = np.frombuffer(matrix, "<f4").reshape(3, 3) if matrix else None
@@ -158,13 +156,13 @@ class State(NodeState):
     """RAM of the program, restored from the retention registers at boot.
 
     Attributes:
-        hardware: what the program runs on.
+        hardware: peripherals of the processor.
         settings: parameters of the setting telecommands.
-        switches: those that the program runs with; kept as the settings are, but not in flash.
+        switches: in use; stored like the settings, but not in flash.
         retained: counters that survive resets.
         task_status: value of telemetry TaskStatus.
-        quality: of the latest picture, values of telemetry Quality.
-        candidate: an attitude that contradicts the last believed one, and needs a second one.
+        quality: of the latest image, values of telemetry Quality.
+        candidate: an attitude that contradicts the last believed one and needs confirmation.
         reset_cause: why the program started.
         startup_us: time from the reset to the main loop.
     """
@@ -189,9 +187,9 @@ class State(NodeState):
         meter: Meter,
         switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        """Restore from ``hardware``: retention registers, else the configuration in flash.
+        """Restore from the retention registers, else from the configuration in flash.
 
-        ``meter`` is charged for erasing and writing flash, where a switch says so; ``switches`` are
+        ``meter`` is charged for erasing and writing flash if the switch says so; ``switches`` are
         those of power-up.
         """
         self.hardware, self._meter = hardware, meter
@@ -209,7 +207,7 @@ class State(NodeState):
             data = BytesIO(hardware.retention[magic : self.RETENTION_SIZE])
             self.settings.unpack(data.read(_SETTINGS_BYTES))
             values = _SWITCHES.unpack(data.read(_SWITCHES.length))
-            self.switches.now = switch_messages.switches_shown(CubeStarSwitches, values)
+            self.switches.now = switch_messages.read_switches(CubeStarSwitches, values)
             flags = _FLAGS.unpack(data.read(_FLAGS.length))
             self.flags = {name for name, raised in flags.items() if raised}
             self.retained = Retained(*self._COUNTERS.unpack(data.read(self._COUNTERS.size)))
@@ -222,8 +220,8 @@ class State(NodeState):
     def retain(self) -> None:
         """Write the retention registers, at the instant of a reset.
 
-        The part's program would keep these values there all the time, so that a watchdog's reset
-        finds them too.
+        The part's program would keep these values there all the time, so that they survive a
+        watchdog's reset too.
         """
         candidate = self.candidate
         counters = [getattr(self.retained, field.name) & _U64 for field in fields(Retained)]
@@ -238,7 +236,7 @@ class State(NodeState):
         )
 
     def forget(self) -> None:
-        """Return to the values after power-up; supplies that were cut are still to be restored."""
+        """Return to the values after power-up; supplies that were cut must still be restored."""
         self.retained = Retained(cut=self.retained.cut)
         self.quality, self.candidate = dict(UNRATED), None
         self.flags.clear()
@@ -247,7 +245,7 @@ class State(NodeState):
 
     @property
     def mode(self) -> MatchMode:
-        """The firmware's mode flag, in flash; lost in space when it was never written."""
+        """The firmware's mode flag, in flash; lost in space if it was never written."""
         page = self.hardware.flash.read(MODE_PAGE)
         return MatchMode.LOST_IN_SPACE if page is None else MatchMode(page[0])
 
@@ -258,7 +256,7 @@ class State(NodeState):
 
     @property
     def attitude(self) -> Attitude | None:
-        """The latest good attitude, in flash; each new one is a write."""
+        """The latest good attitude, in flash; each assignment writes it."""
         page = self.hardware.flash.read(ATTITUDE_PAGE)
         return None if page is None else Attitude.unpack(page)
 
@@ -274,11 +272,10 @@ class State(NodeState):
             self.hardware.flash.write(page, data, FLASH_ENDURANCE)
 
     def save_config(self) -> None:
-        """Write the settings to flash."""
         self._write(CONFIG_PAGE, self.settings.pack())
 
     def load_config(self) -> None:
-        """Read the settings from flash; without any, the declared reset values."""
+        """Read the settings from flash; if there are none, use the declared reset values."""
         page = self.hardware.flash.read(CONFIG_PAGE)
         if page is None:
             self.settings.clear()
@@ -286,6 +283,5 @@ class State(NodeState):
             self.settings.unpack(page)
 
     def erase_config(self) -> None:
-        """Erase the settings in flash, and return to the declared reset values."""
         self.hardware.flash.erase(CONFIG_PAGE)
         self.settings.clear()

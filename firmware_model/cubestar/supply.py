@@ -1,4 +1,4 @@
-"""Supply monitoring: a comparator's interrupt cuts the load switch at once (latch-up).
+"""Supply monitoring: on a latch-up a comparator's interrupt opens the load switch at once.
 
 CubeStar thesis, section 5.2.3. The main loop later powers the channel up again.
 """
@@ -11,11 +11,10 @@ from cubestack.firmware_model.mcu.requests import Routine, pause
 #: The processor's SRAM; the boards of FPGA and image sensor.
 CHANNELS = ("memory", "imager")
 
-OFF_TIME_US = 100_000
-"""How long a channel stays off after a latch-up: assumed, the sources give no time."""
+OFF_TIME_US = 100_000  #: time for which a channel stays off after a latch-up: assumed
 
+#: Less than any working part behind a switch draws: assumed, a quarter of an SRAM in standby.
 UNDER_CURRENT_MA = 0.5
-"""Less than any working part behind a switch draws: assumed, a quarter of an SRAM in standby."""
 
 
 @dataclass(eq=False)
@@ -42,13 +41,12 @@ class SupplyMonitor:
 
     @property
     def imager_on(self) -> bool:
-        """Whether the switch of FPGA and imager is closed."""
         return self._is_on("imager")
 
     def sample(self) -> float:
-        """Measure both channels and keep the imager's extremes; its current in mA.
+        """Measure both channels and record the imager's extremes; returns its current in mA.
 
-        A closed switch with next to no current behind it raises UnderCurrent.
+        A closed switch with almost no current raises UnderCurrent.
         """
         currents = {channel: self.state.hardware.supply_current_ma(channel) for channel in CHANNELS}
         if any(self._is_on(name) and ma < UNDER_CURRENT_MA for name, ma in currents.items()):
@@ -60,7 +58,7 @@ class SupplyMonitor:
         return currents["imager"]
 
     def toggle_imager(self) -> bool:
-        """Open or close the switch of FPGA and imager; whether it is closed now."""
+        """Toggle the switch of FPGA and imager; returns whether it is closed now."""
         retained = self.state.retained
         retained.imager_off ^= 1
         retained.cut &= ~(1 << CHANNELS.index("imager"))
@@ -68,7 +66,7 @@ class SupplyMonitor:
         return not retained.imager_off
 
     def restore(self) -> Routine[bool]:
-        """Close what was cut, after a pause; True when the imager came back, at reset values.
+        """Close the cut switches after a pause; True if the imager came back, at reset values.
 
         A channel that is cut meanwhile waits for the next call.
         """

@@ -1,7 +1,7 @@
-"""What telemetry TaskStatus says of telecommands that report their own progress in no other way.
+"""Values of telemetry TaskStatus for telecommands that report their progress in no other way.
 
 Captures, detection, identification and attitude estimate report theirs step by step, also in the
-loop. A task without a failed state ends as done: the error flags tell how it went.
+loop. A task without a failed state ends as done: the error flags report the outcome.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 
 
 class Task(NamedTuple):
-    """States while a telecommand is carried out, and when it has been, or could not be."""
+    """States of a telecommand: in progress, done, failed."""
 
     begun: TaskStatus
     done: TaskStatus
@@ -29,7 +29,7 @@ TASKS = {
     "WriteCameraRegister": _WRITE,
     "ReadFrom_IS_Register": _READ,
     "SelectCameraRegister": _READ,
-    # One upload is many telecommands: it is being received until a block has come.
+    # One upload is many telecommands: it is in progress until a block was received.
     "UploadImage": Task(
         TaskStatus.RECEIVING_IMAGE, TaskStatus.RECEIVING_IMAGE, TaskStatus.RECEIVING_FAILED
     ),

@@ -1,4 +1,4 @@
-"""Values of every telemetry frame, taken when it is asked for."""
+"""Values of every telemetry frame, computed at the request."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.attitude.geometry import angles_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar.commands import Commands
-from cubestack.firmware_model.cubestar.star_reports import StarReports, Values, named
+from cubestack.firmware_model.cubestar.star_reports import StarReports, Values, by_name
 from cubestack.firmware_model.cubestar.state import Attitude
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
@@ -18,17 +18,16 @@ from cubestack.firmware_model.node.identification import SERIAL_NUMBER, identifi
 
 NODE_TYPE = 5
 
-PROCESSING_LIMIT_MS = 500
-"""CubeStar thesis, section 5.3.6."""
+PROCESSING_LIMIT_MS = 500  #: CubeStar thesis, section 5.3.6
 
 
 def _of(command: str, *fields: str, **renamed: str) -> dict[str, tuple[str, str]]:
-    """Parameters of ``command`` by the telemetry field that shows them, ``renamed`` or not."""
+    """Parameters of ``command`` by the name of their telemetry field, ``renamed`` or not."""
     shown = {field: field for field in fields} | renamed
     return {name: (command, field) for name, field in shown.items()}
 
 
-#: Telemetry that shows settings: of each field the setting telecommand and its parameter.
+#: Telemetry that shows settings: for each field the setting telecommand and its parameter.
 SETTINGS_SHOWN = {
     "Exposure": _of("Exposure", "exposure"),
     "FocalLengthDetails": _of("setFocalLength", "FocalLength")
@@ -50,8 +49,8 @@ SETTINGS_SHOWN = {
     "DelayTime": _of("setDelayTimerTimeout", Timeout="Time"),
 }
 
-#: Telemetry that shows times in ms: of each field the step of ``Processing``. It is the longest one
-#: where the field's name begins with Max, else the latest.
+#: Telemetry that shows times in ms: for each field the step of ``Processing``; the longest time if
+#: the field's name begins with Max, else the latest.
 TIMES_SHOWN = {
     "DetectionTimingOne": {
         "MaxStarSearchTime": "search",
@@ -87,7 +86,7 @@ class Telemetry:
     """
 
     def __init__(self, commands: Commands, pending: Callable[[], bool]) -> None:
-        """Report on what ``commands`` act on; ``pending``: whether telecommands wait."""
+        """Report on ``commands``; ``pending``: telecommands wait."""
         self._commands = commands
         self._processing, self._state = processing, state = commands.processing, commands.state
         self._hardware = hardware = state.hardware
@@ -129,7 +128,7 @@ class Telemetry:
         }
 
     def values(self, message: Message) -> Values | None:
-        """Values of every field of ``message``; None when the node does not offer it."""
+        """Values of every field of ``message``; None if the node does not support it."""
         if shown := SETTINGS_SHOWN.get(message.name):
             return {name: self._state.settings.get(*setting) for name, setting in shown.items()}
         if steps := TIMES_SHOWN.get(message.name):
@@ -203,7 +202,7 @@ class Telemetry:
             "Running": bool(retained.looping),
         }
 
-    # --- camera and picture -------------------------------------------------------------------
+    # --- camera and image ---------------------------------------------------------------------
 
     def _camera_register(self) -> Values:
         address, value = self._capture.sensor.selected_register
@@ -257,31 +256,31 @@ class Telemetry:
         dark = self._stars.summary()["ImageDarkValue"]
         return {"DarkThreshold": dark, **self._state.settings.all("setDetectionThresholds")}
 
-    # --- attitude, and the outcome of the latest picture ------------------------------------------
+    # --- attitude, and the outcome of the latest image --------------------------------------------
 
     def _attitude(self) -> Attitude:
         mode, none = self._processing.results.mode, np.array([0, 0, 0, 1], np.float32)
         return self._state.attitude or Attitude(none, 0, 0, 0, mode)
 
     def _quaternion(self) -> Values:
-        return named((f"Qbar{index}" for index in range(4)), self._attitude().quaternion)
+        return by_name((f"Qbar{index}" for index in range(4)), self._attitude().quaternion)
 
     def _boresight(self) -> NDArray[np.float32]:
         return np.asarray(dcm(self._attitude().quaternion, self._processing.meter)[2])
 
     def _angles(self, boresight: NDArray[np.float32]) -> Values:
         angles = angles_of(boresight, self._processing.meter)
-        return named(("RightAscension", "Declination"), angles)
+        return by_name(("RightAscension", "Declination"), angles)
 
     def _attitude_data(self) -> Values:
         boresight = self._boresight()
-        vector = named(("BSVX", "BSVY", "BSVZ"), boresight)
+        vector = by_name(("BSVX", "BSVY", "BSVZ"), boresight)
         return {**self._quaternion(), **self._angles(boresight), **vector}
 
     def _attitude_quaternion(self) -> Values:
         attitude = self._attitude()
         return {
-            **named(("Q0", "Q1", "Q2", "Q3"), attitude.quaternion),
+            **by_name(("Q0", "Q1", "Q2", "Q3"), attitude.quaternion),
             "FrameCounter": attitude.frame,
             "ImageTime": attitude.image_ms,
             "Mode": attitude.mode,

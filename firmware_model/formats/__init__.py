@@ -1,1 +1,1 @@
-"""File and socket formats that emulator and host both speak."""
+"""File and socket formats that emulator and host share."""

@@ -1,6 +1,7 @@
-"""Names for bytes in a recording: which message a byte belongs to, and which field.
+"""Names for bytes in a recording: the message and field that a byte belongs to.
 
-A device answers one request at a time, so its bytes belong to the last whole request before them.
+A device answers one request at a time, so its bytes belong to the last complete request before
+them.
 """
 
 from bisect import bisect_right
@@ -13,7 +14,7 @@ LONGEST_PAYLOAD = 4096
 
 
 def name_answer_byte(interface: Interface, recording: Recording, port: str, index: int) -> str:
-    """Name of byte ``index`` (or the one missing there) that the device sent on a serial line."""
+    """Name of byte ``index`` from the device, which may be the first one missing."""
     requests, request_times = recording.sent(port, "host")
     answers, answer_times = recording.sent(port, "device")
     if index < len(answers):
@@ -24,7 +25,7 @@ def name_answer_byte(interface: Interface, recording: Recording, port: str, inde
     if interface.service_port is not None and port.startswith("bench"):
         letter = interface.service_port.find(known[-1]) if known else None
         return place if letter is None else f"{place}, answer to letter {letter.letter!r}"
-    payload = _fed(known).payload
+    payload = _decode(known).payload
     if not payload:
         return f"{place}, before any request"
     message = interface.find(payload[0])
@@ -38,7 +39,7 @@ def name_answer_byte(interface: Interface, recording: Recording, port: str, inde
 
 
 def name_request_byte(interface: Interface, written: bytes, index: int, port: str) -> str:
-    """Name of byte ``index`` of all that the host wrote on a serial line."""
+    """Name of byte ``index`` of all bytes that the host wrote on a serial line."""
     place = f"{port}: byte {index} from the host"
     if interface.service_port is not None and port.startswith("bench"):
         return place
@@ -47,7 +48,7 @@ def name_request_byte(interface: Interface, written: bytes, index: int, port: st
         return f"{place}, outside of a frame's payload"
     if offset == 0:
         return f"{place}, the ID"
-    identifier = (_fed(written[:index]).begun or b"\0")[0]
+    identifier = (_decode(written[:index]).begun or b"\0")[0]
     message = interface.find(identifier)
     if message is None:
         return f"{place}, behind unknown ID {identifier}"
@@ -55,7 +56,6 @@ def name_request_byte(interface: Interface, written: bytes, index: int, port: st
 
 
 def name_bus_byte(interface: Interface, transfer: BusTransfer, message: int, index: int) -> str:
-    """Name of a byte of one of a transfer's messages."""
     found = transfer.messages[message]
     kind = "read" if found.read else "written"
     place = f"{transfer.port}: byte {index} {kind} at address {found.address:#04x}"
@@ -74,11 +74,11 @@ def name_bus_byte(interface: Interface, transfer: BusTransfer, message: int, ind
 
 
 def payload_offset(wire: bytes, index: int) -> int | None:
-    """Where in its frame's payload wire byte ``index`` is; None outside of one.
+    """Offset of wire byte ``index`` in its frame's payload; None outside of a payload.
 
-    Both bytes of an escaped pair count as the byte that they carry.
+    Both bytes of an escaped pair have the offset of the byte that they encode.
     """
-    decoder = _fed(wire[:index])
+    decoder = _decode(wire[:index])
     if decoder.begun is None:
         return None
     offset = len(decoder.begun)
@@ -91,8 +91,7 @@ def payload_offset(wire: bytes, index: int) -> int | None:
     return offset
 
 
-def _fed(wire: bytes) -> FrameDecoder:
-    """A decoder that ``wire`` went through."""
+def _decode(wire: bytes) -> FrameDecoder:
     decoder = FrameDecoder(LONGEST_PAYLOAD)
     for byte in wire:
         decoder.feed(byte)

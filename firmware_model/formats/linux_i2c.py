@@ -1,14 +1,14 @@
-"""Linux's I2C device files (/dev/i2c-N): their numbers, and their calls as messages on a socket.
+"""Linux's I2C device files (/dev/i2c-N): their constants, and their calls as messages on a socket.
 
 Numbers and limits are those of Linux's uapi headers linux/i2c.h and linux/i2c-dev.h. The messages
 are this project's own; both ends run on one machine, so numbers are in its byte order. On the
-socket each one follows its length (u32):
+socket each message follows its length (u32):
 
 ========  =====================================================================================
 request   key u64, call u8, body; the key names an opened file, 0 is the connection's own
-OPEN      no body; from now on the connection's own file is known by the key
-IOCTL     request u32, argument u64: the requests without a pointer to more, and FUNCS
-RDWR      per message: address u16, flags u16, length u16, sent u16, then so many bytes
+OPEN      no body; from now on the key names the connection's own file
+IOCTL     request u32, argument u64: the requests without a pointer argument, and FUNCS
+RDWR      per message: address u16, flags u16, length u16, sent u16, then ``sent`` bytes
 SMBUS     direction u8, command u8, data given u8, pad u8, size u32, data 34 bytes (filled up)
 READ      count u64
 WRITE     bytes
@@ -25,17 +25,10 @@ from enum import IntEnum, IntFlag
 from pathlib import Path
 from typing import Any
 
-MAX_MESSAGES = 42
-"""Messages of one I2C_RDWR."""
-
-MAX_MESSAGE_BYTES = 8192
-"""Bytes of one message; read and write are cut to it, I2C_RDWR refuses more."""
-
-MAX_BLOCK_BYTES = 32
-"""Bytes of an SMBus block."""
-
-SMBUS_DATA_BYTES = MAX_BLOCK_BYTES + 2
-"""Size of the union i2c_smbus_data: a block with its length and a checksum."""
+MAX_MESSAGES = 42  #: messages per I2C_RDWR
+MAX_MESSAGE_BYTES = 8192  #: per message; read and write are truncated, I2C_RDWR rejects more
+MAX_BLOCK_BYTES = 32  #: per SMBus block
+SMBUS_DATA_BYTES = MAX_BLOCK_BYTES + 2  #: union i2c_smbus_data: a block, its length, a checksum
 
 
 class Ioctl(IntEnum):
@@ -62,7 +55,7 @@ class MessageFlag(IntFlag):
 
 
 class Function(IntFlag):
-    """What an adapter can do, as I2C_FUNCS tells it."""
+    """Capabilities of an adapter, the result of I2C_FUNCS."""
 
     I2C = 0x0000_0001
     PEC = 0x0000_0008
@@ -125,7 +118,8 @@ class RdwrMessage:
         address: 7-bit address.
         flags: of MessageFlag.
         length: bytes to write or to read.
-        data: bytes to write; of a read whose length the device sends, the first byte of its buffer.
+        data: bytes to write; for a read whose length the device sends, the first byte of its
+            buffer.
     """
 
     address: int
@@ -152,7 +146,7 @@ class SmbusCall:
 
 
 def smbus_data_bytes(size: int) -> int:
-    """Bytes of the union i2c_smbus_data that an SMBus transaction of ``size`` uses, at most."""
+    """Largest part, in bytes, of the union i2c_smbus_data that a transaction of ``size`` uses."""
     if size in (SmbusSize.BYTE, SmbusSize.BYTE_DATA):
         return 1
     if size in (SmbusSize.WORD_DATA, SmbusSize.PROCESS_CALL):
@@ -161,7 +155,7 @@ def smbus_data_bytes(size: int) -> int:
 
 
 def request(key: int, call: Call, body: bytes = b"") -> bytes:
-    """A request without the length before it."""
+    """A request without its length prefix."""
     return _HEAD.pack(key, call) + body
 
 
@@ -175,14 +169,14 @@ def split_request(data: bytes) -> tuple[int, Call, bytes]:
 
 
 def reply(result: int, data: bytes = b"") -> bytes:
-    """A reply without the length before it."""
+    """A reply without its length prefix."""
     return _RESULT.pack(result) + data
 
 
 def take_packet(received: bytearray, most: int | None = None) -> bytes | None:
-    """Take the oldest packet from what was ``received``; None unless it is whole.
+    """Remove the oldest packet from ``received`` and return it; None unless it is complete.
 
-    Raises ValueError for one of more than ``most`` bytes behind its length.
+    Raises ValueError for a packet of more than ``most`` bytes.
     """
     if len(received) < LENGTH.size:
         return None
@@ -205,18 +199,15 @@ def split_reply(data: bytes) -> tuple[int, bytes]:
 
 
 def pack_ioctl(number: int, argument: int) -> bytes:
-    """Body of an IOCTL call."""
     return _IOCTL.pack(number & 0xFFFF_FFFF, argument)
 
 
 def unpack_ioctl(body: bytes) -> tuple[int, int]:
-    """Request and argument; raises ValueError."""
     number, argument = _unpack(_IOCTL, body)
     return number, argument
 
 
 def pack_rdwr(messages: Sequence[RdwrMessage]) -> bytes:
-    """Body of an RDWR call."""
     return b"".join(
         _MESSAGE.pack(message.address, message.flags, message.length, len(message.data))
         + message.data
@@ -225,7 +216,6 @@ def pack_rdwr(messages: Sequence[RdwrMessage]) -> bytes:
 
 
 def unpack_rdwr(body: bytes) -> list[RdwrMessage]:
-    """The messages; raises ValueError."""
     messages = []
     position = 0
     while position < len(body):
@@ -238,7 +228,7 @@ def unpack_rdwr(body: bytes) -> list[RdwrMessage]:
 
 
 def split_rdwr(messages: Sequence[RdwrMessage], data: bytes) -> list[bytes]:
-    """What an RDWR reply holds for each message: empty for those that write.
+    """The part of an RDWR reply for each message: empty for writes.
 
     The reply's data are the bytes read, message after message; one whose length the device sent
     begins with that length.
@@ -257,24 +247,21 @@ def split_rdwr(messages: Sequence[RdwrMessage], data: bytes) -> list[bytes]:
 
 
 def pack_smbus(call: SmbusCall) -> bytes:
-    """Body of an SMBUS call."""
     given = call.data is not None
     return _SMBUS.pack(call.direction, call.command, given, call.size, call.data or b"")
 
 
 def unpack_smbus(body: bytes) -> SmbusCall:
-    """The argument; raises ValueError."""
     direction, command, given, size, data = _unpack(_SMBUS, body)
     return SmbusCall(direction, command, size, data if given else None)
 
 
 def pack_read(count: int) -> bytes:
-    """Body of a READ call."""
     return _COUNT.pack(count)
 
 
 def unpack_read(body: bytes) -> int:
-    """How many bytes are wanted; raises ValueError."""
+    """Number of requested bytes; raises ValueError, like all unpack functions here."""
     return int(_unpack(_COUNT, body)[0])
 
 
@@ -286,10 +273,10 @@ def _unpack(form: struct.Struct, data: bytes) -> tuple[Any, ...]:
 
 
 def socket_path(bus: int) -> Path:
-    """Where an emulation of this user serves I2C bus ``bus``.
+    """Socket on which an emulation of this user serves I2C bus ``bus``.
 
-    In ``$XDG_RUNTIME_DIR/cubestack``, else in a folder with the user's number among the temporary
-    files; whoever serves makes that folder.
+    In ``$XDG_RUNTIME_DIR/cubestack``, else in a temporary folder with the user's number, which the
+    server creates.
     """
     base = os.environ.get("XDG_RUNTIME_DIR")
     if base and Path(base).is_dir():

@@ -1,16 +1,16 @@
-"""Recordings of a device's ports, as lines of JSON; docs/recording.md has the format for readers.
+"""Recordings of a device's ports, as lines of JSON; docs/recording.md has the format for users.
 
-The first line is the header: ``{"recording": 1, "device": ..., "lines": {port: baud}, "setup"}``,
-the last member as in ``recording_setup``, or left out. Each further line is one event, in any
-order; "ps" is virtual time:
+The first line is the header: ``{"recording": 1, "device": ..., "lines": {port: baud}, "setup"}``;
+the optional last member is that of ``Setup.to_json``. Each further line is one event, in any order;
+"ps" is virtual time:
 
 - ``{"ps", "port", "from": "host" or "device", "data": hex, "byte_ps"}``: bytes on a serial line.
-  The first one begins at "ps", each next one "byte_ps" later; both times are of the wire.
+  The first one begins at "ps", each next one "byte_ps" later; both are times on the wire.
 - ``{"ps", "port", "error": "framing"}``: a character that the device dropped.
 - ``{"ps", "port", "end_ps", "messages": [...], "errno"}``: a transfer on an I2C bus. A message is
-  ``{"address", "write": hex}`` or ``{"address", "read": hex}``; "errno" is there when it failed.
-- ``{"ps", "control": [word, ...], "text"}``: what was done to the device from outside of its ports,
-  as typed in the shell; "text" is that of a file that was named.
+  ``{"address", "write": hex}`` or ``{"address", "read": hex}``; "errno" is present if it failed.
+- ``{"ps", "control": [word, ...], "text"}``: a change of the device that did not come over a port,
+  as a shell command; "text" is the content of a file that the command names.
 """
 
 import json
@@ -23,12 +23,11 @@ from cubestack.firmware_model.formats.setup import Setup
 
 VERSION = 1
 
-Side = Literal["host", "device"]
-"""Who sent bytes."""
+Side = Literal["host", "device"]  #: the sender
 
 
 class RecordingError(ValueError):
-    """A file is no recording; the text is one line and names it."""
+    """A file is not a valid recording; the text is one line and names the file."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ class BusTransfer:
 
 @dataclass(frozen=True)
 class Control:
-    """The shell's command ``words`` changed a device; ``text`` is of a file that it names."""
+    """The shell command ``words`` changed a device; ``text``: content of a file that it names."""
 
     time_ps: int
     words: tuple[str, ...]
@@ -88,10 +87,10 @@ class Recording:
 
     Attributes:
         name: of the file.
-        device: name of the device, as the command line has it.
-        bauds: of each serial line, by port.
+        device: name of the device on the command line.
+        bauds: baud rate of each serial line, by port.
         events: in the order of time.
-        setup: how the device was made; None where that was not written down.
+        setup: how the device was created; None if not recorded.
     """
 
     name: str
@@ -101,53 +100,49 @@ class Recording:
     setup: Setup | None = None
 
     def line(self, port: str) -> Iterator[LineBytes]:
-        """What went over a serial line."""
         return (e for e in self.events if isinstance(e, LineBytes) and e.port == port)
 
     def sent(self, port: str, side: Side) -> tuple[bytes, list[int]]:
-        """All bytes that one side sent on a line, and when each began."""
+        """All bytes that one side sent on a line, and the start time of each in ps."""
         blocks = [block for block in self.line(port) if block.side == side]
         times = [b.time_ps + i * b.byte_ps for b in blocks for i in range(len(b.data))]
         return b"".join(block.data for block in blocks), times
 
     @property
     def transfers(self) -> list[BusTransfer]:
-        """All transfers on I2C buses."""
         return [event for event in self.events if isinstance(event, BusTransfer)]
 
     @property
     def controls(self) -> list[Control]:
-        """All that was done from outside of the ports."""
         return [event for event in self.events if isinstance(event, Control)]
 
     def until(self, end_ps: int) -> "Recording":
-        """What had begun by ``end_ps``."""
+        """The part that began up to ``end_ps``."""
         begun = (_begun(event, end_ps) for event in self.events if event.time_ps <= end_ps)
         return replace(self, events=tuple(begun))
 
     @property
     def end_ps(self) -> int:
-        """When the last event has ended; 0 without any."""
+        """End of the last event; 0 without any."""
         return max((_end_ps(event) for event in self.events), default=0)
 
 
 class RecordingWriter:
-    """Writes a recording line by line, so that an interrupted run leaves a whole one."""
+    """Writes a recording line by line, so that an interrupted run leaves complete lines."""
 
     def __init__(
         self, stream: IO[str], device: str, bauds: dict[str, int], setup: Setup | None = None
     ) -> None:
-        """Write the header to ``stream``, which stays its owner's."""
+        """Write the header to ``stream``, which the caller closes."""
         self._stream = stream
         header: dict[str, object] = {"recording": VERSION, "device": device, "lines": bauds}
         self._line(header | ({} if setup is None else {"setup": setup.to_json()}))
 
     def write(self, event: Event) -> None:
-        """Write an event."""
         self._line(_to_json(event))
 
     def flush(self) -> None:
-        """Whoever reads the file finds all events."""
+        """Make all events visible to readers of the file."""
         self._stream.flush()
 
     def _line(self, content: dict[str, object]) -> None:
@@ -155,7 +150,6 @@ class RecordingWriter:
 
 
 def _to_json(event: Event) -> dict[str, object]:
-    """The object of a recording's line."""
     match event:
         case LineBytes(time_ps, port, side, data, byte_ps):
             known = {"ps": time_ps, "port": port, "from": side}
@@ -174,7 +168,7 @@ def _to_json(event: Event) -> dict[str, object]:
 
 
 def load_recording(path: Path) -> Recording:
-    """Read a recording; raises RecordingError, or OSError when there is no such file."""
+    """Read a recording; raises RecordingError, or OSError if the file cannot be read."""
     header: Recording | None = None
     events: list[Event] = []
     with path.open(encoding="utf-8", errors="replace") as stream:
@@ -198,7 +192,7 @@ def load_recording(path: Path) -> Recording:
 
 def _header(path: Path, content: Any) -> Recording:
     if not isinstance(content, dict) or content.get("recording") != VERSION:
-        raise ValueError("the header is not there")
+        raise ValueError("there is no header")
     lines = content["lines"]
     if not isinstance(content["device"], str) or not isinstance(lines, dict):
         raise ValueError('"device" must be a text and "lines" an object')

@@ -1,16 +1,15 @@
-"""How a recorded device was made, for the header of a recording: enough to make it once more."""
+"""Construction of a recorded device, for the recording's header: enough to create it again."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 Option = bool | int | float | str
-"""Value of an option."""
 
 
 @dataclass(frozen=True)
 class Document:
-    """A file that the device was made from: its path as the user gave it, and what was in it."""
+    """A file that the device was created from: its path as the user wrote it, and its content."""
 
     name: str
     text: str
@@ -18,15 +17,15 @@ class Document:
 
 @dataclass(frozen=True)
 class Setup:
-    """How a device was made.
+    """How a device was created.
 
     Attributes:
         version: of this project.
-        target: what was recorded, as the user gave it; empty where it was emulated here.
-        seed: of everything random.
+        target: recorded device, as the user wrote it; empty if it was emulated here.
+        seed: of all random numbers.
         scene: what it saw; None for the device's default.
-        faults: plan of faults.
-        options: others that are not at their default, by name.
+        faults: fault plan.
+        options: other options with a non-default value, by name.
     """
 
     version: str
@@ -37,7 +36,7 @@ class Setup:
     options: Mapping[str, Option] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
-        """All of it, what is not given left out; of a real device, version and target."""
+        """Members with a value; for a real device only version and target."""
         content: dict[str, object] = {"version": self.version}
         if self.target:
             return content | {"target": self.target}
@@ -49,7 +48,7 @@ class Setup:
 
     @classmethod
     def from_json(cls, content: Any) -> "Setup":
-        """Read what ``to_json`` gives; raises ValueError."""
+        """Inverse of ``to_json``; raises ValueError."""
         if not isinstance(content, dict):
             raise ValueError('"setup" must be an object')
         unknown = set(content) - {"version", "target", "seed", "scene", "faults", "options"}

@@ -1,1 +1,1 @@
-"""Interface tables: pure data that every room may import, and the codecs that follow from it."""
+"""Interface tables, pure data that every package may import, and the codecs derived from them."""

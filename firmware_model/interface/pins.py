@@ -1,10 +1,10 @@
-"""What is known of a pin: one declaration for gateware, constraint files, wiring and firmware."""
+"""Declaration of a pin, for gateware, constraint files, wiring and firmware."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-#: Seen from the FPGA; "tristate" is an output that can be off.
+#: From the FPGA's side; "tristate" is an output that can be switched off.
 Direction = Literal["input", "output", "tristate", "inout"]
 
 
@@ -16,7 +16,7 @@ class Port:
         name: of the port.
         output: whether the gateware drives it.
         width: in bits.
-        level: of an input before anybody drives it, of an output in reset.
+        level: of an undriven input, or of an output in reset.
     """
 
     name: str
@@ -26,15 +26,15 @@ class Port:
 
 
 class Pin(str):
-    """A pin of an FPGA board, or a bus of them: its name, with what is known of it.
+    """A pin of an FPGA board, or a bus of them: its name, with attributes.
 
     Attributes:
-        direction: seen from the FPGA.
-        meaning: what it is for.
+        direction: from the FPGA's side.
+        meaning: its purpose.
         width: number of pins.
-        level: of an input before anybody drives it; of an output that is never off, in reset.
+        level: of an undriven input, or in reset of an output that cannot be switched off.
         enables: bits of the output enable: 0 for none, 1 for all pins, or ``width``.
-        level_in, level_out, enable: the gateware's ports for it; None for what it has not.
+        level_in, level_out, enable: names of the gateware's ports; None if absent.
     """
 
     direction: Direction
@@ -59,7 +59,7 @@ class Pin(str):
     ) -> "Pin":
         """Declare a pin; its ports are NAME, or NAME_I, NAME_O and NAME_OE.
 
-        ``bare``: the level that is driven has the port NAME, although it can be off.
+        ``bare``: the driven level has the port NAME, although it can be switched off.
         """
         pin = super().__new__(cls, name)
         pin.direction, pin.meaning, pin.width, pin.level = direction, meaning, width, level
@@ -74,11 +74,11 @@ class Pin(str):
         return pin
 
     def __reduce__(self) -> tuple[type["Pin"], tuple[str, Direction, str], dict[str, object]]:
-        """How copies are made: the least declaration, then all attributes."""
+        """For copies: the smallest declaration, then all attributes."""
         return Pin, (str(self), self.direction, self.meaning), self.__dict__
 
     def but(self, name: str = "", *, meaning: str = "", width: int = 0) -> "Pin":
-        """The same pin with another name, meaning or width."""
+        """A copy with another name, meaning or width."""
         return Pin(
             name or self,
             self.direction,
@@ -91,7 +91,7 @@ class Pin(str):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Its ports, input first."""
+        """The gateware's ports, input first."""
         found = []
         if self.level_in:
             found.append(Port(self.level_in, False, self.width, self.level))
@@ -104,12 +104,12 @@ class Pin(str):
 
 
 def resized(pins: Iterable[Pin], **widths: int) -> tuple[Pin, ...]:
-    """The same pins, with other widths of those that are named."""
+    """Copies of the pins, with other ``widths`` of the named ones."""
     return tuple(pin.but(width=widths.get(pin, pin.width)) for pin in pins)
 
 
 def sram_pins(address_bits: int, address: str = "SRAM address") -> tuple[Pin, ...]:
-    """Pins to an SRAM of bytes; strobes are low active."""
+    """Pins to an SRAM of bytes; strobes are active low."""
     return (
         Pin("SRAM_A", "output", address, address_bits),
         Pin("SRAM_D", "inout", "SRAM data", 8),

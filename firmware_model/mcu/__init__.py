@@ -1,1 +1,1 @@
-"""What every firmware program stands on: requests to the hardware, the meter, cost tables."""
+"""Base of every firmware program: requests to the hardware, the meter, cost tables."""

@@ -3,9 +3,9 @@
 AraMiS thesis, sections 2.3.1 and 2.5.1 (the part), 7.3 and 8 (programs in MATLAB: no time on the
 part is published, so no entry can be fitted and every duration is a prediction). Clocks are those
 of the part's data sheet and of the module in the thesis' appendix A.3: core 600 MHz, system bus
-120 MHz, a whole fraction of it below the bus' 133 MHz.
+120 MHz, the core clock divided by a whole number and below the bus' limit of 133 MHz.
 
-Catalogues and pictures lie in SDRAM behind the data cache, whose lines hold 32 bytes. A line takes
+Catalogues and images are in SDRAM behind the data cache, whose lines hold 32 bytes. A line takes
 about 16 bus clocks (row open, eight transfers of 32 bits as sixteen of 16 bits, the memory's
 width), that is 80 core cycles; a 32-bit word that is read in sequence then costs an eighth of it.
 """
@@ -17,15 +17,14 @@ BUS_DIVIDER = 5
 LINE_FILL_BUS_CLOCKS = 16
 LINE_WORDS = 8
 
+#: Access time of the M29W320D flash, one 16-bit word (data sheet; thesis, appendix A.2).
 FLASH_READ_NS = 70
-"""Access time of the M29W320D flash, one 16-bit word (data sheet; thesis, appendix A.2)."""
-
+#: Bus clocks of a read on the asynchronous bus beside the access: set-up and hold (assumed).
 FLASH_FRAME_BUS_CLOCKS = 2
-"""Of a read on the asynchronous bus, beside the access: one of set-up, one of hold (assumed)."""
 
 
 def blackfin_bf533(*, clock_hz: int = CORE_HZ) -> CostTable:
-    """Costs in core cycles; at another clock memory keeps its speed in bus clocks and ns."""
+    """Costs in core cycles; at another clock, memory keeps its speed in bus clocks and ns."""
     library = "single precision of the Blackfin's run-time library, measured on an ADSP-BF609"
     core = "Blackfin Programming Reference: most instructions take one cycle"
     line_fill = LINE_FILL_BUS_CLOCKS * BUS_DIVIDER
@@ -81,5 +80,4 @@ def blackfin_bf533(*, clock_hz: int = CORE_HZ) -> CostTable:
     )
 
 
-BLACKFIN_BF533 = blackfin_bf533()
-"""The star tracker's processor at its highest clock."""
+BLACKFIN_BF533 = blackfin_bf533()  #: the star tracker's processor at its highest clock

@@ -1,7 +1,7 @@
-"""Costs that a compiler made, build by build: ``cortex_m3_compiled.json``.
+"""Measured costs of compiled code, build by build: ``cortex_m3_compiled.json``.
 
 `cubestack costs measure --write` writes it: each operation as compiled code on the simulated part
-(``firmware_model/reference/costs``), and a whole picture's phases.
+(``firmware_model/reference/costs``), and the phases of a whole image.
 """
 
 import json
@@ -19,9 +19,9 @@ class CompiledCosts:
 
     Attributes:
         build: options and precision, such as "-O2 own".
-        timing: waits of the memories, in words.
-        operations: cycles by name; less than one where a compiler hides an operation behind others.
-        phases: cycles of a whole picture's phases.
+        timing: wait states of the memories, as text.
+        operations: cycles by name; below 1 where a compiler hides an operation behind others.
+        phases: cycles of a whole image's phases.
     """
 
     build: str
@@ -31,15 +31,15 @@ class CompiledCosts:
 
 
 @lru_cache(maxsize=1)
-def measured() -> tuple[str, tuple[CompiledCosts, ...]]:
-    """The compiler, and what was measured of its builds."""
+def load_measurements() -> tuple[str, tuple[CompiledCosts, ...]]:
+    """The compiler, and the measurements of its builds."""
     data = json.loads(FILE.read_text("utf-8"))
     return data["compiler"], tuple(CompiledCosts(**one) for one in data["builds"])
 
 
 def costs_of(build: str, timing: str) -> CompiledCosts:
-    """What was measured of a build; ValueError for one that was not."""
-    _, found = measured()
+    """Measurements of a build; raises ValueError if there are none."""
+    _, found = load_measurements()
     for costs in found:
         if (costs.build, costs.timing) == (build, timing):
             return costs

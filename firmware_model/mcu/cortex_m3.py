@@ -1,33 +1,34 @@
 """Cycle costs of the EFM32GG: Cortex-M3, no floating point unit, 48 MHz.
 
-CubeStar thesis, section 3.2 (the part). Operations cost what they take as compiled code on the
-simulated part, see ``compiled``; nothing is published about the thesis' compiler and its options.
-The transfer loop is the only entry that was fitted to a published duration (table 6.2). Of that
-table capture and processing alone is a prediction: the discard delay is a setting, and idle is what
-is left of the second.
+CubeStar thesis, section 3.2 (the part). Operations cost their cycles as compiled code on the
+simulated part, see ``compiled``; the thesis' compiler and its options are not published. The
+transfer loop is the only entry fitted to a published duration (table 6.2). Of that table only
+capture and processing is a prediction: the discard delay is a setting, and idle is the rest of the
+second.
 """
 
-from cubestack.firmware_model.mcu.compiled import costs_of, measured
+from cubestack.firmware_model.mcu.compiled import costs_of, load_measurements
 from cubestack.firmware_model.mcu.costs import Cost, CostTable
 
+#: Optimised, single precision throughout; `cubestack costs measure` has the others.
 BUILD = "-O2 own"
-"""Optimised, single precision throughout; `cubestack costs measure` has the others."""
 
+#: Wait states of the memories: flash above 32 MHz, its cache on, as after a reset.
 TIMING = "2 flash waits, cache, bus 1-1-3-0"
-"""Waits of the memories: flash above 32 MHz, its cache on, as after a reset."""
 
 _BUS_WAITS = 6
+
+#: Operations whose cost is not that of the compiled code.
 _OURS = frozenset({"transfer_byte", "uart_interrupt", "i2c_interrupt", "ebi_write"})
-"""Operations that the program has otherwise than what was compiled."""
 
 
 def cortex_m3(*, clock_hz: int = 48_000_000, build: str = BUILD, timing: str = TIMING) -> CostTable:
     """Costs of the EFM32GG's Cortex-M3 with software floating point.
 
-    Measured ones are rounded to whole cycles, one at least. Raises ValueError for a build or a
-    timing that was not measured.
+    Measured costs are rounded to whole cycles, at least one. Raises ValueError for a build or a
+    timing without measurements.
     """
-    compiler, _ = measured()
+    compiler, _ = load_measurements()
     source = f"{compiler} {build}; {timing}"
     operations = {
         name: Cost(max(round(cycles), 1), "measured", source)
@@ -55,5 +56,4 @@ def cortex_m3(*, clock_hz: int = 48_000_000, build: str = BUILD, timing: str = T
     return CostTable(name="EFM32GG Cortex-M3", clock_hz=clock_hz, operations=operations)
 
 
-CORTEX_M3 = cortex_m3()
-"""As the CubeStar thesis runs it (section 3.2): 48 MHz."""
+CORTEX_M3 = cortex_m3()  #: at the CubeStar thesis' 48 MHz (section 3.2)

@@ -1,7 +1,7 @@
 """Cycle costs of a processor's operations, and the meter that adds them up.
 
-An algorithm charges the operations that its program would have executed, counted as they really
-happened; the table of its part (a module beside this one) turns the counts into cycles.
+An algorithm charges the operations that its program would have executed, as often as they really
+happened; the table of its part (a module beside this one) converts the counts to cycles.
 """
 
 from collections import Counter
@@ -15,19 +15,18 @@ Provenance = Literal["measured", "published", "fitted", "assumed"]
 
 
 class CostError(ValueError):
-    """A cost, a table or a charge that makes no sense; the message names the offender."""
+    """An invalid cost, table or charge; the message names it."""
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What one operation costs, in processor cycles, and why we think so."""
+    """Processor cycles of one operation, and their source."""
 
     cycles: int
     provenance: Provenance
     source: str
 
     def __post_init__(self) -> None:
-        """Refuse costs that are not positive, not tagged or not explained."""
         if self.cycles < 1:
             raise CostError(f"a cost must be at least 1 cycle, not {self.cycles}")
         if self.provenance not in get_args(Provenance):
@@ -47,22 +46,20 @@ class CostTable:
 
     @cached_property
     def cycles(self) -> dict[str, int]:
-        """What each operation takes."""
         return {name: cost.cycles for name, cost in self.operations.items()}
 
     def seconds(self, cycles: int) -> float:
-        """Duration of so many cycles, in seconds."""
         return cycles / self.clock_hz
 
 
 @dataclass(eq=False)
 class Meter:
-    """Counts a program's operations by name, and cycles: in all, and over all visits of a phase.
+    """Counts a program's operations by name, and its cycles: in total and per phase.
 
     Attributes:
         table: of the processor.
         total, counts, phases: cycles in all, operations by name, cycles by phase.
-        phase_now: of the innermost block; set by ``phase``.
+        current_phase: of the innermost block; set by ``phase``.
     """
 
     table: CostTable
@@ -70,10 +67,10 @@ class Meter:
     counts: Counter[str] = field(default_factory=Counter)
     phases: dict[str, int] = field(default_factory=dict)
     _taken: int = 0
-    phase_now: str | None = None
+    current_phase: str | None = None
 
     def charge(self, **operations: int) -> None:
-        """Charge each named operation so many times.
+        """Charge each named operation with its count.
 
         Raises:
             CostError: for an operation that the table does not have, or a negative count.
@@ -91,13 +88,13 @@ class Meter:
                 f"operation {unknown} is not in the table of {self.table.name} (it has {known})"
             ) from None
         self.total += cycles
-        if self.phase_now is not None:
-            self.phases[self.phase_now] += cycles
+        if self.current_phase is not None:
+            self.phases[self.current_phase] += cycles
 
     def charge_all(self, phases: Mapping[str, Mapping[str, int]], limit: int) -> bool:
-        """Charge operations by phase, unless the total would be above a limit; whether it did.
+        """Charge by phase unless the total would exceed ``limit``; returns whether it charged.
 
-        What `phase` and `charge` do one by one, in half of the model's time.
+        Equivalent to `phase` and `charge` one by one, in half of the model's time.
 
         Raises:
             KeyError: for an operation that the table does not have.
@@ -117,8 +114,8 @@ class Meter:
                 self.counts[name] += count
         return True
 
-    def book(self, **operations: int) -> None:
-        """Count operations as `charge` does whose time has passed already: not to be taken."""
+    def charge_elapsed(self, **operations: int) -> None:
+        """Count operations like `charge`; their time has elapsed, so `take` excludes it."""
         before = self.total
         self.charge(**operations)
         self._taken += self.total - before
@@ -130,12 +127,12 @@ class Meter:
         return cycles
 
     def phase(self, name: str) -> AbstractContextManager[None]:
-        """Book what is charged inside the block under `name`; an inner phase takes its own part."""
+        """Charge the block's operations to the phase `name`; an inner phase has its own part."""
         return _Phase(self, name)
 
 
 class _Phase(AbstractContextManager[None]):
-    """A class, as a generator would take a tenth of the time of what it surrounds."""
+    """A class, because a generator would take a tenth of the time of what it surrounds."""
 
     __slots__ = ("_meter", "_name", "_outer")
 
@@ -144,8 +141,8 @@ class _Phase(AbstractContextManager[None]):
 
     def __enter__(self) -> None:
         meter = self._meter
-        self._outer, meter.phase_now = meter.phase_now, self._name
+        self._outer, meter.current_phase = meter.current_phase, self._name
         meter.phases.setdefault(self._name, 0)
 
     def __exit__(self, *_: object) -> None:
-        self._meter.phase_now = self._outer
+        self._meter.current_phase = self._outer

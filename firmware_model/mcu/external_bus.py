@@ -16,10 +16,10 @@ class BusTiming:
     """Phases of a transaction in cycles of the core clock, the same for reads and writes.
 
     Attributes:
-        address_setup: the upper address is on the lines and ALE high.
-        address_hold: it still is, and ALE low.
-        setup: the lower address is on the lines, with the byte of a write, and chip select low.
-        strobe: the read or write strobe is low besides; a read takes its byte at the end.
+        address_setup: the upper address is on the lines and ALE is high.
+        address_hold: the upper address is still there, and ALE is low.
+        setup: the lower address is on the lines, with the byte of a write; chip select is low.
+        strobe: the read or write strobe is low too; a read samples its byte at the end.
         hold: as in set-up.
     """
 
@@ -30,7 +30,7 @@ class BusTiming:
     hold: int
 
     def __post_init__(self) -> None:
-        """Refuse what the registers can not hold: no phase may be missing here; ValueError."""
+        """Raise ValueError for values outside of the registers' range; no phase may be 0."""
         for name, longest in LONGEST.items():
             cycles = getattr(self, name)
             if not 1 <= cycles <= longest:
@@ -38,11 +38,9 @@ class BusTiming:
 
     @property
     def cycles(self) -> int:
-        """Length of a transaction."""
         return sum(getattr(self, name) for name in LONGEST)
 
 
+#: From the lower address to the end of the strobe: 62.5 ns at 48 MHz. The SRAM needs 12 ns, and the
+#: path through the FPGA 25 ns each way (assumed). One strobe cycle less, 41.7 ns, is too short.
 EBI = BusTiming(address_setup=1, address_hold=1, setup=1, strobe=2, hold=1)
-"""From the lower address to the end of the strobe there are 62.5 ns at 48 MHz: 12 ns of the SRAM,
-and 25 ns each for the way out and the way back through the FPGA (assumed). One strobe cycle less,
-41.7 ns, would be too short."""

@@ -6,13 +6,13 @@ from itertools import zip_longest
 
 @dataclass(eq=False)
 class FlashStore:
-    """Flash pages by name, which survive power cycles, and how often each was written."""
+    """Flash pages by name, which survive power cycles, and the number of writes of each."""
 
     pages: dict[str, bytes] = field(default_factory=dict)
     writes: dict[str, int] = field(default_factory=dict)
 
     def write(self, page: str, data: bytes, endurance: int | None = None) -> None:
-        """Erase and program ``page``; one that was written ``endurance`` times keeps its zeros."""
+        """Erase and program ``page``; after ``endurance`` writes its zeros remain."""
         if endurance is not None and self.writes.get(page, 0) >= endurance:
             worn = self.pages.get(page, b"")
             data = bytes(old & new for old, new in zip_longest(worn, data, fillvalue=0xFF))
@@ -20,9 +20,8 @@ class FlashStore:
         self.writes[page] = self.writes.get(page, 0) + 1
 
     def erase(self, page: str) -> None:
-        """Erase ``page``; reading it then gives None."""
         self.pages.pop(page, None)
 
     def read(self, page: str) -> bytes | None:
-        """Contents of ``page``, or None when it is erased."""
+        """Contents of ``page``, or None if it is erased."""
         return self.pages.get(page)

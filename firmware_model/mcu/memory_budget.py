@@ -1,4 +1,4 @@
-"""Which buffers a program keeps in which memory, and how much of it they take."""
+"""Buffers of a program by memory, and the bytes that they use."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -15,7 +15,7 @@ class Memory(Enum):
 
 @dataclass(frozen=True)
 class Buffer:
-    """One buffer of ``size`` bytes, which may lie ``inside`` the place of the one of that name."""
+    """One buffer of ``size`` bytes, which may lie ``inside`` the buffer of that name."""
 
     name: str
     memory: Memory
@@ -24,10 +24,10 @@ class Buffer:
 
 
 def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
-    """Bytes in use of each memory that holds a buffer."""
-    there = {buffer.memory for buffer in buffers}
+    """Bytes in use, for each memory with a buffer."""
+    memories = {buffer.memory for buffer in buffers}
     return {
         memory: sum(b.size for b in buffers if b.memory is memory and not b.inside)
         for memory in Memory
-        if memory in there
+        if memory in memories
     }

@@ -1,23 +1,23 @@
-"""Cycle costs of the PIC18F45K20: 5 million instructions a second.
+"""Cycle costs of the PIC18F45K20: 5 million instructions per second.
 
 CubeSense thesis, section 3.2.2 (the part), 6.1.1 (Microchip's C18 compiler, an int takes twice a
 char) and 7.4 (the timer's formula, hence the instruction clock). No figures of C18's library are
-published. Addition and division are taken from Microchip's application note AN575, which gives the
-most cycles that each can take, multiplication from the part's own multiplier, which AN575 does not
-use; functions are put together of the three, as the usual algorithms need them. So nothing here is
-fitted to a published time, and floating-point times are rather upper bounds.
+published. Addition and division are those of Microchip's application note AN575, which states the
+maximum of each; multiplication uses the part's own multiplier, which AN575 does not use; functions
+are composed of the three, as in the usual algorithms. Nothing here is fitted to a published time,
+and floating-point times are rather upper bounds.
 """
 
 from cubestack.firmware_model.mcu.costs import Cost, CostTable
 
 INSTRUCTION_HZ = 5_000_000
 
+#: Maximum cycles of the 32-bit routines in Microchip's application note AN575.
 ADD, DIVIDE = 271, 971
-"""Most cycles of the 32-bit routines of Microchip's application note AN575."""
 
+#: Nine 8 x 8 bit products of the mantissas, each fetched, multiplied (MULWF) and added in 8 cycles;
+#: signs, exponents, rounding, arguments and result are assumed. AN575 needs 591, bit by bit.
 MULTIPLY = 9 * 8 + 128
-"""Nine 8 x 8 bit products of the mantissas, each fetched, multiplied (MULWF) and added in 8 cycles;
-signs, exponents, rounding, arguments and result: assumed. AN575 has 591, bit by bit."""
 
 
 def pic18f45k20() -> CostTable:
@@ -29,7 +29,7 @@ def pic18f45k20() -> CostTable:
     def published(cycles: int) -> Cost:
         return Cost(cycles, "published", note)
 
-    def made_of(additions: int, multiplications: int, divisions: int, rest: int, how: str) -> Cost:
+    def composed(additions: int, multiplications: int, divisions: int, rest: int, how: str) -> Cost:
         cycles = additions * ADD + multiplications * MULTIPLY + divisions * DIVIDE + rest
         parts = f"{additions} additions, {multiplications} products, {divisions} quotients"
         return Cost(cycles, "assumed", f"{how}: {parts} as above, and {rest} cycles")
@@ -37,7 +37,7 @@ def pic18f45k20() -> CostTable:
     def measured(cycles: int) -> Cost:
         return Cost(cycles, "measured", survey)
 
-    arc = made_of(5, 4, 3, 1073, "reduction and a quotient of polynomials; the rest as sdcc's has")
+    arc = composed(5, 4, 3, 1073, "reduction and a quotient of polynomials; the rest as sdcc's has")
     port = Cost(2, "measured", f"{survey}; {core}")
     strobe = 2 * port.cycles + port.cycles  # clock up, read, clock down
     array, loop, loop16, signed_loop = 18, 7, 14, 22
@@ -51,7 +51,7 @@ def pic18f45k20() -> CostTable:
                 MULTIPLY, "assumed", "nine products of the part's 8 x 8 bit multiplier"
             ),
             "f32_div": published(DIVIDE),
-            "f32_sqrt": made_of(3, 2, 2, 488, "two of Newton's steps; the rest as sdcc's has"),
+            "f32_sqrt": composed(3, 2, 2, 488, "two of Newton's steps; the rest as sdcc's has"),
             "f32_atan2": arc,
             "f32_tan": Cost(arc.cycles, "assumed", "as long as the arc tangent"),
             "f32_compare": Cost(60, "assumed", "a call; signs, then four bytes one by one"),
@@ -94,4 +94,3 @@ def pic18f45k20() -> CostTable:
 
 
 PIC18F45K20 = pic18f45k20()
-"""As the CubeSense thesis runs it."""

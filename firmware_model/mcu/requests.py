@@ -1,10 +1,10 @@
-"""What a firmware program sees of the hardware around it.
+"""Requests of a firmware program to the hardware.
 
-A program is a generator. Whatever takes time it *yields* as a request; whoever runs the program
-(the emulated board, or a test) performs the request in virtual time and sends the answer back.
-Before any request is performed, the processor is busy for the cycles that the program's ``Meter``
-was charged with since the last one. Interrupt handlers are plain methods that the hardware calls
-at the instant of their cause; the cycles that they charge are paid by the running program.
+A program is a generator. It *yields* a request for everything that takes time; whoever runs the
+program (the emulated board, or a test) performs the request in virtual time and sends the answer
+back. Before a request is performed, the processor is busy for the cycles charged to the program's
+``Meter`` since the last one. Interrupt handlers are plain methods that the hardware calls at the
+instant of their cause; the running program spends the cycles that they charge.
 """
 
 from collections.abc import Generator
@@ -27,7 +27,7 @@ class ReadTimer:
 
 @dataclass(frozen=True)
 class SetPin:
-    """Drive the output pin ``pin`` to ``level``: 0 or 1, or the number on a port of many lines."""
+    """Drive the output pin ``pin`` to ``level``: 0 or 1, or a number on a port of several lines."""
 
     pin: str
     level: int
@@ -44,7 +44,7 @@ class ReadPin:
 class AwaitPin:
     """Poll the input pin ``pin`` until it has ``level``; the answer is False after ``timeout_us``.
 
-    One poll takes ``poll_cycles`` processor cycles, so the program goes on at the end of a poll.
+    One poll takes ``poll_cycles`` processor cycles, so the program continues at the end of a poll.
     """
 
     pin: str
@@ -55,10 +55,10 @@ class AwaitPin:
 
 @dataclass(frozen=True)
 class Sleep:
-    """Sleep until ``Hardware.wake`` is called, or at most until ``deadline_us`` (None: for ever).
+    """Sleep until ``Hardware.wake`` is called, or at most until ``deadline_us`` (None: no limit).
 
-    The answer is True if it was woken. A wake-up that came before the request is not lost.
-    With ``wakeable`` False only the deadline ends the sleep.
+    The answer is True if it was woken. A wake-up before the request is not lost. With ``wakeable``
+    False only the deadline ends the sleep.
     """
 
     deadline_us: int | None
@@ -77,14 +77,14 @@ class StrobeRead:
 class BusAccess:
     """Read or write bytes on the external bus, one transaction after the other.
 
-    The answer is how many were made: all of them, or fewer when a byte that was read is above
-    ``above``; that one is the last.
+    The answer is the number of transactions: all, or fewer if a byte that was read exceeds
+    ``above``; that byte is the last.
 
     Attributes:
         addresses: (n,) int32, of 24 bits each.
-        data: (n,) uint8: the bytes to be written, or where the bytes read go.
-        write: to write them.
-        cycles: of the processor from one to the next.
+        data: (n,) uint8: the bytes to write, or the destination of the bytes read.
+        write: True to write them.
+        cycles: processor cycles from one transaction to the next.
         select: number of the chip select.
         above: 0 to 255.
     """
@@ -101,7 +101,7 @@ class BusAccess:
 class CameraTransfer:
     """One message on the camera's control bus: write ``data``, then read ``read`` bytes.
 
-    The answer is the bytes read, or None when the camera did not acknowledge.
+    The answer is the bytes read, or None if the camera did not acknowledge.
     """
 
     data: bytes
@@ -110,7 +110,7 @@ class CameraTransfer:
 
 @dataclass(frozen=True)
 class Reset:
-    """The program starts anew, RAM is lost; ``cause``: bit in the reset-cause register, from 1."""
+    """Restart the program and lose its RAM; ``cause``: bit in the reset-cause register, from 1."""
 
     cause: int
 
@@ -134,6 +134,6 @@ Routine = Generator[Request, Any, T]
 
 
 def pause(us: int) -> Routine[None]:
-    """Sleep for ``us``, whatever happens meanwhile."""
+    """Sleep for ``us``, even if woken."""
     now_us: int = yield ReadTimer()
     yield Sleep(now_us + us, wakeable=False)

@@ -1,1 +1,1 @@
-"""A node on the satellite's buses: link to the host, queue, settings, flags; no sensor in it."""
+"""A node on the satellite's buses, for any sensor: link to the host, queue, settings, flags."""

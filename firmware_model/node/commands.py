@@ -1,4 +1,4 @@
-"""Executes telecommands, one after the other, in the main loop."""
+"""Executes telecommands one after the other, in the main loop."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,16 +13,16 @@ STREAM_PAUSE_US = 20_000
 
 
 class CommandExecutor:
-    """What telecommands do: settings are stored, actions done at once, routines take time.
+    """Effects of telecommands: settings are stored, actions are immediate, routines take time.
 
     Attributes:
-        running: whether one is being executed, the reset that it asked for included.
+        running: whether a telecommand is being executed, including a reset that it requests.
     """
 
     def __init__(
         self, hardware: NodeHardware, settings: Settings, switches: RunningSwitches[Any]
     ) -> None:
-        """Change ``settings`` and ``switches``; a node adds what its other telecommands do."""
+        """Change ``settings`` and ``switches``; a node adds its other telecommands."""
         self._uart = hardware
         self._settings = settings
         self._actions: dict[str, Callable[[QueuedCommand], None]] = dict.fromkeys(
@@ -38,7 +38,7 @@ class CommandExecutor:
         return frozenset({*self._settings.commands, *self._actions, *self._routines})
 
     def execute(self, command: QueuedCommand) -> Routine[int | None]:
-        """Execute ``command``; returns a cause when the program has to end in a reset."""
+        """Execute ``command``; returns a reset cause if the program must reset."""
         self.running = True
         name = command.message.name
         if name in self._settings.commands:
@@ -52,6 +52,6 @@ class CommandExecutor:
         return self._reset_cause
 
     def _await_room(self, backlog_bytes: int) -> Routine[None]:
-        """Sleep until the UART has no more than ``backlog_bytes`` to send."""
+        """Sleep until the UART has at most ``backlog_bytes`` to send."""
         while self._uart.uart_backlog() > backlog_bytes:
             yield from pause(STREAM_PAUSE_US)

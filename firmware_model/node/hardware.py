@@ -1,4 +1,4 @@
-"""What a node's program sees of its processor beside the requests that take time."""
+"""Peripherals of the processor that a node's program uses without a request."""
 
 from typing import Protocol
 
@@ -7,13 +7,13 @@ class NodeHardware(Protocol):
     """Peripherals that every node's program uses without waiting for them."""
 
     def uart_send(self, data: bytes) -> None:
-        """Queue ``data`` for the satellite's UART; the peripheral sends at its own pace."""
+        """Queue ``data`` for the satellite's UART, which sends at its own pace."""
 
     def uart_backlog(self) -> int:
-        """Bytes that the UART still has to send."""
+        """Number of bytes that the UART still has to send."""
 
     def wake(self) -> None:
-        """End the running ``Sleep``, or the next one at once. For interrupt handlers."""
+        """End the current ``Sleep``, or the next one at once. For interrupt handlers."""
 
     def uptime_us(self) -> int:
-        """What telemetry Identification calls runtime, in us, read in an interrupt."""
+        """Runtime in telemetry Identification, in us, read in an interrupt."""

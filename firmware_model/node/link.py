@@ -1,12 +1,12 @@
-"""The satellite's side of a node: frames over UART and messages over I2C, in interrupt context.
+"""A node's link to the satellite: frames over UART and messages over I2C, in interrupt context.
 
-Both carry the same telecommands and telemetry. A telecommand is checked here against the table
+Both buses have the same telecommands and telemetry. A telecommand is checked here against the table
 (ID, length, parameter ranges), acknowledged, and queued for the main loop; telemetry is answered
 at once. Dialect of the CubeSpace family of nodes: a telemetry answer does not repeat the ID; a
 telecommand is acknowledged on the UART with one error byte, on I2C through telemetry TcmdProcessed.
-An unknown telemetry ID gets no answer. Parameters behind the ID of a telemetry request are ignored.
-An answer that the UART's buffer has no room for is dropped: a host that waits for each answer never
-fills it.
+An unknown telemetry ID gets no answer. Bytes after the ID of a telemetry request are ignored. An
+answer is dropped if the UART's buffer has no room for it: a host that waits for each answer never
+fills the buffer.
 """
 
 from abc import ABC, abstractmethod
@@ -22,23 +22,22 @@ from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.queue import BoundedQueue, QueuedCommand
 from cubestack.firmware_model.node.state import NodeState
 
-NO_DATA = 0xFF
-"""What a read delivers beyond the end of a message, or without one."""
+NO_DATA = 0xFF  #: byte read beyond the end of a message, or without one
 
 
 def longest_command(interface: Interface) -> int:
-    """Bytes of the longest telecommand, its ID included."""
+    """Length of the longest telecommand in bytes, its ID included."""
     return 1 + max(message.length for message in interface.telecommands)
 
 
 @dataclass(frozen=True)
 class BusFlags:
-    """Names of the error flags that messages on one bus raise; None: it raises none.
+    """Names of the error flags for messages on one bus; None: no flag.
 
     Attributes:
         overflow: telecommand while the queue is full.
         too_few, too_many: parameter bytes of a telecommand.
-        unknown_telemetry: telemetry ID that the node does not offer.
+        unknown_telemetry: telemetry ID that the node does not support.
     """
 
     overflow: str
@@ -49,16 +48,16 @@ class BusFlags:
 
 @dataclass(frozen=True)
 class LinkFlags:
-    """Names of a node's error flags for its link; None: it has none.
+    """Names of a node's error flags for its link; None: no flag.
 
     Attributes:
-        uart, i2c: what differs from bus to bus.
+        uart, i2c: flags that differ between the buses.
         protocol_error: byte outside of a frame, unknown escape or empty frame.
         incomplete: frame that never ended.
-        read_without_id: I2C read with no answer to give; one that was refused with a flag counts
-            as an empty answer.
+        read_without_id: I2C read without an answer; one rejected with a flag counts as an empty
+            answer.
         timeout: silence inside a frame.
-        unknown_command: telecommand ID that the node does not know.
+        unknown_command: unknown telecommand ID.
         bad_parameter: parameter out of a range whose table names no flag.
     """
 
@@ -73,7 +72,7 @@ class LinkFlags:
 
 
 class SatelliteLink(ABC):
-    """Decodes what the host sends and answers it; a node says what its messages mean."""
+    """Decodes the host's messages and answers them; a node implements their meaning."""
 
     def __init__(
         self,
@@ -86,7 +85,7 @@ class SatelliteLink(ABC):
     ) -> None:
         """Serve ``interface``, and raise ``flags`` in ``state``.
 
-        ``send_buffer_bytes`` is what the UART may still have to send.
+        ``send_buffer_bytes`` is the capacity of the UART's send buffer.
         """
         self._hardware = hardware
         self._meter = meter
@@ -103,18 +102,18 @@ class SatelliteLink(ABC):
         self._answer: bytes | None = None
         self._position = 0
 
-    # --- what a node says -------------------------------------------------------------------------
+    # --- implemented by a node --------------------------------------------------------------------
 
     @abstractmethod
     def _values(self, message: Message) -> dict[str, Any] | None:
-        """Values of telemetry ``message``, which is counted; None when it is not supported."""
+        """Values of telemetry ``message``, and count it; None if it is not supported."""
 
     @abstractmethod
     def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
-        """Queue an accepted telecommand; False when the queue is full."""
+        """Queue an accepted telecommand; False if the queue is full."""
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
-        """Why parameters are refused: error flags, None for one without; empty: they are good."""
+        """Error flags of bad parameters, None for one without a flag; empty if all are good."""
         return [flag or self._flags.bad_parameter for _, flag in message.violations(values)]
 
     @property
@@ -125,7 +124,7 @@ class SatelliteLink(ABC):
     # --- UART -------------------------------------------------------------------------------------
 
     def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte came."""
+        """Interrupt: a byte was received."""
         self._meter.charge(uart_interrupt=1)
         match self._decoder.feed(byte):
             case FrameEvent.FRAME | FrameEvent.TOO_LONG:  # the kept front is too long as well
@@ -136,7 +135,7 @@ class SatelliteLink(ABC):
                 self._raise(self._flags.protocol_error)
 
     def uart_silence(self) -> None:
-        """Interrupt: nothing came for a while."""
+        """Interrupt: nothing was received for a while."""
         if self._decoder.reset():
             self._raise(self._flags.incomplete)
             self._raise(self._flags.timeout)
@@ -151,12 +150,12 @@ class SatelliteLink(ABC):
             self._uart_send(bytes([self._accept(payload[0], payload[1:], self._flags.uart)]))
 
     def _uart_answer(self, identifier: int) -> bool:
-        """Send a telemetry message; False when the host does not get it."""
+        """Send a telemetry message; False if the host does not get it."""
         answer = self._read_telemetry(identifier, self._flags.uart)
         return answer is not None and self._uart_send(answer)
 
     def _uart_send(self, payload: bytes) -> bool:
-        """Answer, if there is room for it."""
+        """Answer if the buffer has room; returns whether it had."""
         frame = encode_frame(payload)
         room = self._hardware.uart_backlog() + len(frame) <= self._send_buffer_bytes
         if room:
@@ -164,13 +163,12 @@ class SatelliteLink(ABC):
         return room
 
     def _transmit(self, frame: bytes) -> None:
-        """Hand a frame to the UART."""
         self._hardware.uart_send(frame)
 
     # --- I2C --------------------------------------------------------------------------------------
 
     def i2c_start(self, read: bool) -> None:
-        """Interrupt: the node's address came, to write or to ``read``."""
+        """Interrupt: the node is addressed, for a write or a ``read``."""
         self._finish_write()
         self._addressed = True
         self._reading = read
@@ -178,7 +176,7 @@ class SatelliteLink(ABC):
             self._raise(self._flags.read_without_id)
 
     def i2c_write(self, byte: int) -> bool:
-        """Interrupt: a byte came; one beyond the longest telecommand is not acknowledged."""
+        """Interrupt: a byte was received; returns False (NACK) beyond the longest telecommand."""
         self._meter.charge(i2c_interrupt=1)
         if len(self._written) > self._longest:
             return False
@@ -186,7 +184,7 @@ class SatelliteLink(ABC):
         return True
 
     def i2c_read(self) -> int:
-        """Interrupt: the next byte is wanted; beyond the end of an answer it is 255."""
+        """Interrupt: the master reads a byte; beyond the end of an answer it is 255."""
         self._meter.charge(i2c_interrupt=1)
         answer = self._answer or b""
         byte = answer[self._position] if self._position < len(answer) else NO_DATA
@@ -201,11 +199,11 @@ class SatelliteLink(ABC):
         self._addressed = self._reading = False
 
     def _finish_read(self) -> None:
-        """A telemetry answer is used up once it was read."""
+        """A telemetry answer can be read once."""
         self._answer = None
 
     def _finish_write(self) -> None:
-        """Act on the message that a stop or a repeated start ended."""
+        """Process the message that a stop or a repeated start ended."""
         if not self._written:
             return
         self._meter.charge(host_message=1)
@@ -220,7 +218,7 @@ class SatelliteLink(ABC):
         else:
             self._accept(identifier, parameters, self._flags.i2c)
 
-    # --- both -------------------------------------------------------------------------------------
+    # --- both buses -------------------------------------------------------------------------------
 
     def _raise(self, flag: str | None) -> None:
         if flag is not None:
@@ -235,7 +233,7 @@ class SatelliteLink(ABC):
         return message.pack(**values)
 
     def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
-        """Queue a telecommand, or say what is wrong with it."""
+        """Queue a telecommand, or return its error."""
         message = self._interface.find(identifier)
         if message is None or message.kind is not Kind.TELECOMMAND:
             self._raise(self._flags.unknown_command)
@@ -274,14 +272,14 @@ class QueueingLink(SatelliteLink):
         send_buffer_bytes: int,
         telemetry: Callable[[Message], dict[str, Any] | None],
     ) -> None:
-        """Serve; ``telemetry`` gives a message's values, or None when it is not supported."""
+        """``telemetry`` returns a message's values, or None if it is not supported."""
         super().__init__(hardware, meter, state, interface, flags, send_buffer_bytes)
         self._telemetry = telemetry
         self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()
         self.latest = (0, AckError.OK)
 
     def processed(self, running: bool) -> dict[str, int]:
-        """Values of telemetry TcmdProcessed; ``running``: whether a telecommand is executed."""
+        """Values of telemetry TcmdProcessed; ``running``: a telecommand is being executed."""
         waiting = len(self.queue)
         latest, error = self.latest
         done = not waiting and not running

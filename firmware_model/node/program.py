@@ -1,7 +1,7 @@
 """A plain node's program: telecommands one after the other, settings, the node's own telemetry.
 
-A sensor adds what its telecommands do and what its telemetry says. Its tables begin with those of
-``firmware_model.interface.codec.node_messages``.
+A sensor adds the effects of its telecommands and the values of its telemetry. Its tables begin with
+those of ``firmware_model.interface.codec.node_messages``.
 """
 
 from abc import ABC, abstractmethod
@@ -17,8 +17,7 @@ from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink
 from cubestack.firmware_model.node.settings import Settings
 from cubestack.firmware_model.node.state import NodeState
 
-POWER_ON, TELECOMMAND = 1, 2
-"""Causes of a reset."""
+POWER_ON, TELECOMMAND = 1, 2  #: causes of a reset
 
 SEND_BUFFER_BYTES = 512
 
@@ -34,26 +33,26 @@ _FLAGS = LinkFlags(
 )
 
 Action: TypeAlias = Callable[[dict[str, Any]], Routine[None]]
-"""What a telecommand does, given its parameters."""
+"""Effect of a telecommand with these parameters."""
 
 Source: TypeAlias = Callable[[], dict[str, Any]]
-"""Gives the values of a telemetry message, in interrupt context, so that nothing waits."""
+"""Returns the values of a telemetry message, in interrupt context, so without waiting."""
 
 
 class NodeProgram(ABC):
-    """One life of the program, from reset to reset.
+    """One run of the program, from reset to reset.
 
-    A telecommand without an action is a setting: its parameters are kept.
+    A telecommand without an action is a setting: its parameters are stored.
 
     Attributes:
-        meter: charged with what the program does.
+        meter: charged with the program's operations.
         state: the error flags.
         settings: the latest parameters of setting telecommands.
-        link: the satellite's side; its methods are the interrupts of UART and I2C.
+        link: the link to the satellite; its methods are the interrupts of UART and I2C.
     """
 
     def __init__(self, hardware: NodeHardware, meter: Meter, interface: Interface) -> None:
-        """Reset: RAM starts with the reset values that ``interface`` declares."""
+        """RAM starts with the reset values that ``interface`` declares."""
         self.meter = meter
         flags = interface.telemetry("ErrorFlags").fields
         self.state = NodeState(field.flag for field in flags)
@@ -84,7 +83,7 @@ class NodeProgram(ABC):
 
     @abstractmethod
     def actions(self) -> Mapping[str, Action]:
-        """What telecommands do, by name."""
+        """Effects of telecommands, by name."""
 
     @abstractmethod
     def sources(self) -> Mapping[str, Source]:

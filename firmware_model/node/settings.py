@@ -1,4 +1,4 @@
-"""Settings that telecommands change: stored as the telecommands' own parameter bytes.
+"""Settings that telecommands change, stored as the telecommands' own parameter bytes.
 
 The layout derives from the telecommand table, so a new setting is one more name.
 """
@@ -10,33 +10,30 @@ from cubestack.firmware_model.interface.codec.message import Interface
 
 
 class Settings:
-    """Current parameters of the setting telecommands, which ``commands`` names."""
+    """Current parameters of the setting telecommands ``commands``."""
 
     def __init__(self, interface: Interface, commands: Iterable[str]) -> None:
-        """Start with the reset values that ``interface`` declares for ``commands``."""
         self.commands = tuple(commands)
         self._messages = {name: interface.telecommand(name) for name in self.commands}
         self._values: dict[str, dict[str, Any]] = {}
         self.clear()
 
     def clear(self) -> None:
-        """Go back to the reset values."""
+        """Return to the reset values."""
         self._values = {name: dict(m.reset_values()) for name, m in self._messages.items()}
 
     def get(self, command: str, field: str) -> Any:
-        """Value of parameter ``field`` of telecommand ``command``."""
         return self._values[command][field]
 
     def all(self, *commands: str) -> dict[str, Any]:
-        """All parameters of ``commands``, which have no two of one name."""
+        """All parameters of ``commands``, whose names must differ."""
         return {name: value for key in commands for name, value in self._values[key].items()}
 
     def put(self, command: str, values: Mapping[str, Any]) -> None:
-        """Store all parameters of ``command``."""
         self._values[command] = dict(values)
 
     def size(self, *commands: str) -> int:
-        """Bytes of the parameters of ``commands``, in their order; of all when none is named."""
+        """Bytes of the parameters of ``commands``, in their order; of all if none is named."""
         return sum(self._messages[name].length for name in commands or self.commands)
 
     def pack(self, *commands: str) -> bytes:
@@ -45,7 +42,7 @@ class Settings:
         return b"".join(self._messages[name].pack(**self._values[name]) for name in names)
 
     def unpack(self, data: bytes, *commands: str) -> None:
-        """Restore what ``pack`` gave; other lengths raise ValueError."""
+        """Restore the result of ``pack``; another length raises ValueError."""
         if len(data) != self.size(*commands):
             raise ValueError(f"stored settings have {len(data)} bytes, not {self.size(*commands)}")
         for name in commands or self.commands:

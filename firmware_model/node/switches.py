@@ -1,4 +1,4 @@
-"""The switches that a node's program runs with; telecommands change them between two pictures."""
+"""The switches that a node's program runs with; telecommands change them between two images."""
 
 from collections.abc import Mapping
 from typing import Any, Generic
@@ -10,22 +10,21 @@ SWITCH_COMMANDS = (switch_messages.SET_PROFILE, switch_messages.SET_SWITCH)
 
 
 class RunningSwitches(Generic[switch_messages.SwitchesT]):
-    """Whoever depends on a switch asks for ``now`` when it begins with a picture.
+    """Switches in use; a user of a switch reads ``now`` when it begins with an image.
 
-    The main loop executes telecommands between its other tasks, so never in the middle of one.
+    The main loop executes telecommands between its other tasks, so never during one.
 
     Attributes:
-        now: the present ones.
+        now: current switches.
     """
 
     def __init__(self, at_power_up: switch_messages.SwitchesT) -> None:
-        """Start with what was chosen when the device was powered up."""
         self._at_power_up = self.now = at_power_up
 
     def change(self, telecommand: str, values: Mapping[str, Any]) -> None:
         """Execute one of ``SWITCH_COMMANDS``."""
-        self.now = switch_messages.after(self.now, telecommand, values)
+        self.now = switch_messages.apply_command(self.now, telecommand, values)
 
     def forget(self) -> None:
-        """Return to those of power-up."""
+        """Return to the switches of power-up."""
         self.now = self._at_power_up

@@ -1,4 +1,4 @@
-"""Writes what the reference firmware's build includes: tables, pins, the part's registers.
+"""Writes the generated sources of the reference firmware: tables, pins, the part's registers.
 
 `python -m cubestack.firmware_model.reference.generate FOLDER`. The interface's own C header and the
 catalogue come from the host's tools; see the Makefile.
@@ -14,7 +14,7 @@ from cubestack.firmware_model.reference import tables
 
 
 def generate(folder: Path) -> None:
-    """Write the files into ``folder``, which is made if need be."""
+    """Write the files into ``folder``, which is created if needed."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = {
         "cubestar_tables.h": tables.header(),

@@ -1,7 +1,7 @@
 """The prebuilt image of the reference firmware, which needs no compiler.
 
-Beside it stands what it was built with, and its hash: ``python -m
-cubestack.firmware_model.reference.image record FILE COMPILER`` writes that down.
+A JSON file beside it records its compiler and its hash: ``python -m
+cubestack.firmware_model.reference.image record FILE COMPILER`` writes it.
 """
 
 import hashlib
@@ -13,11 +13,11 @@ IMAGE = Path(__file__).with_name("cubestar.elf")
 
 
 class ImageError(ValueError):
-    """The image is not there, or not the one that was built; the text is one line."""
+    """The image is missing, or its hash differs from the recorded one; the text is one line."""
 
 
 def reference_image() -> Path:
-    """The image as built; ImageError when its hash is another."""
+    """The image as built; raises ImageError if its hash is wrong."""
     if not IMAGE.exists():
         raise ImageError(f"{IMAGE} is missing: `make firmware` builds it")
     wanted, found = record_of(IMAGE)["sha256"], sha256_of(IMAGE)
@@ -27,12 +27,11 @@ def reference_image() -> Path:
 
 
 def sha256_of(image: Path) -> str:
-    """Hexadecimal SHA-256 of a file."""
     return hashlib.sha256(image.read_bytes()).hexdigest()
 
 
 def record_of(image: Path) -> dict[str, str]:
-    """What is recorded of an image: ``sha256`` and ``compiler``."""
+    """The record of an image: ``sha256`` and ``compiler``."""
     text = image.with_suffix(".json").read_text(encoding="ascii")
     return {str(key): str(value) for key, value in json.loads(text).items()}
 

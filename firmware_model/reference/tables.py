@@ -1,8 +1,8 @@
-"""C tables for the reference firmware, from the interface's declarations and the Python program's.
+"""C tables for the reference firmware, from the declarations of interface and Python program.
 
-The C header of the interface has offsets; what a node needs beside it is here: which values a
-telecommand may have and what flag others raise, where each setting is kept and which telemetry
-shows it, the states that telecommands report. ``generate`` writes them.
+The C header of the interface has offsets; these tables have the rest: the values that a telecommand
+may have and the flags for others, the place of each setting and the telemetry that shows it, the
+states that telecommands report. ``generate`` writes them.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.node import identification, link, queue
 
-#: Steps of the processing that have a time of their own, as ``Processing`` names them.
+#: Steps of the processing with a separate time, as ``Processing`` names them.
 STEPS = tuple(
     dict.fromkeys(step for shown in telemetry.TIMES_SHOWN.values() for step in shown.values())
 )
@@ -29,12 +29,10 @@ _U8, _LARGEST = 255, 65_535
 
 
 def header() -> str:
-    """``cubestar_tables.h``."""
     return "\n".join([*_opening("CUBESTAR_TABLES_H"), *_declarations(), "", "#endif", ""])
 
 
 def source() -> str:
-    """``cubestar_tables.c``."""
     return "\n".join(["/* Generated. */", '#include "cubestar_tables.h"', *_definitions(), ""])
 
 
@@ -176,7 +174,7 @@ def _reset_settings() -> bytes:
 
 
 def _settings_shown() -> Iterator[str]:
-    """Telemetry that shows settings: the raw bytes are the same."""
+    """Telemetry that shows settings, with the same raw bytes."""
     for name, fields in telemetry.SETTINGS_SHOWN.items():
         message = INTERFACE.telemetry(name)
         for to, (command, parameter) in fields.items():
@@ -199,11 +197,11 @@ def _times_shown() -> Iterator[str]:
             yield f"    {{{numbers}, STEP_{step.upper()}, {longest}}}, /* {name}.{to} */"
 
 
-# --- what telecommands may carry ----------------------------------------------------------------
+# --- allowed parameters -------------------------------------------------------------------------
 
 
 def _rules(message: Message, ranges: list[str]) -> Iterator[str]:
-    """Every rule of a telecommand, as the declaration decides for each raw value."""
+    """Every rule of a telecommand, from the declaration's decision on each raw value."""
     assert message.kind is Kind.TELECOMMAND
     for field in message.fields:
         if field.type.startswith("bytes"):
@@ -240,7 +238,7 @@ def _bound(limit: float | None, sign: str) -> str:
 def _allowed(
     message: Message, field: Field
 ) -> Iterator[tuple[int, int, int, list[tuple[int, int]]]]:
-    """Ranges of allowed raw values: offset of the u8 that they depend on, its range, they."""
+    """Ranges of allowed raw values, after the offset and range of the u8 that they depend on."""
     dependent, last = field.maximum_by or field.choices_by, field.raw_range[1]
     if dependent is None:
         yield 0, 0, _U8, _ranges(last, lambda raw: field.allows(field.decode(raw), {}))
@@ -263,7 +261,7 @@ def _allowed(
 
 
 def _ranges(last: int, allows: Callable[[int], bool]) -> list[tuple[int, int]]:
-    """Where raw values from 0 to ``last`` are allowed, ends included."""
+    """Ranges of allowed raw values from 0 to ``last``, ends included."""
     assert last <= _LARGEST
     found: list[tuple[int, int]] = []
     for raw in range(last + 1):

@@ -13,8 +13,8 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
     SET_PROFILE,
     SET_SWITCH,
     SHOWN,
+    read_switches,
     switch_parameters,
-    switches_shown,
 )
 from cubestack.firmware_model.interface.codec.switches import Switches
 from cubestack.host.clients.exchanges import Exchanges
@@ -215,7 +215,7 @@ class DeviceClient(Closable):
 
         Raises InterfaceError for a device without switches, and the client's errors.
         """
-        return switches_shown(self.client.interface.switches, self.client.telemetry(SHOWN))
+        return read_switches(self.client.interface.switches, self.client.telemetry(SHOWN))
 
     def set_profile(self, profile: str) -> None:
         """Run "published" or "extended" from the next picture on; the board's switches stay.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.interface.codec.attitude_quality import covariance_read
+from cubestack.firmware_model.interface.codec.attitude_quality import read_covariance
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.errors import BadAnswerError
 
@@ -54,7 +54,7 @@ def common(values: Mapping[str, Value]) -> dict[str, Any]:
     Raises BadAnswerError for sigmas below 0 and correlations beyond 1.
     """
     try:
-        covariance = np.array(covariance_read(values))
+        covariance = np.array(read_covariance(values))
     except ValueError as error:
         raise BadAnswerError(f"telemetry Quality: {error}") from None
     return {

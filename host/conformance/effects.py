@@ -9,10 +9,10 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
     SET_PROFILE,
     SET_SWITCH,
     SHOWN,
-    after,
+    apply_command,
+    read_switches,
     shown_values,
     switch_parameters,
-    switches_shown,
 )
 from cubestack.firmware_model.interface.codec.switches import PROFILES, Switches
 from cubestack.host.conformance.contract import CheckRun, FailedError
@@ -121,7 +121,7 @@ OF_SWITCHES = {SET_PROFILE: check_profile, SET_SWITCH: check_switch}
 
 
 def _switches(run: CheckRun) -> Switches:
-    return switches_shown(run.target.interface.switches, run.target.node.telemetry(SHOWN))
+    return read_switches(run.target.interface.switches, run.target.node.telemetry(SHOWN))
 
 
 class _Changes:
@@ -136,7 +136,7 @@ class _Changes:
 
     def make(self, message: Message, **parameters: str) -> None:
         """One telecommand, after which telemetry must show the switches as they are to be then."""
-        wanted = after(self.now, message.name, message.unpack(message.pack(**parameters)))
+        wanted = apply_command(self.now, message.name, message.unpack(message.pack(**parameters)))
         try:
             self._run.perform(message.name, parameters)
             self._made += wanted != self.now

@@ -1,14 +1,14 @@
-"""What the flash holds for the star tracker: stars, triangles, k-vectors and faces, as bytes.
+"""The star tracker's database as bytes in flash: stars, triangles, k-vectors and faces.
 
-AraMiS thesis, sections 5.5 (triangle database), 5.6 (k-vectors), 5.9 (faces) and 2.3.3 (all of it
-is copied to RAM, where the program works on it). The thesis sizes its database as a text file of
-doubles, 21.2 MB (section 2.3.2); this one is binary, little-endian, without gaps:
+AraMiS thesis, sections 5.5 (triangle database), 5.6 (k-vectors), 5.9 (faces) and 2.3.3 (the program
+works on a copy in RAM). The thesis estimates its database as a text file of doubles, 21.2 MB
+(section 2.3.2); this one is binary, little-endian, without gaps:
 
 - `HEADER`; the arrays of `LAYOUT` in order, whose lengths follow from the header's counts;
-- a CRC-32 of everything before it. Error-coding the image is the flash's task, not done here.
+- a CRC-32 of everything before it. The flash store adds the error-correcting code.
 
-Triangles are in the order of their area; a second list has the moments in rising order, each with
-its triangle. Stars of a triangle are indices into the star list, rising.
+Triangles are sorted by area; a second list has the moments in ascending order, each with its
+triangle. Stars of a triangle are ascending indices into the star list.
 """
 
 import struct
@@ -51,7 +51,7 @@ MOST_TRIANGLES = 1 << 24
 
 
 class DatabaseError(ValueError):
-    """Bytes or arrays that are no database; the message says why."""
+    """Invalid bytes or arrays of a database; the message gives the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +60,14 @@ class Database:
 
     Attributes:
         epoch: Julian year of the directions.
-        fov_deg: no side of a triangle is longer.
+        fov_deg: longest side of a triangle.
         numbers: (n,) Hipparcos numbers, uint32.
         vectors: (n, 3) inertial unit vectors, float32.
         v_mag: (n,) V magnitudes, float32.
-        stars: (m, 3) star indices of each triangle, rising, uint16.
+        stars: (m, 3) star indices of each triangle, ascending, uint16.
         faces: (m,) face of each triangle's middle, uint16.
-        areas: (m,) rising, float32.
-        moments: (m,) rising, float32.
+        areas: (m,) ascending, float32.
+        moments: (m,) ascending, float32.
         moment_triangles: (m,) triangle of each moment, uint32.
         area_index, moment_index: k-vectors of both.
         sphere: the faces.
@@ -98,7 +98,6 @@ class Database:
         return {"header": HEADER.size, **arrays, "checksum": 4}
 
     def pack(self) -> bytes:
-        """The image."""
         area, moment = self.area_index, self.moment_index
         counts = len(self.numbers), len(self), area.bins, moment.bins, *self.sphere.neighbours.shape
         bounds = area.lowest, area.highest, moment.lowest, moment.highest
@@ -109,11 +108,11 @@ class Database:
 
     @classmethod
     def unpack(cls, image: bytes | bytearray | memoryview) -> Self:
-        """Database of an image, whose bytes its arrays then share.
+        """Database of an image; its arrays share the image's bytes.
 
         Raises:
-            DatabaseError: for a wrong magic, version, length or checksum, and for indices that
-                reach beyond their lists.
+            DatabaseError: for a wrong magic, version, length or checksum, and for indices beyond
+                their lists.
         """
         if len(image) < HEADER.size + 4:
             raise DatabaseError(f"an image has at least {HEADER.size + 4} bytes, not {len(image)}")
@@ -166,7 +165,7 @@ class Database:
 
 
 def _check(arrays: dict[str, NDArray[Any]], stars: int, triangles: int, faces: int) -> None:
-    """A program must not read beyond its lists, whatever the image says."""
+    """Reject an image that would make the program read beyond its lists."""
     limits = {
         "stars": stars,
         "faces": faces,

@@ -3,7 +3,7 @@
 AraMiS thesis, sections 2.1 (code against upsets in flash, periodic reloading into RAM) and 2.3.
 In flash, all in words of :mod:`hamming`: eight bytes (magic, length), then the image of
 :mod:`database`. In RAM it is not coded, so its checksum is computed before each use; a damaged copy
-is loaded anew. A reload that finds words beyond correction leaves the good copy in RAM alone.
+is loaded again. A reload that finds uncorrectable words keeps the good copy in RAM.
 """
 
 import struct
@@ -24,19 +24,17 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine, pause
 HEADER = struct.Struct("<4sI")
 MAGIC = b"AFLS"
 
-SLICE_WORDS = 8192
-"""Coded words of one step of a load: 3 ms, after which the program looks around."""
+SLICE_WORDS = 8192  #: coded words per step of a load: 3 ms, after which other jobs can run
 
-ERASE_US = 800_000
-PROGRAM_WORD_US = 10
-"""Erasing a sector and programming 16 bits of the M29W320D: typical values of its data sheet."""
+#: Erasing a sector and programming 16 bits of the M29W320D: typical values of its data sheet.
+ERASE_US, PROGRAM_WORD_US = 800_000, 10
 
 
 def flash_image(image: bytes) -> NDArray[np.uint8]:
-    """What the flash holds for a catalogue's ``image``.
+    """Content of the flash for a catalogue's ``image``.
 
     Raises:
-        ValueError: when it is longer than the flash.
+        ValueError: if it is longer than the flash.
     """
     if len(image) > MOST_CATALOGUE_BYTES:
         raise ValueError(
@@ -51,18 +49,17 @@ class CatalogueStore:
     """Loads, checks and writes the catalogue.
 
     Attributes:
-        database: what RAM holds; None when there is no good copy.
+        database: the copy in RAM; None if there is no good one.
         state: of the copy in RAM.
         loads, failures: passes over the flash, and those without a good catalogue.
         corrected, lost: words of the latest pass.
         corrected_total: words corrected since power-up.
         ram_errors: how often RAM was found damaged.
         load_us: duration of the latest pass's steps.
-        loaded_us: when the latest pass ended; None before.
+        loaded_us: end of the latest pass; None before.
     """
 
     def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
-        """Nothing is loaded yet."""
         self._hardware = hardware
         self._meter = meter
         self.database: Database | None = None
@@ -73,7 +70,7 @@ class CatalogueStore:
         self.loaded_us: int | None = None
         self._length = 0
         self._checksum = 0
-        self._at = 0  # word of the image that the pass has come to
+        self._at = 0  # next word of the image in the pass
         self._pass_length: int | None = None
         self._pass_corrected = self._pass_lost = self._pass_us = 0
 
@@ -88,19 +85,19 @@ class CatalogueStore:
         return self._pass_length is not None
 
     def forget(self) -> None:
-        """The copy in RAM is not wanted any longer."""
+        """Drop the copy in RAM."""
         self.database, self.state = None, CatalogueState.NOT_LOADED
         self._pass_length = None
 
     def load(self) -> Routine[bool]:
-        """One whole pass from the start; whether RAM holds a good catalogue after it."""
+        """Run a whole pass; returns whether RAM holds a good catalogue after it."""
         self._pass_length = None
         while not (yield from self.load_step()):
             pass
         return self.database is not None
 
     def load_step(self) -> Routine[bool]:
-        """A slice of a pass over the flash; whether that ended it."""
+        """Run a slice of a pass over the flash; returns whether that ended it."""
         started_us: int = yield ReadTimer()
         if self._pass_length is None:
             self._begin()
@@ -117,7 +114,7 @@ class CatalogueStore:
         return ended
 
     def ensure(self) -> Routine[bool]:
-        """Compare RAM with its checksum, load anew when it differs; whether it is good."""
+        """Verify the checksum of RAM, and reload on a mismatch; returns whether RAM is good."""
         if self.database is None:
             return False
         intact = self._ram_checksum() == self._checksum
@@ -129,7 +126,7 @@ class CatalogueStore:
         return (yield from self.load())
 
     def program(self, image: bytes) -> Routine[None]:
-        """Erase the flash as far as it is needed and write ``image`` to it, coded."""
+        """Erase the necessary sectors and write ``image``, coded."""
         coded = flash_image(image)
         flash = self._hardware.catalogue_flash
         self._meter.charge(coded_word=len(coded) // CODED_BYTES, loop=len(coded) // CODED_BYTES)
@@ -141,7 +138,7 @@ class CatalogueStore:
             flash[start : start + len(sector)] = sector
 
     def refresh(self) -> Routine[bool]:
-        """Write the good copy of RAM to the flash; False when there is none."""
+        """Write the good copy of RAM to the flash; False if there is none."""
         if not (yield from self.ensure()):
             return False
         yield from self.program(self._ram(self._length).tobytes())
@@ -156,7 +153,7 @@ class CatalogueStore:
         return crc32(self._ram(size).data)
 
     def _begin(self) -> None:
-        """Read the header and start a pass; one without a header has ended at once."""
+        """Read the header and start a pass; one without a header ends at once."""
         self._pass_corrected = self._pass_lost = self._pass_us = self._at = 0
         coded = self._hardware.catalogue_flash[:CODED_BYTES]
         header = hamming.decode(coded, self._meter)
@@ -169,7 +166,7 @@ class CatalogueStore:
             self._pass_lost = 0  # erased, which is no coded word
 
     def _slice(self, length: int) -> None:
-        """Take the next words of the image to RAM; a good copy is spared words that are lost."""
+        """Copy the next words of the image to RAM; lost words do not overwrite a good copy."""
         words = min(SLICE_WORDS, -(-length // DATA_BYTES) - self._at)
         start = CODED_BYTES * (1 + self._at)
         coded = self._hardware.catalogue_flash[start : start + CODED_BYTES * words]
@@ -183,7 +180,7 @@ class CatalogueStore:
         self._at += words
 
     def _finish(self) -> None:
-        """Judge what the pass brought."""
+        """Evaluate the pass."""
         length, self._pass_length = self._pass_length, None
         self.loads += 1
         self.corrected, self.lost = self._pass_corrected, self._pass_lost

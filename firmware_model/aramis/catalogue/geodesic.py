@@ -1,9 +1,9 @@
 """The geodesic sphere that divides the sky: an icosahedron split twice, 320 faces.
 
-AraMiS thesis, sections 5.9 and 7.1.3. A direction lies in the face whose centre is nearest. The
-thesis' figure 5.9 leaves open which faces are adjacent; its ground code counts those that share a
-corner, 12, or 11 at the twelve corners of the icosahedron, where only five faces meet. Fewer would
-not do: the three that share an edge leave out stars that are within the field of view.
+AraMiS thesis, sections 5.9 and 7.1.3. A direction lies in the face with the nearest centre. The
+thesis' figure 5.9 leaves open which faces are adjacent; its ground code counts those with a common
+corner, 12, or 11 at the twelve corners of the icosahedron, where only five faces meet. The three
+with a common edge would not suffice: they omit stars within the field of view.
 """
 
 from dataclasses import dataclass
@@ -18,24 +18,22 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 SPLITS = 2
 MOST_NEIGHBOURS = 12
-NO_FACE = 0xFFFF
-"""Fills the list of a face that has 11 neighbours."""
+NO_FACE = 0xFFFF  #: fills the list of a face with 11 neighbours
 
 
 @dataclass(frozen=True, eq=False)
 class GeodesicSphere:
-    """Faces of the sphere, as the flash holds them.
+    """Faces of the sphere, as in flash.
 
     Attributes:
         centres: (f, 3) unit vectors, float32.
-        neighbours: (f, 12) faces that share a corner, rising, filled up with `NO_FACE`; uint16.
+        neighbours: (f, 12) faces with a common corner, ascending, filled with `NO_FACE`; uint16.
     """
 
     centres: Floats
     neighbours: NDArray[np.uint16]
 
     def __len__(self) -> int:
-        """Number of faces."""
         return len(self.centres)
 
     def face_of(self, direction: Floats, meter: Meter) -> int:
@@ -48,7 +46,7 @@ class GeodesicSphere:
         return int(np.argmax(cosine))
 
     def around(self, direction: Floats, meter: Meter) -> Mask:
-        """Which faces (f,) are that of a unit vector (3,) or adjacent to it."""
+        """Mask (f,) of the face of a unit vector (3,) and of its neighbours."""
         face = self.face_of(direction, meter)
         marked, adjacent = np.zeros(len(self), dtype=bool), self.neighbours[face]
         marked[[face, *adjacent[adjacent != NO_FACE]]] = True
@@ -58,7 +56,7 @@ class GeodesicSphere:
 
 @lru_cache(maxsize=4)
 def geodesic_sphere(splits: int = SPLITS) -> GeodesicSphere:
-    """Split each of the icosahedron's 20 faces in four, so many times (0 to 4)."""
+    """Split each of the icosahedron's 20 faces in four, ``splits`` times (0 to 4)."""
     if not 0 <= splits <= 4:
         raise ValueError(f"splits must be 0 to 4, not {splits}")
     corners, faces = _icosahedron()
@@ -79,7 +77,7 @@ def geodesic_sphere(splits: int = SPLITS) -> GeodesicSphere:
 
 
 def _icosahedron() -> tuple[NDArray[np.float64], Indices]:
-    """Corners (12, 3) of length 1 and faces (20, 3) as indices of corners."""
+    """Corners (12, 3) of length 1, and faces (20, 3) as indices of corners."""
     golden = (1 + np.sqrt(5)) / 2
     corners = np.array(
         [
@@ -101,7 +99,7 @@ def _icosahedron() -> tuple[NDArray[np.float64], Indices]:
 
 
 def _split(corners: NDArray[np.float64], faces: Indices) -> tuple[NDArray[np.float64], Indices]:
-    """Four faces from each: its edges are halved and the new corners lifted to the sphere."""
+    """Four faces from each: its edges are halved and the new corners moved to the sphere."""
     points = [*corners]
     middles: dict[tuple[int, int], int] = {}
 

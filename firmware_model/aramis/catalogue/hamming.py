@@ -1,6 +1,6 @@
 """Error-correcting code of the catalogue in flash: one bit in 72 corrected, two detected.
 
-AraMiS thesis, sections 2.1 (some error-correcting code) and 2.3.2 (room for a Hamming code).
+AraMiS thesis, sections 2.1 (an error-correcting code) and 2.3.2 (room for a Hamming code).
 Assumed: one whose 72 columns all have an odd number of ones (Hsiao, "A Class of Optimal Minimum
 Odd-weight-column SEC-DED Codes", 1970): 64 bits of data, 8 check bits. A syndrome with an odd
 number of ones is a single error if a column matches; with an even number it is two errors.
@@ -25,15 +25,14 @@ LOST = -1
 
 
 def _columns() -> list[int]:
-    """Of the 64 data bits: all 56 bytes with three ones, then the first 8 with five."""
+    """Columns of the 64 data bits: all 56 bytes with three ones, then the first 8 with five."""
     return [
         sum(1 << bit for bit in bits) for ones in (3, 5) for bits in combinations(range(8), ones)
     ][:DATA_BITS]
 
 
 def _tables() -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
-    """Check byte of each value (8, 256) of each data byte, and the bit (256,) of each syndrome
-    that is not 0."""
+    """Check byte per data byte and value (8, 256), and wrong bit per non-zero syndrome (256,)."""
     checks = np.zeros((DATA_BYTES, 256), np.uint8)
     located = np.full(256, LOST, np.int16)
     located[1 << np.arange(8)] = DATA_BITS + np.arange(8)
@@ -48,11 +47,11 @@ _CHECKS, _LOCATED = _tables()
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """What came out of coded words.
+    """Result of decoding.
 
     Attributes:
         data: bytes (8 n,), uint8.
-        corrected: words with one wrong bit, put right.
+        corrected: number of words with one wrong bit, which was corrected.
         lost: indices of words with more than one.
     """
 
@@ -62,12 +61,12 @@ class Decoded:
 
 
 def coded_size(size: int) -> int:
-    """Bytes that ``size`` bytes of data take when coded."""
+    """Bytes of the coded words of ``size`` bytes of data."""
     return -(-size // DATA_BYTES) * CODED_BYTES
 
 
 def encode(data: bytes) -> NDArray[np.uint8]:
-    """Coded words of ``data``, filled up with zeros to a whole word."""
+    """Coded words of ``data``, padded with zeros to a whole word."""
     words = np.zeros((-(-len(data) // DATA_BYTES), CODED_BYTES), np.uint8)
     flat = np.frombuffer(data.ljust(len(words) * DATA_BYTES, b"\0"), np.uint8)
     words[:, :DATA_BYTES] = flat.reshape(-1, DATA_BYTES)

@@ -1,13 +1,13 @@
 """The k-vector: a range of sorted values found without a search.
 
-AraMiS thesis, sections 5.6 and 7.1.2. A curve that resembles the sorted values maps a value to a
-bin, and the k-vector holds where each bin starts. The published curve is a parabola through the
-smallest and the largest value, with its vertex at the largest. The bins of the two bounds hold
-values outside the range too; those are compared away, so a range gives what comparing all values
-would. (The thesis is silent on that; its ground code takes whole bins.)
+AraMiS thesis, sections 5.6 and 7.1.2. A curve similar to the sorted values maps a value to a bin,
+and the k-vector holds the start of each bin. The published curve is a parabola through the smallest
+and the largest value, with its vertex at the largest. The bins of the two bounds also hold values
+outside of the range; comparisons remove them, so a range is the same as from comparing all values.
+(The thesis does not say so; its ground code takes whole bins.)
 
-The same single-precision arithmetic numbers the bins on ground and in flight. It never falls with
-a rising value, so rounding moves no value out of the range.
+Ground and flight compute the bins with the same single-precision arithmetic. It never decreases
+with a rising value, so rounding moves no value out of the range.
 """
 
 from dataclasses import dataclass
@@ -19,25 +19,23 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Floats, Indices
 from cubestack.firmware_model.mcu.costs import Meter
 
-VALUES_PER_BIN = 4
-"""Mean occupation of a bin: more saves memory, and costs comparisons (assumed)."""
+VALUES_PER_BIN = 4  #: mean size of a bin: larger ones save memory, cost comparisons (assumed)
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
 
+#: A list with a smaller span is one bin: the inverse of the span would not be finite.
 _NARROWEST = np.finfo(np.float32).tiny
-"""A list that spans less is one bin: the inverse of its span is no number."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Places `start` to `stop` (excluded) in the sorted values, and how many were looked at."""
+    """Places `start` to `stop` (excluded) in the sorted values, and the number of examined ones."""
 
     start: int
     stop: int
     looked_at: int
 
     def __len__(self) -> int:
-        """Number of values."""
         return self.stop - self.start
 
 
@@ -47,7 +45,7 @@ class KVector:
 
     Attributes:
         lowest, highest: smallest and largest value of the list.
-        starts: (bins + 1,) where each bin starts in the list, uint32; the last is its length.
+        starts: (bins + 1,) start of each bin in the list, uint32; the last is its length.
     """
 
     lowest: np.float32
@@ -65,7 +63,6 @@ class KVector:
 
     @property
     def bins(self) -> int:
-        """Number of bins."""
         return len(self.starts) - 1
 
     def find(self, rising: Floats, low: np.float32, high: np.float32, meter: Meter) -> Range:

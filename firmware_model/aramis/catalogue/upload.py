@@ -1,7 +1,7 @@
 """Loading a catalogue by telecommand: blocks into spare RAM, checked, then written to flash.
 
-AraMiS thesis, section 2.2 (inputStarcatalogue). Nothing of the present catalogue is touched before
-the new one has been checked.
+AraMiS thesis, section 2.2 (inputStarcatalogue). The present catalogue stays unchanged until the new
+one has been checked.
 """
 
 from dataclasses import dataclass
@@ -22,38 +22,37 @@ from cubestack.firmware_model.mcu.requests import Pay, Routine
 
 @dataclass
 class CatalogueUpload:
-    """The catalogue that is being loaded, and written to the store in the end."""
+    """The catalogue that is being loaded; ``commit`` writes it to the store."""
 
     _hardware: AramisHardware
     _meter: Meter
     _store: CatalogueStore
 
     def __post_init__(self) -> None:
-        """None is being loaded."""
         self.begin(0, 0)
 
     @property
     def blocks(self) -> int:
-        """Blocks that the image has; 0 when none is being loaded."""
+        """Number of blocks of the image; 0 if none is being loaded."""
         return len(self._received)
 
     @property
     def received(self) -> int:
-        """Different blocks that came."""
+        """Number of different received blocks."""
         return int(self._received.sum())
 
     @property
     def missing(self) -> int:
-        """First block that did not come; ``blocks`` when none is missing."""
+        """First missing block; ``blocks`` if none is missing."""
         return self.blocks if self._received.all() else int(np.argmin(self._received))
 
     def begin(self, length: int, checksum: int) -> None:
-        """An image of ``length`` bytes with that CRC-32 will come."""
+        """Start the upload of an image of ``length`` bytes with that CRC-32."""
         self._length, self._checksum = length, checksum
         self._received: Mask = np.zeros(-(-length // BLOCK_BYTES), bool)
 
     def put(self, number: int, data: bytes) -> bool:
-        """Take a block; False when it is beyond the image or none is being loaded."""
+        """Store a block; False if it is beyond the image or none is being loaded."""
         if number >= self.blocks:
             return False
         start = number * BLOCK_BYTES
@@ -64,7 +63,7 @@ class CatalogueUpload:
         return True
 
     def commit(self) -> Routine[bool]:
-        """Check the image and write it to flash; False when it is refused."""
+        """Check the image and write it to flash; False if it is rejected."""
         length, image = self._length, self._image()
         self._meter.charge(ram_read=-(-length // 4), table_byte=length, loop=length)
         yield Pay()

@@ -1,1 +1,1 @@
-"""CubeSense's links to the outside, one for each protocol."""
+"""CubeSense's external links, one per protocol."""

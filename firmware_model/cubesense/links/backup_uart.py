@@ -1,10 +1,11 @@
-"""The register-pointer protocol's side of the satellite on the backup UART; interrupts.
+"""The register-pointer protocol on the backup UART; interrupt context.
 
-CubeSense thesis, section 6.4.3: the same protocol as on I2C. So a message is the slave's address
-with the direction in its lowest bit, a register's address and, to write, one data byte. A read is
-answered with the register's value, which comes without a further address as a UART has no repeated
-start. Assumed: bytes before the slave's address are ignored; a long silence ends half a message;
-where I2C reads as nothing, no answer comes; a message that begins while a picture is sent ends it.
+CubeSense thesis, section 6.4.3: the same protocol as on I2C. A message is the slave's address with
+the direction in its lowest bit, a register's address and, to write, one data byte. The answer to a
+read is the register's value, without another address, because a UART has no repeated start.
+Assumed: bytes before the slave's address are ignored; a long silence ends an incomplete message;
+where I2C reads fill bytes, there is no answer; a message that begins while an image is sent ends
+it.
 """
 
 from dataclasses import dataclass
@@ -19,16 +20,15 @@ from cubestack.firmware_model.mcu.requests import Routine
 
 @dataclass(eq=False)
 class BackupUart:
-    """Messages on the node's UART, in place of the node protocol's; no pointer stays.
+    """Messages on the node's UART, in place of the node protocol's; the pointer is not kept.
 
     Attributes:
-        registers: what they read and write.
+        registers: the registers that they read and write.
     """
 
     registers: RegisterLink
 
     def __post_init__(self) -> None:
-        """No message has begun."""
         link = self.registers
         self._picture = PictureSender(link.hardware, link.meter, link.reader, Port.NODE)
         self._work = Background(self._send)
@@ -36,7 +36,7 @@ class BackupUart:
         self._message = bytearray()
 
     def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte came."""
+        """Interrupt: a byte was received."""
         self.registers.meter.charge(uart_interrupt=1)
         if not self._message and byte >> 1 != REGISTERS.i2c_address:
             return
@@ -53,7 +53,7 @@ class BackupUart:
             self.registers.write(address, *data)
 
     def uart_silence(self) -> None:
-        """Interrupt: nothing came for a while; half a message is void."""
+        """Interrupt: nothing was received for a while; an incomplete message is dropped."""
         self._message.clear()
 
     def _answer(self, address: int) -> None:
@@ -69,7 +69,7 @@ class BackupUart:
             self.registers.hardware.wake()
 
     def _send(self) -> Routine[None]:
-        """Main loop: a piece of the picture, and a turn for the next one."""
+        """Main loop: send a piece of the image, and queue the next one."""
         sram = self.registers.state.image_sram
         done = not self._sending or (yield from self._picture.send_some(sram))
         if self._sending and not done:

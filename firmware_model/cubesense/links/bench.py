@@ -1,10 +1,10 @@
-"""The one-letter bench protocol's side of the bench computer; the port's interrupts and answers.
+"""The one-letter protocol with the bench computer: the port's interrupts and answers.
 
-CubeSense thesis, appendix E. Letters are answered one after the other, a picture in pieces, between
-which the program does other jobs. Assumed: four letters wait at most, and one that meets more is
-lost; other bytes are ignored; a capture that fails, and a picture that can not be read, are not
-answered. The I2C register's stream waits for the end of a picture here: taking turns, each would
-begin its own anew for every piece.
+CubeSense thesis, appendix E. Letters are answered one after the other, an image in pieces, between
+which the program does other jobs. Assumed: at most four letters wait, and further ones are lost;
+other bytes are ignored; a failed capture, and an image that cannot be read, are not answered. The
+I2C register's stream waits for the end of an image here: taking turns, each would start its own
+image again for every piece.
 """
 
 from collections import deque
@@ -21,8 +21,7 @@ from cubestack.firmware_model.interface.cubesense import codes, service_port
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Routine
 
-LETTERS = 4
-"""Letters that wait."""
+LETTERS = 4  #: most letters that wait
 
 _CAMERAS: dict[Letter, codes.Camera] = {
     letter: camera
@@ -43,13 +42,12 @@ class BenchLink:
     measurement: Measurement
 
     def __post_init__(self) -> None:
-        """No letter waits."""
         self._letters: deque[Letter] = deque()
         self._work = Background(self._serve)
         self._picture = PictureSender(self.hardware, self.meter, self.reader, Port.BENCH)
 
     def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte came."""
+        """Interrupt: a byte was received."""
         self.meter.charge(uart_interrupt=1)
         letter = service_port.SERVICE_PORT.find(byte)
         if letter is None or len(self._letters) >= LETTERS:
@@ -59,10 +57,10 @@ class BenchLink:
         self.hardware.wake()
 
     def uart_silence(self) -> None:
-        """Interrupt: nothing came for a while, which means nothing here."""
+        """Interrupt: nothing was received for a while, which has no effect here."""
 
     def _serve(self) -> Routine[None]:
-        """Main loop: answer the oldest letter, a picture piece by piece."""
+        """Main loop: answer the oldest letter, an image piece by piece."""
         letter = self._letters[0]
         camera = _CAMERAS[letter]
         if letter == service_port.CAPTURES[camera]:

@@ -1,9 +1,9 @@
-"""CubeSense's link by the node protocol, on UART and I2C; interrupts.
+"""CubeSense's link with the node protocol, on UART and I2C; interrupt context.
 
-Assumed, where the public material is silent: an unknown telemetry ID raises UartProtocolError on
-the UART, I2cTlmReadError (once it is read) on I2C. Counters count every message that came, refused
-ones too. A result that schedules the next measurement does so once its answer is on its way (UART),
-or once the transfer that read some of it has ended (I2C); when the queue is full nothing is
+Assumed, because the public material does not say: an unknown telemetry ID raises UartProtocolError
+on the UART, I2cTlmReadError (once it is read) on I2C. Counters count every received message,
+rejected ones too. A result that schedules the next measurement does so once its answer is queued
+(UART), or once the transfer that read a part of it has ended (I2C); if the queue is full nothing is
 scheduled, the result stays, and TcmdBufferOverrun is raised.
 """
 
@@ -21,8 +21,8 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE, codes
 from cubestack.firmware_model.interface.cubesense.telemetry import SCHEDULES
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, SatelliteLink
 
+#: Capacity of the UART's send buffer: the longest answer, every byte of it doubled.
 SEND_BYTES = len(encode_frame(b"")) + 2 * codes.FRAME_BYTES
-"""What the UART may still have to send: the longest answer, every byte of it doubled."""
 
 _FLAGS = LinkFlags(
     uart=BusFlags("TcmdBufferOverrun", unknown_telemetry="UartProtocolError"),
@@ -34,10 +34,10 @@ _FLAGS = LinkFlags(
 
 
 class NodeLink(SatelliteLink):
-    """Decodes what the host sends and answers it."""
+    """Decodes the host's messages and answers them."""
 
     def __init__(self, queue: JobQueue, telemetry: Telemetry) -> None:
-        """Fill ``queue``; ``telemetry`` gives values, and what it reports on is used here too."""
+        """Fill ``queue``; ``telemetry`` provides values, and its state is used here too."""
         hardware, self._state = telemetry.hardware, telemetry.state
         super().__init__(hardware, telemetry.meter, self._state, INTERFACE, _FLAGS, SEND_BYTES)
         self._mcu_addressing = hardware.mcu_addressing
@@ -66,18 +66,18 @@ class NodeLink(SatelliteLink):
         return sent
 
     def i2c_start(self, read: bool) -> None:
-        """Interrupt: the node's address came; a repeated start ends what came before."""
+        """Interrupt: the node is addressed; a repeated start ends the previous message."""
         self.i2c_stop()
         super().i2c_start(read)
 
     def _finish_read(self) -> None:
-        """An answer is used up once some of it was read."""
+        """An answer is used up once a part of it was read."""
         if self._position and self._answer is not None:
             super()._finish_read()
             self._taken(self._requested)
 
     def _taken(self, identifier: int) -> None:
-        """The host has a telemetry message, which may schedule a measurement."""
+        """The host has read a telemetry message, which may schedule a measurement."""
         if identifier not in SCHEDULES:
             return
         camera, sram = SCHEDULES[identifier]
@@ -90,7 +90,7 @@ class NodeLink(SatelliteLink):
     # --- telecommands -----------------------------------------------------------------------------
 
     def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
-        """Check a telecommand and queue it; what telemetry TcmdProcessed says follows."""
+        """Check a telecommand and queue it; update telemetry TcmdProcessed."""
         self._state.telecommands += 1
         if self._latest is not None:
             self._latest.latest = False
@@ -105,7 +105,7 @@ class NodeLink(SatelliteLink):
         return super()._refusals(message, values) or [None] * (not self._possible(message, values))
 
     def _possible(self, message: Message, values: dict[str, Any]) -> bool:
-        """What the table can not say of a telecommand's parameters."""
+        """Checks of a telecommand's parameters that the table cannot express."""
         match message.name:
             case "NextImageFrame":
                 return self._download.has(int(values["Frame"]))
@@ -123,7 +123,7 @@ class NodeLink(SatelliteLink):
         return self._queue.put(self._latest)
 
     def _announce(self, job: TelecommandJob) -> None:
-        """What telemetry shows of a telecommand before it is executed."""
+        """Update telemetry before a telecommand is executed."""
         values = job.values
         match job.message.name:
             case "CaptureAndDetect" | "CaptureOnly":

@@ -1,4 +1,4 @@
-"""A picture over a UART, piece by piece, as the UART has room for it.
+"""Sends an image over a UART, piece by piece, as the UART has room for it.
 
 The program does other jobs between two pieces.
 """
@@ -11,15 +11,15 @@ from cubestack.firmware_model.interface.cubesense import codes, service_port
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
+#: Bytes of an image that are read and queued at once, while at most as many are still queued.
 CHUNK_BYTES = 24
-"""Bytes of a picture that are read and handed to the UART at once, while as many may still wait."""
 
 _BYTE_US = -(-10 * 1_000_000 // service_port.SERVICE_PORT.baud)
 
 
 @dataclass(eq=False)
 class PictureSender:
-    """Sends pictures on ``port``, one at a time."""
+    """Sends images on ``port``, one at a time."""
 
     hardware: CubeSenseHardware
     meter: Meter
@@ -28,11 +28,11 @@ class PictureSender:
     _sent: int = field(default=0, init=False)
 
     def begin(self) -> None:
-        """What is sent next is a picture's first pixel."""
+        """Start again with the first pixel."""
         self._sent = 0
 
     def send_some(self, sram: codes.Sram) -> Routine[bool]:
-        """Send what there is room for; True at the picture's end, or when it can not be read."""
+        """Send as much as there is room for; True at the image's end, or if it cannot be read."""
         too_many = self.hardware.uart_backlog(self.port) - CHUNK_BYTES
         if too_many > 0:
             now_us: int = yield ReadTimer()
@@ -43,13 +43,12 @@ class PictureSender:
         data = yield from self.reader.read_run(sram, start, count)
         if data is None:
             return True
-        if self._sent != start:  # a new beginning meanwhile
+        if self._sent != start:  # restarted meanwhile
             return False
         self.send(data)
         self._sent += count
         return self._sent == codes.IMAGE_BYTES
 
     def send(self, data: bytes) -> None:
-        """Hand ``data`` to the UART."""
         self.meter.charge(uart_interrupt=len(data))
         self.hardware.uart_send(data, self.port)

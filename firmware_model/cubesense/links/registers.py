@@ -1,12 +1,12 @@
-"""The register-pointer protocol's side of the satellite, on I2C; interrupts.
+"""The register-pointer protocol on I2C; interrupt context.
 
-CubeSense thesis, section 6.4.3. Settings and results are the node protocol's own: a setting is
-stored at once, before telecommands that wait, and an action waits with them. A slave can not
-refuse, so an action that meets a full queue is lost and raises TcmdBufferOverrun. Each transfer
-carries one data byte; a further one is not acknowledged.
+CubeSense thesis, section 6.4.3. Settings and results are those of the node protocol: a setting is
+stored at once, before telecommands that wait, and an action waits with them. A slave cannot reject
+data, so an action that meets a full queue is lost and raises TcmdBufferOverrun. Each transfer has
+one data byte; further ones are not acknowledged.
 
-The picture is read ahead of the host into a small buffer, and while that is empty the clock is
-stretched. A picture that can not be read, because its memory is off, is all ``FILL``.
+The image is read ahead of the host into a small buffer; while that is empty the clock is stretched.
+An image that cannot be read, because its memory is off, reads as ``FILL``.
 """
 
 from collections.abc import Callable
@@ -22,34 +22,32 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, regis
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Routine
 
-READ_AHEAD_BYTES = 32
-"""Bytes of the picture that wait for the host; new ones are fetched when half of them are left."""
+READ_AHEAD_BYTES = 32  #: buffered bytes of the image; it is refilled when half of them are left
 
 _SETTINGS = {
     f"{camera.name}_{name}": (camera, "auto_adjust" if name == "AUTO" else name.lower())
     for camera in codes.Camera
     for name in ("THRESHOLD", "EXPOSURE", "GAIN", "BLUE_GAIN", "RED_GAIN", "AUTO")
 }
-"""Camera, and attribute of its settings, by register."""
+"""Camera and attribute of its settings, by register."""
 
 _RESULTS: dict[str, tuple[codes.Camera, str, int]] = {
     f"{camera.name}_{name}": (camera, name.lower(), scale)
     for camera in codes.Camera
     for name, scale in (("CAPTURE", 1), ("DETECT", 1), ("POINTS", 1), ("X", 100), ("Y", 100))
 }
-"""Camera, attribute of its result, and counts for a unit, by register."""
+"""Camera, attribute of its result, and counts per unit, by register."""
 
 
 @dataclass(eq=False)
 class ImageStream:
-    """A picture that the host reads byte by byte."""
+    """An image that the host reads byte by byte."""
 
     hardware: CubeSenseHardware
     queue: JobQueue
     reader: PictureReader
 
     def __post_init__(self) -> None:
-        """Nothing is streamed."""
         self._work = Background(self._fill)
         self._ahead = bytearray()
         self._sram: codes.Sram | None = None
@@ -58,18 +56,18 @@ class ImageStream:
 
     @property
     def active(self) -> bool:
-        """Whether the pointer is at the picture."""
+        """Whether the pointer is at the image."""
         return self._sram is not None
 
     def begin(self, sram: codes.Sram | None) -> None:
-        """Stream the picture in ``sram`` from its first pixel, or None: end the stream."""
+        """Stream the image in ``sram`` from its first pixel; None ends the stream."""
         self._sram = sram
         self._ahead.clear()
         self._fetched = 0
         self._turn += 1
 
     def next(self) -> int | None:
-        """The next byte; None while it has to be waited for."""
+        """The next byte; None if the host must wait for it."""
         wanted = self._fetched < codes.IMAGE_BYTES and len(self._ahead) <= READ_AHEAD_BYTES // 2
         if wanted and self.queue.request(self._work):
             self.hardware.wake()
@@ -92,7 +90,7 @@ class ImageStream:
 
 @dataclass(eq=False)
 class RegisterLink:
-    """Registers behind the pointer."""
+    """Registers behind the pointer, which selects none until a host sets it."""
 
     hardware: CubeSenseHardware
     meter: Meter
@@ -101,7 +99,6 @@ class RegisterLink:
     reader: PictureReader
 
     def __post_init__(self) -> None:
-        """The pointer is at no register until a host sets it."""
         self._image = ImageStream(self.hardware, self.queue, self.reader)
         self._register: PointerRegister | None = None
         self._latched = b""
@@ -116,11 +113,11 @@ class RegisterLink:
         }
 
     def i2c_start(self, read: bool) -> None:
-        """Interrupt: our address came, to write or to ``read``."""
+        """Interrupt: the node is addressed, for a write or a ``read``."""
         self._written = 0
 
     def i2c_write(self, byte: int) -> bool:
-        """Interrupt: the pointer, or a data byte; one beyond that is not acknowledged."""
+        """Interrupt: the pointer, or a data byte; further ones are not acknowledged."""
         self.meter.charge(i2c_interrupt=1)
         self._written += 1
         if self._written == 1:
@@ -134,7 +131,7 @@ class RegisterLink:
         return True
 
     def i2c_read(self) -> int | None:
-        """Interrupt: the next byte is wanted; None: not there yet, the clock is stretched."""
+        """Interrupt: the master reads a byte; None: not available yet, the clock is stretched."""
         if self._image.active:
             byte = self._image.next()
         elif self._position < len(self._latched):
@@ -147,11 +144,10 @@ class RegisterLink:
         return byte
 
     def i2c_stop(self) -> None:
-        """Interrupt: the transfer ended."""
         self._written = 0
 
     def _latch(self) -> None:
-        """Take the register's value, all bytes of it at one time."""
+        """Latch the register's value, all bytes of it at the same time."""
         register = self._register
         self._position = 0
         streams = register is not None and register.streams
@@ -162,7 +158,7 @@ class RegisterLink:
         self._latched = self.read(register)
 
     def read(self, register: PointerRegister) -> bytes:
-        """Value of one that can be read and is no stream."""
+        """Value of a readable register that is not a stream."""
         self.meter.charge(host_message=1)
         return register.encode(self._value(register.name))
 
@@ -181,7 +177,7 @@ class RegisterLink:
         return others[name]
 
     def write(self, address: int, byte: int) -> None:
-        """Store ``byte``, or act on it; ignored where it may not be."""
+        """Store ``byte``, or act on it; ignored if it is not allowed."""
         register = registers.REGISTERS.at(address)
         if register is None or register.streams:
             return

@@ -1,1 +1,1 @@
-"""From edges and Sun pixels to directions, in 16-bit arithmetic."""
+"""Directions from edges and Sun pixels, in 16-bit arithmetic."""

@@ -1,8 +1,8 @@
 """Circles through edges, in the part's single precision.
 
 CubeSense thesis, sections 4.4.1.3 and 6.5.3.1 (least squares, equations 4.4.13 to 4.4.18, by the
-inverse's first rows). Extensions are the radius, which needs the third row too, leaving one point
-out of the sums again, and refusing what is no circle.
+inverse's first rows). Extensions are the radius, which needs the third row too, removing one point
+from the sums again, and rejecting points that form no circle.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 Values = NDArray[np.float32]
 
-FEWEST = 3
-"""Points that a circle needs."""
+FEWEST = 3  #: points that a circle needs
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Circle:
         return self.x * self.x + self.y * self.y - self.radius * self.radius
 
     def residuals(self, points: Values, meter: Meter) -> Values:
-        """How far outside of the circle points (n, 2) lie, to first order: (d^2 - R^2) / 2R."""
+        """Distances outside of the circle of points (n, 2), to first order: (d^2 - R^2) / 2R."""
         dx, dy = points[:, 0] - self.x, points[:, 1] - self.y
         square = self.radius * self.radius
         count = len(points)
@@ -42,21 +41,20 @@ class Circle:
 
 
 class LeastSquaresCircle:
-    """The normal equations, filled with points once."""
+    """The normal equations of points (n, 2)."""
 
     def __init__(self, points: Values, meter: Meter) -> None:
-        """Sum up points (n, 2)."""
         self._meter = meter
         self._count = len(points)
         self._sums = sequential_sum(self._terms(points))
 
     def remove(self, point: Values) -> None:
-        """Take one point (2,) out again."""
+        """Remove one point (2,) again."""
         self._sums = self._sums - self._terms(point[None])[0]
         self._count -= 1
 
     def _terms(self, points: Values) -> Values:
-        """What each point adds (n, 8): the published program sums all 12 elements."""
+        """Terms of each point (n, 8); the published program sums all 12 elements."""
         x, y = points.astype(np.float32).T
         z = x * x + y * y
         self._meter.charge(f32_mul=14 * len(points), f32_add=13 * len(points), loop=len(points))
@@ -64,13 +62,13 @@ class LeastSquaresCircle:
         return np.stack([two * x * x, two * x * y, two * y * y, x, y, z * x, z * y, z], axis=1)
 
     def solve(self) -> Circle | None:
-        """The circle; None when there are too few points, or they lie on a line."""
+        """The circle; None if there are too few points, or they lie on a line."""
         if self._count < FEWEST:
             return None
         determinant, products = self._solution()
         xx, _, yy, *_ = self._sums
         self._meter.charge(f32_mul=18 + 3 + 9, f32_add=9 + 2 + 6, f32_compare=1)
-        # A determinant this small by its largest product is rounding alone.
+        # A determinant this small relative to its largest product is only rounding.
         if abs(determinant) <= np.float32(1e-5) * abs(xx * yy * np.float32(self._count)):
             return None
         x, y, c = products / determinant
@@ -81,24 +79,25 @@ class LeastSquaresCircle:
         return Circle(x, y, np.sqrt(square))
 
     def centre(self) -> Values | None:
-        """The centre (2,) as listing C.5 calculates it, out of any points; None where it divides by
-        0, which the listing does not prevent.
+        """The centre (2,) as in listing C.5, from any points.
+
+        None where it divides by 0, which the listing does not prevent.
         """
         determinant, products = self._solution()
         self._meter.charge(f32_mul=9 + 12 + 6, f32_add=5 + 6 + 4, f32_div=2)
         return products[:2] / determinant if determinant else None
 
     def _solution(self) -> tuple[np.float32, Values]:
-        """Determinant, and the determinant times centre (x, y) and squared radius less theirs."""
+        """Determinant; and it times the centre (x, y) and (squared radius - squared centre)."""
         xx, xy, yy, sx, sy, zx, zy, z = self._sums
         n = np.float32(self._count)
         matrix = np.array([[xx, xy, sx], [xy, yy, sy], [2 * sx, 2 * sy, n]])
 
-        def turned(down: int, right: int) -> Values:
+        def rotated(down: int, right: int) -> Values:
             return np.roll(matrix, (-down, -right), (0, 1))
 
         # The inverse, transposed, times the determinant; cyclic indices give the sign.
-        cofactors = turned(1, 1) * turned(2, 2) - turned(1, 2) * turned(2, 1)
+        cofactors = rotated(1, 1) * rotated(2, 2) - rotated(1, 2) * rotated(2, 1)
         determinant = np.float32(sequential_sum(matrix[0] * cofactors[0]))
         # The thesis' unknowns are the negative centre, and its right side is negative too.
         return determinant, sequential_sum(cofactors * np.array([[zx], [zy], [z]]))

@@ -1,16 +1,16 @@
-"""Undoing the fisheye's distortion with a table of radii.
+"""Removes the fisheye's distortion with a table of radii.
 
-CubeSense thesis, sections 5.2 (equation 5.2.3, 2.9 px for a degree), 6.2 (the table) and 6.3
+CubeSense thesis, sections 5.2 (equation 5.2.3, 2.9 px per degree), 6.2 (the table) and 6.3
 (equations 6.3.7 to 6.3.9).
 
 The published table has 227 bytes, the undistorted radius less the distorted one in whole pixels.
-Its printed last entry, 49, is what the polynomial gives when differences are rounded up. A whole
-pixel is 0.34 deg. Equation 6.3.7, and the listing with it, adds the interpolated difference to the
+Its printed last entry, 49, is the polynomial's value if differences are rounded up. A whole pixel
+is 0.34 deg. Equation 6.3.7, and the listing with it, adds the interpolated difference to the
 radius' whole pixels only, where equations 6.3.2 and 6.3.6 add it to the radius: on average the lost
-half pixel makes up for the rounding.
+half pixel compensates the rounding.
 
-Assumed: a table of 16-bit entries in 1/100 px, added to the whole radius. It was the compiler's
-pages of 256 bytes that forbade one in RAM; flash has room.
+Assumed: a table of 16-bit entries in 1/100 px, added to the whole radius. Only the compiler's pages
+of 256 bytes forbade it in RAM; flash has room.
 
 An extension: `Projection.STEREOGRAPHIC`, see there.
 """
@@ -22,35 +22,32 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubesense.vision.arithmetic import HUNDREDTHS, to_int16
+from cubestack.firmware_model.cubesense.vision.arithmetic import HUNDREDTHS, polynomial, to_int16
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.firmware_model.mcu.costs import Meter
 
-RIM_PX = 226
-"""Radius in the picture where the field of view ends (table 5.1)."""
+RIM_PX = 226  #: image radius at which the field of view ends (table 5.1)
 
 TABLE_ENTRIES = RIM_PX + 1
 
-FOCAL_PX = np.float32(np.degrees(PIXELS_PER_DEGREE))
-"""Undistorted pixels for one radian of field angle."""
+FOCAL_PX = np.float32(np.degrees(PIXELS_PER_DEGREE))  #: undistorted pixels per radian
 
 NEWTON_LIMIT = 20
 NEWTON_END_PX = 1e-3
-FINE_PER_PX = 100
-"""Unit of our table."""
+FINE_PER_PX = 100  #: entries per pixel of the fine table
 
 Values = NDArray[np.float32]
 
 
 class DistortionError(ValueError):
-    """Coefficients that have no inverse over the field of view."""
+    """Coefficients without an inverse over the field of view."""
 
 
 class Projection(Enum):
-    """Where a table puts a field angle theta.
+    """Radius that a table assigns to a field angle theta.
 
-    In the published one the circle of the Earth's limb is no circle off the boresight, so a circle
+    In the published one the image of the Earth's limb is no circle off the boresight, so a circle
     fitted to it is biased. The stereographic projection maps every circle in the sky to a circle.
     Half of its usual scale keeps results within an int of 1/100 px.
     """
@@ -61,12 +58,12 @@ class Projection(Enum):
 
 @dataclass(frozen=True, eq=False)
 class RadiusTable:
-    """New radius less the radius in the picture, for every pixel of the latter.
+    """New radius less the radius in the image, for every pixel of the latter.
 
     Attributes:
         differences: (227,) in 1 / `per_px` px.
         per_px: unit of the entries.
-        entry_bytes: flash of one entry.
+        entry_bytes: flash per entry.
         drops_fraction: add to the radius' whole pixels only, as equation 6.3.7 is printed.
     """
 
@@ -77,14 +74,14 @@ class RadiusTable:
 
     @property
     def size(self) -> int:
-        """Flash that the table takes, in bytes."""
+        """Flash for the table, in bytes."""
         return len(self.differences) * self.entry_bytes
 
     def correct(self, offsets: Values, meter: Meter) -> NDArray[np.int16]:
-        """Move points (n, 2), offsets from the boresight in px; the result is in 1/100 px.
+        """Correct points (n, 2), offsets from the boresight in px; the result is in 1/100 px.
 
-        Beyond the table its last two entries are continued, and the boresight stays where it is;
-        the text leaves both open.
+        Beyond the table its last two entries are extrapolated, and the boresight does not move; the
+        text leaves both open.
         """
         x, y = offsets.astype(np.float32).T
         radius = np.sqrt(x * x + y * y)
@@ -117,26 +114,26 @@ class RadiusTable:
 def byte_table(meter: Meter, coefficients: Sequence[float] = DISTORTION) -> RadiusTable:
     """The published table: whole pixels, rounded up; r_d in px is the sum of coefficients[k] r_u^k.
 
-    DistortionError when they have no inverse, or one more than 255 px away.
+    Raises DistortionError if they have no inverse, or one more than 255 px away.
     """
-    difference = _undistorted(coefficients, meter) - np.arange(TABLE_ENTRIES, dtype=np.float32)
-    return _stored(np.maximum(np.ceil(difference), 0), 255, meter, published=True)
+    difference = _undistort(coefficients, meter) - np.arange(TABLE_ENTRIES, dtype=np.float32)
+    return _make_table(np.maximum(np.ceil(difference), 0), 255, meter, published=True)
 
 
 def fine_table(
     meter: Meter, projection: Projection, coefficients: Sequence[float] = DISTORTION
 ) -> RadiusTable:
-    """Our table: 1/100 px, rounded to the nearest; arguments and errors as `byte_table`."""
-    radius = _undistorted(coefficients, meter)
+    """The table in 1/100 px, rounded to nearest; arguments and errors as for `byte_table`."""
+    radius = _undistort(coefficients, meter)
     if projection is Projection.STEREOGRAPHIC:
         half_angle = radius * np.float32(0.5 / FOCAL_PX)
         radius = FOCAL_PX * np.tan(np.minimum(half_angle, np.float32(np.pi / 2)))
         meter.charge(f32_tan=TABLE_ENTRIES, f32_mul=2 * TABLE_ENTRIES)
     difference = radius - np.arange(TABLE_ENTRIES, dtype=np.float32)
-    return _stored(np.rint(difference * FINE_PER_PX), 32767, meter, published=False)
+    return _make_table(np.rint(difference * FINE_PER_PX), 32767, meter, published=False)
 
 
-def _stored(entries: Values, largest: int, meter: Meter, *, published: bool) -> RadiusTable:
+def _make_table(entries: Values, largest: int, meter: Meter, *, published: bool) -> RadiusTable:
     per_px = 1 if published else FINE_PER_PX
     furthest = float(np.abs(entries).max())
     if not furthest <= largest:
@@ -147,7 +144,7 @@ def _stored(entries: Values, largest: int, meter: Meter, *, published: bool) -> 
     return RadiusTable(entries.astype(np.int16), per_px, 1 if published else 2, published)
 
 
-def _undistorted(coefficients: Sequence[float], meter: Meter) -> Values:
+def _undistort(coefficients: Sequence[float], meter: Meter) -> Values:
     """Undistorted radius (227,) for every distorted one, by Newton's method from the latter."""
     terms = [np.float32(value) for value in coefficients]
     slopes = [np.float32(power) * value for power, value in enumerate(terms)][1:]
@@ -156,10 +153,10 @@ def _undistorted(coefficients: Sequence[float], meter: Meter) -> Values:
     active = np.ones(TABLE_ENTRIES, dtype=bool)
     for _ in range(NEWTON_LIMIT):
         at = radius[active]
-        slope = _polynomial(slopes, at)
+        slope = polynomial(slopes, at)
         if not np.all(slope > 0):
             break
-        step = (_polynomial(terms, at) - target[active]) / slope
+        step = (polynomial(terms, at) - target[active]) / slope
         radius[active] = at - step
         count, products = len(at), len(terms) + len(slopes) - 2
         meter.charge(
@@ -176,11 +173,3 @@ def _undistorted(coefficients: Sequence[float], meter: Meter) -> Values:
         f"coefficients must rise steadily over radii up to {RIM_PX} px, not be "
         f"{', '.join(f'{value:g}' for value in coefficients)}"
     )
-
-
-def _polynomial(terms: Sequence[np.float32], at: Values) -> Values:
-    """Horner's rule, in single precision."""
-    value = np.full_like(at, terms[-1])
-    for term in reversed(terms[:-1]):
-        value = value * at + term
-    return value

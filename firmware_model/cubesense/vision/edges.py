@@ -1,28 +1,28 @@
-"""Edges of the Earth in the lines that the nadir FPGA scans, as their pixels come over the pins.
+"""Edges of the Earth in the lines that the nadir FPGA scans, found while their pixels are read.
 
 CubeSense thesis, sections 4.2.2, 6.5.1, 6.5.2 and appendices C.3 and C.4. Every 64th pixel of a
 line is a sample. Between two samples on different sides of the threshold, a binary search in the
 buffer finds the first bright pixel. An edge at or beyond the rim of the field of view is false. The
-pixel before a line is dark; the text leaves that open. Boresight: table 5.1.
+pixel before a line counts as dark; the text leaves that open. Boresight: table 5.1.
 
-As printed, the buffer's first pixel is a bound of the search and the steps are 6, or 5, whatever
-they find: a bright line that ends with a sample is found to end one pixel late. The edge is the
-centre of the bright pixel, up to a pixel inside, which also lets parts of the lens' rim pass.
+As printed, the buffer's first pixel is a bound of the search and the number of steps is 6, or 5,
+whatever they find: if a bright line ends with a sample, the edge is found one pixel late. The edge
+is the centre of the bright pixel, up to a pixel inside, so parts of the lens' rim pass the check.
 
 An extension, with ``sub_pixel``: the previous sample is a bound, and the edge lies between the two
-pixels that the search ends with, where a straight line through their values meets the threshold.
+pixels at which the search ends, where a straight line through their values meets the threshold.
 
-Another, with ``sharp``: an edge counts as the Earth's limb only where it is dark a few pixels
-outside; the terminator and clouds fade more slowly. Both ends of a short bright run are no edges:
-the limb seldom just touches a line, and the Sun is often in the field. Lines are searched with a
-third of the threshold's distance from dark, as a limb in low sunlight is no brighter, and the edge
-lies half-way up to what is a few pixels inside, as a dim limb meets a fixed threshold further in
-than a bright one.
+Another, with ``sharp``: an edge counts as the Earth's limb only if it is dark a few pixels outside;
+the terminator and clouds fade more slowly. Both ends of a short bright run are no edges: the limb
+rarely just touches a line, and the Sun is often in the field. The search's threshold is a third of
+the threshold's distance from dark, because a limb in low sunlight is no brighter, and the edge is
+placed half-way to the level a few pixels inside, because a dim limb meets a fixed threshold further
+inside than a bright one.
 
-Appendix C.3 has two slips that the text has not, here with ``listing``: edges of the last 32 rows
-come out 224 rows too high, and the rim has a centre of its own. The 1 that it adds to positions is
-right for gateware as flown (appendix D.3), which presents each pixel one clock early
-(``ReadOut.scan_start``); so samples are one pixel further on there.
+Appendix C.3 has two slips that the text does not have, reproduced with ``listing``: edges of the
+last 32 rows come out 224 rows too high, and the rim has a separate centre. The 1 that it adds to
+positions is right for gateware as flown (appendix D.3), which presents each pixel one clock early
+(``ReadOut.scan_start``); samples are one pixel further there.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -41,25 +41,19 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 LISTED_RIM_CENTRE = (367.0, 237.0)
 
-LISTED_REST = 32
-"""Pixels at a column's end; the listing halves where they start."""
+LISTED_REST = 32  #: pixels at a column's end; the listing halves their start
 
+#: Distances from an edge: outside, where it must be dark even if a line grazes the limb; inside.
 OUTSIDE_PX, INSIDE_PX = 6, 3
-"""How far outside of an edge it must be dark, as the limb may graze a line; and where it is lit."""
 
-MOST_INWARDS = 3
-"""Pixels that an edge found by a low threshold may be moved inwards."""
+MOST_INWARDS = 3  #: largest shift inwards, in pixels, of an edge found with a low threshold
+SHORT_PX = 40  #: longest bright run of a small light: the Sun with its bloom has some 25
+DARK = 34  #: level of an image without light (section 5.7)
 
-SHORT_PX = 40
-"""A bright run of a line up to this long is a small light: the Sun with its bloom has some 25."""
-
-DARK = 34
-"""Level of a picture without light (section 5.7)."""
-
+#: Edges that the part stores: assumed. The widest Earth has 28, the rest is for false ones.
 MAX_EDGES = 2 * EDGES_PER_FRAME
-"""Edges that the part keeps: assumed. The widest Earth has 28, the rest is for false ones."""
 
-Asked = TypeVar("Asked")
+Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 
 
@@ -70,7 +64,7 @@ class EdgeConfig:
     Attributes:
         threshold: a pixel at or above it is bright.
         boresight: (x, y) in px.
-        rim_px: an edge so far from the boresight is false.
+        rim_px: an edge at least this far from the boresight is false.
         masks: areas whose edges are dropped.
         sub_pixel: interpolate between the pixels of an edge.
         listing: with the slips of appendix C.3.
@@ -87,12 +81,12 @@ class EdgeConfig:
 
     @property
     def level(self) -> int:
-        """Where lines are bright."""
+        """Threshold of the search in lines."""
         return DARK + (self.threshold - DARK) // 3 if self._lowered else self.threshold
 
     @property
     def darkest(self) -> int:
-        """A pixel outside of a sharp edge is at most so bright: half-way from dark to bright."""
+        """Largest value outside of a sharp edge: half-way from dark to bright."""
         return (self.level + DARK) // 2
 
     @property
@@ -105,11 +99,10 @@ class EdgeList:
 
     Attributes:
         false: edges dropped at the rim, in a mask, of small lights, or because they are not sharp.
-        full: whether there were more than the part keeps.
+        full: more edges were found than the part stores.
     """
 
     def __init__(self, config: EdgeConfig, meter: Meter) -> None:
-        """Start with none."""
         self._config = config
         self._meter = meter
         self._points: list[tuple[int, int]] = []
@@ -120,7 +113,6 @@ class EdgeList:
         self.full = False
 
     def __len__(self) -> int:
-        """Number of edges kept."""
         return len(self._points)
 
     @property
@@ -130,12 +122,12 @@ class EdgeList:
 
     @property
     def sides(self) -> NDArray[np.int8]:
-        """Where the bright side of each is (n, 2): one of x and y is 1 or -1, the other 0."""
+        """Direction of the bright side of each (n, 2): one of x and y is 1 or -1, the other 0."""
         return np.array(self._sides, np.int8).reshape(-1, 2)
 
     @property
     def lit(self) -> NDArray[np.bool_]:
-        """Which edges (n,) are as bright inside as the threshold asks for."""
+        """Mask (n,) of the edges whose inside reaches the threshold."""
         return np.array(self._lit, bool)
 
     def offsets(self) -> NDArray[np.float32]:
@@ -151,9 +143,9 @@ class EdgeList:
     def add(
         self, line: int, vertical: bool, crossing: "Crossing", around: tuple[int, int] | None = None
     ) -> None:
-        """Judge and keep an edge on scanned row, or column, ``line``.
+        """Check and store an edge on scanned row, or column, ``line``.
 
-        ``around`` has the values outside of it and inside, where an edge must be sharp.
+        ``around`` has the values outside and inside of an edge that must be sharp.
         """
         along, level = EDGE_UNIT * crossing.bright, self._config.level
         if around is not None:
@@ -179,8 +171,10 @@ class EdgeList:
             self._lit.append(around is None or around[1] >= self._config.threshold)
 
     def _ends_short(self, line: int, vertical: bool, crossing: "Crossing", soft: bool) -> bool:
-        """Whether the edge ends a short bright run, whose begin is then dropped as well; a soft
-        end is a terminator's, and the other one may be a crescent's limb."""
+        """Whether the edge ends a short bright run, whose beginning is then dropped as well.
+
+        A soft end is a terminator, and the other end may be a crescent's limb.
+        """
         self._meter.charge(i8=6, i16_add=1)
         kept = len(self)
         begun, self._begun = self._begun, None
@@ -198,12 +192,12 @@ class EdgeList:
 
     @staticmethod
     def _from(centre: tuple[float, float], points: NDArray[np.int16]) -> NDArray[np.float32]:
-        """1/32 px (..., 2) to px from ``centre``."""
+        """Points (..., 2) in 1/32 px, as px from ``centre``."""
         unit = np.float32(1 / EDGE_UNIT)
         return points.astype(np.float32) * unit - np.array(centre, np.float32)
 
     def _outside(self, point: tuple[int, int]) -> bool:
-        """Equation 6.5.1 against the rim; the listing converts each factor anew."""
+        """Equation 6.5.1 against the rim; the listing converts each factor again."""
         centre = LISTED_RIM_CENTRE if self._config.listing else self._config.boresight
         x, y = self._from(centre, np.array(point, np.int16))
         self._meter.charge(
@@ -221,7 +215,7 @@ class EdgeList:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Two pixels of a line on different sides of the threshold: positions on it, and values."""
+    """Two pixels of a line on different sides of the threshold: positions and values."""
 
     bright: int
     dark: int
@@ -230,7 +224,7 @@ class Crossing:
 
 
 def crossing(one: tuple[int, int], other: tuple[int, int], threshold: int) -> Crossing | None:
-    """Between two pixels of a line (position, value); None when they are alike."""
+    """Crossing between two pixels of a line (position, value); None if both are on one side."""
     if (one[1] >= threshold) == (other[1] >= threshold):
         return None
     bright, dark = (one, other) if one[1] >= threshold else (other, one)
@@ -241,10 +235,10 @@ def _half_way(inside: int) -> int:
     return (inside + DARK) >> 1
 
 
-def settled(edge: Crossing, meter: Meter) -> Generator[int, int, tuple[Crossing, tuple[int, int]]]:
-    """Move an edge inwards to where it is half as bright as inside; asks as `bisect` does.
+def settle(edge: Crossing, meter: Meter) -> Generator[int, int, tuple[Crossing, tuple[int, int]]]:
+    """Move an edge inwards to half the brightness inside; requests pixels like `bisect`.
 
-    Returns it, and the values some way outside and inside.
+    Returns it, and the values at a distance outside and inside.
     """
     outwards = 1 if edge.dark > edge.bright else -1
     outside = yield edge.dark + OUTSIDE_PX * outwards
@@ -263,7 +257,7 @@ def settled(edge: Crossing, meter: Meter) -> Generator[int, int, tuple[Crossing,
 
 
 def bisect(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, int, Crossing]:
-    """Narrow a wide crossing down to neighbours: asks for the values of positions on the line."""
+    """Narrow a wide crossing down to neighbours; requests values of positions on the line."""
     bright, dark = crossing.bright, crossing.dark
     bright_value, dark_value = crossing.bright_value, crossing.dark_value
     meter.charge(call=1)
@@ -278,12 +272,12 @@ def bisect(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, i
     return Crossing(bright, dark, bright_value, dark_value)
 
 
-def answered(search: Generator[Asked, int, Answer], read: Callable[[Asked], int]) -> Answer:
-    """Run a search whose questions ``read`` answers at once."""
+def run_search(search: Generator[Question, int, Answer], read: Callable[[Question], int]) -> Answer:
+    """Run a search whose requests ``read`` answers at once."""
     try:
-        asked = next(search)
+        question = next(search)
         while True:
-            asked = search.send(read(asked))
+            question = search.send(read(question))
     except StopIteration as end:
         answer: Answer = end.value
         return answer
@@ -291,7 +285,7 @@ def answered(search: Generator[Asked, int, Answer], read: Callable[[Asked], int]
 
 @dataclass(frozen=True)
 class _Piece:
-    """What fills the buffer once: part of a line, or a preset's byte (no line)."""
+    """One filling of the buffer: part of a line, or a preset's byte (no line)."""
 
     size: int
     line: int | None = None
@@ -301,9 +295,9 @@ class _Piece:
 
 
 class NadirLines:
-    """Consumer of the nadir scan: ``space`` takes the bytes of the next clocks, then ``filled``.
+    """Consumer of the nadir scan: read the next bytes into ``space``, then call ``filled``.
 
-    The bytes' own cost (``scan_byte`` each) is left to whoever clocks them in.
+    The caller charges the transfer of the bytes (``scan_byte`` each).
 
     Attributes:
         edges: found so far.
@@ -316,7 +310,7 @@ class NadirLines:
         read_out: ReadOut = FULL_SIZE,
         buffer: NDArray[np.uint8] | None = None,
     ) -> None:
-        """Wait for a scan's first clock; ``buffer`` (scan_step,) takes pixels, None makes one."""
+        """``buffer`` (scan_step,) receives pixels; None creates one."""
         self.edges = EdgeList(config, meter)
         self._config = config
         self._meter = meter
@@ -328,23 +322,23 @@ class NadirLines:
 
     @property
     def wanted(self) -> int:
-        """Bytes until the part looks into the buffer; 0 after the last one."""
+        """Bytes until the part examines the buffer; 0 after the last one."""
         return 0 if self._piece is None else self._piece.size
 
     @property
     def space(self) -> NDArray[np.uint8]:
-        """Where the next `wanted` bytes go; `filled` says that they are there."""
+        """Target of the next `wanted` bytes; call `filled` afterwards."""
         return self._buffer[: self.wanted]
 
     def filled(self) -> None:
-        """`space` is full: look into it."""
+        """Examine the bytes in `space`."""
         assert self._piece is not None
         if self._piece.line is not None:
             self._examine(self._piece, self._piece.line)
         self._piece = next(self._pieces, None)
 
     def _examine(self, piece: _Piece, line: int) -> None:
-        """Compare the buffer's last pixel, the sample, with the one before."""
+        """Compare the buffer's last pixel, the sample, with the previous sample."""
         before = 0 if piece.first else self._previous
         sample = int(self._buffer[piece.size - 1])
         self._previous = sample
@@ -355,7 +349,7 @@ class NadirLines:
             return
         if self._config.sub_pixel:
             steps = bisect(wide, threshold, self._meter)
-            found = answered(steps, lambda position: int(self._buffer[position - start]))
+            found = run_search(steps, lambda position: int(self._buffer[position - start]))
         else:
             if self._config.listing and piece.size == LISTED_REST:
                 start = (start - self._scan_start) // 2 + self._scan_start
@@ -369,11 +363,11 @@ class NadirLines:
                     return before
                 return int(self._buffer[min(position - piece.start, piece.size - 1)])
 
-            found, around = answered(settled(found, self._meter), read)
+            found, around = run_search(settle(found, self._meter), read)
         self.edges.add(line, piece.vertical, found, around)
 
     def _listed_search(self, size: int, rises: bool) -> int:
-        """Appendix C.4: the bright pixel's place in the buffer, between its first and its last."""
+        """Appendix C.4: the bright pixel's position in the buffer, between its first and last."""
         light, dark = (size - 1, 0) if rises else (0, size - 1)
         steps = size.bit_length() - 1
         self._meter.charge(call=1, i8=6 * steps, array_byte=steps, loop=steps)
@@ -387,7 +381,7 @@ class NadirLines:
 
 
 def _pieces(size: ReadOut) -> Iterator[_Piece]:
-    """The scan in the order of its clocks, cut into what the buffer takes."""
+    """The scan in the order of its clocks, divided into fillings of the buffer."""
     scans = ((size.scan_rows, size.columns), (size.scan_columns, size.rows))
     for vertical, (lines, length) in enumerate(scans):
         yield _Piece(1)

@@ -1,44 +1,42 @@
-"""Whether distortion coefficients have an inverse, quickly enough for a telecommand's acknowledge.
+"""Quick check whether distortion coefficients have an inverse, for a telecommand's acknowledge.
 
-Making the tables takes the part some 0.4 to 0.5 s. What can spoil them is a distorted radius that
-does not rise steadily with the undistorted one, or a correction that an entry can not hold; what
-spoils results is an undistorted radius that an int of 1/100 px can not hold. So Newton's method is
-tried at every 32nd radius only, and the slope, which is cubic, is looked at in between, where it
-can be least: at its ends and where its derivative, a quadratic, is zero. A correction between two
-tried radii is bounded by theirs, because the radii rise.
+Computing the tables takes the part some 0.4 to 0.5 s. They are impossible if the distorted radius
+does not rise steadily with the undistorted one, or an entry cannot hold a correction; results are
+invalid if an int of 1/100 px cannot hold an undistorted radius. So Newton's method is applied only
+at every 32nd radius, and the slope, which is cubic, is checked in between where it can be smallest:
+at the ends and where its derivative, a quadratic, is zero. A correction between two tested radii is
+bounded by theirs, because the radii rise.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from cubestack.firmware_model.cubesense.vision.arithmetic import polynomial
 from cubestack.firmware_model.cubesense.vision.distortion import FOCAL_PX, NEWTON_END_PX, RIM_PX
 from cubestack.firmware_model.mcu.costs import Meter
 
-STEP_PX = 32
-"""Distance of the radii that are tried."""
+STEP_PX = 32  #: distance of the tested radii
+CORRECTION_LIMIT_PX = 254  #: the published table's bytes, which are rounded up, hold 255
 
-CORRECTION_LIMIT_PX = 254
-"""Largest correction; the published table's bytes, which are rounded up, hold 255."""
-
+#: At the rim; a few pixels beyond it a radius must still fit an int of 1/100 px, which would wrap.
 LARGEST_RADIUS_PX = 320
-"""At the rim; a few pixels beyond it, a radius still fits an int of 1/100 px, which would wrap."""
 
 LEAST_SLOPE = np.float32(0.1)
 LARGEST_RATIO = np.float32(3)
 LARGEST_OFFSET_PX = np.float32(16)
 NEWTON_LIMIT = 8
-"""Stricter than the tables' makers are, because radii in between are not tried: assumed."""
+"""Stricter than for the tables, because radii in between are not tested: assumed."""
 
 _TRIED = [np.float32(radius) for radius in (*range(0, RIM_PX, STEP_PX), RIM_PX)]
 
 
 def invertible(coefficients: Sequence[float], meter: Meter) -> bool:
-    """Whether `byte_table` and `fine_table` can be made of ``coefficients``, at any projection.
+    """Whether `byte_table` and `fine_table` accept ``coefficients``, for any projection.
 
-    Some for which they could are refused: a slope below 0.1 somewhere, slopes that differ by more
-    than a factor of 3 (this one by 2.2), an offset beyond 16 px, or a rim beyond 320 px (this one
-    at 275).
+    Some that they accept are rejected: a slope below 0.1 somewhere, slopes that differ by more than
+    a factor of 3 (the shipped lens: 2.2), an offset beyond 16 px, or a rim beyond 320 px (the
+    shipped lens: 275).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         terms = [np.float32(value) for value in coefficients]
@@ -72,10 +70,10 @@ def _undistorted(
 
 
 def _rises(slopes: list[np.float32], low: np.float32, high: np.float32, meter: Meter) -> bool:
-    """Whether the slope is steep enough, and even enough, all over ``low`` to ``high``."""
+    """Whether the slope is steep and even enough from ``low`` to ``high``."""
     linear, square, cube = slopes[1], 2 * slopes[2], 3 * slopes[3]  # of the slope's derivative
     least = [low, high]
-    # The roots of cube x^2 + square x + linear, in a form that has no difference of like numbers.
+    # The roots of cube x^2 + square x + linear, without cancellation of similar numbers.
     root = square * square - 4 * cube * linear
     meter.charge(f32_mul=6, f32_add=3, f32_sqrt=1, f32_div=2, f32_compare=6)
     if root >= 0:
@@ -88,7 +86,7 @@ def _rises(slopes: list[np.float32], low: np.float32, high: np.float32, meter: M
 
 
 def _fits(new: list[np.float32], meter: Meter) -> bool:
-    """Whether no correction exceeds the tables, and no radius an int, in either projection."""
+    """Whether the tables hold all corrections, and an int all radii, in either projection."""
     for radius, below in zip(new[1:], _TRIED, strict=False):
         half_angle = radius / (2 * FOCAL_PX)
         meter.charge(f32_div=1, f32_tan=1, f32_mul=1, f32_add=2, f32_compare=4, loop=1)
@@ -101,9 +99,6 @@ def _fits(new: list[np.float32], meter: Meter) -> bool:
 
 
 def _polynomial(terms: list[np.float32], at: np.float32, meter: Meter) -> np.float32:
-    """Horner's rule, in single precision."""
-    value = terms[-1]
-    for term in reversed(terms[:-1]):
-        value = value * at + term
+    """Charged `polynomial`."""
     meter.charge(f32_mul=len(terms) - 1, f32_add=len(terms) - 1)
-    return value
+    return np.float32(polynomial(terms, at))

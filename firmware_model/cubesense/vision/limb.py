@@ -1,19 +1,19 @@
-"""The Earth's limb among edges that need not all be its own: a circle, and how sure it is.
+"""The Earth's limb among edges that may not all be its own: a circle, and its uncertainty.
 
 An extension; CubeSense thesis, section 4.4.1.3, fits a circle through all edges. Here:
 
 1. A circle through all edges, if all lie on it (least squares, as published).
-2. Else circles through three edges each (RANSAC: Fischler and Bolles 1981, Comm. of the ACM 24,
-   381), drawn by a fixed rule. Only those that an altitude of interest can have are tried; the one
-   with most edges on it wins. An edge counts if its bright side is towards the centre, which tells
-   the limb from the far side of the Moon, of glints and of the shadow.
-3. From there, least squares of the distances (Gauss and Newton), as the sum of squares of step 1
-   pulls circles through short arcs inwards; edges that are not on the circle are left out.
+2. Otherwise circles through three edges each (RANSAC: Fischler and Bolles 1981, Comm. of the ACM
+24, 381), drawn by a fixed rule. Only those that are possible at an altitude of interest are tested;
+the one with most edges on it wins. An edge counts if its bright side is towards the centre, which
+distinguishes the limb from the far side of the Moon, of glints and of the shadow.
+3. From there, least squares of the distances (Gauss and Newton), because the sum of squares of step
+1 pulls circles through short arcs inwards; edges that are not on the circle are left out.
 
-The uncertainty is that of the fit: the inverse of its normal equations, which knows how long the
-arc is, times the edges' variance. That is what an edge has in a usual picture, counted as `PRIOR`
-edges, and what these have: a posterior mean; what is beyond the usual counts `EXCESS` times. Edges
-left out make it less sure in proportion.
+The uncertainty is that of the fit: the inverse of its normal equations, which reflects the length
+of the arc, times the edges' variance. That variance is a posterior mean of the usual one, with the
+weight of `PRIOR` edges, and that of these edges; variance beyond the usual one counts `EXCESS`
+times. Edges left out increase it in proportion.
 """
 
 from dataclasses import dataclass
@@ -24,37 +24,29 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubesense.vision.circle import FEWEST, Circle, LeastSquaresCircle
 from cubestack.firmware_model.mcu.costs import Meter
 
-END_PX = np.float32(0.02)
-"""Least squares have ended when they move the circle by no more."""
+END_PX = np.float32(0.02)  #: least squares end when the circle moves by less
 
-HELD, DRAWN = 400, 48
-"""Edges are held against circles so often at most, and so many triples are drawn: what a second has
-time for."""
+#: Most comparisons of edges with circles, and number of triples: as many as a second allows.
+COMPARISONS, TRIPLES = 400, 48
 
+#: With few edges a false one goes unnoticed: variance * (1 + FEW * number / (number - 3)^2).
 FEW = 2
-"""Few edges hide that one is false: their variance is larger by ``FEW`` times their number by
-their excess squared."""
 
-STEPS = 3
-"""Of Gauss and Newton at most."""
-
-EXCESS = 4.0
-"""How much variance beyond the usual one counts: clouds move neighbouring edges alike."""
-
-PRIOR = 6
-"""So many edges the usual standard deviation counts."""
+STEPS = 3  #: most steps of Gauss and Newton
+EXCESS = 4.0  #: weight of variance beyond the usual one: clouds move neighbouring edges alike
+PRIOR = 6  #: weight of the usual standard deviation, in edges
 
 Values = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What a limb's edges may do, in px of the projection.
+    """Tolerances of a limb's edges, in px of the projection.
 
     Attributes:
         on_px: an edge this near to the circle is on it.
-        good_rms_px: all edges together are a limb when no further off.
-        usual_px: standard deviation of an edge's distance in usual pictures.
+        good_rms_px: largest rms at which all edges together are a limb.
+        usual_px: standard deviation of an edge's distance in usual images.
     """
 
     on_px: float
@@ -68,7 +60,7 @@ class Limb:
 
     Attributes:
         circle: in px of the points.
-        on: which points lie on it (n,).
+        on: mask of the points on it (n,).
         rms_px: of their distances.
         covariance: (3, 3) of centre and radius, px^2.
     """
@@ -80,7 +72,6 @@ class Limb:
 
     @property
     def on_circle(self) -> int:
-        """Number of points on it."""
         return int(np.count_nonzero(self.on))
 
 
@@ -91,13 +82,14 @@ def find_limb(
     tangents: tuple[float, float, float],
     meter: Meter,
 ) -> Limb | None:
-    """The circle that most of the points lie on.
+    """The circle with most of the points on it.
 
     Args:
         points: (n, 2) px, in a projection that images circles as circles.
         sides: (n, 2) towards the bright side of each: one of x and y is 1 or -1, the other 0.
-        allowed: how far off edges may be.
-        tangents: least and largest tangent of the Earth's angular radius, and the focal length: px.
+        allowed: tolerances of the edges.
+        tangents: smallest and largest tangent of the Earth's angular radius, and the focal length:
+            px.
         meter: charged.
     """
     if len(points) < FEWEST:
@@ -105,13 +97,13 @@ def find_limb(
     circle = LeastSquaresCircle(points, meter).solve()
     if circle is None or not _all_on(circle, points, sides, allowed.good_rms_px, meter):
         circle = _most_on(points, sides, allowed.on_px, tangents, meter)
-    return None if circle is None else _refined(circle, points, sides, allowed, meter)
+    return None if circle is None else _refine(circle, points, sides, allowed, meter)
 
 
 def far_off(
     circle: Circle, points: Values, sides: NDArray[np.int8], most_px: float, meter: Meter
 ) -> int:
-    """How many points are further off than ``most_px``, or have their bright side outside."""
+    """Number of points further off than ``most_px``, or with their bright side outside."""
     distance, right = _distances(circle, points, sides, meter)
     meter.charge(f32_compare=len(points))
     return int(np.count_nonzero(~right | (np.abs(distance) > np.float32(most_px))))
@@ -120,9 +112,9 @@ def far_off(
 def _distances(
     circle: Circle, points: Values, sides: NDArray[np.int8], meter: Meter
 ) -> tuple[Values, NDArray[np.bool_]]:
-    """How far outside of the circle points lie (n,), and whether their sides are right (n,)."""
+    """Distances of points outside of the circle (n,), and whether their sides are right (n,)."""
     count = len(points)
-    # Sides are signs of differences that are there already.
+    # Sides are signs of differences that were computed before.
     meter.charge(f32_add=4 * count, f32_mul=3 * count, i8=4 * count, loop=count)
     towards = np.array([circle.x, circle.y], np.float32) - points
     return circle.residuals(points, Meter(meter.table)), (towards * sides).sum(axis=1) > 0
@@ -137,10 +129,10 @@ def _all_on(
 
 
 def _triples(count: int) -> list[tuple[int, int, int]]:
-    """Three of ``count`` numbers, again and again: a linear congruential generator of 16 bits."""
+    """Triples of ``count`` numbers, from a linear congruential generator of 16 bits."""
     drawn: list[tuple[int, int, int]] = []
     state = 1
-    while len(drawn) < DRAWN:
+    while len(drawn) < TRIPLES:
         numbers = []
         for _ in range(3):
             state = (state * 25173 + 13849) & 0xFFFF
@@ -151,7 +143,6 @@ def _triples(count: int) -> list[tuple[int, int, int]]:
 
 
 def _through(three: Values, meter: Meter) -> Circle | None:
-    """The circle through three points (3, 2)."""
     meter.charge(f32_add=12, f32_mul=14, f32_div=2, f32_sqrt=1, f32_compare=1, call=1)
     (ax, ay), (bx, by), (cx, cy) = three
     bx, by, cx, cy = bx - ax, by - ay, cx - ax, cy - ay
@@ -172,8 +163,8 @@ def _most_on(
 ) -> Circle | None:
     """The best of the circles through three points."""
     low, high, focal = (np.float32(value) for value in tangents)
-    best, most, held = None, 0, 0
-    meter.charge(i16_add=9 * DRAWN, loop=3 * DRAWN)
+    best, most, compared = None, 0, 0
+    meter.charge(i16_add=9 * TRIPLES, loop=3 * TRIPLES)
     for triple in _triples(len(points)):
         circle = _through(points[list(triple)], meter)
         if circle is None:
@@ -187,19 +178,19 @@ def _most_on(
         meter.charge(f32_compare=len(points))
         if not right[list(triple)].all():
             continue
-        held += len(points)
+        compared += len(points)
         count = int(np.count_nonzero(right & (np.abs(distance) < np.float32(on_px))))
         if count > most:
             best, most = circle, count
-        if held >= HELD or 5 * most >= 4 * len(points):
+        if compared >= COMPARISONS or 5 * most >= 4 * len(points):
             break
     return best
 
 
-def _refined(
+def _refine(
     circle: Circle, points: Values, sides: NDArray[np.int8], allowed: Tolerances, meter: Meter
 ) -> Limb | None:
-    """Least squares of the distances of those on the circle."""
+    """Least squares of the distances of the points on the circle."""
     for _ in range(STEPS):
         distance, right = _distances(circle, points, sides, meter)
         on = right & (np.abs(distance) < np.float32(allowed.on_px))

@@ -1,6 +1,6 @@
-"""Areas of a picture that detection ignores, such as a boom in the field of view.
+"""Areas of an image that detection ignores, such as a boom in the field of view.
 
-Telecommands Mask1 and Mask2 of the node protocol; what the areas do is assumed.
+Telecommands Mask1 and Mask2 of the node protocol; the areas' effect is assumed.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class Mask(NamedTuple):
 def masked(
     x: NDArray[np.int64], y: NDArray[np.int64], masks: Sequence[Mask], meter: Meter
 ) -> NDArray[np.bool_]:
-    """Which pixels (n,) lie in an area; charges four comparisons a pixel and area."""
+    """Mask of the pixels (n,) in an area; charges four comparisons per pixel and area."""
     inside = np.zeros(len(x), dtype=bool)
     used = [mask for mask in masks if any(mask)]
     for mask in used:

@@ -1,23 +1,23 @@
-"""From the edges of the Earth to the direction of its centre.
+"""Direction of the Earth's centre from its edges.
 
 CubeSense thesis, sections 4.4.1.3, 5.5, 6.5.3 and appendix C.5: undistort each edge, fit a circle,
-hand out its centre as int of 1/100 px. Angles are the centre's coordinates at 2.9 px a degree.
+return its centre as int of 1/100 px. Angles are the centre's coordinates at 2.9 px per degree.
 
-The result codes are public, what leads to them is not; assumed:
+The result codes are public, their conditions are not; assumed:
 
-- too many edges: more than the part keeps.
+- too many edges: more than the part stores.
 
 As printed there are no checks: every edge counts, the radius is not calculated, and only a division
-by 0 or a centre that the interface does not have is a bad fit. With them:
+by 0 or a centre outside of the interface's range is a bad fit. With checks:
 
 - too few edges: fewer than `NadirConfig.min_edges`, in all or on the circle.
-- bad fit: no circle, an angular radius that no altitude of interest has, a centre more than 100 deg
-  away along an axis, which the interface does not have, or half as many edges again off the circle
-  as on it beyond the three that make it (`limb`).
+- bad fit: no circle, an angular radius impossible at an altitude of interest, a centre more than
+  100 deg away along an axis, outside of the interface's range, or half as many edges again off the
+  circle as on it beyond the three that define it (`limb`).
 
-An extension is the fit in the stereographic projection (see `Projection`). A circle there has the
-centre (x, y) and gives the origin the power p; the cone that it is the image of has its axis along
-(2 f x, 2 f y, f^2 - p).
+An extension is the fit in the stereographic projection (see `Projection`). If a circle there has
+the centre (x, y) and the origin has the power p, it is the image of a cone with its axis along (2 f
+x, 2 f y, f^2 - p).
 """
 
 from dataclasses import dataclass, replace
@@ -37,17 +37,15 @@ LIT = {
     Projection.STEREOGRAPHIC: Tolerances(on_px=1.0, good_rms_px=0.35, usual_px=0.1),
     Projection.EQUIDISTANT: Tolerances(on_px=12.0, good_rms_px=8.0, usual_px=3.0),
 }
-"""Of edges that are lit well. In the published projection the limb itself leaves the circle by so
+"""Of well-lit edges. In the published projection the limb itself deviates from the circle by this
 much towards the rim."""
 
-DUSK = 3
-"""Edges along the dusk may be off by so many times as much, and still be the limb's."""
+DUSK = 3  #: factor of the tolerance for limb edges along the dusk
 
+#: Tolerances of edges along the dusk.
 DIM = {kind: replace(allowed, usual_px=2 * allowed.usual_px) for kind, allowed in LIT.items()}
-"""Of edges along the dusk."""
 
-FLOOR_DEG = 0.01
-"""Part of the standard deviation that no number of edges takes away."""
+FLOOR_DEG = 0.01  #: part of the standard deviation that more edges do not reduce
 
 MOST_SIGMA = 0xFFFF
 
@@ -58,14 +56,14 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class NadirConfig:
-    """How the edges become a direction.
+    """Settings of the fit.
 
     Attributes:
         table: undistorts the edges.
-        projection: that the table leads to.
-        min_edges: fewer are too few: three make a circle, one tells whether it is the limb's.
-        radius_deg: angular radii that the Earth may have: 96 to 6378 km of altitude.
-        checked: whether these and the distances from the circle are looked at.
+        projection: of the table.
+        min_edges: smallest number: three define a circle, a fourth tests whether it is the limb's.
+        radius_deg: range of the Earth's angular radius: 96 to 6378 km of altitude.
+        checked: whether radius and distances from the circle are checked.
     """
 
     table: RadiusTable
@@ -74,27 +72,27 @@ class NadirConfig:
     radius_deg: tuple[float, float] = (30.0, 80.0)
     checked: bool = True
 
-    def because(self, reason: codes.Reason) -> codes.Reason:
-        """The published program gives no reasons."""
+    def reason_if_checked(self, reason: codes.Reason) -> codes.Reason:
+        """``reason`` if results are checked; the published program reports none."""
         return reason if self.checked else codes.Reason.NONE
 
     @property
     def bounds(self) -> tuple[float, float, float]:
-        """As `find_limb` takes them; constants of the program."""
+        """Tangents for `find_limb`; constants of the program."""
         low, high = np.tan(np.radians(self.radius_deg))
         return float(low), float(high), float(FOCAL_PX)
 
 
 @dataclass(frozen=True)
 class Direction:
-    """What became of a detection.
+    """Outcome of a detection.
 
     Attributes:
         detect: its result code.
         x, y: centre from the boresight, 1/100 px, undistorted; 0 without success.
         alpha, beta: the same, 1/100 deg.
-        sigma_alpha, sigma_beta: standard deviations of these, 1/100 deg; 0: not known.
-        reason: why, where that is looked at.
+        sigma_alpha, sigma_beta: standard deviations of these, 1/100 deg; 0: unknown.
+        reason: of the outcome, if it is checked.
     """
 
     detect: codes.DetectResult
@@ -109,12 +107,12 @@ class Direction:
 
 @dataclass(frozen=True)
 class NadirResult(Direction):
-    """A direction, and what it rests on.
+    """A direction, and the data of its fit.
 
     Attributes:
-        edges: that the fit used; without a fit, that were found.
+        edges: number used in the fit; without a fit, number found.
         dropped: edges left out of it.
-        radius_deg: angular radius of the circle; 0 when there is none, or it was not calculated.
+        radius_deg: angular radius of the circle; 0 if there is none, or it was not calculated.
         rms_px: of the distances of these edges from the circle, in px of the projection.
     """
 
@@ -132,12 +130,12 @@ def angle_of(hundredths: NDArray[np.int16], meter: Meter) -> NDArray[np.int16]:
 
 
 def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResult:
-    """Undistort the edges, fit the circle, judge it. Phases: `undistort` and `fit`."""
+    """Undistort the edges, fit the circle, check it. Phases: `undistort` and `fit`."""
     meter.charge(i8=3)
     bad, why = codes.DetectResult.BAD_FIT, codes.Reason
     if edges.full:
         many = codes.DetectResult.TOO_MANY_EDGES
-        return NadirResult(many, edges=len(edges), reason=config.because(why.MANY_EDGES))
+        return NadirResult(many, edges=len(edges), reason=config.reason_if_checked(why.MANY_EDGES))
     if config.checked and len(edges) < config.min_edges:
         few = codes.DetectResult.TOO_FEW_EDGES
         return NadirResult(few, edges=len(edges), reason=why.FEW_EDGES)
@@ -151,23 +149,23 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
             limb = _limb(points, edges, config, meter)
             circle, used = (None, 0) if limb is None else (limb.circle, limb.on_circle)
         else:
-            circle, used = _as_printed(points, config, meter), len(points)
+            circle, used = _circle_as_printed(points, config, meter), len(points)
         fit = NadirResult(bad, edges=used, dropped=len(edges) - used)
         if circle is None:
-            return replace(fit, reason=config.because(why.NO_CIRCLE))
+            return replace(fit, reason=config.reason_if_checked(why.NO_CIRCLE))
         centre, radius_deg = _on_the_sky(circle, config.projection, meter)
         fit = replace(fit, radius_deg=radius_deg)
         low, high = config.radius_deg if config.checked else (0.0, 180.0)
         if config.checked:
             meter.charge(f32_compare=4, i8=4)
         if not (np.all(np.abs(centre) <= LARGEST_PX) and low <= radius_deg <= high):
-            return replace(fit, reason=config.because(why.WRONG_RADIUS))
+            return replace(fit, reason=config.reason_if_checked(why.WRONG_RADIUS))
         if limb is not None:
             if used < config.min_edges:
                 return replace(fit, reason=why.FEW_EDGES)
             off_px = DUSK * LIT[config.projection].on_px
             against = far_off(circle, points, edges.sides, off_px, meter)
-            # Up to three edges against weigh as many as others; of more, a third may be wrong.
+            # Up to three edges off the circle count fully; of more, a third may be wrong.
             if 3 * (used - FEWEST) <= 2 * against + min(against, 3):
                 return replace(fit, reason=why.OTHER_LIGHT)
             sigma = _sigma(limb, centre, config.projection, meter)
@@ -186,7 +184,7 @@ def find_nadir(edges: EdgeList, config: NadirConfig, meter: Meter) -> NadirResul
 
 
 def _limb(points: Values, edges: EdgeList, config: NadirConfig, meter: Meter) -> Limb | None:
-    """Of the edges that are well lit, if they are enough and make one; else of all."""
+    """The limb of the well-lit edges if they suffice, else of all edges."""
     lit = edges.lit
     meter.charge(i8=3 * len(lit))
     if np.count_nonzero(lit) >= config.min_edges:
@@ -201,7 +199,7 @@ def _limb(points: Values, edges: EdgeList, config: NadirConfig, meter: Meter) ->
 def _sigma(limb: Limb, centre: Values, projection: Projection, meter: Meter) -> tuple[int, int]:
     """Standard deviations of alpha and beta, 1/100 deg, rounded.
 
-    How they hang on the circle is tried, with a step of a pixel of its centre and its radius.
+    Sensitivities by finite differences of 1 px in centre and radius.
     """
     circle, one = limb.circle, np.float32(1)
     moved = (
@@ -219,8 +217,8 @@ def _sigma(limb: Limb, centre: Values, projection: Projection, meter: Meter) -> 
     return alpha, beta
 
 
-def _as_printed(points: Values, config: NadirConfig, meter: Meter) -> Circle | None:
-    """Circle through all points, without a radius where only its centre is wanted."""
+def _circle_as_printed(points: Values, config: NadirConfig, meter: Meter) -> Circle | None:
+    """Circle through all points, without a radius if only its centre is needed."""
     equations = LeastSquaresCircle(points, meter)
     if config.projection is not Projection.EQUIDISTANT:
         return equations.solve()

@@ -1,10 +1,10 @@
-"""Edges of the Earth around a grid of samples, by addresses that the microcontroller chooses.
+"""Edges of the Earth around a grid of samples, at addresses that the microcontroller chooses.
 
-CubeSense thesis, section 9.2.2 (wished for, not built): each sample is compared with its neighbours
-to the left and above, and only between unlike ones are pixels looked at. The text leaves open
-how; both ways are here. The grid is that of the scanned rows and columns; what lies before it is
-dark. Edges of the Earth beyond the last row or column of the grid are not found, but no edge within
-the rim of the field of view lies there.
+CubeSense thesis, section 9.2.2 (proposed, not built): each sample is compared with its neighbours
+to the left and above, and pixels are examined only between samples that differ. The text leaves the
+method open; both are here. The grid is that of the scanned rows and columns; pixels before it count
+as dark. Edges beyond the last row or column of the grid are not found, but no edge within the rim
+of the field of view lies there.
 """
 
 from collections.abc import Generator
@@ -19,7 +19,7 @@ from cubestack.firmware_model.cubesense.vision.edges import (
     EdgeList,
     bisect,
     crossing,
-    settled,
+    settle,
 )
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.mcu.costs import Meter
@@ -28,7 +28,7 @@ Pixel = tuple[int, int]
 
 
 class Between(Enum):
-    """How the edge between two unlike samples is found."""
+    """Search for the edge between two samples that differ."""
 
     SEQUENTIAL = "one pixel after the other, away from the dark sample"
     BINARY = "by halves"
@@ -40,10 +40,10 @@ def around_samples(
     between: Between = Between.BINARY,
     read_out: ReadOut = FULL_SIZE,
 ) -> Generator[Pixel, int, EdgeList]:
-    """Find the edges: asks for the value of one pixel (x, y) after the other.
+    """Find the edges; requests the value of one pixel (x, y) after the other.
 
-    The cost of reading one (``address_byte``) is left to whoever does so. The part keeps the values
-    of one row of the grid.
+    The caller charges the reads (``address_byte`` each). The part stores the values of one row of
+    the grid.
     """
     edges = EdgeList(config, meter)
     columns = read_out.scan_columns
@@ -67,7 +67,7 @@ def around_samples(
                 found = yield from _on_line(steps, line, vertical, last)
                 around = None
                 if config.sharp:
-                    found, around = yield from _on_line(settled(found, meter), line, vertical, last)
+                    found, around = yield from _on_line(settle(found, meter), line, vertical, last)
                 edges.add(line, vertical, found, around)
             left = sample
             above[index] = sample
@@ -75,7 +75,7 @@ def around_samples(
 
 
 def _walk(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, int, Crossing]:
-    """From the dark end to the first bright pixel."""
+    """Step from the dark end to the first bright pixel."""
     step = 1 if crossing.bright > crossing.dark else -1
     dark, dark_value = crossing.dark, crossing.dark_value
     meter.charge(call=1)
@@ -91,7 +91,7 @@ def _walk(crossing: Crossing, threshold: int, meter: Meter) -> Generator[int, in
 def _on_line(
     steps: Generator[int, int, Answer], line: int, vertical: bool, last: int
 ) -> Generator[Pixel, int, Answer]:
-    """Ask for pixels where ``steps`` asks for positions on a line, 0 to ``last``."""
+    """Request the pixels at positions of ``steps`` on a line, clamped to 0 to ``last``."""
     try:
         position = next(steps)
         while True:

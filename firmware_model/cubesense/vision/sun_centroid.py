@@ -1,23 +1,23 @@
-"""The Sun's centre from the 15 x 15 window that the sun FPGA hands out.
+"""The Sun's centre from the 15 x 15 window that the sun FPGA presents.
 
 CubeSense thesis, sections 4.4.2, 6.6.2, 6.6.3, appendix C.6 and table 5.1: mean of the coordinates
 of all pixels that reach the threshold, weighted by value, plus the window's origin, less the
 boresight; then undistorted.
 
-As printed that is all; only a division by 0 is no Sun. Where the window lies at the picture's
-border is a matter of the gateware (``ReadOut.window_origin``).
+As printed that is all; only a division by 0 means no Sun. The window's position at the image border
+depends on the gateware (``ReadOut.window_origin``).
 
-An extension: a Sun that overflows the window is cut, mostly at the bottom, and its mean moves. A
-row that reaches the window's left or right border is then left out of the mean of x, a column that
-reaches the upper or lower one out of the mean of y. When nothing would remain, all count.
+An extension: a Sun larger than the window is cut, mostly at the bottom, and its mean moves. A row
+that reaches the window's left or right border is then left out of the mean of x, a column that
+reaches the upper or lower one out of the mean of y. If nothing would remain, all count.
 
-Another: the light must be a Sun. It is none when the FPGA saw no run of bright pixels, when too few
-or too many pixels reach the threshold, when they are not round or not in one piece, their middle is
-not saturated, or when their centre lies outside of the field of view, where the lens shows nothing
-and an int of 1/100 px may overflow. A light with an edge sharper than that of the Sun's image may
-be a Sun or sunlit structure: it is handed out with a standard deviation that says so. The FPGA
-finds the first bright light of the picture only, so a false one before the Sun hides it: then there
-is none. The limits are assumed, around images of 6 to 8 px in radius (section 5.1.3.2).
+Another: the light must be a Sun. It is none if the FPGA saw no run of bright pixels, if too few or
+too many pixels reach the threshold, if they are not round or not connected, their middle is not
+saturated, or their centre lies outside of the field of view, where the lens images nothing and an
+int of 1/100 px may overflow. A light with an edge sharper than that of the Sun's image may be a Sun
+or sunlit structure: it is reported with a standard deviation that reflects this. The FPGA finds
+only the first bright light of the image, so a false one before the Sun hides it: then there is
+none. The limits are assumed, around images of 6 to 8 px in radius (section 5.1.3.2).
 """
 
 from collections.abc import Sequence
@@ -33,36 +33,29 @@ from cubestack.firmware_model.cubesense.vision.nadir import Direction, angle_of
 from cubestack.firmware_model.interface.cubesense import codes, fpga
 from cubestack.firmware_model.mcu.costs import Meter
 
-COORDINATE_BYTES = 4
-"""x low, x high, y low, y high of the first Sun pixel, ahead of the window."""
+COORDINATE_BYTES = 4  #: x low, x high, y low, y high of the first Sun pixel, before the window
 
 FULL_SCALE = 255
+ROUND = 4  #: largest difference between width and height of a whole Sun, in pixels
+TIPS = 4  #: pixels of a small Sun that are alone in their row or column: they do not widen it
 
-ROUND = 4
-"""Width and height of a whole Sun differ by so many pixels at most."""
-
-TIPS = 4
-"""Pixels of a small Sun that are alone in their row or column, and make it no wider."""
-
+#: Smallest ratio of the squared number of edge pixels of a Sun to the number of bright pixels.
 SOFT = 5
-"""Square of the number of pixels of a Sun's edge, by the number of bright pixels, at least."""
 
+#: Edge pixels of a Sun are brighter than this, and below its threshold: 30 % of its level (5.7).
 EDGE_LEVEL = 100
-"""Pixels of a Sun's edge are brighter, and below its threshold: 30 % of its level (5.7)."""
 
-SIGMA_DEG = 0.03
-"""Standard deviation of alpha and beta, fitted: noise, and edges in whole pixels."""
+SIGMA_DEG = 0.03  #: of alpha and beta, fitted: noise, and edges in whole pixels
 
+#: Of a light that may be no Sun: that of a position anywhere in the field, half its radius.
 SHARP_SIGMA_DEG = 48.0
-"""That of a light that is perhaps no Sun: of a place anywhere in the field, half its radius."""
 
-_LARGEST_ANGLE = codes.LARGEST_ANGLE_DEG * 100
-"""In 1/100 deg; only another lens images anything beyond."""
+_LARGEST_ANGLE = codes.LARGEST_ANGLE_DEG * 100  #: in 1/100 deg; beyond any of this lens
 
 
 @dataclass(frozen=True, eq=False)
 class SunConfig:
-    """How the window becomes a direction.
+    """Settings of the search in the window.
 
     Attributes:
         table: undistorts the centre; an equidistant one.
@@ -90,7 +83,7 @@ class SunResult(Direction):
 
 
 def window_bytes(read_out: fpga.ReadOut = fpga.FULL_SIZE) -> int:
-    """Bytes that the FPGA hands out: coordinates and window."""
+    """Bytes that the FPGA presents: coordinates and window."""
     return COORDINATE_BYTES + read_out.window**2
 
 
@@ -102,9 +95,9 @@ def find_sun(
 ) -> SunResult:
     """Measure in the bytes of one window read-out; phases: `centroid` and `undistort`.
 
-    The bytes' own cost (``strobe_byte`` each) is left to whoever clocks them in. The published
-    program works on each byte as it comes; no step depends on a later one. ValueError when the
-    bytes are not as many as `window_bytes`.
+    The caller charges the transfer of the bytes (``strobe_byte`` each). The published program
+    processes each byte as it comes; no step depends on a later one. Raises ValueError unless there
+    are `window_bytes` bytes.
     """
     if data.shape != (window_bytes(read_out),):
         raise ValueError(f"a window has {window_bytes(read_out)} bytes, not {data.shape}")
@@ -127,7 +120,7 @@ def find_sun(
             return replace(none, reason=reason)
         if not pixels:
             return none
-        # What the listing does for each Sun pixel, every factor converted anew.
+        # The listing's operations per Sun pixel; it converts every factor again.
         meter.charge(f32_convert=4 * pixels, f32_mul=2 * pixels, f32_add=2 * pixels, i16_add=pixels)
         values = window[rows, columns]
         side, axes = read_out.window, ((columns, rows), (rows, columns))
@@ -163,10 +156,10 @@ def _no_sun(
     config: SunConfig,
     meter: Meter,
 ) -> codes.Reason | None:
-    """Why the bright pixels of the window are no Sun; None when they may be one.
+    """Why the bright pixels of the window are no Sun; None if they may be one.
 
-    Counted while the window is read: pixels, those at full scale, and limits; columns are gone
-    through once more.
+    Counted while the window is read: pixels, those at full scale, and limits; columns are scanned
+    once more.
     """
     why, pixels = codes.Reason, len(rows)
     meter.charge(i8=5 * window.size + 12 * pixels + 20, i16_add=12)
@@ -176,7 +169,7 @@ def _no_sun(
         return why.TOO_LARGE
     if 2 * np.count_nonzero(window[rows, columns] == FULL_SCALE) < pixels:
         return why.NOT_SATURATED
-    # Rows and columns with two bright pixels: a stuck one beside the Sun makes it no wider.
+    # Rows and columns with two bright pixels: a stuck pixel beside the Sun does not widen it.
     chords = [np.bincount(axis, minlength=window.shape[0]) > 1 for axis in (columns, rows)]
     width, height = (int(np.count_nonzero(chord)) for chord in chords)
     cut = [bool(chord[0] or chord[-1]) for chord in chords]
@@ -190,9 +183,9 @@ def _no_sun(
 
 
 def _torn(bright: NDArray[np.bool_]) -> bool:
-    """Whether a row has two pieces, or two rows that follow each other have no column in common.
+    """Whether a row has two pieces, or two consecutive rows have no common column.
 
-    A lone pixel is no piece, and none is missed: pixels may be stuck.
+    A single pixel is no piece, and a single missing one is ignored: pixels may be stuck.
     """
     wide = np.pad(bright, ((0, 0), (1, 1)))
     wide[:, 1:-1] |= wide[:, :-2] & wide[:, 2:]
@@ -205,14 +198,14 @@ def _torn(bright: NDArray[np.bool_]) -> bool:
 
 
 def _soft(window: NDArray[np.uint8], pixels: int, config: SunConfig, meter: Meter) -> bool:
-    """Whether the light fades as the Sun's image does, over more than a pixel."""
+    """Whether the light fades over more than a pixel, as the Sun's image does."""
     meter.charge(i8=2 * window.size, i16_add=2)
     edge = np.count_nonzero((window >= EDGE_LEVEL) & (window < config.threshold))
     return int(edge) ** 2 >= SOFT * pixels
 
 
 def _out_of_field(offset: NDArray[np.float32], meter: Meter) -> bool:
-    """In whole pixels, because the processor multiplies bytes by itself."""
+    """In whole pixels, because the processor multiplies bytes directly."""
     meter.charge(f32_convert=2, i16_add=6)
     across, down = (int(value) for value in offset)
     return across * across + down * down > RIM_PX * RIM_PX
@@ -226,9 +219,9 @@ def _mean(
     config: SunConfig,
     meter: Meter,
 ) -> np.float32:
-    """Weighted mean of the coordinate ``along``, chords (rows of x, columns of y) cut left out."""
+    """Weighted mean of the coordinate ``along``, without cut chords (rows of x, columns of y)."""
     if not config.printed:
-        # Each chord's sums are kept, and added up at its end unless it was cut.
+        # Each chord's sums are added at its end unless it was cut.
         meter.charge(i8=2 * len(values), f32_add=side, i16_add=side)
         cut = np.unique(chord[(along == 0) | (along == side - 1)])
         whole = ~np.isin(chord, cut)

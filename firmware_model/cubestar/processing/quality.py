@@ -10,7 +10,7 @@ from cubestack.firmware_model.cubestar.matching.identification import Identifica
 from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.cubestar.state import UNRATED
 from cubestack.firmware_model.interface.codec.attitude_quality import (
-    covariance_told,
+    covariance_fields,
     log_false_alarm,
 )
 from cubestack.firmware_model.interface.codec.field import Value
@@ -63,5 +63,5 @@ def rated(
         "Valid": reason is Reason.SOLVED,
     }
     if reason is Reason.SOLVED:
-        values |= covariance_told(rating.covariance.tolist())
+        values |= covariance_fields(rating.covariance.tolist())
     return values

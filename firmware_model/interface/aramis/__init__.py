@@ -1,7 +1,7 @@
-"""The whole interface of AraMiS' star tracker: telecommands, telemetry, numbers with names.
+"""The whole interface of AraMiS' star tracker: telecommands, telemetry, named numbers.
 
-AraMiS thesis, section 2.2, gives use cases and no bytes. Frames and buses are those of the
-CubeSpace family's nodes; I2C address, baud rate, IDs and layouts are assumed.
+AraMiS thesis, section 2.2, has use cases but no bytes. Frames and buses are those of the CubeSpace
+family's nodes; I2C address, baud rate, IDs and layouts are assumed.
 """
 
 from cubestack.firmware_model.interface.aramis.codes import (

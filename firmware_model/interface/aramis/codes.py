@@ -1,7 +1,7 @@
-"""Numbers with names in AraMiS' star tracker interface: states, outcomes, reasons, actions.
+"""Named numbers of AraMiS' star tracker interface: states, outcomes, reasons, actions.
 
 All numbers are assumed. Outcomes are those of the AraMiS thesis, section 5.7; the failure reasons
-are what its use case for the attitude asks for (section 2.2).
+are those that its use case for the attitude requests (section 2.2).
 """
 
 from enum import IntEnum
@@ -14,16 +14,14 @@ class SensorState(IntEnum):
     ACTIVATING = 1
     READY = 2
     MEASURING = 3
-    PROGRAMMING = 4
-    """The catalogue's flash is being written."""
+    PROGRAMMING = 4  #: the catalogue's flash is being written
 
 
 class MeasurementMode(IntEnum):
     """What is known beforehand."""
 
     LOST_IN_SPACE = 0
-    AIDED = 1
-    """A rough direction: only the triangles around it are searched."""
+    AIDED = 1  #: a rough direction: only the triangles around it are searched
 
 
 class MeasurementOutcome(IntEnum):
@@ -39,60 +37,37 @@ class Reason(IntEnum):
     """Why a measurement ended as it did; from 16 on there was no picture or no catalogue."""
 
     NOT_MEASURED = 0
-    UNIQUE = 1
-    """One triangle of the catalogue was left."""
-    CONFIRMED = 2
-    """Further stars confirm the attitude."""
-    SEVERAL = 3
-    """Several triangles were left after the last pivot."""
+    UNIQUE = 1  #: one triangle of the catalogue was left
+    CONFIRMED = 2  #: further stars confirm the attitude
+    SEVERAL = 3  #: several triangles were left after the last pivot
     TOO_FEW_STARS = 4
-    TOO_MANY_PIXELS = 5
-    """Too many pixels were lit to be stars."""
-    DEGENERATE = 6
-    """The stars stand on a line."""
-    NO_TRIANGLE = 7
-    """No triangle of the catalogue has that area and moment."""
-    NO_SHARED_PAIR = 8
-    """No candidate shared two stars with a pivot triangle's."""
-    UNCONFIRMED = 9
-    """No attitude was confirmed."""
-    FAR_FROM_HINT = 10
-    """The boresight is far from the rough direction."""
-    SMEAR = 11
-    """Motion drew the stars out."""
-    STRAY_LIGHT = 12
-    """The sky is bright, or not evenly so."""
-    SATURATED = 13
-    """Parts of the field are too bright for stars: the Moon, the Earth."""
-    RADIATION = 14
-    """Too many pixels are hit by particles or hot."""
-    NO_TIME = 15
-    """The time of a measurement was over before an attitude was confirmed."""
+    TOO_MANY_PIXELS = 5  #: too many pixels were lit to be stars
+    DEGENERATE = 6  #: the stars stand on a line
+    NO_TRIANGLE = 7  #: no triangle of the catalogue has that area and moment
+    NO_SHARED_PAIR = 8  #: no candidate shared two stars with a pivot triangle's
+    UNCONFIRMED = 9  #: no attitude was confirmed
+    FAR_FROM_HINT = 10  #: the boresight is far from the rough direction
+    SMEAR = 11  #: motion drew the stars out
+    STRAY_LIGHT = 12  #: the sky is bright, or not evenly so
+    SATURATED = 13  #: parts of the field are too bright for stars: the Moon, the Earth
+    RADIATION = 14  #: too many pixels are hit by particles or hot
+    NO_TIME = 15  #: the time of a measurement was over before an attitude was confirmed
     NOT_ACTIVE = 16
-    CAMERA_OFF = 17
-    """Its supply is switched off (latch-up action)."""
-    CAMERA_SILENT = 18
-    """It did not acknowledge on its control bus."""
-    CAMERA_TIMEOUT = 19
-    """No whole frame came in time."""
-    CAMERA_FRAME = 20
-    """The frame was shorter, or its lines longer or shorter, than programmed."""
-    NO_CATALOGUE = 21
-    """The flash holds none."""
-    CATALOGUE_DAMAGED = 22
-    """More bits were wrong than can be corrected."""
+    CAMERA_OFF = 17  #: its supply is switched off (latch-up action)
+    CAMERA_SILENT = 18  #: it did not acknowledge on its control bus
+    CAMERA_TIMEOUT = 19  #: no whole frame came in time
+    CAMERA_FRAME = 20  #: the frame was shorter, or its lines longer or shorter, than programmed
+    NO_CATALOGUE = 21  #: the flash holds none
+    CATALOGUE_DAMAGED = 22  #: more bits were wrong than can be corrected
 
 
 class CatalogueState(IntEnum):
     """State of the star and triangle catalogue."""
 
-    NOT_LOADED = 0
-    """The star tracker is not active."""
+    NOT_LOADED = 0  #: the star tracker is not active
     GOOD = 1
-    MISSING = 2
-    """The flash holds none."""
-    DAMAGED = 3
-    """More bits were wrong than can be corrected, or its checksum does not fit."""
+    MISSING = 2  #: the flash holds none
+    DAMAGED = 3  #: more bits were wrong than can be corrected, or its checksum does not fit
 
 
 class LatchUpStep(IntEnum):
@@ -106,10 +81,8 @@ class SpikeMethod(IntEnum):
     """How spikes of noise are removed (AraMiS thesis, section 3.5)."""
 
     OFF = 0
-    CENTRE = 1
-    """Method 1: a window of 5 x 5 steps by one and judges the pixel in its middle."""
-    WINDOW = 2
-    """Method 2: it steps by five and judges the bright pixels in it."""
+    CENTRE = 1  #: method 1: a window of 5 x 5 steps by one and judges the pixel in its middle
+    WINDOW = 2  #: method 2: it steps by five and judges the bright pixels in it
 
 
 class OnOff(IntEnum):

@@ -1,8 +1,8 @@
-"""AraMiS' error flags, all assumed: one declaration for telemetry ErrorFlags."""
+"""AraMiS' error flags, all assumed."""
 
 from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
-#: Name to bit and cause.
+#: Bit and cause by name.
 _FLAGS = {
     "UartProtocolError": (0, "byte outside of a frame, or an unknown escape"),
     "UartIncomplete": (1, "frame that never ended"),
@@ -33,5 +33,4 @@ FLAG_NAMES = frozenset(_FLAGS)
 
 
 def flag_fields() -> tuple[Field, ...]:
-    """Fields of telemetry ErrorFlags."""
     return flags_at((bit, name, cause, name) for name, (bit, cause) in _FLAGS.items())

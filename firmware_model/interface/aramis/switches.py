@@ -1,4 +1,4 @@
-"""Where AraMiS' firmware can do what its thesis prints, or better."""
+"""Choices of AraMiS' firmware between the algorithms that its thesis prints and better ones."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -68,5 +68,4 @@ class AramisSwitches(Switches):
     )
 
 
-#: Those of the default profile.
 DEFAULT_SWITCHES = AramisSwitches()

@@ -1,8 +1,8 @@
 """AraMiS' telecommands: the use cases of the thesis, then settings and service.
 
-AraMiS thesis, section 2.2: what the attitude controller, the power management and the integrator
-ask of the star tracker. It defines no bytes, so all IDs and layouts are assumed; those from 100 on
-have no use case behind them.
+AraMiS thesis, section 2.2: requests of the attitude controller, the power management and the
+integrator. The thesis defines no bytes, so all IDs and layouts are assumed; no use case covers
+those from 100 on.
 """
 
 import math
@@ -20,16 +20,16 @@ from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
 
-#: Bytes of a picture: one for each pixel, row after row.
+#: Bytes of an image: one per pixel, row by row.
 IMAGE_BYTES = mt9m001.COLUMNS * mt9m001.ROWS
 
-#: Bytes that a block of a picture or of the catalogue has.
+#: Bytes of a block of an image or of the catalogue.
 BLOCK_BYTES = 128
 
 MS_PER_DAY = 86_400_000
 
+#: Largest catalogue: as many blocks as a telecommand can number.
 MOST_CATALOGUE_BYTES = 65_536 * BLOCK_BYTES
-"""Of a catalogue's image: as many blocks as a telecommand can number."""
 
 _DEFAULT_EXPOSURE_ROWS = 6299
 
@@ -193,7 +193,6 @@ _EXTENSIONS = (
     ).of(u8("Address", "register's address")),
 )
 
-#: Messages of the switches.
 *SET_SWITCHES, SWITCHES_SHOWN = switch_messages(
     AramisSwitches, 118, 210, "lost at a reset, and not saved"
 )

@@ -1,7 +1,7 @@
 """AraMiS' telemetry: the answers of the thesis' use cases, then reports.
 
-AraMiS thesis, section 2.2: an attitude quaternion with the time of its picture, or the reason why
-there is none. IDs and layouts are assumed; those from 200 on have no use case behind them.
+AraMiS thesis, section 2.2: an attitude quaternion with the time of its image, or the reason why
+there is none. IDs and layouts are assumed; no use case covers those from 200 on.
 """
 
 from dataclasses import replace
@@ -199,9 +199,9 @@ _QUALITY = Message(
     u32("Spikes", "bright pixels that belong to no star"),
     u16("Rejected", "bright regions whose shape no star has"),
 )
-"""Beside the thesis: of `belief=confirmed`, and from Background on of `detection=local`."""
+"""Not in the thesis: filled with `belief=confirmed`, from Background on with `detection=local`."""
 
-#: Telemetry frame of each setting telecommand, which shows its parameters: ID and name.
+#: ID and name of the telemetry frame that shows a setting telecommand's parameters.
 _SHOWN = {
     "SetExposure": (220, "Exposure"),
     "SetGain": (221, "Gain"),
@@ -214,7 +214,7 @@ _SHOWN = {
     "ImageBlockSet": (228, "ImageBlockSettings"),
 }
 
-#: Telemetry frame to the setting telecommand whose parameters it shows.
+#: The setting telecommand whose parameters a telemetry frame shows.
 SETTINGS_SHOWN = {name: command for command, (_, name) in _SHOWN.items()}
 
 

@@ -1,10 +1,10 @@
-"""The MLX75412 image sensor: its picture, its clocks, and its published control registers.
+"""The MLX75412 image sensor: size, clocks, and its published control registers.
 
 CubeStar thesis, appendix D (and appendix C for the device address). The thesis names registers and
-what they do, but reset values and the positions of most feature bits only where they matter to
-it; what is chosen here stands in each register's ``assumed``. Which registers wait for the sync
-register is not printed either: it is taken that all do but the mode select register, whose enable
-bit the published firmware uses without a sync.
+their effects, but prints reset values and the positions of most feature bits only where they matter
+to it; values chosen here are marked in each register's ``assumed``. The thesis does not say which
+registers wait for the sync register: here all do except the mode select register, whose enable bit
+the published firmware uses without a sync.
 """
 
 from functools import partial
@@ -15,7 +15,7 @@ from cubestack.firmware_model.interface.cameras.registers import (
     CameraRegisterMap,
 )
 
-#: Pixels of a picture, and the distance of their centres (table 3.3).
+#: Size of an image in pixels, and the distance between pixel centres (table 3.3).
 COLUMNS = 1024
 ROWS = 512
 PIXEL_PITCH_MM = 0.0056
@@ -24,12 +24,12 @@ PIXEL_PITCH_MM = 0.0056
 LINE_CLOCKS = 1322
 
 #: CubeStar's crystal: all measured frame rates fit 10 MHz, though 11 MHz is printed in places.
-CRYSTAL_HZ = 10_000_000  # chosen: the published frame rates need it, one place says 11 MHz
+CRYSTAL_HZ = 10_000_000  # chosen: required by the published frame rates
 
 #: Value of SYNC that makes written values take effect.
 SYNC_APPLY = 0x03
 
-#: Value of EXPOSURE_RULE that asks for the longest exposure the frame rate allows.
+#: Value of EXPOSURE_RULE for the longest exposure that the frame rate allows.
 LONGEST_EXPOSURE = 0x0002
 
 
@@ -131,5 +131,5 @@ _REGISTERS = (
     ),
 )
 
-# The address: 0101_100: image sensor zero.
+# Address 0101_100: image sensor zero.
 REGISTERS = CameraRegisterMap("MLX75412", 0x2C, address_bytes=2, registers=_REGISTERS)

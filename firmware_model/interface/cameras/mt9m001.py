@@ -1,9 +1,9 @@
-"""The MT9M001C12STM image sensor: its picture, its clocks, and its control registers.
+"""The MT9M001C12STM image sensor: size, clocks, and its control registers.
 
 MT9M001 data sheet, revisions C (2005) and K (2011): registers of 16 bits behind addresses of 8 bits
-on a two-wire bus, frame timing (tables 3 and 4 there), gain. Which pixel of the array is the first
-active one (row 12, column 20) is that of the reset values. Bits that must keep their reset value
-are left out of the fields.
+on a two-wire bus, frame timing (tables 3 and 4 there), gain. The first active pixel of the array
+(row 12, column 20) follows from the reset values. Bits that must keep their reset value are left
+out of the fields.
 """
 
 from functools import partial
@@ -15,7 +15,7 @@ from cubestack.firmware_model.interface.cameras.registers import (
     RegisterAccess,
 )
 
-#: Active pixels, and the distance of their centres.
+#: Active pixels, and the distance between their centres.
 COLUMNS = 1280
 ROWS = 1024
 PIXEL_PITCH_MM = 0.0052
@@ -24,11 +24,11 @@ PIXEL_PITCH_MM = 0.0052
 ARRAY_ROW = 12
 ARRAY_COLUMN = 20
 
-#: PIXCLK has the frequency of the master clock; this is the recommended and the highest one.
+#: Frequency of PIXCLK and of the master clock: the recommended and highest one.
 PIXEL_CLOCK_HZ = 48_000_000
 
-#: FRAME_VALID is high so long before the first LINE_VALID and after the last one, in pixel clocks,
-#: when HORIZONTAL_BLANKING is smallest; more blanking adds to the second.
+#: Pixel clocks for which FRAME_VALID is high before the first LINE_VALID and after the last one, at
+#: the smallest HORIZONTAL_BLANKING; more blanking adds to the second.
 FRAME_START_CLOCKS = 242
 FRAME_END_CLOCKS = 2
 
@@ -36,14 +36,13 @@ FRAME_END_CLOCKS = 2
 FEWEST_BLANK_CLOCKS = 19
 FEWEST_BLANK_ROWS = 15
 
-CHIP_VERSION = 0x8431
-"""Monochrome."""
+CHIP_VERSION = 0x8431  # the monochrome version
 
 HIGHEST_GAIN = 15.0
 
 
 def gain(register: int) -> float:
-    """Amplification that a gain register's value stands for.
+    """Amplification for a gain register's value.
 
     Up to 8: bits 5:0 in eighths, doubled by bit 6; above, from 0x60 on, 8 plus bits 2:0.
     """
@@ -54,7 +53,10 @@ def gain(register: int) -> float:
 
 
 def gain_register(amplification: float) -> int:
-    """Recommended value of the gain nearest to ``amplification``; ValueError outside of 1 to 15."""
+    """Recommended register value for the gain nearest to ``amplification``.
+
+    Raises ValueError outside of 1 to 15.
+    """
     if not 1 <= amplification <= HIGHEST_GAIN:
         raise ValueError(f"the gain must be in 1..{HIGHEST_GAIN:g}, not {amplification:g}")
     recommended = (*range(0x08, 0x21), *range(0x51, 0x61), *range(0x61, 0x68))

@@ -1,8 +1,8 @@
-"""Picture, registers and frame timing of the OV7620 image sensor, as far as CubeSense needs them.
+"""Size, registers and frame timing of the OV7620 image sensor, as far as CubeSense needs them.
 
 OV7620 product specifications, revision 1.3: addresses and bits; CubeSense thesis, section 3.2 and
 appendix A. Registers are written over SCCB, an I2C dialect, with one address byte; writes to other
-addresses are ignored. Reset values and what the model leaves out are said in each register.
+addresses are ignored. Each register states its reset value and what is not modelled.
 """
 
 from functools import partial
@@ -13,33 +13,33 @@ from cubestack.firmware_model.interface.cameras.registers import (
     CameraRegisterMap,
 )
 
-#: Pixels that are sent, of 664 x 492.
+#: Transmitted pixels, out of 664 x 492.
 COLUMNS = 640
 ROWS = 480
 
 PIXEL_CLOCK_HZ = 13_500_000
 
-#: Pixel clocks of a line, with its blanking.
+#: Pixel clocks per line, blanking included.
 CLOCKS_PER_LINE = 858
 
-#: Lines of a frame, with its blanking: 33.37 ms a frame (CCIR-601).
+#: Lines per frame, blanking included: 33.37 ms per frame (CCIR-601).
 LINES_PER_FRAME = 525
 
-#: Line times of one count of EXPOSURE: 127 us.
+#: Line times per count of EXPOSURE: 127 us.
 EXPOSURE_LINES = 2
 
-_WINDOW_LEFT, _COLUMNS_A_COUNT = 0x2F, 4
-_WINDOW_TOP, _ROWS_A_COUNT = 0x05, 2
+_WINDOW_LEFT, _COLUMNS_PER_COUNT = 0x2F, 4
+_WINDOW_TOP, _ROWS_PER_COUNT = 0x05, 2
 
 
 def window_column(column: int) -> int:
-    """Value of HSTART or HSTOP for the window's edge at ``column``, 0 to 640, rounded down to 4."""
-    return _WINDOW_LEFT + column // _COLUMNS_A_COUNT
+    """HSTART or HSTOP for a window edge at ``column``, 0 to 640, rounded down to 4."""
+    return _WINDOW_LEFT + column // _COLUMNS_PER_COUNT
 
 
 def window_row(row: int) -> int:
-    """Value of VSTART or VSTOP for the window's edge at ``row``, 0 to 480, rounded down to 2."""
-    return _WINDOW_TOP + row // _ROWS_A_COUNT
+    """VSTART or VSTOP for a window edge at ``row``, 0 to 480, rounded down to 2."""
+    return _WINDOW_TOP + row // _ROWS_PER_COUNT
 
 
 _COLOUR = "a monochrome picture does not depend on it"
@@ -116,5 +116,5 @@ _REGISTERS = (
     ),
 )
 
-# The address: SCCB 0x42 to write, 0x43 to read.
+# SCCB address 0x42 to write, 0x43 to read.
 REGISTERS = CameraRegisterMap("OV7620", 0x21, address_bytes=1, registers=_REGISTERS)

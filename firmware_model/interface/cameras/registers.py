@@ -1,8 +1,8 @@
-"""Camera control registers: addresses, widths, bit fields, and what of them is modelled.
+"""Camera control registers: addresses, widths, bit fields, and which of them are modelled.
 
-Pure data: the firmware finds a register's address and bits by name, the camera model decodes from
-it, documents list it. Values of more than one byte stand with the most significant byte at the
-lowest address.
+Pure data: the firmware looks up a register's address and bits by name, the camera model decodes
+writes, documents list it. Values of several bytes have the most significant byte at the lowest
+address.
 """
 
 from collections.abc import Iterator
@@ -11,11 +11,11 @@ from enum import Enum
 
 
 class UnknownRegisterError(ValueError):
-    """No register or bit field has that name."""
+    """No register or bit field has the requested name."""
 
 
 class RegisterAccess(Enum):
-    """What the control bus may do with a register."""
+    """Accesses that the control bus may make."""
 
     READ_WRITE = "rw"
     READ_ONLY = "ro"
@@ -24,7 +24,7 @@ class RegisterAccess(Enum):
 
 @dataclass(frozen=True)
 class BitField:
-    """Adjacent bits of a register; not ``modelled``: the camera model does nothing with them."""
+    """Adjacent bits of a register; the camera model ignores them unless ``modelled``."""
 
     name: str
     lsb: int
@@ -34,11 +34,10 @@ class BitField:
 
     @property
     def mask(self) -> int:
-        """The field's bits within the register."""
         return ((1 << self.width) - 1) << self.lsb
 
     def of(self, register_value: int) -> int:
-        """Value of the field in the register's value."""
+        """The field's value in the register's value."""
         return (register_value & self.mask) >> self.lsb
 
 
@@ -50,15 +49,14 @@ class CameraRegister:
         address: of its first, most significant byte.
         name: unique within the map.
         reset: value after power-up and reset, unsigned.
-        meaning: what the value does.
-        fields: declared bits; none when the value is one number.
-        width: number of addresses that it takes.
-        access: what the control bus may do.
-        needs_sync: a written value waits for the sync register before it takes effect.
-        modelled: False when the camera model stores the value, with all its fields, and does
-            nothing with it.
-        assumed: what here is chosen because nothing is published; empty when all is published.
-        unit_bits: bits behind one address.
+        meaning: effect of the value.
+        fields: declared bits; none if the value is one number.
+        width: number of addresses that it occupies.
+        access: accesses that the control bus may make.
+        needs_sync: a written value takes effect only with the sync register.
+        modelled: False if the camera model stores the value, with all its fields, but ignores it.
+        assumed: parts of this declaration that no document states; empty if all are published.
+        unit_bits: bits per address.
     """
 
     address: int
@@ -74,35 +72,33 @@ class CameraRegister:
     unit_bits: int = 8
 
     def __post_init__(self) -> None:
-        """Pass ``modelled`` on to the fields."""
         if not self.modelled:
             fields = tuple(replace(field, modelled=False) for field in self.fields)
             object.__setattr__(self, "fields", fields)
 
     def of(self, *fields: BitField) -> "CameraRegister":
-        """This register with ``fields``."""
         return replace(self, fields=fields)
 
     @property
     def addresses(self) -> range:
-        """Addresses of its bytes, or of what else stands behind an address."""
+        """The addresses that it occupies."""
         return range(self.address, self.address + self.width)
 
     @property
     def bits(self) -> int:
-        """Mask of the declared bits: the whole register when it has no fields."""
+        """Mask of the declared bits: the whole register if it has no fields."""
         if not self.fields:
             return (1 << (self.unit_bits * self.width)) - 1
         return sum(field.mask for field in self.fields)
 
     def units(self, value: int) -> list[int]:
-        """``value`` cut up by addresses, most significant part first."""
+        """``value`` split by addresses, most significant part first."""
         part = (1 << self.unit_bits) - 1
         shifts = reversed(range(self.width))
         return [value >> (self.unit_bits * shift) & part for shift in shifts]
 
     def field(self, name: str) -> BitField:
-        """The bit field ``name``; UnknownRegisterError when there is none."""
+        """The bit field ``name``; raises UnknownRegisterError if there is none."""
         for field in self.fields:
             if field.name == name:
                 return field
@@ -122,7 +118,7 @@ class CameraRegisterMap:
     registers: InitVar[tuple[CameraRegister, ...]]
 
     def __post_init__(self, registers: tuple[CameraRegister, ...]) -> None:
-        """Make the map; ValueError when registers share a name or an address."""
+        """Raise ValueError if registers share a name or an address."""
         self._by_name: dict[str, CameraRegister] = {}
         self._by_address: dict[int, CameraRegister] = {}
         for register in sorted(registers, key=lambda r: r.address):
@@ -138,7 +134,7 @@ class CameraRegisterMap:
                 self._by_address[address] = register
 
     def __getitem__(self, name: str) -> CameraRegister:
-        """The register ``name``; UnknownRegisterError when there is none."""
+        """The register ``name``; raises UnknownRegisterError if there is none."""
         if name not in self._by_name:
             raise UnknownRegisterError(
                 f"{self.camera} has no register {name!r}, only {', '.join(self._by_name)}"
@@ -146,9 +142,8 @@ class CameraRegisterMap:
         return self._by_name[name]
 
     def __iter__(self) -> Iterator[CameraRegister]:
-        """Registers in the order of their addresses."""
         return iter(self._by_name.values())
 
     def at(self, address: int) -> CameraRegister | None:
-        """The register that owns the byte at ``address``, or None."""
+        """The register that contains the byte at ``address``, or None."""
         return self._by_address.get(address)

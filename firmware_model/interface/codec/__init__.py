@@ -1,1 +1,1 @@
-"""What interface tables are made of: fields, messages, frames, registers."""
+"""Elements of interface tables: fields, messages, frames, registers."""

@@ -1,7 +1,6 @@
-"""How good an attitude is: the fields that telemetry Quality of every star tracker has.
+"""Quality of an attitude: the fields of telemetry Quality that every star tracker has.
 
-A standard deviation of `UNKNOWN_RAD` tells a filter that nothing is known: there is no attitude, or
-one that is not rated.
+A standard deviation of `UNKNOWN_RAD` means unknown: there is no attitude, or an unrated one.
 """
 
 import math
@@ -30,20 +29,19 @@ UNRATED: dict[str, Value] = {
     **dict.fromkeys(("SigmaX", "SigmaY", "SigmaZ"), UNKNOWN_RAD),
     "Scale": 1.0,
 }
-"""Values of these fields that say nothing."""
+"""Values of these fields for an unrated attitude."""
 
+#: Smaller probabilities are reported as this one.
 SMALLEST_FALSE_ALARM = 1e-30
-"""Probability that is told for smaller ones."""
 
 _PAIRS = {"CorrelationXY": (0, 1), "CorrelationXZ": (0, 2), "CorrelationYZ": (1, 2)}
 
 
 def log_false_alarm(probability: float) -> float:
-    """Value of field LogFalseAlarm."""
     return math.log10(max(probability, SMALLEST_FALSE_ALARM))
 
 
-def covariance_told(covariance: Sequence[Sequence[float]]) -> dict[str, Value]:
+def covariance_fields(covariance: Sequence[Sequence[float]]) -> dict[str, Value]:
     """Fields Sigma and Correlation of a covariance, three rows of three, rad^2."""
     sigmas = [math.sqrt(covariance[axis][axis]) for axis in range(3)]
     values: dict[str, Value] = dict(zip(("SigmaX", "SigmaY", "SigmaZ"), sigmas, strict=True))
@@ -53,8 +51,11 @@ def covariance_told(covariance: Sequence[Sequence[float]]) -> dict[str, Value]:
     }
 
 
-def covariance_read(values: Mapping[str, Value]) -> tuple[tuple[float, float, float], ...]:
-    """Covariance, three rows of three, rad^2, of them; ValueError for what none can have."""
+def read_covariance(values: Mapping[str, Value]) -> tuple[tuple[float, float, float], ...]:
+    """Covariance, three rows of three, rad^2, from the fields Sigma and Correlation.
+
+    Raises ValueError for values that no covariance has.
+    """
     sigmas = [float(values[f"Sigma{axis}"]) for axis in "XYZ"]
     correlations = {axes: float(values[name]) for name, axes in _PAIRS.items()}
     known = all(sigma >= 0 for sigma in sigmas)

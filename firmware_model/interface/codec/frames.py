@@ -12,46 +12,44 @@ END = 0xFF
 
 
 def encode_frame(payload: bytes) -> bytes:
-    """The frame that carries ``payload`` (any length, 0 included)."""
+    """The frame with ``payload``, which may be empty."""
     escaped = payload.replace(bytes((ESCAPE,)), bytes((ESCAPE, ESCAPE)))
     return bytes((ESCAPE, START)) + escaped + bytes((ESCAPE, END))
 
 
 class FrameEvent(Enum):
-    """What a byte brought about."""
+    """Result of a received byte."""
 
-    FRAME = auto()
-    """A whole frame: its payload is in ``FrameDecoder.payload``."""
-    TOO_LONG = auto()
-    """A whole frame whose payload exceeds the limit; only the front of it is kept."""
+    FRAME = auto()  #: a complete frame: its payload is in ``FrameDecoder.payload``
+    TOO_LONG = auto()  #: a complete frame whose payload exceeds the limit; only its front is kept
     INCOMPLETE = auto()
     """A start inside a frame: the unfinished one is dropped, the new one has begun."""
     PROTOCOL_ERROR = auto()
-    """A byte outside of a frame, or an escape that means nothing; an open frame is dropped."""
+    """A byte outside of a frame, or an unknown escape; an open frame is dropped."""
 
 
 class FrameDecoder:
     """Finds frames in a stream of bytes, one byte at a time; no byte sequence raises.
 
-    After anything, the next good frame is found, with one exception that the format itself makes:
-    when noise has opened a frame (it holds 1F 7F) and ends in an odd number of 1F, the good
-    frame's first 1F completes a doubled data byte, so that frame is swallowed and only the one
-    after it is found. A silence on the line (``reset``) ends such a state too.
+    After any input the next good frame is found, with one exception that the format causes: when
+    noise has opened a frame (it contains 1F 7F) and ends in an odd number of 1F, the good frame's
+    first 1F completes a doubled data byte, so that frame is lost and only the one after it is
+    found. A silence on the line (``reset``) ends such a state too.
 
     Attributes:
-        payload: payload of the last whole frame, or the front of it.
-        escaped: the last byte was an escape, whose meaning the next one tells.
+        payload: payload of the last complete frame, or its front.
+        escaped: the last byte was an escape; the next byte determines its meaning.
     """
 
     def __init__(self, max_length: int) -> None:
-        """Accept payloads of at most ``max_length`` bytes; memory is bounded by it."""
+        """Accept payloads of at most ``max_length`` bytes, which also bounds the memory."""
         self._max_length = max_length
         self._inside = self.escaped = False
         self._buffer = bytearray()
         self.payload = b""
 
     def feed(self, byte: int) -> FrameEvent | None:
-        """Take the next ``byte``; returns what it completed or broke, None while all is well."""
+        """Process the next ``byte``; returns what it completed or broke, else None."""
         inside, escaped = self._inside, self.escaped
         self.escaped = not escaped and byte == ESCAPE
         if self.escaped:
@@ -74,7 +72,7 @@ class FrameDecoder:
 
     @property
     def begun(self) -> bytes | None:
-        """Payload so far of a frame that has not ended; None outside of one."""
+        """Payload so far of an open frame; None outside of one."""
         return bytes(self._buffer) if self._inside else None
 
     @property
@@ -83,7 +81,7 @@ class FrameDecoder:
         return self._inside or self.escaped
 
     def reset(self) -> bool:
-        """Forget an unfinished frame, as after a silence; returns whether there was one."""
+        """Drop an unfinished frame, as after a silence; returns whether there was one."""
         unfinished = self.unfinished
         self._inside = self.escaped = False
         return unfinished

@@ -1,7 +1,7 @@
-"""One-letter protocols of service ports as data: a letter is a request, an answer has a length.
+"""One-letter protocols of service ports as data: a letter is a request with a fixed answer length.
 
-A host sends one byte and waits for the whole answer; there are no frames and no error codes. What
-is no letter of the protocol gets no answer.
+A host sends one byte and waits for the whole answer; there are no frames and no error codes. Other
+bytes get no answer.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from itertools import combinations
 
 @dataclass(frozen=True)
 class Letter:
-    """A request of one ASCII character; ``answer``, where it is always the same one."""
+    """A request of one ASCII character; ``answer`` if it is always the same."""
 
     letter: str
     name: str
@@ -19,7 +19,6 @@ class Letter:
     answer: bytes | None = None
 
     def __post_init__(self) -> None:
-        """Check the declaration; raises ValueError."""
         if len(self.letter) != 1 or not self.letter.isascii():
             raise ValueError(f"letter {self.name}: {self.letter!r} is not one ASCII character")
         if self.answer is not None and len(self.answer) != self.length:
@@ -29,7 +28,6 @@ class Letter:
 
     @property
     def request(self) -> bytes:
-        """The byte to send."""
         return self.letter.encode("ascii")
 
 
@@ -41,7 +39,6 @@ class LetterProtocol:
     letters: tuple[Letter, ...]
 
     def __post_init__(self) -> None:
-        """Check the declaration; raises ValueError."""
         for other, letter in combinations(self.letters, 2):
             if letter.letter == other.letter or letter.name == other.name:
                 raise ValueError(
@@ -50,5 +47,5 @@ class LetterProtocol:
                 )
 
     def find(self, byte: int) -> Letter | None:
-        """The letter that ``byte`` is, or None."""
+        """The letter whose request is ``byte``, or None."""
         return next((letter for letter in self.letters if letter.request[0] == byte), None)

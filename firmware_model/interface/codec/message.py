@@ -1,8 +1,8 @@
-"""Messages and interfaces as data: what telecommands and telemetry frames exist, and their fields.
+"""Messages and interfaces as data: telecommands and telemetry frames with their fields.
 
-Frame layouts of the CubeSpace family of nodes: an ID below 128 is a telecommand, from 128 on a
-telemetry frame; both have a fixed length. Firmware decodes with these declarations, hosts encode
-with them, and documentation is generated from them.
+Frame layouts of the CubeSpace family of nodes: IDs below 128 are telecommands, others telemetry
+frames; both have a fixed length. Firmware decodes with these declarations, hosts encode with them,
+and documentation is generated from them.
 """
 
 import dataclasses
@@ -47,16 +47,16 @@ class Message:
     """A telecommand or telemetry frame.
 
     Attributes:
-        id: ID byte on the wire; its bit 7 tells the kind.
+        id: ID byte on the wire; its bit 7 determines the kind.
         name: printed name.
         meaning: one phrase for a reader.
-        fields: in order of their offsets, each placed behind the one before.
-        ordered: pairs of field names of which the first must not exceed the second.
+        fields: in order of their offsets, without gaps.
+        ordered: pairs of field names; the first value must not exceed the second.
         extension: added by this project to the published interface.
         steps: each read returns the next of several records, and wraps.
-        starts_measurement: reading it makes the node measure again.
-        supported: False when the node treats the ID as unknown.
-        confidence: how well the layout is known; None when it is printed, or an extension.
+        starts_measurement: a read makes the node measure again.
+        supported: False if the node rejects the ID as unknown.
+        confidence: how well the layout is known; None if it is printed, or an extension.
         length: bytes of parameters or data.
     """
 
@@ -99,35 +99,33 @@ class Message:
                 )
 
     def of(self, *fields: Field, ordered: tuple[tuple[str, str], ...] = ()) -> "Message":
-        """This message with ``fields``, one behind the other, and what holds between them."""
+        """This message with consecutive ``fields`` and pairs of ``ordered`` field names."""
         return dataclasses.replace(self, fields=fields, ordered=ordered)
 
     @property
     def kind(self) -> Kind:
-        """Telecommand or telemetry."""
         return Kind.TELEMETRY if self.id & TELEMETRY_BIT else Kind.TELECOMMAND
 
     @property
     def has_side_effect(self) -> bool:
-        """Whether reading it changes something in the node."""
+        """Whether a read changes the node's state."""
         return self.steps or self.starts_measurement
 
     def field(self, name: str) -> Field:
-        """The field called ``name``, in any case; else InterfaceError."""
+        """The field ``name``, in any case; raises InterfaceError if there is none."""
         for field in self.fields:
             if field.name.lower() == name.lower():
                 return field
         raise InterfaceError(f"{self.name} has no field {name!r}; {self._field_hint(name)}")
 
     def reset_values(self) -> dict[str, Value]:
-        """Every field's value after power-up."""
         return {f.name: f.decode(f.encode(f.reset, saturate=False)) for f in self.fields}
 
     def pack(self, **values: object) -> bytes:
-        """``length`` bytes that carry ``values``, one for each field.
+        """``length`` bytes with ``values``, one for each field.
 
         Telemetry saturates; a telecommand's value that does not fit its type, and an unknown or
-        missing field, raise InterfaceError. Limits are the node's to check (``violations``).
+        missing field, raise InterfaceError. The node checks limits (``violations``).
         """
         for name in values:
             if all(field.name != name for field in self.fields):
@@ -145,7 +143,7 @@ class Message:
         return whole.to_bytes(self.length, "little")
 
     def unpack(self, data: bytes) -> dict[str, Value]:
-        """Every field's value in ``data``; another length than declared raises InterfaceError."""
+        """Every field's value in ``data``; raises InterfaceError for a wrong length."""
         if len(data) != self.length:
             raise InterfaceError(f"{self.name} has {self.length} bytes, not {len(data)}")
         whole = int.from_bytes(data, "little")
@@ -155,7 +153,7 @@ class Message:
         }
 
     def violations(self, values: Mapping[str, Value]) -> list[tuple[Field, str]]:
-        """Fields whose decoded value is not allowed, each with the error flag it raises or ""."""
+        """Fields whose decoded value is not allowed, each with its error flag or ""."""
         wrong = [field for field in self.fields if not field.allows(values[field.name], values)]
         for low, high in self.ordered:
             below, above = values[low], values[high]
@@ -170,7 +168,7 @@ class Message:
 
 @dataclass(frozen=True)
 class Interface:
-    """All messages of a node, and what else the device speaks.
+    """All messages of a node, and the device's other protocols.
 
     Attributes:
         version: interface version that the node reports.
@@ -180,7 +178,7 @@ class Interface:
         ack_errors: error codes of a telecommand's acknowledge; 0 is no error.
         registers: registers behind another I2C address, or None.
         service_port: one-letter protocol on another serial port, or None.
-        switches: where the firmware can do what its documents print, or better.
+        switches: choices between published and better algorithms.
     """
 
     name: str
@@ -195,7 +193,6 @@ class Interface:
     switches: type[Switches] = Switches
 
     def __post_init__(self) -> None:
-        """Check the declaration; raises InterfaceError."""
         for messages, kind in (
             (self.telecommands, Kind.TELECOMMAND),
             (self.telemetries, Kind.TELEMETRY),
@@ -211,12 +208,11 @@ class Interface:
 
     @property
     def messages(self) -> tuple[Message, ...]:
-        """Telecommands, then telemetry."""
         return self.telecommands + self.telemetries
 
     @property
     def choices(self) -> tuple[Choices, ...]:
-        """The sets of named numbers that fields use beside ``ack_errors``, by their first use."""
+        """The sets of named numbers in fields, without ``ack_errors``, by first use."""
         fields = [field for message in self.messages for field in message.fields]
         if self.registers is not None:
             fields += [register.field for register in self.registers]
@@ -224,15 +220,15 @@ class Interface:
         return tuple(choices for choices in used if choices not in (None, self.ack_errors))
 
     def telecommand(self, key: str | int) -> Message:
-        """The telecommand of this name (in any case) or ID; else InterfaceError."""
+        """The telecommand with this name (in any case) or ID; raises InterfaceError if none."""
         return self._lookup(self.telecommands, "telecommand", key)
 
     def telemetry(self, key: str | int) -> Message:
-        """The telemetry frame of this name (in any case) or ID; else InterfaceError."""
+        """The telemetry frame with this name (in any case) or ID; raises InterfaceError if none."""
         return self._lookup(self.telemetries, "telemetry frame", key)
 
     def find(self, identifier: int) -> Message | None:
-        """The message with this ID byte as the node knows it; None for an invalid ID."""
+        """The supported message with this ID byte; None for an invalid ID."""
         return self._supported.get(identifier)
 
     @cached_property

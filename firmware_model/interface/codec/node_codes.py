@@ -1,4 +1,4 @@
-"""Numbers with names that all nodes of the CubeSpace family share."""
+"""Named numbers that all nodes of the CubeSpace family share."""
 
 from enum import IntEnum
 

@@ -1,6 +1,6 @@
-"""Messages that a plain node has beside its own: who it is, what went wrong, whether it is done.
+"""Messages that a plain node has beside its own: identification, errors, progress.
 
-As the CubeSpace family's nodes have them; ``firmware_model.node.program`` serves them.
+They are those of the CubeSpace family's nodes; ``firmware_model.node.program`` serves them.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ NODE_TELECOMMANDS = (
 
 
 def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Message, ...]:
-    """Telemetry 128 to 131 of a node of that type, whose ``own_flags`` follow those of its link."""
+    """Telemetry 128 to 131 of a node; its ``own_flags`` follow those of the link."""
     flags = {**NODE_FLAGS, **own_flags}
     return (
         Message(128, "Identification", "who answers").of(

@@ -1,19 +1,19 @@
 """Registers behind a register pointer on I2C, and on a UART, as data.
 
-A host writes the address of a register, then either one data byte in the same transfer, or it reads
-the value after a repeated start or in a transfer of its own (CubeSense thesis, section 6.4.3).
-Values of two bytes are signed. What is assumed, because the text leaves it open:
+A host writes the address of a register, then one data byte in the same transfer; or it reads the
+value after a repeated start or in another transfer (CubeSense thesis, section 6.4.3). Values of two
+bytes are signed. Assumed, because the text leaves it open:
 
 - The most significant byte comes first.
 - Writing the address latches the value, so that both bytes belong together; the pointer stays, and
-  a read continues where the one before it stopped, because a bus driver limits the length of one
-  read. Writing the address again begins anew.
-- A read beyond the end of a value, or of an address without a register, gives ``FILL`` bytes.
-- A slave can not refuse: a write to an address without a register, to one that can not be written,
-  or of a value that is not allowed, is ignored.
+  a read continues where the previous one stopped, because bus drivers limit the length of one read.
+  Writing the address again starts again.
+- A read beyond the end of a value, or of an address without a register, returns ``FILL`` bytes.
+- A slave cannot reject data: a write to an address without a register, to a read-only register, or
+  of a value that is not allowed, is ignored.
 
 On a UART a message is the I2C address with the direction in its lowest bit, the register's address
-and, to write, one data byte; a read is answered with the value.
+and, to write, one data byte; the answer to a read is the value.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value, suggestion
 
-#: What a read gives where there is nothing.
+#: Byte read where there is no value.
 FILL = 0xFF
 
 
@@ -32,7 +32,7 @@ class PointerRegister:
 
     Attributes:
         address: the pointer's value.
-        access: what the host may do.
+        access: accesses that the host may make.
         field: name, type, meaning, unit, scale and limits; whole bytes. A ``bytesN`` is a
             stream, anything else a number.
     """
@@ -42,7 +42,6 @@ class PointerRegister:
     field: Field
 
     def __post_init__(self) -> None:
-        """Check the declaration; raises InterfaceError."""
         if not 0 <= self.address <= 255:
             raise InterfaceError(f"register {self.name}: address {self.address} is not a byte")
         if self.field.bits % 8:
@@ -52,50 +51,47 @@ class PointerRegister:
 
     @property
     def name(self) -> str:
-        """The field's name."""
         return self.field.name
 
     @property
     def length(self) -> int:
-        """Bytes of the value."""
+        """In bytes."""
         return self.field.bits // 8
 
     @property
     def writable(self) -> bool:
-        """Whether a host may write it."""
         return self.access is not RegisterAccess.READ_ONLY
 
     @property
     def readable(self) -> bool:
-        """Whether a read gives its value."""
         return self.access is not RegisterAccess.WRITE_ONLY
 
     @property
     def streams(self) -> bool:
-        """Whether it is a stream of bytes and no number."""
+        """Whether it is a stream of bytes, not a number."""
         return self.field.type.startswith("bytes")
 
     def allows(self, value: Value) -> bool:
-        """Whether a decoded ``value`` may be written."""
+        """Whether a host may write the decoded ``value``."""
         return self.writable and self.field.allows(value, {})
 
     def encode(self, value: object, *, saturate: bool = True) -> bytes:
-        """The bytes of a number, most significant first; InterfaceError as ``Field.encode``."""
+        """Bytes of a number, most significant first; raises InterfaceError as ``Field.encode``."""
         if self.streams:
             raise InterfaceError(f"register {self.name} is a stream and carries no number")
         return self.field.encode(value, saturate=saturate).to_bytes(self.length, "big")
 
     def decode(self, data: bytes) -> Value:
-        """The number, or stream, that ``data`` carries; another length raises InterfaceError."""
+        """The number, or stream, in ``data``; raises InterfaceError for another length."""
         if len(data) != self.length:
             raise InterfaceError(f"register {self.name} has {self.length} bytes, not {len(data)}")
         return data if self.streams else self.field.decode(int.from_bytes(data, "big"))
 
 
 class PointerMap:
-    """All registers behind one I2C address; ``note`` is a sentence on the map as a whole.
+    """All registers behind one I2C address; ``note`` describes the map as a whole.
 
-    ``baud`` is the rate of a UART that the same protocol can be chosen for, None for none.
+    ``baud`` is the rate of a UART with the same protocol, None if there is none.
     """
 
     def __init__(
@@ -105,7 +101,7 @@ class PointerMap:
         note: str = "",
         baud: int | None = None,
     ) -> None:
-        """Make the map; InterfaceError when registers share a name or an address."""
+        """Raise InterfaceError if registers share a name or an address."""
         self.i2c_address = i2c_address
         self.note = note
         self.baud = baud
@@ -124,16 +120,14 @@ class PointerMap:
             self._by_name[register.name.lower()] = register
 
     def at(self, address: int) -> PointerRegister | None:
-        """The register at ``address``, or None."""
         return self._by_address.get(address)
 
     def __getitem__(self, name: str) -> PointerRegister:
-        """The register ``name``, in any case; InterfaceError when there is none."""
+        """The register ``name``, in any case; raises InterfaceError if there is none."""
         if name.lower() not in self._by_name:
             hint = suggestion(name, [register.name for register in self])
             raise InterfaceError(f"no register {name!r}; {hint}")
         return self._by_name[name.lower()]
 
     def __iter__(self) -> Iterator[PointerRegister]:
-        """Registers in the order of their addresses."""
         return iter(self._by_address.values())

@@ -1,7 +1,7 @@
 """Telecommands that change a firmware's switches, and telemetry that shows them.
 
-Made of the switches' declaration. A switch has the number of its place there, and a value that of
-its name among the values of all switches, so that one name is one number everywhere.
+They are derived from the switches' declaration. A switch's number is its position there; a value's
+number is its position among the value names of all switches, so that a name always has one number.
 """
 
 import re
@@ -25,10 +25,11 @@ _PROFILES = (*PROFILES, MIXED)
 def switch_messages(
     switches: type[Switches], telecommand: int, telemetry: int, kept: str
 ) -> tuple[Message, ...]:
-    """SetProfile, SetSwitch and telemetry Profile of ``switches``, extensions all.
+    """SetProfile, SetSwitch and telemetry Profile of ``switches``, all of them extensions.
 
-    ``telecommand`` is the first of two IDs, ``telemetry`` the third's; ``kept`` says what becomes
-    of a change at a reset. Switches of the board are shown, and no telecommand knows them.
+    ``telecommand`` is the first of two IDs, ``telemetry`` the third ID; ``kept`` describes the
+    effect of a reset on a change. Telemetry shows switches of the board too; no telecommand sets
+    them.
     """
     declared, numbers = switches.declared(), _numbers(switches)
     values = [
@@ -63,21 +64,21 @@ def switch_messages(
 
 
 def shown_values(switches: Switches) -> dict[str, int]:
-    """What telemetry shows of them."""
+    """Field values of telemetry Profile."""
     values = {"Profile": _PROFILES.index(switches.profile)}
     for name, numbers in _numbers(type(switches)).items():
         values[_field_name(name)] = numbers[_value_name(name, getattr(switches, name))]
     return values
 
 
-def switches_shown(switches: type[SwitchesT], values: Mapping[str, Value]) -> SwitchesT:
-    """The ``switches`` of which telemetry has these ``values``; ValueError for a wrong one."""
+def read_switches(switches: type[SwitchesT], values: Mapping[str, Value]) -> SwitchesT:
+    """The ``switches`` with these telemetry ``values``; raises ValueError for a wrong one."""
     names = switches.declared()
     return switches(**{n: _value(switches, n, int(values[_field_name(n)])) for n in names})
 
 
-def after(switches: SwitchesT, telecommand: str, values: Mapping[str, Value]) -> SwitchesT:
-    """The switches once one of the telecommands, whose ``values`` it allows, was executed."""
+def apply_command(switches: SwitchesT, telecommand: str, values: Mapping[str, Value]) -> SwitchesT:
+    """The switches after one of the telecommands with valid ``values``."""
     declared = switches.declared()
     if telecommand == SET_PROFILE:
         profile = _PROFILES[int(values["Profile"])]
@@ -88,12 +89,12 @@ def after(switches: SwitchesT, telecommand: str, values: Mapping[str, Value]) ->
 
 
 def switch_parameters(switch: str, value: str) -> dict[str, str]:
-    """Parameters of SetSwitch, by the names that the declaration has."""
+    """Parameters of SetSwitch, from the names in the declaration."""
     return {"Switch": switch.upper(), "Value": _value_name(switch, value)}
 
 
 def _numbers(switches: type[Switches]) -> dict[str, dict[str, int]]:
-    """By switch, the number of each value's name."""
+    """Number of each value's name, by switch."""
     names = {
         name: [_value_name(name, value) for value in one.choices]
         for name, one in switches.declared().items()
@@ -103,7 +104,7 @@ def _numbers(switches: type[Switches]) -> dict[str, dict[str, int]]:
 
 
 def _value(switches: type[Switches], name: str, number: int) -> str:
-    """The value as declared; one that there is not is the number, which no switch takes."""
+    """The value as declared; an unknown one is returned as its number, which no switch accepts."""
     values = zip(_numbers(switches)[name].values(), switches.declared()[name].choices, strict=True)
     return dict(values).get(number, str(number))
 
@@ -114,13 +115,13 @@ def _numbered(names: Iterable[str]) -> dict[str, int]:
 
 def _choices(name: str, meaning: str, numbers: Mapping[str, int]) -> Choices:
     members = {"__doc__": meaning, **{key.upper(): number for key, number in numbers.items()}}
-    made = new_class(name, (IntEnum,), exec_body=lambda body: body.update(members))
-    assert issubclass(made, IntEnum)
-    return made
+    choices = new_class(name, (IntEnum,), exec_body=lambda body: body.update(members))
+    assert issubclass(choices, IntEnum)
+    return choices
 
 
 def _value_name(switch: str, value: str) -> str:
-    """``value`` as a name in any language: a number has that of its switch in front."""
+    """``value`` as an identifier; the switch's name precedes one that starts with a digit."""
     name = re.sub(r"\W", "_", value).upper()
     return f"{switch.upper()}_{name}" if name[0].isdigit() else name
 

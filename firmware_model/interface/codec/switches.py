@@ -1,8 +1,8 @@
-"""Switches of a firmware: where it can do what its documents print, or better.
+"""Switches of a firmware: each chooses between the documents' algorithm and a better one.
 
-A sensor declares its switches as one dataclass, whose fields `switch` makes. A profile sets them
-all: `published` runs the algorithms as the documents print them, with their failures, and
-`extended` the best that is known. Single switches can differ from the profile.
+A sensor declares its switches as one dataclass with `switch` fields. A profile sets all of them:
+`published` runs the algorithms as the documents print them, with their failures, and `extended` the
+best known ones. Single switches can differ from the profile.
 """
 
 from collections.abc import Mapping
@@ -13,22 +13,22 @@ Profile = Literal["published", "extended"]
 PROFILES: tuple[Profile, ...] = get_args(Profile)
 DEFAULT_PROFILE: Profile = "published"
 
-#: What switches are that are of no one profile.
+#: Profile name of switches that match no profile.
 MIXED = "mixed"
 
 
 @dataclass(frozen=True)
 class Switch:
-    """What is declared of a switch, in the metadata of its field.
+    """Declaration of a switch, in the metadata of its field.
 
     Attributes:
         meaning: one phrase: what it decides.
-        published: value as the documents have it.
-        extended: the better one.
+        published: value according to the documents.
+        extended: the better value.
         source: document and section.
         reason: why there is another value.
         choices: all values, as typed.
-        hardware: whether it is a matter of the built board, so that no telecommand can change it.
+        hardware: it describes the built board, so no telecommand can change it.
     """
 
     meaning: str
@@ -49,7 +49,7 @@ def switch(
     reason: str,
     hardware: bool = False,
 ) -> Any:
-    """A field for a switch, whose default is that of the default profile."""
+    """A dataclass field for a switch; its default is that of the default profile."""
     choices = tuple(dict.fromkeys((published, extended, *others)))
     declared = Switch(meaning, published, extended, source, reason, choices, hardware)
     return field(default=getattr(declared, DEFAULT_PROFILE), metadata={"switch": declared})
@@ -57,10 +57,10 @@ def switch(
 
 @dataclass(frozen=True)
 class Switches:
-    """Base of a sensor's switches; by itself, of a sensor that has none."""
+    """Base of a sensor's switches; by itself, for a sensor without any."""
 
     def __post_init__(self) -> None:
-        """Refuse values that a switch does not have: ValueError."""
+        """Raise ValueError for a value that a switch does not have."""
         for name, declared in self.declared().items():
             if (value := getattr(self, name)) not in declared.choices:
                 known = ", ".join(declared.choices)
@@ -68,14 +68,14 @@ class Switches:
 
     @classmethod
     def declared(cls) -> Mapping[str, Switch]:
-        """All of them by name."""
+        """The declarations by name."""
         return {one.name: one.metadata["switch"] for one in fields(cls)}
 
     @classmethod
     def of(cls, profile: str = DEFAULT_PROFILE, changes: str = "") -> Self:
-        """Those of a profile, but for ``changes``: `SWITCH=VALUE`, with commas between several.
+        """A profile's switches with ``changes``: `SWITCH=VALUE`, separated by commas.
 
-        ValueError names the profile, switch or value that there is not.
+        ValueError names an unknown profile, switch or value.
         """
         if profile not in PROFILES:
             raise ValueError(f"profile must be one of {', '.join(PROFILES)}, not {profile!r}")
@@ -91,7 +91,7 @@ class Switches:
         return cls(**values)
 
     def beside(self, profile: str) -> dict[str, str]:
-        """Those that differ from a profile, by name."""
+        """Values that differ from a profile, by name."""
         plain = type(self).of(profile)
         return {
             name: value
@@ -101,5 +101,5 @@ class Switches:
 
     @property
     def profile(self) -> str:
-        """The profile that these are; ``MIXED`` where single ones differ."""
+        """The matching profile, or ``MIXED``."""
         return next((one for one in PROFILES if self == type(self).of(one)), MIXED)

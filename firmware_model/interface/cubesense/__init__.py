@@ -1,7 +1,7 @@
 """CubeSense's whole interface: node protocol, register-pointer protocol, service port.
 
 Node protocol: CubeSpace family with two cameras, interface generation 2, node dialect on the UART.
-The register-pointer protocol and that of the service port, for a bench computer, are those of the
+The register-pointer protocol and the service port's, for a bench computer, are those of the
 CubeSense thesis, section 6.4.3 and appendix E. Extensions, or assumed where nothing is published:
 both I2C addresses, the register addresses, telecommands from 100 and telemetry from 220 on.
 """

@@ -1,8 +1,8 @@
-"""Numbers with names in CubeSense's interface, the picture's geometry, and values of two bytes.
+"""Named numbers of CubeSense's interface, the image geometry, and two-byte values.
 
 CubeSpace family of nodes with two cameras, interface generation 2; geometry and scales from the
-CubeSense thesis, sections 2.3 to 5.2 and 6.1. What the public material leaves open is assumed, and
-marked so.
+CubeSense thesis, sections 2.3 to 5.2 and 6.1. What the public material leaves open is assumed and
+marked.
 """
 
 import math
@@ -14,23 +14,23 @@ from cubestack.firmware_model.interface.cameras import ov7620
 
 COLUMNS, ROWS = ov7620.COLUMNS, ov7620.ROWS
 
-#: Bytes of a picture, row after row.
+#: Bytes of an image, row by row.
 IMAGE_BYTES = COLUMNS * ROWS
 
-#: Bytes of one frame of a download.
+#: Bytes per frame of a download.
 FRAME_BYTES = 128
 
 #: Frame number of telemetry ImageFrameInfo while no frame is ready; assumed.
 EMPTY_FRAME = 0xFFFF
 
-#: Areas of a camera's mask.
+#: Number of areas in a camera's mask.
 MASK_AREAS = 5
 
-#: Coordinates of an edge are in 1/32 px, and so many edges fill a telemetry frame; both assumed.
+#: Edge coordinates are in 1/32 px; edges per telemetry frame. Both are assumed.
 EDGE_UNIT = 32
 EDGES_PER_FRAME = 20
 
-#: Undistorted pixels for one degree of field angle.
+#: Undistorted pixels per degree of field angle.
 PIXELS_PER_DEGREE = 2.9
 
 #: Largest alpha or beta, of either sign, that a result may have.
@@ -86,7 +86,7 @@ class CaptureResult(IntEnum):
 
     @property
     def stored(self) -> bool:
-        """Whether the picture is in a memory."""
+        """Whether the image is in a memory."""
         return self in (CaptureResult.STORED_OWN_SRAM, CaptureResult.STORED_OTHER_SRAM)
 
 
@@ -106,24 +106,18 @@ class DetectResult(IntEnum):
 class Reason(IntEnum):
     """Why a detection ended as it did, by what the firmware saw; an extension."""
 
-    NONE = 0
-    """No detection yet, or one by the published program, which does not say."""
+    NONE = 0  #: no detection yet, or one by the published program, which does not say
     MEASURED = 1
     FEW_EDGES = 2
     MANY_EDGES = 3
-    NO_CIRCLE = 4
-    """The edges lie on no common circle with its bright side inside."""
-    OTHER_LIGHT = 5
-    """Most edges lie off the best circle."""
+    NO_CIRCLE = 4  #: the edges lie on no common circle with its bright side inside
+    OTHER_LIGHT = 5  #: most edges lie off the best circle
     WRONG_RADIUS = 6
     """The circle is none that an altitude of interest has, or its centre is too far away."""
-    NO_LIGHT = 7
-    """No run of bright pixels, or too few of them for a Sun."""
-    TOO_LARGE = 8
-    """More bright pixels than a Sun has: the Earth, or structure."""
+    NO_LIGHT = 7  #: no run of bright pixels, or too few of them for a Sun
+    TOO_LARGE = 8  #: more bright pixels than a Sun has: the Earth, or structure
     NOT_ROUND = 9
-    NOT_SATURATED = 10
-    """The Sun's middle is; a reflection's is not."""
+    NOT_SATURATED = 10  #: the Sun's middle is; a reflection's is not
     SHARP = 11
     """Found, but the light ends more sharply than the Sun's image does: perhaps it is none."""
     OUT_OF_FIELD = 12
@@ -139,12 +133,11 @@ class Measurement(IntEnum):
 
     @property
     def camera(self) -> Camera:
-        """Camera that takes the picture."""
+        """Camera that takes the image."""
         return Camera(self >> 1)
 
     @property
     def sram(self) -> Sram:
-        """Memory that stores it."""
         return Sram(self & 1)
 
 
@@ -175,42 +168,44 @@ class ImageSize(IntEnum):
 
     @property
     def step(self) -> int:
-        """Every step-th pixel of every step-th row of the large square is sent."""
+        """Every step-th pixel of every step-th row of the largest square is sent."""
         return 1 << self
 
     @property
     def side(self) -> int:
-        """Columns and rows."""
+        """Number of columns and of rows."""
         return 1024 // self.step
 
     @property
     def frames(self) -> int:
-        """Frames of a download."""
         return self.side * self.side // FRAME_BYTES
 
     @property
     def left(self) -> int:
-        """Column of the square where the picture begins."""
+        """Column of the square at which the image begins."""
         return (1024 - COLUMNS) // 2 // self.step
 
     @property
     def top(self) -> int:
-        """Row of the square where the picture begins."""
+        """Row of the square at which the image begins."""
         return (1024 - ROWS) // 2 // self.step
 
 
 def checksum(frame: bytes) -> int:
-    """Checksum of a downloaded frame: the exclusive or of its bytes; the algorithm is assumed."""
+    """Checksum of a downloaded frame: the exclusive OR of its bytes; the algorithm is assumed."""
     return reduce(xor, frame, 0)
 
 
 def coefficient(mantissa: int, exponent: int) -> float:
-    """Value of a distortion coefficient: mantissa (i16) / 10^exponent (0 to 255); assumed."""
+    """Distortion coefficient: mantissa (i16) / 10^exponent (0 to 255); assumed."""
     return float(mantissa) / 10.0**exponent
 
 
 def split_coefficient(value: float) -> tuple[int, int]:
-    """Mantissa and exponent of ``value``, to 1.6e-4 of it; ValueError beyond 32767 and for NaN."""
+    """Mantissa and exponent of ``value``, with a relative error of up to 1.6e-4.
+
+    Raises ValueError beyond 32767 and for NaN.
+    """
     if not abs(value) <= 32767:
         raise ValueError(f"a distortion coefficient is within +-32767, not {value}")
     if value == 0:

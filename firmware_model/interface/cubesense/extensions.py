@@ -1,5 +1,4 @@
-"""CubeSense's telemetry beside the published, IDs from 220 on: what a measurement rests on, how
-sure it is, times.
+"""CubeSense's telemetry beyond the published one, IDs from 220 on: details, accuracy and times.
 
 Also the telecommands that change the switches, and the telemetry that shows them.
 """
@@ -12,7 +11,6 @@ from cubestack.firmware_model.interface.codec.switch_messages import switch_mess
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 
-#: Telecommands of the switches.
 *SET_SWITCHES, _SHOWN = switch_messages(
     CubeSenseSwitches, 101, 227, "lost when the program restarts"
 )

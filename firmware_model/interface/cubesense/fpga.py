@@ -1,4 +1,4 @@
-"""CubeSense's FPGAs as the microcontroller sees them: commands, read-out order, Sun coordinates.
+"""CubeSense's FPGAs from the microcontroller's side: commands, read-out order, Sun coordinates.
 
 CubeSense thesis, tables 6.3 and 6.4 (commands), section 6.4.4 (address), section 6.5.1 and figure
 6.7 (nadir scan), section 6.6 and figures 6.15 and 6.16 (Sun search and window), section 9.2.2
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 
 class Action(Enum):
-    """What one of the two FPGAs does. "Other" is the other FPGA, its camera or its sensor."""
+    """Action of one of the two FPGAs. "Other" is the other FPGA, its camera or its sensor."""
 
     STANDBY = "standby"
     STORE = "own camera's picture to own memory"
@@ -27,7 +27,7 @@ class Action(Enum):
 
 
 class Actions(NamedTuple):
-    """What both FPGAs do."""
+    """Actions of both FPGAs."""
 
     sun: Action
     nadir: Action
@@ -35,7 +35,7 @@ class Actions(NamedTuple):
 
 @dataclass(frozen=True)
 class FpgaCommand:
-    """One row of the command table: levels, None for either; the two enables are low active."""
+    """One row of the command table: levels, None for either; the two enables are active low."""
 
     shift: int | None
     edge: int | None
@@ -46,11 +46,11 @@ class FpgaCommand:
 
     @property
     def levels(self) -> tuple[int | None, ...]:
-        """Levels of the control lines, in the order of the fields."""
+        """In the order of the fields."""
         return (self.shift, self.edge, self.rnw, self.sunen, self.naden)
 
     def fits(self, shift: int, edge: int, rnw: int, sunen: int, naden: int) -> bool:
-        """Whether these levels are this row's."""
+        """Whether these are the row's levels."""
         given = (shift, edge, rnw, sunen, naden)
         return all(row in (None, level) for row, level in zip(self.levels, given, strict=True))
 
@@ -73,10 +73,10 @@ COMMANDS = (
     FpgaCommand(0, 0, 0, 0, 0, Actions(Action.STORE, Action.STORE)),
 )
 
-#: Rows that a board with address control from the microcontroller has besides, out of those that
-#: table 6.4 leaves open; section 9.2.2 wishes for it, the protocol is assumed. Only SHIFT moves
-#: between the two, with an enable low: no other row is crossed, and the address is kept. The
-#: microcontroller may drive the data bus while SHIFT and RNW are both low: no FPGA does then.
+#: Additional rows of a board with address control from the microcontroller, out of those that table
+#: 6.4 leaves open; section 9.2.2 proposes it, the protocol is assumed. With an enable low, SHIFT
+#: alone switches between the two rows, so no other row is crossed and the address is kept. The
+#: microcontroller may drive the data bus while SHIFT and RNW are both low: no FPGA drives it then.
 ADDRESSING_COMMANDS = (
     FpgaCommand(0, 1, 0, 0, 1, Actions(Action.TAKE_ADDRESS, _IDLE)),
     FpgaCommand(0, 1, 0, 1, 0, Actions(_IDLE, Action.TAKE_ADDRESS)),
@@ -88,7 +88,7 @@ ADDRESSING_COMMANDS = (
 def actions(
     shift: int, edge: int, rnw: int, sunen: int, naden: int, *, mcu_addressing: bool = False
 ) -> Actions:
-    """What both FPGAs do; an unlisted row is standby. ``mcu_addressing`` lists its rows too."""
+    """Actions of both FPGAs; an unlisted row is standby. ``mcu_addressing`` adds its rows."""
     for command in COMMANDS + ADDRESSING_COMMANDS * mcu_addressing:
         if command.fits(shift, edge, rnw, sunen, naden):
             return command.actions
@@ -98,48 +98,47 @@ def actions(
 def link_shows_enables(shift: int, edge: int) -> bool:
     """Whether each FPGA can see the other's enable at these levels.
 
-    It can unless a picture crosses the link, which takes both control lines for its clock and its
+    It cannot while an image crosses the link, which uses both control lines for its clock and its
     HREF. An FPGA that is enabled alone then acts as if the other were enabled too.
     """
     return not (shift and not edge)
 
 
-#: Data clocks that take an address, one byte each.
+#: Data clocks, and bytes, of an address.
 ADDRESS_BYTES = 3
 
 #: Lowest value of a bright pixel; figure 6.15.
 SUN_THRESHOLD = 200
 
-#: So many bright pixels in one row make the first of them the first Sun pixel; figure 6.15.
+#: Number of adjacent bright pixels of which the first is the first Sun pixel; figure 6.15.
 SUN_RUN = 3
 
-#: x and y, read as the first Sun pixel's, of a picture that has none; assumed.
+#: x and y that are read if an image has no Sun pixel; assumed.
 SUN_NOT_FOUND = (0x3FF, 0x1FF)
 
 
 @dataclass(frozen=True)
 class ReadOut:
-    """Size of the picture and what the edge read-outs take of it, in pixels from (0, 0).
+    """Image size and the pixels of the edge read-outs, counted from (0, 0).
 
     Nadir scan: ``scan_clocks`` data clocks. Two of them present no pixel of a scanned line: the
     first one, and the one between the last row and the first column. Sun window: four bytes (x low,
-    x high, y low, y high), then the window row by row. Past the end the scan goes on with its
+    x high, y low, y high), then the window row by row. Beyond the end the scan continues with its
     first column, and the window with its first pixel.
 
     Attributes:
-        columns, rows: size of the picture.
+        columns, rows: size of the image.
         frame_gap: a frame starts with the first line after more clocks than this with HREF low.
         scan_step: distance of two scanned lines, a power of two.
-        first_row, first_column: where the scanned rows and columns start; below ``scan_step``.
+        first_row, first_column: first scanned row and column; below ``scan_step``.
         window: side of the Sun window.
-        window_left, window_above: the window's origin is so far left of and above the first Sun
-            pixel, unless the picture's border is nearer.
-        as_flown: as appendices D.3 and D.4 print them: the scan presents each pixel one clock
-            earlier, and the window crosses the picture's border.
-        one_search: each FPGA has its own sensor's search only. Where another one's edge data are
-            commanded, the owner of the memory sends the picture from its first pixel on, as the
-            words of table 6.4 have it, and the first Sun pixel is looked for in the FPGA of the
-            camera, not of the memory.
+        window_left, window_above: distance of the window's origin to the left of and above the
+            first Sun pixel, unless the image border is nearer.
+        as_flown: as printed in appendices D.3 and D.4: the scan presents each pixel one clock
+            earlier, and the window crosses the image border.
+        one_search: each FPGA has only its own sensor's search. On commands for the other sensor's
+            edge data, the owner of the memory sends the whole image, as table 6.4 words it, and
+            the FPGA of the camera, not of the memory, searches for the first Sun pixel.
     """
 
     columns: int = 640
@@ -155,7 +154,7 @@ class ReadOut:
     one_search: bool = False
 
     def __post_init__(self) -> None:
-        """Check that the read-outs fit the picture; ValueError when one does not."""
+        """Raise ValueError if a read-out does not fit the image."""
         if self.scan_step & (self.scan_step - 1):
             raise ValueError(f"scan_step must be a power of two, not {self.scan_step}")
         if not max(self.first_row, self.first_column) < self.scan_step:
@@ -172,32 +171,30 @@ class ReadOut:
 
     @property
     def pixels(self) -> int:
-        """Bytes of a picture."""
         return self.columns * self.rows
 
     @property
     def column_bits(self) -> int:
-        """Bits of a column number, the lower ones of an address."""
+        """Bits of a column number, the low bits of an address."""
         return (self.columns - 1).bit_length()
 
     @property
     def row_bits(self) -> int:
-        """Bits of a row number, the upper ones of an address."""
+        """Bits of a row number, the high bits of an address."""
         return (self.rows - 1).bit_length()
 
     @property
     def address_bits(self) -> int:
-        """Bits of an address, row : column."""
         return self.row_bits + self.column_bits
 
     @property
     def scan_rows(self) -> range:
-        """Rows that the nadir scan presents from the first to the last column."""
+        """Rows that the nadir scan presents, each from the first to the last column."""
         return range(self.first_row, self.rows, self.scan_step)
 
     @property
     def scan_columns(self) -> range:
-        """Columns that it presents next, from the first to the last row."""
+        """Columns that it presents next, each from the first to the last row."""
         return range(self.first_column, self.columns, self.scan_step)
 
     @property
@@ -208,15 +205,15 @@ class ReadOut:
 
     @property
     def scan_start(self) -> int:
-        """Position on its line of the first pixel behind a preset."""
+        """Position on its line of the first pixel after a preset."""
         return int(self.as_flown)
 
     def scan(self) -> Iterator[tuple[int, int] | None]:
-        """Pixel (x, y) that each clock of the nadir scan presents.
+        """Pixel (x, y) that each clock of the nadir scan presents; None for a preset.
 
-        None for a preset; as flown the second one presents the first column's first pixel, each
-        line ends with the next line's first pixel, the last row with its own last one, and the last
-        column with a pixel beyond the picture.
+        As flown the second preset presents the first column's first pixel, each line ends with the
+        next line's first pixel, the last row repeats its last pixel, and the last column ends with
+        a pixel beyond the image.
         """
         rows = [(x, y) for y in self.scan_rows for x in range(self.columns)]
         columns = [(x, y) for x in self.scan_columns for y in range(self.rows)]
@@ -227,9 +224,9 @@ class ReadOut:
             yield from (None, *rows, None, *columns)
 
     def window_origin(self, x: int, y: int) -> tuple[int, int]:
-        """First pixel (x, y) of the window around first Sun pixel (x, y).
+        """First pixel of the window around the first Sun pixel (x, y).
 
-        Inside of the picture; as flown wherever it comes to lie, below 0 too.
+        It is inside the image; as flown it can be outside, with negative coordinates too.
         """
         if self.as_flown:
             return x - self.window_left, y - self.window_above
@@ -239,10 +236,10 @@ class ReadOut:
         )
 
 
-#: The OV7620's picture and the published read-outs.
+#: The OV7620's image size and the published read-outs.
 FULL_SIZE = ReadOut()
 
-#: By the value of switch ``gateware``.
+#: Read-outs by the value of switch ``gateware``.
 READ_OUTS = {
     "as-flown": replace(FULL_SIZE, as_flown=True),
     "corrected": FULL_SIZE,
@@ -251,7 +248,7 @@ READ_OUTS = {
 
 
 def address_bytes(x: int, y: int, size: ReadOut = FULL_SIZE) -> bytes:
-    """Address of pixel (x, y), row : column, highest byte first; ValueError outside the picture."""
+    """Address row : column, highest byte first; raises ValueError outside the image."""
     if not (0 <= x < size.columns and 0 <= y < size.rows):
         raise ValueError(f"pixel ({x}, {y}) is not inside of {size.columns} x {size.rows} pixels")
     address = y << size.column_bits | x

@@ -1,11 +1,12 @@
-"""Pins of CubeSense: its two FPGAs, its microcontroller, and what the current monitors show.
+"""Pins of CubeSense: its two FPGAs, its microcontroller, and the current monitors.
 
 CubeSense thesis, table 3.4 for the FPGAs (64 pins), section 3.2 and table 3.3 for the
 microcontroller (two data lines for each camera and one more control line, a switch for each memory,
 eight data lines and six control lines for both FPGAs, analogue inputs for the 3.3 V supply and both
 memories), table 6.3 for the FPGAs' control lines, section 9.2.2 for addresses on the data lines.
-Names are assumed where table 6.3 has none; so are the third line of each camera, which switches its
-supply, the monitor of the 5 V supply, which the node protocol reports, and the monitors' scale.
+Names that table 6.3 does not print are assumed; so are the third line of each camera, which
+switches its supply, the monitor of the 5 V supply, which the node protocol reports, and the
+monitors' scale.
 
 Tables of pins are in the order of the gateware's ports.
 """
@@ -57,13 +58,12 @@ FPGA = (
 
 _ADDRESSED = "bytes to the microcontroller and addresses from it, on a bus for both FPGAs"
 
-#: With address control from the microcontroller: DATA is bidirectional, which takes no other pin.
+#: With address control from the microcontroller: DATA is bidirectional; no other pin is needed.
 ADDRESSING = tuple(Pin(DATA, "inout", _ADDRESSED, 8) if pin == DATA else pin for pin in FPGA)
 
-#: What goes before the names of the pins that each half has for itself.
+#: Prefixes of the pins that each half has separately.
 PREFIXES = {"sun": "SUN_", "nadir": "NAD_"}
 
-#: These pins.
 OWN_PINS = (*CAMERA_PINS, *SRAM_PINS)
 
 #: Control lines of the microcontroller that lead to both FPGAs.
@@ -75,13 +75,13 @@ ENABLE = (
     Pin("NADEN", "input", "nadir's enable, low active", level=1),
 )
 
-#: What tells of a whole picture, by the memory that it is in.
+#: Signals that a whole image is stored, by memory.
 ACKNOWLEDGE = {
     Sram.SRAM1: Pin("SUNACK", "output", "a whole picture is in the sun's memory"),
     Sram.SRAM2: Pin("NADACK", "output", "a whole picture is in the nadir's memory"),
 }
 
-#: The lines whose levels are a command, in the order of table 6.4.
+#: The lines whose levels form a command, in the order of table 6.4.
 CONTROLS = (SHIFT, EDGE, RNW, *ENABLE)
 
 CONTENTION = Pin(
@@ -106,7 +106,7 @@ def pair_pins(mcu_addressing: bool = False) -> tuple[Pin, ...]:
 
 
 def halves(pins: Iterable[Pin]) -> tuple[Pin, ...]:
-    """Pins that each half has for itself, as those of the pair: the sun's, then the nadir's."""
+    """Pins that each half has separately, as pins of the pair: the sun's, then the nadir's."""
     return tuple(
         pin.but(prefix + pin, meaning=f"{side}: {pin.meaning}")
         for side, prefix in PREFIXES.items()
@@ -134,8 +134,8 @@ class Monitor(StrEnum):
     SUPPLY_5V = "5V"
 
 
-#: Largest value of a conversion.
+#: Largest value of the converter.
 ADC_FULL_SCALE = 1023
 
-#: Current of one count. Sense and load resistors are not published: a range of 200 mA, assumed.
+#: Current per count. Sense and load resistors are not published: a range of 200 mA is assumed.
 MA_PER_COUNT = 200.0 / ADC_FULL_SCALE

@@ -1,10 +1,9 @@
 """CubeSense's register map for the thesis' register-pointer protocol on I2C and backup UART.
 
-CubeSense thesis, section 6.4.3: configuration registers of one byte, measurement registers that
-return a signed 16-bit number, and an image register that streams the whole picture. Which
-registers there are, their addresses, names and reset values are assumed, as the text names none but
-the thresholds. The settings and results are the same ones as in the node protocol, so their reset
-values are taken from there.
+CubeSense thesis, section 6.4.3: configuration registers of one byte, measurement registers with a
+signed 16-bit number, and an image register that streams the whole image. The text names only the
+thresholds; the other registers, all addresses, names and reset values are assumed. The settings and
+results are those of the node protocol, and so are their reset values.
 """
 
 from collections.abc import Iterator
@@ -23,7 +22,7 @@ _RESETS = {message.name: message.reset_values() for message in TELECOMMANDS}
 
 
 def _camera(camera: codes.Camera) -> Iterator[PointerRegister]:
-    """Registers of a camera; those of the nadir one are 8 behind those of the Sun's."""
+    """Registers of a camera; the nadir camera's addresses are 8 above the Sun camera's."""
     number, name = camera + 1, camera.name
     resets = _RESETS[f"CameraSettings{number}"] | _RESETS[f"DetectionThreshold{number}"]
     settings = (

@@ -1,7 +1,7 @@
 """The one-letter protocol of CubeSense's service port, for a bench computer.
 
-CubeSense thesis, appendix E: 115200 baud, 8N1. Ours, because nothing is said of it: a capture that
-fails is not answered, and the download reads the memory of the camera's own.
+CubeSense thesis, appendix E: 115200 baud, 8N1. Assumed, because the thesis does not say: a failed
+capture is not answered, and the download reads the camera's own memory.
 """
 
 from cubestack.firmware_model.interface.codec.letters import Letter, LetterProtocol
@@ -20,10 +20,10 @@ def _download(letter: str, camera: Camera) -> Letter:
     return Letter(letter, f"SEND_{camera.name}", meaning, IMAGE_BYTES)
 
 
-#: Letter that takes a camera's picture.
+#: Letters that capture an image, by camera.
 CAPTURES = {Camera.NADIR: _capture("a", Camera.NADIR), Camera.SUN: _capture("q", Camera.SUN)}
 
-#: Letter that sends the picture in a camera's own memory.
+#: Letters that send the image in a camera's own memory.
 DOWNLOADS = {Camera.NADIR: _download("s", Camera.NADIR), Camera.SUN: _download("w", Camera.SUN)}
 
 SERVICE_PORT = LetterProtocol(115_200, (*CAPTURES.values(), *DOWNLOADS.values()))

@@ -1,4 +1,4 @@
-"""Where CubeSense's firmware can do what its thesis prints, or better."""
+"""Choices of CubeSense's firmware between its thesis' algorithms and better ones."""
 
 from dataclasses import dataclass
 
@@ -68,5 +68,4 @@ class CubeSenseSwitches(Switches):
     )
 
 
-#: Those of the default profile.
 DEFAULT_SWITCHES = CubeSenseSwitches()

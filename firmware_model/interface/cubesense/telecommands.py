@@ -2,8 +2,8 @@
 
 CubeSpace family of nodes with two cameras, interface generation 2: IDs, lengths and parameters as
 hosts use them; names and limits are assumed. Reset values follow the CubeSense thesis: thresholds
-section 4.3, boresights Table 5.1, distortion equation 5.2.3, exposure of the Sun's
-camera section 3.2; that of the nadir camera is assumed.
+section 4.3, boresights Table 5.1, distortion equation 5.2.3, exposure of the Sun camera section
+3.2; that of the nadir camera is assumed.
 """
 
 from collections.abc import Iterator

@@ -21,8 +21,8 @@ _low = partial(Message, confidence=Confidence.LOW)
 #: ID of a camera's result.
 RESULTS: Mapping[codes.Camera, int] = {codes.Camera.SUN: 148, codes.Camera.NADIR: 149}
 
-#: ID of a result that, once it is read, makes the node capture and detect again: with which camera
-#: (whose result it is) and into which memory.
+#: Results whose read makes the node capture and detect again: camera (of the result and the new
+#: capture) and memory of the capture, by ID.
 SCHEDULES: Mapping[int, tuple[codes.Camera, codes.Sram]] = {
     150: (codes.Camera.SUN, codes.Sram.SRAM1),
     151: (codes.Camera.NADIR, codes.Sram.SRAM2),

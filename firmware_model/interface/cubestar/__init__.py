@@ -1,9 +1,9 @@
-"""CubeStar's whole interface: telecommands, telemetry, and the numbers with names.
+"""CubeStar's whole interface: telecommands, telemetry, and named numbers.
 
-CubeSpace family of nodes, interface version 3, node dialect on the UART. Ours where nothing is
+CubeSpace family of nodes, interface version 3, node dialect on the UART. Assumed where nothing is
 published: the I2C address, 57600 baud, telecommands 100-127 and telemetry 200-255. Telecommands
-13 and 14 and telemetry 142 belong to a later image sensor and reach the registers of this one
-through a page (SetCameraRegisterPage); telemetry 138 is answered as an unknown ID.
+13 and 14 and telemetry 142 belong to a later image sensor and access the registers of this one
+through a page (SetCameraRegisterPage); telemetry 138 is rejected as an unknown ID.
 """
 
 from cubestack.firmware_model.interface.codec.message import Interface

@@ -1,7 +1,7 @@
-"""Numbers with names in CubeStar's interface: task states, reset causes, modes, error codes.
+"""Named numbers of CubeStar's interface: task states, reset causes, modes, error codes.
 
-CubeSpace family of nodes, interface version 3. What the published tables leave open is assumed, and
-marked so.
+CubeSpace family of nodes, interface version 3. What the published tables leave open is assumed and
+marked.
 """
 
 from enum import IntEnum
@@ -77,7 +77,6 @@ class ImageBlockSize(IntEnum):
 
     @property
     def length(self) -> int:
-        """Bytes of a block."""
         return 32 << self
 
 

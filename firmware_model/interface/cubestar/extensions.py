@@ -15,10 +15,10 @@ from cubestack.firmware_model.interface.cubestar.codes import MatchMode, Reason
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.interface.cubestar.telecommands import IMAGE_BYTES
 
-#: Bytes that one UploadBlock carries.
+#: Bytes of data per UploadBlock.
 UPLOAD_BLOCK_BYTES = 128
 
-_LARGEST_FRAME_RATE = 39  # of 27 MHz / 1322 clocks a line: a frame outlasts its 512 lines
+_LARGEST_FRAME_RATE = 39  # from 27 MHz and 1322 clocks per line: a frame must outlast its 512 lines
 
 *_SET_SWITCHES, _SWITCHES_SHOWN = switch_messages(
     CubeStarSwitches, 108, 208, "kept by every reset but telecommand Reset"
@@ -43,7 +43,7 @@ _TELECOMMANDS = (
             reset=7,
         ).within(6, _LARGEST_FRAME_RATE, "ConfigChangeError")
     ),
-    # The reset value is chosen: the published wait, which the published 68 ms follow from.
+    # The reset value is chosen: the published wait that explains the published 68 ms.
     Message(103, "SetDiscardDelay", "wait between enabling the image sensor and storing").of(
         u16("Delay", "less than a read-out (67.7 ms) splits the picture", "ms", reset=70).within(
             None, 1000, "DelayTimeSetToLong"

@@ -1,8 +1,8 @@
 """CubeStar's error flags: one declaration for telemetry ErrorFlags and LogStatus.
 
-CubeSpace family of nodes, interface version 3. The two frames show the same ten bytes of flags; a
-few names are printed differently in the second. The causes are worded here: the published tables
-give names only. Some belong to hardware that this node does not have, or that does not fail here.
+CubeSpace family of nodes, interface version 3. The two frames show the same ten bytes of flags; the
+second prints a few names differently. The published tables have names only: the causes are worded
+here. Some flags belong to hardware that this node lacks, or that does not fail here.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.codec.field import Field, flags_at
 
 @dataclass(frozen=True)
 class ErrorFlag:
-    """A flag: ``log_name`` in LogStatus, if other; ``never``: why this node does not raise it."""
+    """A flag; ``log_name`` if LogStatus has another name; ``never``: why it is never raised."""
 
     bit: int
     name: str
@@ -117,7 +117,7 @@ NEVER_RAISED = {flag.name: flag.never for flag in _FLAGS if flag.never}
 
 
 def flag_fields(*, log_names: bool = False) -> tuple[Field, ...]:
-    """Fields of the block of flags, with LogStatus' names if asked."""
+    """Fields of the block of flags, with LogStatus' names if ``log_names``."""
     return flags_at(
         (
             flag.bit,

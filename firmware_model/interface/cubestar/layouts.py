@@ -1,4 +1,4 @@
-"""Memory layouts of CubeStar: how camera, FPGA, SRAM and processor are connected.
+"""Memory layouts of CubeStar: connections of camera, FPGA, SRAM and processor.
 
 CubeStar thesis, options 1 to 3 of section 3.3, and section 7.2.
 """
@@ -8,19 +8,15 @@ from typing import Never
 
 
 class Layout(Enum):
-    """A layout; its value is its name on the command line. ValueError for another name."""
+    """A layout; its value is its name on the command line. Other names raise ValueError."""
 
-    COPIED = "1"
-    """Option 1, the published one: an SRAM for the FPGA, one for the processor."""
+    COPIED = "1"  #: option 1, the published one: an SRAM for the FPGA, one for the processor
 
-    SHARED = "2"
-    """Option 2: one SRAM, the FPGA as bus switch."""
+    SHARED = "2"  #: option 2: one SRAM, the FPGA as bus switch
 
-    TWO_MEMORIES = "3"
-    """Option 3: two SRAMs at one FPGA, in turn."""
+    TWO_MEMORIES = "3"  #: option 3: two SRAMs at one FPGA, used alternately
 
-    TWO_BOARDS = "two-boards"
-    """Section 7.2: two boards of option 2 on one bus, in turn."""
+    TWO_BOARDS = "two-boards"  #: section 7.2: two boards of option 2 on one bus, used alternately
 
     @classmethod
     def _missing_(cls, value: object) -> Never:

@@ -2,8 +2,8 @@
 
 CubeStar thesis, table C.2, for the published board (option 1 of section 3.3). The boards on the
 processor's external bus, options 2 and 3 of that section and two boards of option 2 (section 7.2),
-were not built then: their pins are assumed, and keep those of the published board wherever they
-still serve. So is BANK: the published board has the memory for two images but no pin to choose.
+were not built: their pins are assumed, and keep those of the published board where possible. BANK
+is assumed too: the published board's memory holds two images, but no pin selects one.
 """
 
 from cubestack.firmware_model.interface.pins import Pin, sram_pins
@@ -31,7 +31,7 @@ _CAMERA = (PIXCLK, PIXDATA, HSYNC, VSYNC)
 _BUS = (AD_HIGH, AD_LOW, ALE, CS_N, RE_N, WE_N)
 _SRAM = sram_pins(20)
 
-#: Positions of the published board's pins on its header.
+#: Header positions of the published board's pins.
 HEADER = {
     PIXDATA: "1-8",
     ACK: "9",
@@ -77,10 +77,9 @@ DOUBLE = (
     ),
 )
 
-#: What goes before the names of the pins that each of two boards has for itself.
+#: Prefixes of the pins that each of two boards has separately.
 BOARD_PREFIXES = ("BOARD1_", "BOARD2_")
 
-#: These pins.
 OWN_PINS = (ENABLE, RNW, BANK, ACK, CS_N, *_SRAM)
 
 TWO_BOARDS = (

@@ -1,6 +1,6 @@
-"""What CubeStar's processor is connected to, as C, for firmware: pins, units and their numbers.
+"""Connections of CubeStar's processor as C, for firmware: pins, units and their numbers.
 
-A pin is its port times 16 plus its bit.
+A pin's number is its port times 16 plus its bit.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ _UNITS = {
 
 
 def pins_header() -> str:
-    """All of it; it is to follow the header of the part's registers."""
+    """The header's text, which must follow the header of the part's registers."""
     return "\n".join(["/* What the processor is connected to. */", *_lines(), ""])
 
 

@@ -1,9 +1,9 @@
-"""Which pin of CubeStar's EFM32GG280F1024 (LQFP100) leads where, for firmware of one's own.
+"""Wiring of CubeStar's EFM32GG280F1024 (LQFP100), for a user's own firmware.
 
-The thesis prints no schematic of the processor's pins: this wiring is ours. It keeps to the part's
-alternate functions (see ``efm32gg.pins``), leaves the external bus (PE8..PE15, PA15, PA0..PA6,
-PD9..PD12, PF3..PF5), the crystals (PB7, PB8, PB13, PB14) and the debug pins (PF0..PF2) alone, and
-puts the eight data pins of the FPGA side by side, so that a byte is one read of a port.
+The thesis prints no schematic of the processor's pins: this wiring is assumed. It follows the
+part's alternate functions (see ``efm32gg.pins``), leaves the external bus (PE8..PE15, PA15,
+PA0..PA6, PD9..PD12, PF3..PF5), the crystals (PB7, PB8, PB13, PB14) and the debug pins (PF0..PF2)
+free, and has the eight data pins of the FPGA side by side, so that a byte is one read of a port.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from cubestack.firmware_model.interface.cubestar import pins
 from cubestack.firmware_model.interface.efm32gg.pins import ROUTES, pin_number
 
-#: Pins to the FPGA board of the published layout, by the FPGA's names; DATA from its bit 0 on.
+#: Pins to the FPGA board of the published layout, by the FPGA's names; for DATA, its bit 0.
 FPGA = {
     pins.ENABLE: "PA8",
     pins.RNW: "PA9",
@@ -21,24 +21,23 @@ FPGA = {
     pins.DATA: "PE0",
 }
 
-CAMERA_RESET = "PA7"
-"""Reset of the image sensor, low active, pulled up."""
+CAMERA_RESET = "PA7"  #: reset of the image sensor, active low, pulled up
 
 #: Load switches by supply channel: high is on, pulled up.
 SWITCHES = {"memory": "PC6", "imager": "PC7"}
 
 LEDS = ("PB3", "PB4")
-"""High is on. Their current is not switched: the published figures have both on all the time."""
+"""High is on. Their current is constant: the published figures have both on all the time."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A peripheral of the part that leads outside.
+    """A peripheral of the part with connections to the outside.
 
     Attributes:
-        name: of it.
-        location: that its ROUTE register has to choose.
-        signals: that it needs, without its name.
+        name: of the peripheral.
+        location: value for its ROUTE register.
+        signals: used ones, without the peripheral's name.
     """
 
     name: str
@@ -46,7 +45,7 @@ class Unit:
     signals: tuple[str, ...]
 
     def pin(self, signal: str) -> int:
-        """Port times 16 plus bit of a signal's pin."""
+        """A signal's pin: port times 16 plus bit."""
         return ROUTES[f"{self.name}_{signal}"][self.location]
 
 
@@ -57,13 +56,13 @@ CAMERA_I2C = Unit("I2C1", 1, ("SDA", "SCL"))  # PB11, PB12; master
 
 @dataclass(frozen=True)
 class Monitor:
-    """A current monitor of a supply channel: its output is at an ADC and a comparator input.
+    """A current monitor of a supply channel, at an ADC and a comparator input.
 
     Attributes:
-        adc_channel: of ADC0, which has them at PD0..PD7.
+        adc_channel: of ADC0, whose channels are at PD0..PD7.
         comparator: number of the ACMP.
-        comparator_channel: of it; ACMP0 has them at PC0..PC7, ACMP1 at PC8..PC15.
-        volts_per_a: output over current; it ends at ``SUPPLY_VOLTS``.
+        comparator_channel: ACMP0 has its channels at PC0..PC7, ACMP1 at PC8..PC15.
+        volts_per_a: output voltage per current; it saturates at ``SUPPLY_VOLTS``.
     """
 
     adc_channel: int
@@ -72,18 +71,17 @@ class Monitor:
     volts_per_a: float
 
 
-#: By supply channel.
 MONITORS = {"memory": Monitor(4, 0, 4, 50.0), "imager": Monitor(5, 1, 0, 5.0)}
 
 SUPPLY_VOLTS = 3.3
 
 EXTERNAL_RAM = 0x8000_0000
-"""Where the external bus' first bank is: the SRAM of the published layout, at chip select EBI_CS0.
+"""Address of the external bus' first bank: the SRAM of the published layout, chip select EBI_CS0.
 
 Bus mode D8A24ALE, address latch and strobes at location 0. The other layouts have the FPGA there.
 """
 
 
 def port_pin(name: str) -> tuple[int, int]:
-    """Number of the port and bit of a pin, by its name."""
+    """Port number and bit of a pin, by its name."""
     return divmod(pin_number(name), 16)

@@ -1,4 +1,4 @@
-"""Where CubeStar's firmware can do what its thesis prints, or better."""
+"""Choices of CubeStar's firmware between its thesis' algorithms and better ones."""
 
 from dataclasses import dataclass
 
@@ -85,5 +85,4 @@ class CubeStarSwitches(Switches):
     )
 
 
-#: Those of the default profile.
 DEFAULT_SWITCHES = CubeStarSwitches()

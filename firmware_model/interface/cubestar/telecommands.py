@@ -12,11 +12,11 @@ from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.cubestar import codes
 
-#: Bytes of a picture: one for each pixel, row after row.
+#: Bytes of an image: one per pixel, row by row.
 IMAGE_BYTES = COLUMNS * ROWS
 
+#: Length of the firmware's preallocated arrays (CubeStar thesis, section 5.3.4).
 MOST_STARS = 20
-"""What the firmware's preassigned arrays hold (CubeStar thesis, section 5.3.4)."""
 
 
 def _focal_length(name: str, meaning: str, reset: float) -> Field:

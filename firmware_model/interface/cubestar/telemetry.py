@@ -6,7 +6,7 @@ the detected stars from 0; Identity and CatNum are the index in the onboard star
 telemetry 170 to 172 in 0.02 px, magnitudes there are measured brightness in DN (no catalogue
 magnitude is on board); confidence is the share of the other identified stars whose distance
 agrees, in percent or as a fraction; the unit vectors of telemetry 176, printed as plain i16, have
-the scale of all others. Quaternions turn inertial vectors into camera vectors,
+the scale of all others. Quaternions rotate inertial vectors to camera vectors,
 v_camera = q v_inertial q*, with the scalar in Qbar3. Angles are in rad.
 """
 
@@ -44,17 +44,16 @@ _CURRENTS = (
 
 
 def _times(*names_and_meanings: tuple[str, str]) -> tuple[Field, ...]:
-    """u16 fields in ms, one after the other."""
+    """Consecutive u16 fields in ms."""
     return tuple(u16(name, meaning, "ms") for name, meaning in names_and_meanings)
 
 
 def _scaled(meaning: str, *names: str, unit: str = "") -> tuple[Field, ...]:
-    """i16/10000 fields, one after the other."""
+    """Consecutive i16/10000 fields."""
     return tuple(i16(name, meaning, unit, UNIT_VECTOR_SCALE) for name in names)
 
 
 def _selected_star(number: int) -> Message:
-    """One of the three stars of highest confidence."""
     prefix = f"S{number}"
     return Message(
         169 + number, f"Star{number}Details", f"selected star {number}: centroid, vectors, identity"

@@ -1,4 +1,4 @@
-"""The EFM32GG280F1024's registers, once: simulator, C header and traces derive from them."""
+"""Registers of the EFM32GG280F1024, the source of simulator, C header and traces."""
 
 from cubestack.firmware_model.interface.efm32gg.analog import ANALOG
 from cubestack.firmware_model.interface.efm32gg.clocks import CLOCKS
@@ -11,7 +11,7 @@ from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, R
 from cubestack.firmware_model.interface.efm32gg.timers import TIMERS
 from cubestack.firmware_model.interface.efm32gg.unmodelled import UNMODELLED
 
-#: Every kind of peripheral of the part.
+#: All kinds of peripherals of the part.
 LAYOUTS: tuple[Layout, ...] = (
     *(*SYSTEM, *CLOCKS, *PORTS, *EXTERNAL_BUS),
     *(*SERIAL, *TIMERS, *ANALOG, DMA),
@@ -20,7 +20,7 @@ LAYOUTS: tuple[Layout, ...] = (
 
 
 def register_at(address: int) -> tuple[Instance, Register] | None:
-    """The register that has ``address``, and whose it is; None when there is none."""
+    """The register at ``address`` and its peripheral, or None."""
     for layout in LAYOUTS:
         for instance in layout.instances:
             for register in layout.registers:

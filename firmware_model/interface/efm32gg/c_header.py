@@ -18,7 +18,6 @@ _TOP = """\
 
 
 def c_header(layouts: Iterable[Layout]) -> str:
-    """All of ``layouts``, and the interrupt numbers of their instances."""
     layouts = list(layouts)
     lines: list[str] = []
     for layout in layouts:

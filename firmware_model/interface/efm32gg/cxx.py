@@ -1,4 +1,4 @@
-"""The register tables as a C++ header: what the simulator's peripherals are made of."""
+"""The register tables as a C++ header for the simulator's peripherals."""
 
 from collections.abc import Iterable, Iterator
 
@@ -39,7 +39,7 @@ struct Instance {
 
 
 def cxx_header(layouts: Iterable[Layout]) -> str:
-    """All of ``layouts``: a namespace each with offsets and masks, and tables of descriptions."""
+    """A namespace per layout with offsets and masks, and tables of descriptions."""
     layouts = list(layouts)
     parts = [_TYPES]
     for layout in layouts:

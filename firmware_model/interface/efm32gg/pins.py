@@ -1,11 +1,11 @@
-"""Which pin a peripheral's signal has at which location: alternate functions of the EFM32GG280.
+"""Alternate functions of the EFM32GG280: the pins of each peripheral signal at each location.
 
-EFM32GG280 data sheet, table of alternate functionality; a ROUTE register's LOCATION chooses.
+EFM32GG280 data sheet, table of alternate functionality; a ROUTE register's LOCATION selects one.
 """
 
 import re
 
-#: A row is a signal and its pins, location 0 first.
+#: Each row is a signal and its pins, location 0 first.
 _TABLE = """
     USART0_TX     PE10 PE7  PC11 PE13 PB7  PC0
     USART0_RX     PE11 PE6  PC10 PE12 PB8  PC1
@@ -62,11 +62,11 @@ _TABLE = """
     DBG_SWO       PF2  PC15 PD1  PD2
 """
 
-LOCATIONS = 8  #: that a LOCATION field can say; no signal has as many pins
+LOCATIONS = 8  #: range of a LOCATION field; no signal has as many pins
 
 
 def pin_number(name: str) -> int:
-    """``PE10`` is 74: port times 16 plus bit. ValueError when it is no pin's name."""
+    """Port times 16 plus bit: ``PE10`` is 74. Raises ValueError for other names."""
     match = re.fullmatch(r"P([A-F])(\d|1[0-5])", name)
     if not match:
         raise ValueError(f"{name!r} is no pin, as PA0 or PE10 are")

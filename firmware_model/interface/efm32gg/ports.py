@@ -1,4 +1,4 @@
-"""Registers of the pins and what connects peripherals: GPIO, PRS.
+"""Registers of the pins and of the connections between peripherals: GPIO, PRS.
 
 EFM32GG Reference Manual, chapters 32 (GPIO) and 13 (PRS).
 """

@@ -83,7 +83,7 @@ WDOG = peripheral(
     Instance("WDOG", 0x40088000),
 )
 
-#: Read-only memory; the reset values are those of one part, calibrated at 25 degrees Celsius with
+#: Read-only memory; the reset values are those of a part calibrated at 25 degrees Celsius with
 #: nominal oscillators. A tuning of 0x80 is a band's nominal frequency here.
 DEVINFO = peripheral(
     "DEVINFO",

@@ -1,20 +1,20 @@
-"""Register tables: a peripheral is lines of text, and everything else derives from them.
+"""Register tables: a peripheral is declared in lines of text.
 
-A line is ``offset NAME access reset field ...``; numbers are hexadecimal where they are addresses
-or values, decimal where they count::
+A line is ``offset NAME access reset field ...``; addresses and values are hexadecimal, counts
+decimal::
 
     000 CTRL    rw 0000000C  MODE:0:2 BOOST:2:2 EN:4
     004 STATUS  r  00000000  BUSY:0
     008 CMD     w  00000000  START:0 STOP:1
     010 DATA    rw 00000000  *
 
-- ``rw``, ``r`` or ``w``; a field of another access says so: ``EN:4:1:r``. A ``r`` after which
-  something happens (data that is taken) is ``ra``.
-- ``NAME:lsb:width``; width 1 need not stand there. ``*`` is the whole register.
-- ``CH{0-11}:0`` stands for twelve fields, each beside the one before. In a register's name,
-  with ``offset/step``, it stands for registers: ``030/10 CC{0-2}_CTRL``; ``{ABC}`` are letters.
-- A line that begins with ``+`` goes on with the fields of the one before.
-- ``- note`` at the end of a line says that the emulator keeps the value and does nothing with it.
+- ``rw``, ``r`` or ``w``; a field with another access states it: ``EN:4:1:r``. A ``r`` with a side
+  effect (reading takes the data) is ``ra``.
+- ``NAME:lsb:width``; a width of 1 may be omitted. ``*`` is the whole register.
+- ``CH{0-11}:0`` is twelve adjacent fields. In a register's name, with ``offset/step``, it is
+  several registers: ``030/10 CC{0-2}_CTRL``; ``{ABC}`` are letters.
+- A line that begins with ``+`` continues the fields of the previous one.
+- ``- note`` at the end of a line: the emulator stores the value but does not use it.
 """
 
 import re
@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 
 class RegisterTableError(ValueError):
-    """A line of a table can not be read, or contradicts another."""
+    """A line of a table is malformed or contradicts another."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,12 @@ class Field:
 
     @property
     def mask(self) -> int:
-        """Its bits within the register."""
         return ((1 << self.width) - 1) << self.lsb
 
 
 @dataclass(frozen=True)
 class Register:
-    """One word; ``modelled`` is False where the emulator keeps the value and that is all."""
+    """One word; ``modelled`` is False if the emulator only stores the value."""
 
     offset: int
     name: str
@@ -55,18 +54,18 @@ class Register:
 
     @property
     def readable(self) -> int:
-        """Bits that read as something else than 0."""
+        """Bits that can read as 1."""
         return sum(field.mask for field in self.fields if field.readable)
 
     @property
     def writable(self) -> int:
-        """Bits that a write reaches."""
+        """Bits that a write can change."""
         return sum(field.mask for field in self.fields if field.writable)
 
 
 @dataclass(frozen=True)
 class Instance:
-    """One peripheral of the part: where it is, and its interrupt lines, numbers by name."""
+    """One peripheral of the part: its address, and its interrupt numbers by name."""
 
     name: str
     base: int
@@ -75,14 +74,14 @@ class Instance:
 
 @dataclass(frozen=True)
 class Layout:
-    """The registers that all instances of a kind of peripheral have.
+    """Registers of a kind of peripheral.
 
     Attributes:
-        name: of the kind; an only instance has the same.
-        title: what it is, and the chapter of the reference manual.
+        name: of the kind; the same as the instance's if there is only one.
+        title: description and chapter of the reference manual.
         registers: in the order of their offsets.
-        instances: of the part.
-        modelled: False for a peripheral of which nothing but the table is there.
+        instances: peripherals of the part.
+        modelled: False if the emulator has only the table.
     """
 
     name: str
@@ -97,7 +96,6 @@ class Layout:
         return max(register.offset for register in self.registers) + 4
 
     def __getitem__(self, name: str) -> Register:
-        """The register ``name``; KeyError when there is none."""
         for register in self.registers:
             if register.name == name:
                 return register
@@ -111,7 +109,7 @@ class Processor:
     Attributes:
         name: of the part.
         layouts: its registers.
-        pins_header: what its pins lead to on the board, as C.
+        pins_header: writes the C header of its connections on the board.
     """
 
     name: str
@@ -122,7 +120,7 @@ class Processor:
 def peripheral(
     name: str, title: str, registers: str, *instances: Instance, modelled: bool = True
 ) -> Layout:
-    """The layout that ``registers`` declares; RegisterTableError names the line that is wrong."""
+    """The layout declared by ``registers``; RegisterTableError names a wrong line."""
     found: dict[int, Register] = {}
     names: set[str] = set()
     for line in re.sub(r"\n\s*\+", "", registers).splitlines():

@@ -1,4 +1,4 @@
-"""Registers of what counts: TIMER, LETIMER, RTC, BURTC, PCNT.
+"""Registers of timers and counters: TIMER, LETIMER, RTC, BURTC, PCNT.
 
 EFM32GG Reference Manual, chapters 20 to 24.
 """

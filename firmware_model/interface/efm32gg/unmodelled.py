@@ -1,6 +1,6 @@
-"""Peripherals of the part of which the emulator has nothing: registers read 0, writes are lost.
+"""Peripherals that the emulator does not model: registers read 0, writes are ignored.
 
-Only what a program is likely to touch is declared, so that the report has a name.
+Only those that a program is likely to access are declared, so that reports can name them.
 """
 
 from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, peripheral

@@ -48,7 +48,11 @@ def test_telecommands_are_acknowledged_queued_and_wake_the_program(desk: Served)
     frame = encode_frame(bytes([gain.id]) + gain.pack(Gain=2.0))
     assert desk.wire(frame) == bytes.fromhex("1f7f001fff")
     command = desk.link.queue[0]
-    assert (command.message.name, command.values, command.came_us) == ("SetGain", {"Gain": 2.0}, 77)
+    assert (command.message.name, command.values, command.received_us) == (
+        "SetGain",
+        {"Gain": 2.0},
+        77,
+    )
     assert desk.told == ["SetGain"]
     assert desk.perform(sleep())
     assert desk.state.telecommands == 1

@@ -49,9 +49,9 @@ def test_what_is_written_is_read(tmp_path_factory, events):
     [
         ("", "it is empty"),
         ("hello", "line 1: Expecting value"),
-        ('{"recording": 2}', "line 1: the header is not there"),
+        ('{"recording": 2}', "line 1: there is no header"),
         ('{"recording": 1}', "line 1: lacks 'lines'"),
-        ("[]", "line 1: the header is not there"),
+        ("[]", "line 1: there is no header"),
         ('{"recording": 1, "device": "x", "lines": {}}\n{"ps": 1}', "line 2: lacks 'port'"),
         (
             '{"recording": 1, "device": "x", "lines": {}}\n'

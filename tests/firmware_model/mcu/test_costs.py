@@ -49,7 +49,7 @@ def test_book_counts_without_a_debt() -> None:
     meter = Meter(SIMPLE)
     meter.charge(loop=3)
     with meter.phase("search"):
-        meter.book(add=10)
+        meter.charge_elapsed(add=10)
     assert meter.counts["add"] == 10
     assert meter.phases == {"search": 30}
     assert [meter.take(), meter.take()] == [15, 0]

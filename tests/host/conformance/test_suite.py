@@ -8,9 +8,9 @@ import pytest
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.codec.switch_messages import (
-    after,
+    apply_command,
+    read_switches,
     shown_values,
-    switches_shown,
 )
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
@@ -71,8 +71,8 @@ def good(node, uart, monkeypatch):
         elif name == "UploadBlock":
             node.values["UploadStatus"]["NextBlock"] = values["BlockNumber"] + 1
         elif name in ("SetProfile", "SetSwitch"):
-            switches = switches_shown(CubeStarSwitches, node.values["Profile"])
-            node.values["Profile"] = shown_values(after(switches, name, values))
+            switches = read_switches(CubeStarSwitches, node.values["Profile"])
+            node.values["Profile"] = shown_values(apply_command(switches, name, values))
         elif name == "TestWDG":
             identification["WDGResetCount"] = identification.get("WDGResetCount", 0) + 1
             identification["ResetCause"] = ResetCause.WATCHDOG
@@ -192,8 +192,8 @@ def refuse(monkeypatch, node, refuses):
         if message is not None and message.name in ("SetProfile", "SetSwitch"):
             values = message.unpack(payload[1:]) if len(payload) == 1 + message.length else {}
             if values and not message.violations(values):
-                now = switches_shown(CubeStarSwitches, node.values["Profile"])
-                if refuses(now, after(now, message.name, values), message.name):
+                now = read_switches(CubeStarSwitches, node.values["Profile"])
+                if refuses(now, apply_command(now, message.name, values), message.name):
                     return b"\x03"
         return answer(payload)
 

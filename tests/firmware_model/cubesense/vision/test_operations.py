@@ -13,7 +13,7 @@ from cubestack.firmware_model.cubesense.vision.distortion import (
     byte_table,
     fine_table,
 )
-from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, answered
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, run_search
 from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
@@ -76,7 +76,7 @@ def test_samples(meter: Meter, picture: str, between: Between, sharp: bool) -> N
     pixels = PICTURES[picture]
     config = EdgeConfig(sharp=sharp)
     search = around_samples(config, meter, between)
-    edges = answered(search, lambda at: int(pixels[at[1], at[0]]))
+    edges = run_search(search, lambda at: int(pixels[at[1], at[0]]))
     as_on_record(f"samples: {picture}, {between.name}, sharp {sharp}", meter, of_edges(edges))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.cubesense.vision.distortion import RadiusTable
-from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, answered
+from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, run_search
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
 from cubestack.firmware_model.cubesense.vision.sample_search import Between, around_samples
 from cubestack.firmware_model.interface.cubesense.codes import DetectResult
@@ -19,7 +19,7 @@ from ..scenery import earth, edges_in, error_deg
 def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float) -> None:
     picture = earth(alpha, beta, rng=np.random.default_rng(4))
     lines = edges_in(picture, meter)
-    edges = answered(
+    edges = run_search(
         around_samples(EdgeConfig(), meter, between), lambda at: int(picture[at[1], at[0]])
     )
     rows = set(range(15 * 32, 480 * 32, 64 * 32))
@@ -46,7 +46,7 @@ def test_as_good_from_few_pixels(
             asked[at] += 1
             return int(picture[at[1], at[0]])
 
-        edges = answered(around_samples(EdgeConfig(), meter, between), read)
+        edges = run_search(around_samples(EdgeConfig(), meter, between), read)
         result = find_nadir(edges, NadirConfig(stereographic), meter)
         assert result.detect is DetectResult.SUCCESS
         assert error_deg((result.alpha / 100, result.beta / 100), (alpha, beta)) < 0.1
@@ -68,6 +68,6 @@ def test_the_searches_cost_less_in_the_order_expected(meter: Meter) -> None:
             meter.charge(address_byte=1)
             return int(picture[at[1], at[0]])
 
-        answered(around_samples(EdgeConfig(), meter, between), read)
+        run_search(around_samples(EdgeConfig(), meter, between), read)
         cycles.append(meter.take())
     assert cycles[0] > 1.5 * cycles[1] > 1.9 * cycles[2]

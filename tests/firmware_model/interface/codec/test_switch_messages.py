@@ -6,11 +6,11 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.codec.switch_messages import (
-    after,
+    apply_command,
+    read_switches,
     shown_values,
     switch_messages,
     switch_parameters,
-    switches_shown,
 )
 from cubestack.firmware_model.interface.codec.switches import Switches, switch
 
@@ -46,7 +46,7 @@ def test_the_boards_switch_is_shown_and_stays() -> None:
         SET_SWITCH.pack(**switch_parameters("lens", "drawn"))
     with pytest.raises(InterfaceError, match="no choice 'NONSENSE'; known: STAR_LIMIT_3_8, "):
         SET_SWITCH.pack(**switch_parameters("fit", "nonsense"))
-    changed = after(PUBLISHED, "SetProfile", {"Profile": 1})
+    changed = apply_command(PUBLISHED, "SetProfile", {"Profile": 1})
     assert changed == Own(lens="ideal", star_limit="4", fit="some-of-them")
     assert shown_values(changed) == {"Profile": 2, "Lens": 0, "StarLimit": 3, "Fit": 5}
     assert shown_values(EXTENDED)["Profile"] == 1
@@ -55,11 +55,11 @@ def test_the_boards_switch_is_shown_and_stays() -> None:
 @pytest.mark.parametrize("switches", [PUBLISHED, EXTENDED, Own(lens="drawn", star_limit="all")])
 def test_what_is_shown_is_what_there_is(switches: Own) -> None:
     values = SHOWN.unpack(SHOWN.pack(**shown_values(switches)))
-    assert switches_shown(Own, values) == switches
+    assert read_switches(Own, values) == switches
     with pytest.raises(ValueError, match="switch fit must be one of all, some-of-them, not '9'"):
-        switches_shown(Own, values | {"Fit": 9})
+        read_switches(Own, values | {"Fit": 9})
 
 
 def test_one_switch_changes_alone() -> None:
     values = SET_SWITCH.unpack(SET_SWITCH.pack(**switch_parameters("star_limit", "all")))
-    assert after(PUBLISHED, "SetSwitch", values) == Own.of("published", "star_limit=all")
+    assert apply_command(PUBLISHED, "SetSwitch", values) == Own.of("published", "star_limit=all")

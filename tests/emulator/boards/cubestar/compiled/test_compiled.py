@@ -21,7 +21,7 @@ from cubestack.emulator.boards.cubestar.compiled.machine import Timing, started
 from cubestack.emulator.boards.processor_registers import peek
 from cubestack.emulator.iss.calls import CallError, Calls
 from cubestack.emulator.iss.insight.symbols import Symbols
-from cubestack.firmware_model.mcu.compiled import measured
+from cubestack.firmware_model.mcu.compiled import load_measurements
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.studies.cubestar.costs import generated
@@ -59,7 +59,7 @@ def test_the_compiled_program_finds_the_same_attitude_to_the_bit(
 @pytest.fixture
 def recorded_compiler() -> None:
     """Another one makes other code: `cubestack costs measure` is for that."""
-    compiler, _ = measured()
+    compiler, _ = load_measurements()
     if compiler != compiler_version():
         pytest.skip(f"recorded of {compiler}")
 
@@ -67,7 +67,7 @@ def recorded_compiler() -> None:
 @needs_compiler
 @pytest.mark.usefixtures("recorded_compiler")
 def test_operations_cost_what_was_recorded(fast: Calls) -> None:
-    _, recorded = measured()
+    _, recorded = load_measurements()
     (of_this_build,) = (
         one for one in recorded if (one.build, one.timing) == (str(Build("O2")), str(Timing()))
     )
