@@ -28,19 +28,15 @@ _ENABLE = REGISTERS["OUTPUT_CONTROL"].field("CHIP_ENABLE").mask
 
 @dataclass
 class Camera:
-    """Registers over the control bus, and images; set up with the settings in the state.
-
-    Attributes:
-        selected_register: address and value of the register read last; value None: no answer.
-        off: its supply was switched off by a latch-up action.
-        latest: which of the two places holds the latest image; None before the first.
-    """
+    """Registers over the control bus, and images; set up with the settings in the state."""
 
     _hardware: AramisHardware
     _state: State
     _meter: Meter
+    #: address and value of the register read last; value None: no answer
     selected_register: tuple[int, int | None] = (0, None)
-    off: bool = False
+    off: bool = False  #: its supply was switched off by a latch-up action
+    #: which of the two places holds the latest image; None before the first
     latest: int | None = None
     _set_up: tuple[int, int] | None = None
     _pending: int | None = None

@@ -24,19 +24,13 @@ class FrameEnd(IntEnum):
 
 
 class AramisHardware(NodeHardware, Protocol):
-    """Peripherals that the program uses without waiting for them.
+    """Peripherals that the program uses without waiting for them."""
 
-    Attributes:
-        sdram: the external dynamic memory, shape (bytes,), uint8.
-        catalogue_flash: the flash chips of the coded catalogue, shape (bytes,), uint8, a live view.
-        flash: pages of settings in the boot flash.
-        reset_cause: ``ResetCause`` of :mod:`cubestack.firmware_model.interface.aramis.codes`.
-    """
-
-    sdram: NDArray[np.uint8]
+    sdram: NDArray[np.uint8]  #: the external dynamic memory, shape (bytes,), uint8
+    #: the flash chips of the coded catalogue, shape (bytes,), uint8, a live view
     catalogue_flash: NDArray[np.uint8]
-    flash: FlashStore
-    reset_cause: int
+    flash: FlashStore  #: pages of settings in the boot flash
+    reset_cause: int  #: ``ResetCause`` of :mod:`cubestack.firmware_model.interface.aramis.codes`
 
     def start_capture(self, target: NDArray[np.uint8]) -> None:
         """Transfer the next whole frame to ``target``, shape (rows, columns), part of SDRAM."""

@@ -20,15 +20,10 @@ class Port(StrEnum):
 
 
 class CubeSenseHardware(NodeHardware, Protocol):
-    """Peripherals that the program uses without waiting for them; uptime starts with each reset.
+    """Peripherals that the program uses without waiting for them; uptime starts with each reset."""
 
-    Attributes:
-        mcu_addressing: the FPGAs have the option that lets the program set addresses.
-        serial_number: ASCII, at most 6 characters.
-    """
-
-    mcu_addressing: bool
-    serial_number: str
+    mcu_addressing: bool  #: the FPGAs have the option that lets the program set addresses
+    serial_number: str  #: ASCII, at most 6 characters
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
         """Queue ``data`` for ``port``, which sends at its own pace."""

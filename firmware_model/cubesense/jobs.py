@@ -27,17 +27,12 @@ class FrameRequest:
 
 @dataclass(eq=False)
 class TelecommandJob:
-    """An accepted telecommand.
-
-    Attributes:
-        frame: the requested frame, if any.
-        latest: it is the latest telecommand, which telemetry TcmdProcessed describes.
-    """
+    """An accepted telecommand."""
 
     message: Message
     values: dict[str, Any]
-    frame: FrameRequest | None = None
-    latest: bool = False
+    frame: FrameRequest | None = None  #: the requested frame, if any
+    latest: bool = False  #: it is the latest telecommand, which telemetry TcmdProcessed describes
 
 
 @dataclass(frozen=True)

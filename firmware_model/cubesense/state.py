@@ -35,27 +35,18 @@ def distortion_of(values: Mapping[str, Any]) -> tuple[float, ...]:
 
 @dataclass
 class CameraSettings:
-    """Settings of one camera, in the units of the telecommands.
+    """Settings of one camera, in the units of the telecommands."""
 
-    Attributes:
-        threshold: detection threshold in DN.
-        auto_adjust: 1: the camera adjusts itself.
-        exposure: as sent, u16; the camera gets at most 255.
-        gain: as sent; the camera gets at most 63.
-        blue_gain, red_gain: as sent.
-        boresight: (x, y) in px.
-        masks: five areas that detection ignores; unused ones are all 0.
-        distortion: factors of the polynomial.
-    """
-
-    threshold: int
-    auto_adjust: int
-    exposure: int
-    gain: int
+    threshold: int  #: detection threshold in DN
+    auto_adjust: int  #: 1: the camera adjusts itself
+    exposure: int  #: as sent, u16; the camera gets at most 255
+    gain: int  #: as sent; the camera gets at most 63
+    #: blue_gain, red_gain: as sent
     blue_gain: int
     red_gain: int
-    boresight: tuple[float, float]
-    distortion: tuple[float, ...]
+    boresight: tuple[float, float]  #: (x, y) in px
+    distortion: tuple[float, ...]  #: factors of the polynomial
+    #: five areas that detection ignores; unused ones are all 0
     masks: list[Mask] = field(default_factory=lambda: [Mask()] * codes.MASK_AREAS)
 
     @classmethod
@@ -80,41 +71,29 @@ class CameraSettings:
 
 @dataclass(eq=False)
 class Result:
-    """The latest measurement of one camera.
+    """The latest measurement of one camera."""
 
-    Attributes:
-        capture, detect: outcome.
-        alpha, beta: 1/100 deg; valid with SUCCESS only.
-        x, y: centre from the boresight, undistorted, 1/100 px.
-        radius: of the fitted circle, undistorted, 1/100 px; 0 for the Sun.
-        points: edges of the fit, or Sun pixels of the mean.
-        sigma: standard deviations of alpha and beta, 1/100 deg; 0: unknown.
-        rms: of the edges' distances from the circle, 1/100 px.
-        found: edges that the search found, or Sun pixels.
-        reason: why the detection ended as it did.
-        edges: pixels (n, 2) of the edges that the search found, in 1/32 px; none for the Sun.
-        sram: memory that holds the image.
-        first: first Sun pixel (x, y); (0, 0) for the nadir camera.
-        pixels_read: pixels that the processor read from the FPGA.
-        wait_us, store_us, search_us, centroid_us, total_us: as in telemetry PhaseTimes.
-    """
-
+    #: capture, detect: outcome
     capture: codes.CaptureResult = codes.CaptureResult.START_UP
     detect: codes.DetectResult = codes.DetectResult.START_UP
+    #: alpha, beta: 1/100 deg; valid with SUCCESS only
     alpha: int = 0
     beta: int = 0
+    #: x, y: centre from the boresight, undistorted, 1/100 px
     x: int = 0
     y: int = 0
-    radius: int = 0
-    points: int = 0
-    sigma: tuple[int, int] = (0, 0)
-    rms: int = 0
-    found: int = 0
-    reason: codes.Reason = codes.Reason.NONE
+    radius: int = 0  #: of the fitted circle, undistorted, 1/100 px; 0 for the Sun
+    points: int = 0  #: edges of the fit, or Sun pixels of the mean
+    sigma: tuple[int, int] = (0, 0)  #: standard deviations of alpha and beta, 1/100 deg; 0: unknown
+    rms: int = 0  #: of the edges' distances from the circle, 1/100 px
+    found: int = 0  #: edges that the search found, or Sun pixels
+    reason: codes.Reason = codes.Reason.NONE  #: why the detection ended as it did
+    #: pixels (n, 2) of the edges that the search found, in 1/32 px; none for the Sun
     edges: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 2), np.int16))
-    sram: codes.Sram = codes.Sram.SRAM1
-    first: tuple[int, int] = (0, 0)
-    pixels_read: int = 0
+    sram: codes.Sram = codes.Sram.SRAM1  #: memory that holds the image
+    first: tuple[int, int] = (0, 0)  #: first Sun pixel (x, y); (0, 0) for the nadir camera
+    pixels_read: int = 0  #: pixels that the processor read from the FPGA
+    #: wait_us, store_us, search_us, centroid_us, total_us: as in telemetry PhaseTimes
     wait_us: int = 0
     store_us: int = 0
     search_us: int = 0

@@ -30,17 +30,11 @@ class CatalogueError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class PairList:
-    """Pairs of stars, sorted by ascending angle.
+    """Pairs of stars, sorted by ascending angle."""
 
-    Attributes:
-        first: (m,) index of one star in the star list.
-        second: (m,) index of the other star.
-        angle: (m,) angle between them in rad, single precision, ascending.
-    """
-
-    first: NDArray[np.uint16]
-    second: NDArray[np.uint16]
-    angle: NDArray[np.float32]
+    first: NDArray[np.uint16]  #: (m,) index of one star in the star list
+    second: NDArray[np.uint16]  #: (m,) index of the other star
+    angle: NDArray[np.float32]  #: (m,) angle between them in rad, single precision, ascending
 
     @cached_property
     def ends(self) -> NDArray[np.intp]:
@@ -53,23 +47,14 @@ class PairList:
 
 @dataclass(frozen=True, eq=False)
 class StarCatalogue:
-    """Star list and pair list for one magnitude limit, pair limit and epoch.
+    """Star list and pair list for one magnitude limit, pair limit and epoch."""
 
-    Attributes:
-        vectors: (n, 3) inertial unit vectors, single precision as stored.
-        pairs: every pair closer than the pair limit.
-        hip: (n,) Hipparcos numbers, for the ground.
-        v_mag: (n,) V magnitudes, for the ground.
-        mag_limit: stars are strictly brighter than this V magnitude.
-        pair_limit_deg: pairs are strictly closer than this angle.
-    """
-
-    vectors: NDArray[np.float32]
-    pairs: PairList
-    hip: NDArray[np.int64]
-    v_mag: NDArray[np.float64]
-    mag_limit: float
-    pair_limit_deg: float
+    vectors: NDArray[np.float32]  #: (n, 3) inertial unit vectors, single precision as stored
+    pairs: PairList  #: every pair closer than the pair limit
+    hip: NDArray[np.int64]  #: (n,) Hipparcos numbers, for the ground
+    v_mag: NDArray[np.float64]  #: (n,) V magnitudes, for the ground
+    mag_limit: float  #: stars are strictly brighter than this V magnitude
+    pair_limit_deg: float  #: pairs are strictly closer than this angle
 
     @cached_property
     def cosines(self) -> NDArray[np.float32]:

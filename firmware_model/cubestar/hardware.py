@@ -10,19 +10,13 @@ from cubestack.firmware_model.node.hardware import NodeHardware
 
 
 class CubeStarHardware(NodeHardware, Protocol):
-    """Peripherals that the program uses without waiting for them.
+    """Peripherals that the program uses without waiting for them."""
 
-    Attributes:
-        external_ram: SRAM on the external bus, shape (bytes,), uint8.
-        retention: battery-domain registers, kept over software resets, not over power-off.
-        flash: non-volatile store.
-        reset_causes: the reset-cause register: one of the single causes of ``ResetCause`` for each
-            bit set since the program cleared it.
-    """
-
-    external_ram: NDArray[np.uint8]
-    retention: bytearray
-    flash: FlashStore
+    external_ram: NDArray[np.uint8]  #: SRAM on the external bus, shape (bytes,), uint8
+    retention: bytearray  #: battery-domain registers, kept over software resets, not over power-off
+    flash: FlashStore  #: non-volatile store
+    #: the reset-cause register: one of the single causes of ``ResetCause`` for each bit set since
+    #: the program cleared it
     reset_causes: set[int]
 
     def switch_supply(self, channel: str, on: bool) -> None: ...

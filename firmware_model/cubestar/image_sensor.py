@@ -34,14 +34,10 @@ _AUTOVIEW_ONLY = _bits("FIRMWARE_FEATURES", AUTOVIEW=1)
 
 @dataclass(eq=False)
 class ImageSensor:
-    """Register access over the camera's own control bus.
+    """Register access over the camera's own control bus."""
 
-    Attributes:
-        state: its settings determine the sensor's set-up.
-        selected_register: address and value of the register read last; value None: no answer.
-    """
-
-    state: State
+    state: State  #: its settings determine the sensor's set-up
+    #: address and value of the register read last; value None: no answer
     selected_register: tuple[int, int | None] = (0, None)
 
     def power_up(self) -> Routine[None]:

@@ -42,22 +42,16 @@ class Pictures(ABC):
 
     All offsets are within the newest image, of ``IMAGE_BYTES``. A place is a position for an image;
     ``Retained.image_place`` is that of the newest one.
-
-    Attributes:
-        acknowledge: pin that signals a stored image.
-        while_storing: the newest image can be processed while the next one is stored.
-        iteration_us: period of the loop.
-        selects: chip select of each memory of two images.
     """
 
     state: State
     meter: Meter
     supply: SupplyMonitor
 
-    acknowledge = str(pins.ACK)
-    while_storing = True
-    iteration_us = FAST_ITERATION_US
-    selects: ClassVar[tuple[int, ...]] = (0,)
+    acknowledge = str(pins.ACK)  #: pin that signals a stored image
+    while_storing = True  #: the newest image can be processed while the next one is stored
+    iteration_us = FAST_ITERATION_US  #: period of the loop
+    selects: ClassVar[tuple[int, ...]] = (0,)  #: chip select of each memory of two images
 
     @abstractmethod
     def start(self) -> Routine[None]: ...

@@ -73,22 +73,14 @@ _U64 = 0xFFFF_FFFF_FFFF_FFFF
 
 @dataclass(frozen=True)
 class Attitude:
-    """A solved attitude as stored in flash.
+    """A solved attitude as stored in flash."""
 
-    Attributes:
-        quaternion: float32 (4,), scalar last, inertial to camera.
-        frame: number of the image since power-up, modulo 2^32.
-        image_ms: uptime at the image's mid-exposure, in ms, modulo 2^32.
-        matched: stars used.
-        mode: MatchMode by which they were identified.
-        rotation: float32 (3, 3), the direction cosine matrix, if it is stored too.
-    """
-
-    quaternion: NDArray[np.float32]
-    frame: int
-    image_ms: int
-    matched: int
-    mode: int
+    quaternion: NDArray[np.float32]  #: float32 (4,), scalar last, inertial to camera
+    frame: int  #: number of the image since power-up, modulo 2^32
+    image_ms: int  #: uptime at the image's mid-exposure, in ms, modulo 2^32
+    matched: int  #: stars used
+    mode: int  #: MatchMode by which they were identified
+    #: float32 (3, 3), the direction cosine matrix, if it is stored too
     rotation: NDArray[np.float32] | None = None
 
     LAYOUT = struct.Struct("<4fIIBB")

@@ -112,37 +112,23 @@ MAX_REQUEST_BYTES = _HEAD.size + MAX_MESSAGES * (_MESSAGE.size + MAX_MESSAGE_BYT
 
 @dataclass(frozen=True)
 class RdwrMessage:
-    """One message of I2C_RDWR.
+    """One message of I2C_RDWR."""
 
-    Attributes:
-        address: 7-bit address.
-        flags: of MessageFlag.
-        length: bytes to write or to read.
-        data: bytes to write; for a read whose length the device sends, the first byte of its
-            buffer.
-    """
-
-    address: int
-    flags: int
-    length: int
+    address: int  #: 7-bit address
+    flags: int  #: of MessageFlag
+    length: int  #: bytes to write or to read
+    #: bytes to write; for a read whose length the device sends, the first byte of its buffer
     data: bytes = b""
 
 
 @dataclass(frozen=True)
 class SmbusCall:
-    """The argument of I2C_SMBUS.
+    """The argument of I2C_SMBUS."""
 
-    Attributes:
-        direction: 1 to read, 0 to write.
-        command: command or register.
-        size: of SmbusSize.
-        data: the union i2c_smbus_data, 34 bytes; None for a null pointer.
-    """
-
-    direction: int
-    command: int
-    size: int
-    data: bytes | None
+    direction: int  #: 1 to read, 0 to write
+    command: int  #: command or register
+    size: int  #: of SmbusSize
+    data: bytes | None  #: the union i2c_smbus_data, 34 bytes; None for a null pointer
 
 
 def smbus_data_bytes(size: int) -> int:

@@ -83,21 +83,13 @@ Event = LineBytes | LineError | BusTransfer | Control
 
 @dataclass(frozen=True)
 class Recording:
-    """A whole recording.
+    """A whole recording."""
 
-    Attributes:
-        name: of the file.
-        device: name of the device on the command line.
-        bauds: baud rate of each serial line, by port.
-        events: in the order of time.
-        setup: how the device was created; None if not recorded.
-    """
-
-    name: str
-    device: str
-    bauds: dict[str, int] = field(default_factory=dict)
-    events: tuple[Event, ...] = ()
-    setup: Setup | None = None
+    name: str  #: of the file
+    device: str  #: name of the device on the command line
+    bauds: dict[str, int] = field(default_factory=dict)  #: baud rate of each serial line, by port
+    events: tuple[Event, ...] = ()  #: in the order of time
+    setup: Setup | None = None  #: how the device was created; None if not recorded
 
     def line(self, port: str) -> Iterator[LineBytes]:
         return (e for e in self.events if isinstance(e, LineBytes) and e.port == port)

@@ -17,22 +17,14 @@ class Document:
 
 @dataclass(frozen=True)
 class Setup:
-    """How a device was created.
+    """How a device was created."""
 
-    Attributes:
-        version: of this project.
-        target: recorded device, as the user wrote it; empty if it was emulated here.
-        seed: of all random numbers.
-        scene: what it saw; None for the device's default.
-        faults: fault plan.
-        options: other options with a non-default value, by name.
-    """
-
-    version: str
-    target: str = ""
-    seed: int = 0
-    scene: Document | None = None
-    faults: Document | None = None
+    version: str  #: of this project
+    target: str = ""  #: recorded device, as the user wrote it; empty if it was emulated here
+    seed: int = 0  #: of all random numbers
+    scene: Document | None = None  #: what it saw; None for the device's default
+    faults: Document | None = None  #: fault plan
+    #: other options with a non-default value, by name
     options: Mapping[str, Option] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:

@@ -19,36 +19,22 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True)
 class Top:
-    """A design of whole FPGAs.
+    """A design of whole FPGAs."""
 
-    Attributes:
-        make: creates its component, at full size.
-        summary: one line.
-        clocks: inputs that clock flip-flops, unrelated to each other.
-        parts: number of AGLN030s; more than one for a model of several chips.
-        pulled_up: pins that need a pull-up.
-        reset: what puts the registers into a defined state.
-        fits: whether the estimated tiles fit into the part.
-    """
-
-    make: Callable[[], PinnedComponent]
-    summary: str
-    clocks: tuple[Clock, ...]
-    parts: int = 1
-    pulled_up: tuple[str, ...] = ()
-    reset: str = "standby"
-    fits: bool = True
+    make: Callable[[], PinnedComponent]  #: creates its component, at full size
+    summary: str  #: one line
+    clocks: tuple[Clock, ...]  #: inputs that clock flip-flops, unrelated to each other
+    parts: int = 1  #: number of AGLN030s; more than one for a model of several chips
+    pulled_up: tuple[str, ...] = ()  #: pins that need a pull-up
+    reset: str = "standby"  #: what puts the registers into a defined state
+    fits: bool = True  #: whether the estimated tiles fit into the part
 
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a top, or an alternative to one, whose area is reported.
+    """A part of a top, or an alternative to one, whose area is reported."""
 
-    Attributes:
-        make: creates its component, at full size.
-    """
-
-    make: Callable[[], Component]
+    make: Callable[[], Component]  #: creates its component, at full size
 
 
 #: Tops and blocks by their names on the command line.

@@ -71,24 +71,19 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True)
 class Proof:
-    """A property of a design, and how it is proved.
+    """A property of a design, and how it is proved."""
 
-    Attributes:
-        property: the property, in one sentence.
-        make: creates the design and returns it with a description of its size; of a small image
-            if its argument is True.
-        harness: adds assumptions and assertions to the module; the namespace has a signal for
-            each port and each wire. Input ports are free. ``size`` is the one from ``make``, and
-            ``registers`` are all of the design's.
-        fault: a bug with which the proof must fail.
-        wires: internal wires of the design that ``harness`` uses, by its names for them.
-            Submodules are named as in the design, without the numbers that make names unique.
-    """
-
-    property: str
+    property: str  #: the property, in one sentence
+    #: creates the design and returns it with a description of its size; of a small image if its
+    #: argument is True
     make: Callable[[bool], tuple[Component, Any]]
+    #: adds assumptions and assertions to the module; the namespace has a signal for each port and
+    #: each wire. Input ports are free. ``size`` is the one from ``make``, and ``registers`` are all
+    #: of the design's.
     harness: Callable[[Module, SimpleNamespace], None]
-    fault: Fault
+    fault: Fault  #: a bug with which the proof must fail
+    #: internal wires of the design that ``harness`` uses, by its names for them. Submodules are
+    #: named as in the design, without the numbers that make names unique.
     wires: Mapping[str, str] = field(default_factory=dict)
 
 

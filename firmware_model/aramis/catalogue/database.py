@@ -56,36 +56,22 @@ class DatabaseError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Database:
-    """Onboard database for one field of view and epoch.
+    """Onboard database for one field of view and epoch."""
 
-    Attributes:
-        epoch: Julian year of the directions.
-        fov_deg: longest side of a triangle.
-        numbers: (n,) Hipparcos numbers, uint32.
-        vectors: (n, 3) inertial unit vectors, float32.
-        v_mag: (n,) V magnitudes, float32.
-        stars: (m, 3) star indices of each triangle, ascending, uint16.
-        faces: (m,) face of each triangle's middle, uint16.
-        areas: (m,) ascending, float32.
-        moments: (m,) ascending, float32.
-        moment_triangles: (m,) triangle of each moment, uint32.
-        area_index, moment_index: k-vectors of both.
-        sphere: the faces.
-    """
-
-    epoch: float
-    fov_deg: float
-    numbers: NDArray[np.uint32]
-    vectors: Floats
-    v_mag: Floats
-    stars: NDArray[np.uint16]
-    faces: NDArray[np.uint16]
-    areas: Floats
-    moments: Floats
-    moment_triangles: NDArray[np.uint32]
+    epoch: float  #: Julian year of the directions
+    fov_deg: float  #: longest side of a triangle
+    numbers: NDArray[np.uint32]  #: (n,) Hipparcos numbers, uint32
+    vectors: Floats  #: (n, 3) inertial unit vectors, float32
+    v_mag: Floats  #: (n,) V magnitudes, float32
+    stars: NDArray[np.uint16]  #: (m, 3) star indices of each triangle, ascending, uint16
+    faces: NDArray[np.uint16]  #: (m,) face of each triangle's middle, uint16
+    areas: Floats  #: (m,) ascending, float32
+    moments: Floats  #: (m,) ascending, float32
+    moment_triangles: NDArray[np.uint32]  #: (m,) triangle of each moment, uint32
+    #: area_index, moment_index: k-vectors of both
     area_index: KVector
     moment_index: KVector
-    sphere: GeodesicSphere
+    sphere: GeodesicSphere  #: the faces
 
     def __len__(self) -> int:
         """Number of triangles."""

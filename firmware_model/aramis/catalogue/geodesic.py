@@ -23,14 +23,10 @@ NO_FACE = 0xFFFF  #: fills the list of a face with 11 neighbours
 
 @dataclass(frozen=True, eq=False)
 class GeodesicSphere:
-    """Faces of the sphere, as in flash.
+    """Faces of the sphere, as in flash."""
 
-    Attributes:
-        centres: (f, 3) unit vectors, float32.
-        neighbours: (f, 12) faces with a common corner, ascending, filled with `NO_FACE`; uint16.
-    """
-
-    centres: Floats
+    centres: Floats  #: (f, 3) unit vectors, float32
+    #: (f, 12) faces with a common corner, ascending, filled with `NO_FACE`; uint16
     neighbours: NDArray[np.uint16]
 
     def __len__(self) -> int:

@@ -47,17 +47,11 @@ _CHECKS, _LOCATED = _tables()
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """Result of decoding.
+    """Result of decoding."""
 
-    Attributes:
-        data: bytes (8 n,), uint8.
-        corrected: number of words with one wrong bit, which was corrected.
-        lost: indices of words with more than one.
-    """
-
-    data: NDArray[np.uint8]
-    corrected: int
-    lost: Indices
+    data: NDArray[np.uint8]  #: bytes (8 n,), uint8
+    corrected: int  #: number of words with one wrong bit, which was corrected
+    lost: Indices  #: indices of words with more than one
 
 
 def coded_size(size: int) -> int:

@@ -41,15 +41,12 @@ class Range:
 
 @dataclass(frozen=True, eq=False)
 class KVector:
-    """The bins of one sorted list.
+    """The bins of one sorted list."""
 
-    Attributes:
-        lowest, highest: smallest and largest value of the list.
-        starts: (bins + 1,) start of each bin in the list, uint32; the last is its length.
-    """
-
+    #: lowest, highest: smallest and largest value of the list
     lowest: np.float32
     highest: np.float32
+    #: (bins + 1,) start of each bin in the list, uint32; the last is its length
     starts: NDArray[np.uint32]
 
     @classmethod

@@ -20,13 +20,9 @@ from cubestack.firmware_model.mcu.requests import Routine
 
 @dataclass(eq=False)
 class BackupUart:
-    """Messages on the node's UART, in place of the node protocol's; the pointer is not kept.
+    """Messages on the node's UART, in place of the node protocol's; the pointer is not kept."""
 
-    Attributes:
-        registers: the registers that they read and write.
-    """
-
-    registers: RegisterLink
+    registers: RegisterLink  #: the registers that they read and write
 
     def __post_init__(self) -> None:
         link = self.registers

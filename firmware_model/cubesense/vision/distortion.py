@@ -58,19 +58,12 @@ class Projection(Enum):
 
 @dataclass(frozen=True, eq=False)
 class RadiusTable:
-    """New radius less the radius in the image, for every pixel of the latter.
+    """New radius less the radius in the image, for every pixel of the latter."""
 
-    Attributes:
-        differences: (227,) in 1 / `per_px` px.
-        per_px: unit of the entries.
-        entry_bytes: flash per entry.
-        drops_fraction: add to the radius' whole pixels only, as equation 6.3.7 is printed.
-    """
-
-    differences: NDArray[np.int16]
-    per_px: int
-    entry_bytes: int
-    drops_fraction: bool
+    differences: NDArray[np.int16]  #: (227,) in 1 / `per_px` px
+    per_px: int  #: unit of the entries
+    entry_bytes: int  #: flash per entry
+    drops_fraction: bool  #: add to the radius' whole pixels only, as equation 6.3.7 is printed
 
     @property
     def size(self) -> int:

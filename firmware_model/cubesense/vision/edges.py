@@ -59,24 +59,15 @@ Answer = TypeVar("Answer")
 
 @dataclass(frozen=True)
 class EdgeConfig:
-    """Settings of the search.
+    """Settings of the search."""
 
-    Attributes:
-        threshold: a pixel at or above it is bright.
-        boresight: (x, y) in px.
-        rim_px: an edge at least this far from the boresight is false.
-        masks: areas whose edges are dropped.
-        sub_pixel: interpolate between the pixels of an edge.
-        listing: with the slips of appendix C.3.
-        sharp: drop edges that are not dark outside; place the others by the light inside.
-    """
-
-    threshold: int = 70
-    boresight: tuple[float, float] = (371.0, 236.0)
-    rim_px: float = RIM_PX
-    masks: Sequence[Mask] = ()
-    sub_pixel: bool = True
-    listing: bool = False
+    threshold: int = 70  #: a pixel at or above it is bright
+    boresight: tuple[float, float] = (371.0, 236.0)  #: (x, y) in px
+    rim_px: float = RIM_PX  #: an edge at least this far from the boresight is false
+    masks: Sequence[Mask] = ()  #: areas whose edges are dropped
+    sub_pixel: bool = True  #: interpolate between the pixels of an edge
+    listing: bool = False  #: with the slips of appendix C.3
+    #: drop edges that are not dark outside; place the others by the light inside
     sharp: bool = False
 
     @property

@@ -41,34 +41,21 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Tolerances of a limb's edges, in px of the projection.
+    """Tolerances of a limb's edges, in px of the projection."""
 
-    Attributes:
-        on_px: an edge this near to the circle is on it.
-        good_rms_px: largest rms at which all edges together are a limb.
-        usual_px: standard deviation of an edge's distance in usual images.
-    """
-
-    on_px: float
-    good_rms_px: float
-    usual_px: float
+    on_px: float  #: an edge this near to the circle is on it
+    good_rms_px: float  #: largest rms at which all edges together are a limb
+    usual_px: float  #: standard deviation of an edge's distance in usual images
 
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """A circle through the limb.
+    """A circle through the limb."""
 
-    Attributes:
-        circle: in px of the points.
-        on: mask of the points on it (n,).
-        rms_px: of their distances.
-        covariance: (3, 3) of centre and radius, px^2.
-    """
-
-    circle: Circle
-    on: NDArray[np.bool_]
-    rms_px: float
-    covariance: Values
+    circle: Circle  #: in px of the points
+    on: NDArray[np.bool_]  #: mask of the points on it (n,)
+    rms_px: float  #: of their distances
+    covariance: Values  #: (3, 3) of centre and radius, px^2
 
     @property
     def on_circle(self) -> int:

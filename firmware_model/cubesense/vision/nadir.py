@@ -56,21 +56,15 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class NadirConfig:
-    """Settings of the fit.
+    """Settings of the fit."""
 
-    Attributes:
-        table: undistorts the edges.
-        projection: of the table.
-        min_edges: smallest number: three define a circle, a fourth tests whether it is the limb's.
-        radius_deg: range of the Earth's angular radius: 96 to 6378 km of altitude.
-        checked: whether radius and distances from the circle are checked.
-    """
-
-    table: RadiusTable
-    projection: Projection = Projection.STEREOGRAPHIC
+    table: RadiusTable  #: undistorts the edges
+    projection: Projection = Projection.STEREOGRAPHIC  #: of the table
+    #: smallest number: three define a circle, a fourth tests whether it is the limb's
     min_edges: int = 4
+    #: range of the Earth's angular radius: 96 to 6378 km of altitude
     radius_deg: tuple[float, float] = (30.0, 80.0)
-    checked: bool = True
+    checked: bool = True  #: whether radius and distances from the circle are checked
 
     def reason_if_checked(self, reason: codes.Reason) -> codes.Reason:
         """``reason`` if results are checked; the published program reports none."""
@@ -85,41 +79,30 @@ class NadirConfig:
 
 @dataclass(frozen=True)
 class Direction:
-    """Outcome of a detection.
+    """Outcome of a detection."""
 
-    Attributes:
-        detect: its result code.
-        x, y: centre from the boresight, 1/100 px, undistorted; 0 without success.
-        alpha, beta: the same, 1/100 deg.
-        sigma_alpha, sigma_beta: standard deviations of these, 1/100 deg; 0: unknown.
-        reason: of the outcome, if it is checked.
-    """
-
-    detect: codes.DetectResult
+    detect: codes.DetectResult  #: its result code
+    #: x, y: centre from the boresight, 1/100 px, undistorted; 0 without success
     x: int = 0
     y: int = 0
+    #: alpha, beta: the same, 1/100 deg
     alpha: int = 0
     beta: int = 0
+    #: sigma_alpha, sigma_beta: standard deviations of these, 1/100 deg; 0: unknown
     sigma_alpha: int = 0
     sigma_beta: int = 0
-    reason: codes.Reason = codes.Reason.NONE
+    reason: codes.Reason = codes.Reason.NONE  #: of the outcome, if it is checked
 
 
 @dataclass(frozen=True)
 class NadirResult(Direction):
-    """A direction, and the data of its fit.
+    """A direction, and the data of its fit."""
 
-    Attributes:
-        edges: number used in the fit; without a fit, number found.
-        dropped: edges left out of it.
-        radius_deg: angular radius of the circle; 0 if there is none, or it was not calculated.
-        rms_px: of the distances of these edges from the circle, in px of the projection.
-    """
-
-    edges: int = 0
-    dropped: int = 0
+    edges: int = 0  #: number used in the fit; without a fit, number found
+    dropped: int = 0  #: edges left out of it
+    #: angular radius of the circle; 0 if there is none, or it was not calculated
     radius_deg: float = 0.0
-    rms_px: float = 0.0
+    rms_px: float = 0.0  #: of the distances of these edges from the circle, in px of the projection
 
 
 def angle_of(hundredths: NDArray[np.int16], meter: Meter) -> NDArray[np.int16]:

@@ -55,24 +55,16 @@ _LARGEST_ANGLE = codes.LARGEST_ANGLE_DEG * 100  #: in 1/100 deg; beyond any of t
 
 @dataclass(frozen=True, eq=False)
 class SunConfig:
-    """Settings of the search in the window.
+    """Settings of the search in the window."""
 
-    Attributes:
-        table: undistorts the centre; an equidistant one.
-        threshold: a pixel at or above it belongs to the Sun.
-        boresight: (x, y) in px.
-        masks: areas whose pixels do not count.
-        min_pixels, max_pixels: fewer, or more, are no Sun.
-        printed: without the extensions.
-    """
-
-    table: RadiusTable
-    threshold: int = 225
-    boresight: tuple[float, float] = (369.0, 250.0)
-    masks: Sequence[Mask] = ()
+    table: RadiusTable  #: undistorts the centre; an equidistant one
+    threshold: int = 225  #: a pixel at or above it belongs to the Sun
+    boresight: tuple[float, float] = (369.0, 250.0)  #: (x, y) in px
+    masks: Sequence[Mask] = ()  #: areas whose pixels do not count
+    #: min_pixels, max_pixels: fewer, or more, are no Sun
     min_pixels: int = 7
     max_pixels: int = 190
-    printed: bool = False
+    printed: bool = False  #: without the extensions
 
 
 @dataclass(frozen=True)

@@ -125,32 +125,28 @@ class ReadOut:
     first one, and the one between the last row and the first column. Sun window: four bytes (x low,
     x high, y low, y high), then the window row by row. Beyond the end the scan continues with its
     first column, and the window with its first pixel.
-
-    Attributes:
-        columns, rows: size of the image.
-        frame_gap: a frame starts with the first line after more clocks than this with HREF low.
-        scan_step: distance of two scanned lines, a power of two.
-        first_row, first_column: first scanned row and column; below ``scan_step``.
-        window: side of the Sun window.
-        window_left, window_above: distance of the window's origin to the left of and above the
-            first Sun pixel, unless the image border is nearer.
-        as_flown: as printed in appendices D.3 and D.4: the scan presents each pixel one clock
-            earlier, and the window crosses the image border.
-        one_search: each FPGA has only its own sensor's search. On commands for the other sensor's
-            edge data, the owner of the memory sends the whole image, as table 6.4 words it, and
-            the FPGA of the camera, not of the memory, searches for the first Sun pixel.
     """
 
+    #: columns, rows: size of the image
     columns: int = 640
     rows: int = 480
+    #: a frame starts with the first line after more clocks than this with HREF low
     frame_gap: int = 858
-    scan_step: int = 64
+    scan_step: int = 64  #: distance of two scanned lines, a power of two
+    #: first_row, first_column: first scanned row and column; below ``scan_step``
     first_row: int = 15
     first_column: int = 63
-    window: int = 15
+    window: int = 15  #: side of the Sun window
+    #: window_left, window_above: distance of the window's origin to the left of and above the first
+    #: Sun pixel, unless the image border is nearer
     window_left: int = 5
     window_above: int = 3
+    #: as printed in appendices D.3 and D.4: the scan presents each pixel one clock earlier, and the
+    #: window crosses the image border
     as_flown: bool = False
+    #: each FPGA has only its own sensor's search. On commands for the other sensor's edge data, the
+    #: owner of the memory sends the whole image, as table 6.4 words it, and the FPGA of the camera,
+    #: not of the memory, searches for the first Sun pixel.
     one_search: bool = False
 
     def __post_init__(self) -> None:

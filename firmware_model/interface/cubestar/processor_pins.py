@@ -32,17 +32,11 @@ LEDS = ("PB3", "PB4")
 
 @dataclass(frozen=True)
 class Unit:
-    """A peripheral of the part with connections to the outside.
+    """A peripheral of the part with connections to the outside."""
 
-    Attributes:
-        name: of the peripheral.
-        location: value for its ROUTE register.
-        signals: used ones, without the peripheral's name.
-    """
-
-    name: str
-    location: int
-    signals: tuple[str, ...]
+    name: str  #: of the peripheral
+    location: int  #: value for its ROUTE register
+    signals: tuple[str, ...]  #: used ones, without the peripheral's name
 
     def pin(self, signal: str) -> int:
         """A signal's pin: port times 16 plus bit."""
@@ -56,19 +50,12 @@ CAMERA_I2C = Unit("I2C1", 1, ("SDA", "SCL"))  # PB11, PB12; master
 
 @dataclass(frozen=True)
 class Monitor:
-    """A current monitor of a supply channel, at an ADC and a comparator input.
+    """A current monitor of a supply channel, at an ADC and a comparator input."""
 
-    Attributes:
-        adc_channel: of ADC0, whose channels are at PD0..PD7.
-        comparator: number of the ACMP.
-        comparator_channel: ACMP0 has its channels at PC0..PC7, ACMP1 at PC8..PC15.
-        volts_per_a: output voltage per current; it saturates at ``SUPPLY_VOLTS``.
-    """
-
-    adc_channel: int
-    comparator: int
-    comparator_channel: int
-    volts_per_a: float
+    adc_channel: int  #: of ADC0, whose channels are at PD0..PD7
+    comparator: int  #: number of the ACMP
+    comparator_channel: int  #: ACMP0 has its channels at PC0..PC7, ACMP1 at PC8..PC15
+    volts_per_a: float  #: output voltage per current; it saturates at ``SUPPLY_VOLTS``
 
 
 MONITORS = {"memory": Monitor(4, 0, 4, 50.0), "imager": Monitor(5, 1, 0, 5.0)}

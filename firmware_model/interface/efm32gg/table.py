@@ -74,21 +74,13 @@ class Instance:
 
 @dataclass(frozen=True)
 class Layout:
-    """Registers of a kind of peripheral.
+    """Registers of a kind of peripheral."""
 
-    Attributes:
-        name: of the kind; the same as the instance's if there is only one.
-        title: description and chapter of the reference manual.
-        registers: in the order of their offsets.
-        instances: peripherals of the part.
-        modelled: False if the emulator has only the table.
-    """
-
-    name: str
-    title: str
-    registers: tuple[Register, ...]
-    instances: tuple[Instance, ...]
-    modelled: bool = True
+    name: str  #: of the kind; the same as the instance's if there is only one
+    title: str  #: description and chapter of the reference manual
+    registers: tuple[Register, ...]  #: in the order of their offsets
+    instances: tuple[Instance, ...]  #: peripherals of the part
+    modelled: bool = True  #: False if the emulator has only the table
 
     @property
     def size(self) -> int:
@@ -104,17 +96,11 @@ class Layout:
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor on its board, as firmware sees it.
+    """A processor on its board, as firmware sees it."""
 
-    Attributes:
-        name: of the part.
-        layouts: its registers.
-        pins_header: writes the C header of its connections on the board.
-    """
-
-    name: str
-    layouts: Sequence[Layout]
-    pins_header: Callable[[], str]
+    name: str  #: of the part
+    layouts: Sequence[Layout]  #: its registers
+    pins_header: Callable[[], str]  #: writes the C header of its connections on the board
 
 
 def peripheral(
