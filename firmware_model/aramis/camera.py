@@ -44,7 +44,6 @@ class Camera:
     _exposure_rows: int = 0  # of the awaited frame
 
     def frame_ended(self, end: FrameEnd) -> None:
-        """Interrupt: the transfer of a frame ended."""
         self._meter.charge(frame_interrupt=1)
         self._ended = end, self._hardware.uptime_us()
         self._hardware.wake()
@@ -105,7 +104,6 @@ class Camera:
         self._hardware.start_capture(self.picture(place))
 
     def _give_up(self) -> None:
-        """Cancel the requested frame."""
         self._hardware.stop_capture()
         self._pending = None
 
@@ -149,7 +147,6 @@ class Camera:
         self._set_up = None
 
     def select(self, address: int) -> Routine[None]:
-        """Read any register into ``selected_register``."""
         value = yield from self._read(address)
         self.selected_register = address, value
         if value is None:

@@ -49,7 +49,6 @@ class AramisProgram:
         self.link = AramisLink(hardware, meter, state, telemetry.values, self.commands.urgent)
 
     def frame_ended(self, end: FrameEnd) -> None:
-        """Interrupt: the transfer of a frame ended."""
         self._camera.frame_ended(end)
 
     def main(self) -> Routine[None]:
@@ -75,7 +74,6 @@ class AramisProgram:
         return True
 
     def _iteration(self) -> Routine[None]:
-        """One turn of the loop, at its time."""
         state = self.state
         now_us: int = yield ReadTimer()
         if now_us < state.loop_due_us:

@@ -44,7 +44,6 @@ class StoredSettings(Settings):
             self._write(BODY_PAGE, (BODY_COMMAND,))
 
     def save(self) -> None:
-        """Write all but the body rotation to flash."""
         self._write(CONFIG_PAGE, _SAVED)
 
     def erase(self) -> None:

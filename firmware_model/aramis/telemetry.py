@@ -51,7 +51,6 @@ def body_quaternion(rotation: Floats, attitude: Floats) -> Floats:
 
 
 def _parts(quaternion: Floats | None) -> Values:
-    """The four fields of a quaternion; zeros without one."""
     return {f"Q{index}": 0.0 if quaternion is None else quaternion[index] for index in range(4)}
 
 

@@ -195,7 +195,6 @@ class Acquisition:
         return True
 
     def read_bytes(self, target: NDArray[np.uint8]) -> Routine[None]:
-        """Continue reading into ``target`` (n,), as long as ``picture_open``."""
         chunks = (target[at : at + CHUNK] for at in range(0, len(target), CHUNK))
         yield from self._strobe(chunks, self._scan_cycles)
 

@@ -107,7 +107,6 @@ class Download:
         self.checksum = 0
 
     def has(self, frame: int) -> bool:
-        """Whether a selected image has frame ``frame``."""
         return self._wanted is not None and frame < self._wanted.size.frames
 
     def request(self, values: Mapping[str, Any]) -> FrameRequest:
@@ -121,7 +120,6 @@ class Download:
         return wanted
 
     def forget(self) -> None:
-        """Deselect the image."""
         self._select(None)
 
     def prepare(self, request: FrameRequest) -> Routine[None]:

@@ -69,7 +69,6 @@ class JobQueue:
         return self._jobs.full
 
     def put(self, job: TelecommandJob | Measure) -> bool:
-        """Append ``job``; False if the queue is full."""
         return self._jobs.put(job)
 
     def request(self, stream: Background, *, next_turn: bool = False) -> bool:

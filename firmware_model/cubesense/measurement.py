@@ -41,7 +41,6 @@ def microseconds(ticks: int) -> int:
 
 
 def read_ticks() -> Routine[int]:
-    """The timer's 16 bits."""
     now_us: int = yield ReadTimer()
     return ticks_of(now_us) & 0xFFFF
 
@@ -67,7 +66,6 @@ FLASH_ERASE_BYTES, FLASH_WRITE_BYTES, FLASH_STEP_US = 64, 32, 2_000
 
 
 def projection_of(camera: codes.Camera, switches: CubeSenseSwitches) -> distortion.Projection:
-    """Projection of the distortion table of ``camera``."""
     if camera is codes.Camera.NADIR and switches.distortion == "stereographic":
         return distortion.Projection.STEREOGRAPHIC
     return distortion.Projection.EQUIDISTANT

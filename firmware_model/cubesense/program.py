@@ -48,7 +48,6 @@ class CubeSenseProgram:
         meter: Meter,
         switches: CubeSenseSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        """RAM starts with the declared reset values, and ``switches``."""
         self.idle = False
         self._hardware = hardware
         self.state = state = State(switches)

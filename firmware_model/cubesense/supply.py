@@ -95,6 +95,5 @@ class Supply:
         self._on[sram] = on
 
     def pause(self, us: int) -> Routine[None]:
-        """Wait for ``us`` as ``watch_until`` does."""
         now_us: int = yield ReadTimer()
         yield from self.watch_until(now_us + us)

@@ -144,11 +144,9 @@ class StarCatalogue:
         }
 
     def to_bytes(self) -> bytes:
-        """`arrays`, concatenated."""
         return b"".join(array.tobytes() for array in self.arrays().values())
 
     def sha256(self) -> str:
-        """Hexadecimal SHA-256 of `to_bytes`."""
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
     def limited(self, pair_limit_deg: float) -> Self:

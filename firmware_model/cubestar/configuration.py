@@ -40,7 +40,6 @@ def detection_config(
 
 
 def camera_parameters(settings: Settings) -> CameraParameters:
-    """Calibration of camera and lens."""
     values = settings.all(
         "setFocalLengthComponents",
         "setPrincipalPoint",
@@ -54,7 +53,6 @@ def camera_parameters(settings: Settings) -> CameraParameters:
 
 
 def field(settings: Settings) -> Field:
-    """Directions inside the image."""
     return field_of(camera_parameters(settings), COLUMNS, ROWS)
 
 

@@ -106,7 +106,6 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
 
 
 def _background_search() -> dict[str, int]:
-    """Buffers of the search above the background, by name."""
     cells = -(-ROWS // CELL) * -(-COLUMNS // CELL)
     runs = COLUMNS // 2  # of a row, at most
     window = (2 * HALF + 1) ** 2

@@ -108,7 +108,6 @@ class Pictures(ABC):
         yield from self._access(select, offsets + first, data, write=True)
 
     def _address_of(self, place: int) -> tuple[int, int]:
-        """Chip select and first address of ``place``."""
         return 0, place * IMAGE_BYTES
 
     def _access(

@@ -24,7 +24,6 @@ Values = dict[str, Any]
 
 
 def by_name(names: Iterable[str], vector: Iterable[Any]) -> Values:
-    """Components of a vector by name."""
     return dict(zip(names, vector, strict=True))
 
 

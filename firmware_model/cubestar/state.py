@@ -86,7 +86,6 @@ class Attitude:
     LAYOUT = struct.Struct("<4fIIBB")
 
     def pack(self) -> bytes:
-        """Contents of the flash page."""
         matrix = b"" if self.rotation is None else self.rotation.astype("<f4").tobytes()
         return matrix + self.LAYOUT.pack(
             *self.quaternion, self.frame & _U32, self.image_ms & _U32, self.matched, self.mode

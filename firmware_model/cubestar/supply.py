@@ -24,7 +24,6 @@ class SupplyMonitor:
     state: State
 
     def overcurrent(self, channel: str) -> None:
-        """Interrupt: the comparator of ``channel`` tripped."""
         self.state.hardware.switch_supply(channel, False)
         retained = self.state.retained
         retained.cut |= 1 << CHANNELS.index(channel)

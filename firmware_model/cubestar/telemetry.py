@@ -86,7 +86,6 @@ class Telemetry:
     """
 
     def __init__(self, commands: Commands, pending: Callable[[], bool]) -> None:
-        """Report on ``commands``; ``pending``: telecommands wait."""
         self._commands = commands
         self._processing, self._state = processing, state = commands.processing, commands.state
         self._hardware = hardware = state.hardware

@@ -141,7 +141,6 @@ def smbus_data_bytes(size: int) -> int:
 
 
 def request(key: int, call: Call, body: bytes = b"") -> bytes:
-    """A request without its length prefix."""
     return _HEAD.pack(key, call) + body
 
 
@@ -155,7 +154,6 @@ def split_request(data: bytes) -> tuple[int, Call, bytes]:
 
 
 def reply(result: int, data: bytes = b"") -> bytes:
-    """A reply without its length prefix."""
     return _RESULT.pack(result) + data
 
 

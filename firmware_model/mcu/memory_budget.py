@@ -24,7 +24,6 @@ class Buffer:
 
 
 def used(buffers: tuple[Buffer, ...]) -> dict[Memory, int]:
-    """Bytes in use, for each memory with a buffer."""
     memories = {buffer.memory for buffer in buffers}
     return {
         memory: sum(b.size for b in buffers if b.memory is memory and not b.inside)

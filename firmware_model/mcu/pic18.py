@@ -21,7 +21,6 @@ MULTIPLY = 9 * 8 + 128
 
 
 def pic18f45k20() -> CostTable:
-    """Costs in instruction cycles."""
     survey = "routines on a PIC18 as compiled by sdcc"
     core = "PIC18 instruction set: bit set, bit clear and move, with their bank"
     note = "Microchip AN575, at most"

@@ -34,7 +34,6 @@ class CommandExecutor:
 
     @property
     def handled(self) -> frozenset[str]:
-        """Names of the telecommands that have an effect."""
         return frozenset({*self._settings.commands, *self._actions, *self._routines})
 
     def execute(self, command: QueuedCommand) -> Routine[int | None]:

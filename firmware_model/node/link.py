@@ -124,7 +124,6 @@ class SatelliteLink(ABC):
     # --- UART -------------------------------------------------------------------------------------
 
     def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte was received."""
         self._meter.charge(uart_interrupt=1)
         match self._decoder.feed(byte):
             case FrameEvent.FRAME | FrameEvent.TOO_LONG:  # the kept front is too long as well
@@ -192,7 +191,6 @@ class SatelliteLink(ABC):
         return byte
 
     def i2c_stop(self) -> None:
-        """Interrupt: the transfer ended."""
         self._finish_write()
         if self._reading:
             self._finish_read()

@@ -90,7 +90,6 @@ class NodeProgram(ABC):
         """Values of the sensor's telemetry, by name."""
 
     def main(self) -> Routine[None]:
-        """Execute one telecommand after the other."""
         while True:
             if not self.link.queue:
                 yield Sleep(None)

@@ -11,7 +11,6 @@ class NodeState:
         self.flags: set[str] = set()
 
     def flag_values(self) -> dict[str, bool]:
-        """Whether each declared flag is raised, by name."""
         return {name: name in self.flags for name in self._declared}
 
     def raise_flag(self, name: str) -> None:

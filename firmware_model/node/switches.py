@@ -22,7 +22,6 @@ class RunningSwitches(Generic[switch_messages.SwitchesT]):
         self._at_power_up = self.now = at_power_up
 
     def change(self, telecommand: str, values: Mapping[str, Any]) -> None:
-        """Execute one of ``SWITCH_COMMANDS``."""
         self.now = switch_messages.apply_command(self.now, telecommand, values)
 
     def forget(self) -> None:

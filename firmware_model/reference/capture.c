@@ -1,7 +1,5 @@
-/* Image capture, as firmware_model/cubestar/capture.py does it (getImage of the thesis).
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Image capture as in firmware_model/cubestar/capture.py (getImage of the thesis). */
 #include "capture.h"
 
 #include <stddef.h>
@@ -17,7 +15,7 @@
 #define POLL_US 10u
 #define TRANSFER_PIECE 4096 /* bytes; the watchdog is fed after each */
 
-/* Starts the sensor and lets its first, invalid frame pass (imagerEnable). */
+/* Starts the sensor and waits for its first, invalid frame (imagerEnable). */
 static uint8_t enable_sensor(void)
 {
     uint8_t failure = sensor_configure();
@@ -34,7 +32,7 @@ static uint8_t enable_sensor(void)
     return NO_FLAG;
 }
 
-/* Polls for it; a picture's time need not be known better than to POLL_US. */
+/* Polls ACK; the resolution of an image's time is POLL_US. */
 static bool await_acknowledge(void)
 {
     uint64_t started = time_us();
@@ -47,7 +45,7 @@ static bool await_acknowledge(void)
     return true;
 }
 
-/* Has the FPGA store a frame (fpgaWriteToRam). */
+/* Lets the FPGA store a frame (fpgaWriteToRam). */
 static uint8_t store_frame(bool (*meanwhile)(void))
 {
     uint64_t started = time_us();
@@ -62,7 +60,7 @@ static uint8_t store_frame(bool (*meanwhile)(void))
     retained.capture_us = since(started);
     retained.image_ms = (uint32_t)((time_us() - sensor_age_at_frame_end_us()) / 1000u);
     if (!sensor_enable(false)) {
-        raise_flag(FLAG_ISDisableError); /* the picture is good all the same */
+        raise_flag(FLAG_ISDisableError); /* the image is valid nevertheless */
         sensor_forget_set_up();
     }
     return stored ? NO_FLAG : FLAG_ImageCaptureError;
@@ -93,7 +91,7 @@ bool capture_image(bool (*meanwhile)(void))
         meanwhile();
     if (failure == NO_FLAG) {
         fetch();
-        if (supply_cut()) /* while the picture was on its way */
+        if (supply_cut()) /* during the transfer */
             failure = FLAG_ImageCaptureError;
     }
     if (failure != NO_FLAG) {

@@ -1,12 +1,9 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Image capture: discarding the first frame, FPGA store and transfer.
  *
- * CubeStar thesis, sections 5.3.1 and 5.3.6, appendix D. The picture lies at the beginning of the
- * processor's external RAM.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef CAPTURE_H
-#define CAPTURE_H
+ * CubeStar thesis, sections 5.3.1 and 5.3.6, appendix D. The image is at the beginning of the
+ * processor's external RAM. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -19,11 +16,9 @@
 #define PICTURE_ROWS 512
 #define PICTURE_BYTES (PICTURE_COLUMNS * PICTURE_ROWS)
 
-/* Captures a picture; false, with a flag raised, when it failed. `meanwhile` runs while the FPGA
- * waits for the frame; NULL: nothing does. */
+/* Captures an image; raises a flag and returns false if it failed. `meanwhile` runs while the FPGA
+ * waits for the frame, unless it is NULL. */
 bool capture_image(bool (*meanwhile)(void));
 
-/* The picture was made by other means; false: its supply was cut. */
+/* The image was replaced by an upload or a test pattern; false: its supply was cut. */
 bool capture_replaced(void);
-
-#endif

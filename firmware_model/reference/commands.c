@@ -1,10 +1,8 @@
-/* Telecommands, as firmware_model/cubestar/commands.py executes them.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Telecommands, as in firmware_model/cubestar/commands.py.
  *
  * A setting telecommand stores its parameters. Others act at once, or take time; a few end in a
- * reset, in which telecommands that still wait are lost.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * reset, which discards waiting telecommands. */
 #include "commands.h"
 
 #include "capture.h"
@@ -46,7 +44,7 @@ static void forget_all(void)
     state_forget();
 }
 
-/* Hangs until the watchdog bites; interrupts are still served. */
+/* Hangs until the watchdog resets; interrupts are still served. */
 static void hang(void)
 {
     for (;;)
@@ -58,7 +56,7 @@ static uint8_t pattern(unsigned address)
     return (uint8_t)(address * PATTERN_FACTOR >> 3);
 }
 
-/* Writes a pattern and reads it back, then its complement; the picture is lost. */
+/* Writes a pattern and reads it back, then its complement; the image is lost. */
 static void test_memory(void)
 {
     volatile uint8_t *memory = EXTERNAL_MEMORY;
@@ -79,13 +77,13 @@ static void test_memory(void)
     memory_test = passed ? CUBESTAR_MEMORY_TEST_PASSED : CUBESTAR_MEMORY_TEST_FAILED;
 }
 
-/* Address of a register of the image sensor in the selected page. */
+/* Address of an image sensor register in the selected page. */
 static uint16_t paged(const uint8_t *parameters)
 {
     return (uint16_t)(SETTING(u8, SetCameraRegisterPage, Page) << 8 | parameters[0]);
 }
 
-/* --- picture ---------------------------------------------------------------------------------- */
+/* --- image ------------------------------------------------------------------------------------ */
 
 static bool test_pattern(uint8_t kind)
 {
@@ -114,7 +112,7 @@ static bool upload_block(const uint8_t *parameters)
            parameters + CUBESTAR_TC_UploadBlock_Data_OFFSET, UPLOAD_BLOCK_BYTES);
     next_block = (uint16_t)(number + 1);
     blocks_received++;
-    return retained.image_present; /* else nothing was begun, or it was lost */
+    return retained.image_present; /* false: no upload has begun, or it was lost */
 }
 
 static void stream_image(void)
@@ -145,7 +143,7 @@ static void trigger(void)
     retained.looping = retained.delaying = 1;
 }
 
-/* --- all -------------------------------------------------------------------------------------- */
+/* --- dispatch --------------------------------------------------------------------------------- */
 
 /* False: the task failed. */
 static bool act(uint8_t id, const uint8_t *parameters)

@@ -1,9 +1,6 @@
-/* The core's own instructions and registers, ARMv7-M Architecture Reference Manual.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef CORE_H
-#define CORE_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The core's own instructions and registers, ARMv7-M Architecture Reference Manual. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -45,5 +42,3 @@ static inline void interrupt_enable(int number)
 {
     NVIC_ENABLE[number / 32] = 1u << number % 32;
 }
-
-#endif

@@ -1,7 +1,5 @@
-/* Frames on the UART, as firmware_model/interface/codec/frames.py decodes them.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Frames on the UART, decoded as in firmware_model/interface/codec/frames.py. */
 #include "frames.h"
 
 #define ESCAPE 0x1F

@@ -1,9 +1,6 @@
-/* Frames on the UART: 1F 7F, the payload, 1F FF; a payload byte 1F is sent twice.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef FRAMES_H
-#define FRAMES_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Frames on the UART: 1F 7F, the payload, 1F FF; a payload byte 1F is sent twice. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -13,10 +10,10 @@
 #define LONGEST_PAYLOAD (LONGEST_TELECOMMAND + 1)
 #define LONGEST_FRAME (2 * LONGEST_TELEMETRY + 4)
 
-/* What a byte brought about. */
+/* Result of a byte. */
 enum frame_event { FRAME_NOTHING, FRAME_WHOLE, FRAME_INCOMPLETE, FRAME_PROTOCOL_ERROR };
 
-/* Zero is its state at rest. A payload that is too long keeps its front, one byte too long. */
+/* All zero at rest. Of a payload that is too long the front is kept, one byte more than allowed. */
 struct frame_decoder {
     bool inside, escaped;
     int length;
@@ -25,12 +22,10 @@ struct frame_decoder {
 
 enum frame_event frame_feed(struct frame_decoder *decoder, uint8_t byte);
 
-/* Forgets an unfinished frame; whether there was one. */
+/* Drops an incomplete frame; returns whether there was one. */
 bool frame_reset(struct frame_decoder *decoder);
 
 bool frame_unfinished(const struct frame_decoder *decoder);
 
-/* Writes the frame that carries a payload; returns its length, 2 * count + 4 at most. */
+/* Writes the frame of a payload; returns its length, at most 2 * count + 4. */
 int frame_encode(uint8_t *frame, const uint8_t *payload, int count);
-
-#endif

@@ -31,7 +31,6 @@ def sha256_of(image: Path) -> str:
 
 
 def record_of(image: Path) -> dict[str, str]:
-    """The record of an image: ``sha256`` and ``compiler``."""
     text = image.with_suffix(".json").read_text(encoding="ascii")
     return {str(key): str(value) for key, value in json.loads(text).items()}
 

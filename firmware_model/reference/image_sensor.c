@@ -1,7 +1,5 @@
-/* The image sensor's set-up, as firmware_model/cubestar/image_sensor.py writes it.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The image sensor's set-up, as in firmware_model/cubestar/image_sensor.py. */
 #include "image_sensor.h"
 
 #include "drivers/camera_bus.h"
@@ -24,7 +22,7 @@ uint16_t selected_address;
 uint8_t selected_value;
 bool selected_valid;
 
-/* A register takes its value with the high byte first. */
+/* Registers take the high byte first. */
 static bool write(uint16_t address, int width, uint32_t value)
 {
     uint8_t message[2 + LONGEST_REGISTER] = {(uint8_t)(address >> 8), (uint8_t)address};
@@ -58,7 +56,7 @@ uint8_t sensor_configure(void)
     if (retained.camera_setup == wanted)
         return NO_FLAG;
     uint8_t flag = retained.camera_setup ? FLAG_ConfigChangeError : FLAG_ISSetupError;
-    retained.camera_setup = 0; /* until all is written */
+    retained.camera_setup = 0; /* until all registers are written */
     task_status = CUBESTAR_TASK_STATUS_CAMERA_INITIALISING;
     uint64_t started = time_us();
     if (!write(CAMERA_MODE_SELECT, REST) || !write(CAMERA_HARDWARE_FEATURES, ALL_BUT_SHARPENING) ||

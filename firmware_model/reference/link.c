@@ -1,7 +1,5 @@
-/* The satellite's side of the node.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The node's link to the satellite. */
 #include "link.h"
 
 #include "drivers/clock.h"
@@ -15,7 +13,7 @@
 #define TELEMETRY_BIT 0x80
 #define NO_DATA 0xFF /* beyond the end of a message, or without one */
 
-/* Flags that messages on one bus raise. */
+/* Flags for messages on one bus. */
 struct bus_flags {
     uint8_t overflow, too_few, too_many;
 };
@@ -29,7 +27,7 @@ static struct frame_decoder decoder;
 static uint8_t frame[LONGEST_FRAME];
 
 static struct {
-    bool addressed, reading, answered; /* answered: there is an answer, perhaps an empty one */
+    bool addressed, reading, answered; /* answered: there is an answer, which may be empty */
     int written, length, position;
     uint8_t message[LONGEST_TELECOMMAND + 1];
     uint8_t answer[LONGEST_TELEMETRY];
@@ -42,7 +40,7 @@ bool link_idle(void)
 
 /* --- both buses ------------------------------------------------------------------------------- */
 
-/* Length of the answer, in `data`; -1 without one. */
+/* Writes the answer to `data` and returns its length; -1 without one. */
 static int read_telemetry(uint8_t id, uint8_t *data)
 {
     const struct telemetry *message = telemetry_of(id);
@@ -56,7 +54,7 @@ static int read_telemetry(uint8_t id, uint8_t *data)
     return message->length;
 }
 
-/* The switches are those of the published program: any other value is refused. */
+/* The switches are those of the published program: other values are rejected. */
 static bool switches_allowed(uint8_t id, const uint8_t *parameters)
 {
     if (id == CUBESTAR_TC_SetProfile)
@@ -66,7 +64,7 @@ static bool switches_allowed(uint8_t id, const uint8_t *parameters)
     return true;
 }
 
-/* Queues a telecommand, or says what is wrong with it. */
+/* Queues a telecommand, or returns its error. */
 static uint8_t checked(uint8_t id, const uint8_t *parameters, int length,
                        const struct bus_flags *flags)
 {
@@ -97,7 +95,7 @@ static uint8_t checked(uint8_t id, const uint8_t *parameters, int length,
 
 /* --- UART ------------------------------------------------------------------------------------- */
 
-/* Answers, if there is room for it. */
+/* Answers if the buffer has room. */
 static void send(const uint8_t *payload, int length)
 {
     int count = frame_encode(frame, payload, length);
@@ -124,7 +122,7 @@ static void uart_message(const uint8_t *payload, int length)
 void uart_received(uint8_t byte)
 {
     switch (frame_feed(&decoder, byte)) {
-    case FRAME_WHOLE: /* the kept front of a long one is too long as well */
+    case FRAME_WHOLE: /* the kept front of a long one is too long too */
         uart_message(decoder.payload, decoder.length);
         break;
     case FRAME_INCOMPLETE:
@@ -148,14 +146,14 @@ void uart_silent(void)
 
 /* --- I2C -------------------------------------------------------------------------------------- */
 
-/* Acts on the message that a stop or a repeated start ended. */
+/* Processes the message that a stop or a repeated start ended. */
 static void finish_write(void)
 {
     if (!i2c.written)
         return;
     if (i2c.message[0] & TELEMETRY_BIT) {
         int count = read_telemetry(i2c.message[0], i2c.answer);
-        i2c.answered = true; /* one that was refused with a flag counts as an empty answer */
+        i2c.answered = true; /* one rejected with a flag counts as an empty answer */
         i2c.length = count < 0 ? 0 : count;
         i2c.position = 0;
     } else {

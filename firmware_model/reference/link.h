@@ -1,16 +1,11 @@
-/* The satellite's side of the node: frames over UART and messages over I2C, in interrupt context.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The node's link to the satellite: frames over UART, messages over I2C, in interrupt context.
  *
  * As firmware_model/node/link.py: a telecommand is checked, acknowledged and queued for the main
- * loop; telemetry is answered at once.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef LINK_H
-#define LINK_H
+ * loop; telemetry is answered at once. */
+#pragma once
 
 #include <stdbool.h>
 
-/* Whether nothing is under way that a reset would cut short: a message or an answer. */
+/* True if a reset would interrupt neither a message nor an answer. */
 bool link_idle(void);
-
-#endif

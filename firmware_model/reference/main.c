@@ -1,11 +1,9 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* CubeStar's main program: telecommands, and the 1 Hz pipeline.
  *
- * CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new picture, the processor
- * works on the previous one; then the picture is transferred, and a software reset ends the
- * iteration. As firmware_model/cubestar/program.py.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new image, the processor
+ * works on the previous one; then the image is transferred, and a software reset ends the
+ * iteration. As firmware_model/cubestar/program.py. */
 #include "capture.h"
 #include "commands.h"
 #include "core.h"
@@ -27,8 +25,8 @@
 #include "supply_monitor.h"
 
 #define ITERATION_US 1000000u
-#define RESET_LEAD_US 5000u  /* from the reset to the next iteration: it takes a third of that */
-#define LATE_US 10000u       /* an iteration later than this is a timing error */
+#define RESET_LEAD_US 5000u  /* from the reset, which takes a third of it, to the next iteration */
+#define LATE_US 10000u       /* an iteration that is later is a timing error */
 
 static void reset(void)
 {
@@ -39,7 +37,7 @@ static void reset(void)
     reset_processor();
 }
 
-/* Restores a supply and executes a telecommand, if any waits; false when none does. */
+/* Restores a supply and executes a waiting telecommand; false if there was neither. */
 static bool serve(void)
 {
     timer_retain();
@@ -71,8 +69,8 @@ static void idle(uint64_t due_us)
     retained.idling_us += since(started);
 }
 
-/* Idles until then; what the host and the supplies want is done meanwhile. Returns at once when the
- * loop is stopped. Telecommands go before the next iteration. */
+/* Idles until `due_us` and serves the host and the supplies meanwhile. Returns at once if the loop
+ * is stopped. Telecommands precede the next iteration. */
 static void wait_until(uint64_t due_us)
 {
     while (retained.looping) {
@@ -84,7 +82,7 @@ static void wait_until(uint64_t due_us)
     }
 }
 
-/* One turn of the loop; it starts when the last one's second is over. */
+/* One turn of the loop; it starts at the end of the last one's second. */
 static void iterate(void)
 {
     wait_until(retained.loop_due_us);

@@ -1,7 +1,5 @@
-/* Times of the steps, by the core's cycle counter.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Times of the steps, by the core's cycle counter. */
 #include "phases.h"
 
 #include "core.h"

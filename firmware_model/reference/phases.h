@@ -1,15 +1,12 @@
-/* How long each phase of the work took: by the timer, and by the core's cycle counter.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef PHASES_H
-#define PHASES_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Duration of each phase of the work, by the timer and by the core's cycle counter. */
+#pragma once
 
 #include <stdint.h>
 
 #include "cubestar_tables.h"
 
-/* What the cycle counter measures: steps that telemetry shows, and one that it does not. */
+/* Phases measured by the cycle counter: steps that telemetry shows, and one that it does not. */
 enum phase {
     PHASE_SEARCH = STEP_SEARCH,
     PHASE_CENTROID = STEP_CENTROID,
@@ -27,11 +24,11 @@ enum phase {
 
 #ifdef __arm__
 
-/* A phase within another takes its own part from it. */
+/* The time of an inner phase does not count for the outer one. */
 void phase_begin(enum phase phase);
 void phase_end(enum phase phase);
 
-/* Begins to count anew; shows what was counted since as the steps' times. */
+/* Clears the counts; stores the counts since then as the steps' times. */
 void phases_clear(void);
 void phases_record(void);
 
@@ -44,5 +41,4 @@ void step_took(enum step step, uint32_t us);
 static inline void phase_begin(enum phase phase) { (void)phase; }
 static inline void phase_end(enum phase phase) { (void)phase; }
 
-#endif
 #endif

@@ -1,7 +1,5 @@
-/* From picture to attitude, as firmware_model/cubestar/processing.py does it in profile published.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* From image to attitude, as firmware_model/cubestar/processing in profile published. */
 #include "processing.h"
 
 #include "algorithms/catalogue.h"
@@ -46,7 +44,7 @@ static uint8_t at_least_one(uint8_t value)
     return value ? value : 1;
 }
 
-/* Settings that this hardware can not follow act as the nearest that it can. */
+/* Settings that this hardware cannot follow are replaced by the nearest possible ones. */
 static struct detection_config detection_config(void)
 {
     uint8_t stars = at_least_one(SETTING(u8, setDetectionVariables, MaxStars));
@@ -126,7 +124,7 @@ bool detect(void)
 
 /* --- identification --------------------------------------------------------------------------- */
 
-/* The flag of the mode decides; without an attitude and a hint the node is lost in space. */
+/* The mode flag decides; without an attitude and a hint the node is lost in space. */
 static uint8_t choose_mode(void)
 {
     if (mode() == LOST)
@@ -161,7 +159,7 @@ static void match(uint8_t chosen, struct identification *found)
     identify(found, vectors, results.detection.count, chosen == LOST ? NULL : boresight, margin);
 }
 
-/* Raises the flags that say more about a failure than its outcome. */
+/* Raises flags with details of a failure. */
 static void explain(uint8_t chosen, const struct identification *found)
 {
     bool too_few = found->outcome == TOO_FEW_MATCHED, votes = false;

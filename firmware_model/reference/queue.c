@@ -1,7 +1,5 @@
-/* Telecommands that wait, in a ring.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Waiting telecommands, in a ring. */
 #include "queue.h"
 
 static struct queued_command queue[QUEUE_DEPTH];

@@ -1,11 +1,8 @@
-/* Telecommands that wait: interrupts put them in, the main loop takes them out.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Waiting telecommands: interrupts add them, the main loop removes them.
  *
- * As firmware_model/node/queue.py.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef QUEUE_H
-#define QUEUE_H
+ * As firmware_model/node/queue.py. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -17,12 +14,10 @@ struct queued_command {
     uint8_t parameters[LONGEST_TELECOMMAND];
 };
 
-/* Whether a telecommand waits; the oldest one, which stays in its place until it is taken. */
+/* Whether a telecommand waits; the oldest one; its removal. */
 bool queue_waiting(void);
 const struct queued_command *queue_first(void);
 void queue_taken(void);
 
-/* Puts in a telecommand with the parameters of its length; false: there is no room. */
+/* Adds a telecommand with its parameters; false if there is no room. */
 bool queue_put(const struct telecommand *command, const uint8_t *parameters);
-
-#endif

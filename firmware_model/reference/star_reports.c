@@ -1,7 +1,5 @@
-/* Telemetry of single stars; frames that step give the next star at each read, and wrap.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Telemetry of single stars; stepping frames return the next star at each read, and wrap. */
 #include "star_reports.h"
 
 #include "algorithms/catalogue.h"
@@ -10,9 +8,9 @@
 
 #define NOT_IDENTIFIED 0xFFFF
 #define NO_STAR 0xFF
-#define VECTOR_COUNTS 10000.0f /* StarDetails has its vectors as plain counts */
+#define VECTOR_COUNTS 10000.0f /* StarDetails has vectors as plain counts */
 
-/* Where a stepping frame is. */
+/* Position of a stepping frame. */
 struct cursor {
     unsigned generation;
     int next;
@@ -51,7 +49,7 @@ static double confidence_of(int star)
                : (double)confidence(&results.identification, star);
 }
 
-/* The next of `count` stars; new results start over. */
+/* The next of `count` stars; new results start again. */
 static int step(struct cursor *cursor, int count)
 {
     int place = cursor->generation == results.generation ? cursor->next % count : 0;

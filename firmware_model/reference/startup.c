@@ -1,7 +1,5 @@
-/* Vectors, and what runs before main. ARMv7-M Architecture Reference Manual, section B1.5.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Vectors, and the code before main. ARMv7-M Architecture Reference Manual, section B1.5. */
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -14,14 +12,14 @@ extern uint32_t stack_top, data_from[], data_start[], data_end[], bss_start[], b
 
 int main(void);
 
-/* A fault, or an interrupt that nobody enabled: the watchdog ends it. */
+/* A fault, or an interrupt that was not enabled: the watchdog resets the processor. */
 void unexpected_handler(void)
 {
     for (;;)
         ;
 }
 
-/* The host is not heard until main runs, so the fast clock comes first; it needs no RAM. */
+/* The node is deaf until main runs, so the fast clock starts first; it needs no RAM. */
 void reset_handler(void)
 {
     clock_start();

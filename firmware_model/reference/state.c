@@ -1,7 +1,5 @@
-/* What the node remembers.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The node's memory. */
 #include "state.h"
 
 #include "core.h"
@@ -59,7 +57,7 @@ void state_forget(void)
     interrupts_restore(masked);
 }
 
-/* Interrupts raise flags as well. */
+/* Interrupts raise flags too. */
 void raise_flag(uint8_t flag)
 {
     if (flag == NO_FLAG)

@@ -1,7 +1,5 @@
-/* Supply monitoring, as firmware_model/cubestar/supply.py does it.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Supply monitoring, as in firmware_model/cubestar/supply.py. */
 #include "supply_monitor.h"
 
 #include "core.h"
@@ -41,7 +39,7 @@ bool supply_imager_on(void)
 
 float supply_sample(void)
 {
-    uint32_t masked = interrupts_off(); /* interrupts measure as well */
+    uint32_t masked = interrupts_off(); /* interrupts measure too */
     float current_ma[CHANNELS];
     for (int channel = 0; channel < CHANNELS; channel++) {
         current_ma[channel] = supply_current_ma((enum channel)channel);

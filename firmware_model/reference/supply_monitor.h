@@ -1,11 +1,8 @@
-/* Supply monitoring: a comparator's interrupt cuts the load switch at once (latch-up).
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Supply monitoring: on a latch-up a comparator's interrupt opens the load switch at once.
  *
- * CubeStar thesis, section 5.2.3. The main loop powers the channel up again later.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef SUPPLY_MONITOR_H
-#define SUPPLY_MONITOR_H
+ * CubeStar thesis, section 5.2.3. The main loop powers the channel up again later. */
+#pragma once
 
 #include <stdbool.h>
 
@@ -14,13 +11,11 @@
 bool supply_cut(void);
 bool supply_imager_on(void);
 
-/* Measures both channels and keeps the imager's extremes; its current in mA. */
+/* Measures both channels and records the imager's extremes; returns its current in mA. */
 float supply_sample(void);
 
-/* Opens or closes the switch of FPGA and imager; whether it is closed now. */
+/* Toggles the switch of FPGA and imager; returns whether it is closed now. */
 bool supply_toggle_imager(void);
 
-/* Closes what was cut, after a pause; true when the imager came back. */
+/* Closes the cut switches after a pause; true if the imager came back. */
 bool supply_restore(void);
-
-#endif

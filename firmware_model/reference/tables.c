@@ -1,9 +1,7 @@
-/* Look-up, checks and packing by the generated tables.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Look-up, checks and packing with the generated tables.
  *
- * Rounding and saturation are those of firmware_model/interface/codec/field.py.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * Rounding and saturation are those of firmware_model/interface/codec/field.py. */
 #include "cubestar_tables.h"
 
 static double limited(double value, double low, double high)
@@ -13,7 +11,7 @@ static double limited(double value, double low, double high)
     return value < low ? low : value > high ? high : value;
 }
 
-/* Halves away from zero. */
+/* Rounds halves away from zero. */
 static int64_t nearest(double value)
 {
     double magnitude = value < 0 ? -value : value;

@@ -1,9 +1,6 @@
-/* What the generated tables consist of: fields of telemetry, rules of telecommands.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef TABLES_H
-#define TABLES_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Elements of the generated tables: fields of telemetry, rules of telecommands. */
+#pragma once
 
 #include <math.h>
 #include <stdbool.h>
@@ -18,17 +15,17 @@ struct field {
     double scale;
 };
 
-/* Puts a value into a message that is zero there: rounded to the nearest count, halves away from
- * zero, and held within the type; not-a-number is 0 in an integer. */
+/* Writes a value into a message that is zero there: rounded to the nearest count, halves away from
+ * zero, and saturated; not-a-number is 0 in an integer. */
 void put(uint8_t *data, struct field field, double value);
 
-/* The same, by the names of the interface, into `data`. */
+/* The same, by the names in the interface, into `data`. */
 #define PUT(message, name, value) put(data, F_##message##_##name, value)
 
 #define NO_FLAG 255
 
-/* What a parameter must satisfy, if the byte at `other` is within `low` and `high`. The two orders
- * want the one at `offset` not to exceed the one at `other`. */
+/* Condition on a parameter, if the byte at `other` is within `low` and `high`. The two orders
+ * require that the one at `offset` does not exceed the one at `other`. */
 enum rule_kind { RULE_U8, RULE_U16, RULE_F32, RULE_ORDER_U8, RULE_ORDER_U16 };
 
 struct range {
@@ -37,7 +34,7 @@ struct range {
 
 struct rule {
     uint8_t kind, offset, other, low, high;
-    uint8_t flag; /* that is raised when it does not, or NO_FLAG */
+    uint8_t flag; /* raised on a violation, or NO_FLAG */
     union {
         struct {
             const struct range *ranges;
@@ -56,7 +53,7 @@ struct task {
 
 struct telecommand {
     uint8_t id, length;
-    int16_t setting; /* place of its parameters in the settings; -1: they are not kept */
+    int16_t setting; /* place of its parameters in the settings; -1: not stored */
     uint8_t first_rule, rules;
     struct task task;
 };
@@ -65,12 +62,12 @@ struct telemetry {
     uint8_t id, length;
 };
 
-/* A setting as telemetry shows it: `size` bytes. */
+/* A setting in telemetry: `size` bytes. */
 struct setting_shown {
     uint8_t id, to, from, size;
 };
 
-/* A step's latest or longest time as telemetry shows it, u16 in ms. */
+/* A step's latest or longest time in telemetry, u16 in ms. */
 struct time_shown {
     uint8_t id, to, step, longest;
 };
@@ -83,13 +80,10 @@ extern const struct setting_shown settings_shown[];
 extern const struct time_shown times_shown[];
 extern const uint8_t published_profile[]; /* telemetry Profile of the switches that run here */
 
-/* NULL for an ID that there is not. */
+/* NULL for an unknown ID. */
 const struct telecommand *telecommand_of(uint8_t id);
 const struct telemetry *telemetry_of(uint8_t id);
 
-/* Checks parameters; `violated` is told the flag of each rule that they break. True: they break
- * none. */
+/* Checks parameters; calls `violated` with the flag of each broken rule. True: none is broken. */
 bool parameters_allowed(const struct telecommand *command, const uint8_t *parameters,
                         void (*violated)(uint8_t flag));
-
-#endif

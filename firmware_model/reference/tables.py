@@ -160,7 +160,6 @@ def _telemetries() -> list[Message]:
 
 
 def _places() -> dict[str, int]:
-    """Offset of each setting telecommand's parameters."""
     places, end = {}, 0
     for name in state.SETTING_COMMANDS:
         places[name] = end

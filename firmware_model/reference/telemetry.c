@@ -1,7 +1,5 @@
-/* Values of every telemetry frame, as firmware_model/cubestar/telemetry.py has them.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Values of every telemetry frame, as in firmware_model/cubestar/telemetry.py. */
 #include "telemetry.h"
 
 #include "algorithms/geometry.h"
@@ -95,7 +93,7 @@ static void loop_status(uint8_t *data)
     PUT(LoopStatus, Running, retained.looping);
 }
 
-/* --- camera and picture ----------------------------------------------------------------------- */
+/* --- camera and image ------------------------------------------------------------------------- */
 
 static void image_setup(uint8_t *data)
 {
@@ -151,7 +149,7 @@ static void image_block(uint8_t *data)
     memcpy(data, PICTURE + start, length);
 }
 
-/* --- the latest picture ----------------------------------------------------------------------- */
+/* --- the latest image ------------------------------------------------------------------------- */
 
 static const struct detection *found(void)
 {
@@ -289,7 +287,7 @@ static void attitude_quaternion(uint8_t *data)
     PUT(AttitudeQuaternion, Valid, retained.solved);
 }
 
-/* As profile published leaves it: nothing is rated, which 1 sigma of pi rad says. */
+/* In profile published nothing is rated, which a sigma of pi rad indicates. */
 static void quality(uint8_t *data)
 {
     const double unknown = 3.14159265358979;
@@ -299,7 +297,7 @@ static void quality(uint8_t *data)
     PUT(Quality, Scale, 1.0);
 }
 
-/* --- all -------------------------------------------------------------------------------------- */
+/* --- dispatch --------------------------------------------------------------------------------- */
 
 static const struct {
     uint8_t id;
@@ -329,7 +327,7 @@ static const struct {
     {CUBESTAR_TLM_Quality, quality},
 };
 
-/* What the tables say of settings and of the steps' times. */
+/* Settings and times of the steps, from the tables. */
 static void fill_by_table(uint8_t id, uint8_t *data)
 {
     for (int i = 0; i < SETTINGS_SHOWN; i++) {

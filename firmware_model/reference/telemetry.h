@@ -1,13 +1,8 @@
-/* Values of every telemetry frame, taken when it is asked for.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef TELEMETRY_H
-#define TELEMETRY_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Values of every telemetry frame, computed at the request. */
+#pragma once
 
 #include "cubestar_tables.h"
 
 /* Fills a message that is all zero; interrupt context, so nothing here waits. */
 void telemetry_fill(const struct telemetry *message, uint8_t *data);
-
-#endif

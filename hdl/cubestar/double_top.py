@@ -35,7 +35,6 @@ class CubeStarDouble(CubeStarBoard):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """A stored row, for either memory."""
         return tuple(
             self._row_stored(f"row-{number}", f"SRAM{number}", (("into", number - 1),))
             for number in (1, 2)

@@ -39,7 +39,6 @@ class CubeStarTop(CubeStarBoard):
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """A stored row, and a row that is read."""
         read = Stride(
             "row-read",
             clock=pins.DCLK,

@@ -147,5 +147,4 @@ class _Design:
 
 
 def _extended(bits: list[int], width: int, signed: bool = False) -> list[int]:
-    """Number cut or extended to ``width`` bits."""
     return [*bits, *[bits[-1] if signed else FALSE] * width][:width]

@@ -68,7 +68,6 @@ _NEXTPNR = _Tool(
 
 
 def have_yosys() -> bool:
-    """Whether :func:`run_yosys` finds a Yosys."""
     return _YOSYS.command() is not None
 
 
@@ -95,7 +94,6 @@ def yosys_files(script: str, files: Mapping[str, str], *results: str) -> tuple[s
 
 
 def have_nextpnr() -> bool:
-    """Whether :func:`run_nextpnr_ice40` finds its tool."""
     return _NEXTPNR.command() is not None
 
 

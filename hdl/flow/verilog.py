@@ -130,7 +130,6 @@ def _bits(pin: Pin) -> list[str]:
 
 
 def _wrapper(module: str, pins: Sequence[Pin]) -> Iterator[str]:
-    """The module with the bidirectional pins."""
     yield f"module {module} ("
     yield ",\n".join(f"  {_KINDS[pin.direction]} wire {_range(pin.width)}{pin}" for pin in pins)
     yield ");"

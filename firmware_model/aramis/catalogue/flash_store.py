@@ -81,11 +81,9 @@ class CatalogueStore:
 
     @property
     def loading(self) -> bool:
-        """Whether a pass has begun and not ended."""
         return self._pass_length is not None
 
     def forget(self) -> None:
-        """Drop the copy in RAM."""
         self.database, self.state = None, CatalogueState.NOT_LOADED
         self._pass_length = None
 
@@ -180,7 +178,6 @@ class CatalogueStore:
         self._at += words
 
     def _finish(self) -> None:
-        """Evaluate the pass."""
         length, self._pass_length = self._pass_length, None
         self.loads += 1
         self.corrected, self.lost = self._pass_corrected, self._pass_lost

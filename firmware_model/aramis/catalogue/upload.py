@@ -38,7 +38,6 @@ class CatalogueUpload:
 
     @property
     def received(self) -> int:
-        """Number of different received blocks."""
         return int(self._received.sum())
 
     @property

@@ -32,7 +32,6 @@ class BackupUart:
         self._message = bytearray()
 
     def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte was received."""
         self.registers.meter.charge(uart_interrupt=1)
         if not self._message and byte >> 1 != REGISTERS.i2c_address:
             return

@@ -47,7 +47,6 @@ class BenchLink:
         self._picture = PictureSender(self.hardware, self.meter, self.reader, Port.BENCH)
 
     def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte was received."""
         self.meter.charge(uart_interrupt=1)
         letter = service_port.SERVICE_PORT.find(byte)
         if letter is None or len(self._letters) >= LETTERS:

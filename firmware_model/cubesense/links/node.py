@@ -123,7 +123,6 @@ class NodeLink(SatelliteLink):
         return self._queue.put(self._latest)
 
     def _announce(self, job: TelecommandJob) -> None:
-        """Update telemetry before a telecommand is executed."""
         values = job.values
         match job.message.name:
             case "CaptureAndDetect" | "CaptureOnly":

@@ -28,7 +28,6 @@ class PictureSender:
     _sent: int = field(default=0, init=False)
 
     def begin(self) -> None:
-        """Start again with the first pixel."""
         self._sent = 0
 
     def send_some(self, sram: codes.Sram) -> Routine[bool]:

@@ -56,7 +56,6 @@ class ImageStream:
 
     @property
     def active(self) -> bool:
-        """Whether the pointer is at the image."""
         return self._sram is not None
 
     def begin(self, sram: codes.Sram | None) -> None:
@@ -76,7 +75,6 @@ class ImageStream:
         return None if self._fetched < codes.IMAGE_BYTES else FILL
 
     def _fill(self) -> Routine[None]:
-        """Main loop: read ahead."""
         turn, sram, start = self._turn, self._sram, self._fetched
         count = min(READ_AHEAD_BYTES - len(self._ahead), codes.IMAGE_BYTES - start)
         if sram is None or count <= 0:

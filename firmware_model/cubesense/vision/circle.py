@@ -49,7 +49,6 @@ class LeastSquaresCircle:
         self._sums = sequential_sum(self._terms(points))
 
     def remove(self, point: Values) -> None:
-        """Remove one point (2,) again."""
         self._sums = self._sums - self._terms(point[None])[0]
         self._count -= 1
 

@@ -99,6 +99,5 @@ def _fits(new: list[np.float32], meter: Meter) -> bool:
 
 
 def _polynomial(terms: list[np.float32], at: np.float32, meter: Meter) -> np.float32:
-    """Charged `polynomial`."""
     meter.charge(f32_mul=len(terms) - 1, f32_add=len(terms) - 1)
     return np.float32(polynomial(terms, at))

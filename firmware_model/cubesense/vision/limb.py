@@ -148,7 +148,6 @@ def _most_on(
     tangents: tuple[float, float, float],
     meter: Meter,
 ) -> Circle | None:
-    """The best of the circles through three points."""
     low, high, focal = (np.float32(value) for value in tangents)
     best, most, compared = None, 0, 0
     meter.charge(i16_add=9 * TRIPLES, loop=3 * TRIPLES)

@@ -72,7 +72,6 @@ class NadirConfig:
 
     @property
     def bounds(self) -> tuple[float, float, float]:
-        """Tangents for `find_limb`; constants of the program."""
         low, high = np.tan(np.radians(self.radius_deg))
         return float(low), float(high), float(FOCAL_PX)
 

@@ -81,7 +81,6 @@ class CameraRegister:
 
     @property
     def addresses(self) -> range:
-        """The addresses that it occupies."""
         return range(self.address, self.address + self.width)
 
     @property

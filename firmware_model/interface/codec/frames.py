@@ -77,7 +77,6 @@ class FrameDecoder:
 
     @property
     def unfinished(self) -> bool:
-        """Whether a frame has begun and not ended."""
         return self._inside or self.escaped
 
     def reset(self) -> bool:

@@ -47,5 +47,4 @@ class LetterProtocol:
                 )
 
     def find(self, byte: int) -> Letter | None:
-        """The letter whose request is ``byte``, or None."""
         return next((letter for letter in self.letters if letter.request[0] == byte), None)

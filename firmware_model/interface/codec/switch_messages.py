@@ -64,7 +64,6 @@ def switch_messages(
 
 
 def shown_values(switches: Switches) -> dict[str, int]:
-    """Field values of telemetry Profile."""
     values = {"Profile": _PROFILES.index(switches.profile)}
     for name, numbers in _numbers(type(switches)).items():
         values[_field_name(name)] = numbers[_value_name(name, getattr(switches, name))]

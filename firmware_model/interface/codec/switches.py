@@ -68,7 +68,6 @@ class Switches:
 
     @classmethod
     def declared(cls) -> Mapping[str, Switch]:
-        """The declarations by name."""
         return {one.name: one.metadata["switch"] for one in fields(cls)}
 
     @classmethod

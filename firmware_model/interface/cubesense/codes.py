@@ -86,7 +86,6 @@ class CaptureResult(IntEnum):
 
     @property
     def stored(self) -> bool:
-        """Whether the image is in a memory."""
         return self in (CaptureResult.STORED_OWN_SRAM, CaptureResult.STORED_OTHER_SRAM)
 
 
@@ -133,7 +132,6 @@ class Measurement(IntEnum):
 
     @property
     def camera(self) -> Camera:
-        """Camera that takes the image."""
         return Camera(self >> 1)
 
     @property

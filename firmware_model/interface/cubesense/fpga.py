@@ -46,11 +46,9 @@ class FpgaCommand:
 
     @property
     def levels(self) -> tuple[int | None, ...]:
-        """In the order of the fields."""
         return (self.shift, self.edge, self.rnw, self.sunen, self.naden)
 
     def fits(self, shift: int, edge: int, rnw: int, sunen: int, naden: int) -> bool:
-        """Whether these are the row's levels."""
         given = (shift, edge, rnw, sunen, naden)
         return all(row in (None, level) for row, level in zip(self.levels, given, strict=True))
 

@@ -44,12 +44,10 @@ _CURRENTS = (
 
 
 def _times(*names_and_meanings: tuple[str, str]) -> tuple[Field, ...]:
-    """Consecutive u16 fields in ms."""
     return tuple(u16(name, meaning, "ms") for name, meaning in names_and_meanings)
 
 
 def _scaled(meaning: str, *names: str, unit: str = "") -> tuple[Field, ...]:
-    """Consecutive i16/10000 fields."""
     return tuple(i16(name, meaning, unit, UNIT_VECTOR_SCALE) for name in names)
 
 

@@ -1,12 +1,10 @@
-/* Looking into the star list and the pair list.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Searches of the star list and the pair list. */
 #include "catalogue.h"
 
 #include <stddef.h>
 
-/* The reduced pair list; the generator knows the most that any direction needs. */
+/* The reduced pair list; the generator computes the largest size over all directions. */
 static uint16_t reduced_first[REDUCED_PAIRS], reduced_second[REDUCED_PAIRS];
 static stored_float reduced_angle[REDUCED_PAIRS];
 

@@ -1,10 +1,8 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Image plane search, region growing and centroids.
  *
- * CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is settled as in
- * firmware_model/cubestar/detection/sampled.py.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. Details left open there are those of
+ * firmware_model/cubestar/detection/sampled.py. */
 #include "detection.h"
 
 #include "phases.h"
@@ -15,7 +13,7 @@
 #define PLACE(pixel) ((pixel) >> 8)
 #define VALUE(pixel) ((pixel) & 0xFFu)
 
-/* The area that is grown. */
+/* The growing area. */
 struct area {
     uint8_t *picture;
     unsigned count, most;
@@ -33,7 +31,7 @@ bool detection_valid(const struct detection_config *c) {
 
 static bool grow(struct area *area, uint32_t place, uint8_t value);
 
-/* Grows into a neighbour if it is bright; false when the area is too large. */
+/* Grows into a neighbour if it is bright; false if the area is too large. */
 static bool grow_into(struct area *area, uint32_t place) {
     uint8_t value = area->picture[place];
     if (value <= area->threshold) {
@@ -42,7 +40,7 @@ static bool grow_into(struct area *area, uint32_t place) {
     return area->count < area->most && grow(area, place, value);
 }
 
-/* Takes a pixel and what is bright around it: left, right, up, down. */
+/* Adds a pixel and its bright neighbours: left, right, up, down. */
 static bool grow(struct area *area, uint32_t place, uint8_t value) {
     uint32_t column = place % IMAGE_COLUMNS;
     area->pixels[area->count++] = place << 8 | value;
@@ -53,7 +51,7 @@ static bool grow(struct area *area, uint32_t place, uint8_t value) {
            (place + IMAGE_COLUMNS >= PIXELS || grow_into(area, place + IMAGE_COLUMNS));
 }
 
-/* Mean of places that add up to so much, to the nearest whole. */
+/* Mean of `count` places with this sum, rounded. */
 static int32_t middle(uint32_t sum, uint32_t count) {
     return (int32_t)((2 * sum + count) / (2 * count));
 }
@@ -92,7 +90,7 @@ static void find_centroid(const struct area *area, int grid_size, float centroid
     centroid[1] = (float)y_middle + (float)y_sum / total;
 }
 
-/* Enters a complete area that is large enough into the list. */
+/* Adds a complete area that is large enough to the list. */
 static void list_star(const struct area *area, int grid_size, struct detection *found) {
     uint16_t intensity = 0;
     for (unsigned i = 0; i < area->count; i++) {

@@ -1,18 +1,15 @@
-/* Finding stars in a picture: image plane search, region growing, centroids.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Finding stars in an image: image plane search, region growing, centroids.
  *
- * CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef DETECTION_H
-#define DETECTION_H
+ * CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "limits.h"
 
-/* Settings of telecommands 20 to 23; regions and limits must make sense, see detection_valid. */
+/* Settings of telecommands 20 to 23; see detection_valid for valid ones. */
 struct detection_config {
     uint16_t step;                /* distance of sampled pixels and rows */
     uint16_t x_start, x_end;      /* end excluded */
@@ -29,7 +26,7 @@ struct detection_config {
 
 enum search_end { SEARCH_COMPLETE, SEARCH_STARS, SEARCH_INVALID, SEARCH_NOISE };
 
-/* What a search found, in its order, row by row. */
+/* Result of a search, in its order, row by row. */
 struct detection {
     int count;
     float centroids[MOST_STARS][2];  /* x and y in px */
@@ -41,18 +38,16 @@ struct detection {
     enum search_end end;
 };
 
-/* Words that the list of visited pixels needs at the settings' limits: areas that are stars or
+/* Words for the list of visited pixels at the settings' limits: areas that are stars or
  * invalid, and areas that are noise. */
 #define VISITED_WORDS                                    \
     ((MOST_STARS + MOST_INVALID + 1) * MOST_PIXELS +     \
      (MOST_NOISE + 1) * (MOST_PIXELS - 1))
 
-/* Whether the region lies in the picture and the limits in their ranges. */
+/* Whether the region lies in the image and the limits in their ranges. */
 bool detection_valid(const struct detection_config *config);
 
-/* Finds the stars of a picture [IMAGE_ROWS][IMAGE_COLUMNS]. Visited pixels are zeroed meanwhile
+/* Finds the stars of an image [IMAGE_ROWS][IMAGE_COLUMNS]. Visited pixels are zeroed meanwhile
  * and written back from `visited` [VISITED_WORDS] at the end. */
 void detect_stars(uint8_t *picture, uint32_t *visited, const struct detection_config *config,
                   struct detection *found);
-
-#endif

@@ -1,8 +1,6 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Arc cosine, arc tangent, sine and cosine: fits and order of operations are those of
- * firmware_model/attitude/float_functions.py. No contraction into fused operations, please.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * firmware_model/attitude/float_functions.py. Do not contract them to fused operations. */
 #include "float_functions.h"
 
 #include <math.h>
@@ -13,7 +11,7 @@
 #define QUARTER_PI 0x1.921fb6p-1f
 #define HALF_PI_REST -0x1.777a5cp-25f /* pi / 2 - HALF_PI */
 
-/* Horner's scheme over coefficients of rising powers. */
+/* Horner's scheme over coefficients of ascending powers. */
 static float polynomial(const float *coefficients, int count, float x) {
     float value = x * coefficients[count - 1];
     for (int i = count - 2; i > 0; i--) {
@@ -63,7 +61,7 @@ float arc_tangent(float y, float x) {
     return y < 0.0f ? -angle : angle;
 }
 
-/* Sine of the angle and so many quarters of a turn. */
+/* Sine of the angle plus `ahead` quarters of a turn. */
 static float wave(float x, int ahead) {
     static const float sines[] = {-0.166666552f, 0.00833215751f, -0.000195143773f};
     static const float cosines[] = {0.041666653f, -0.00138877111f, 2.44742641e-05f};

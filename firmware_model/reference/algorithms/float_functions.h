@@ -1,11 +1,8 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Functions in plain single-precision operations, the same on every machine.
  *
- * The order of operations is that of firmware_model/attitude/float_functions.py, bit for bit.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef FLOAT_FUNCTIONS_H
-#define FLOAT_FUNCTIONS_H
+ * The order of operations is that of firmware_model/attitude/float_functions.py, bit for bit. */
+#pragma once
 
 /* Of -1 to 1; 0 to pi. */
 float arc_cosine(float x);
@@ -15,5 +12,3 @@ float arc_tangent(float y, float x);
 
 float sine(float x);
 float cosine(float x);
-
-#endif

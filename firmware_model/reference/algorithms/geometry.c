@@ -1,8 +1,6 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Distortion, unit vectors and directions; order of operations as in
- * firmware_model/attitude/geometry.py.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * firmware_model/attitude/geometry.py. */
 #include "geometry.h"
 
 #include <math.h>

@@ -1,9 +1,8 @@
-/* Voting as Algorithm 2 prints it, verification, selection; tracking.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Voting as printed in Algorithm 2, verification, selection; tracking.
  *
  * CubeStar thesis, sections 4.3.3, 4.3.4, 4.5 and 5.3.4 (binary search, angles computed once,
- * preassigned arrays). What the text leaves open is settled as in firmware_model/cubestar/matching.
- *
- * SPDX-License-Identifier: BSD-2-Clause
+ * preallocated arrays). Details left open there are those of firmware_model/cubestar/matching.
  */
 #include "matching.h"
 
@@ -51,7 +50,7 @@ static void begin(struct identification *result, int count) {
     memset(result->votes, 0, sizeof result->votes);
 }
 
-/* First entry of a rising list that is not below the wanted value. */
+/* First entry of an ascending list that is not below the wanted value. */
 static int first_not_below(const struct pair_list *list, float wanted) {
     int low = 0, high = list->count;
     while (low < high) {
@@ -74,7 +73,7 @@ static void measure_pairs(const float (*directions)[3], int count) {
     }
 }
 
-/* Both centroids of a pair get a vote from both stars of every listed pair as far apart. */
+/* Every listed pair with the same angle votes with both its stars for both centroids. */
 static void vote(const struct pair_list *list, int count, float margin) {
     const float *angle = pair_angles;
     memset(ballot, 0, sizeof ballot);
@@ -106,7 +105,7 @@ static int16_t elected(const uint16_t votes[STAR_COUNT]) {
     return best;
 }
 
-/* Every pair of centroids whose identities are as far apart as they are confirms both. */
+/* A pair of centroids whose identities have the same angle confirms both. */
 static void verify(struct identification *result, float margin) {
     const float *angle = pair_angles;
     for (int first = 0; first < result->count; first++) {
@@ -125,7 +124,7 @@ static void verify(struct identification *result, float margin) {
     }
 }
 
-/* Keeps the stars within one vote of the most; returns how many. */
+/* Keeps the stars within one vote of the most; returns their number. */
 static int select_stars(struct identification *result) {
     uint8_t most = 0;
     int kept = 0;

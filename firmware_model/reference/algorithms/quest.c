@@ -1,18 +1,16 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* QUEST with sequential rotations and Gaussian elimination; order of operations as in
- * firmware_model/attitude/quest.py.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * firmware_model/attitude/quest.py. */
 #include "quest.h"
 
 #include <math.h>
 
 #define SMALLEST_DETERMINANT 2e-6f /* 0.1 deg between two vectors; see quest.py */
 
-/* Signs of the reference axes: unchanged, or turned by 180 deg about x, y or z. */
+/* Signs of the reference axes: unchanged, or rotated by 180 deg about x, y or z. */
 static const float turns[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
 
-/* Matrix and right side of equation 4.4.9 for weights that add up to 1. */
+/* Matrix and right side of equation 4.4.9 for weights with the sum 1. */
 static void make_system(float rows[3][4], float b[3][3], const float signs[3]) {
     float p[3][3];
     for (int i = 0; i < 3; i++) {

@@ -1,7 +1,5 @@
-/* The functions of float_functions.h by those of the C library.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The functions of float_functions.h, implemented by the C library. */
 #include "float_functions.h"
 
 #include <math.h>

@@ -1,11 +1,9 @@
-/* Operations of the cost table, as a compiler makes them.
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Operations of the cost table, as compiled code.
  *
- * Each function repeats one operation on operands that change. It is called with two numbers of
- * turns, so that what the call itself costs falls out, and beside a `plain_` function that does all
- * but the operation.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * Each function repeats one operation on changing operands. It is called with two numbers of turns,
+ * which cancels the cost of the call itself, and compared with a `plain_` function that does
+ * everything but the operation. */
 #include <math.h>
 #include <stdint.h>
 
@@ -33,7 +31,7 @@ volatile uint8_t bytes[OPERANDS];
     }
 
 /* Eight additions and multiplications in turn, and an operation after each pair: more code than the
- * flash cache has, as in a formula. An operand comes out of RAM. */
+ * flash cache holds, as in a formula. One operand is read from RAM. */
 #define STEP(n, operation) x = x + left[n]; x = x * right[n]; operation(n);
 #define NONE(n)
 #define ADD(n) x = x + right[n]
@@ -65,7 +63,7 @@ REPEATED(f32_acos, UNITS(arc_cosine(x)))
 REPEATED(f32_sin, UNITS(sine(x)))
 REPEATED(f32_atan2, UNITS(arc_tangent(x, 0.3f)))
 
-/* A comparison decides something, as in a search; the plain function decides by integers. */
+/* A comparison decides a branch, as in a search; the plain function compares integers. */
 REPEATED(plain_compare, {
     float x = left[OPERAND(turn)], y = right[OPERAND(turn)];
     int32_t decided = whole[OPERAND(turn)];
@@ -92,7 +90,7 @@ REPEATED(i32_add, WHOLES(x + y))
 REPEATED(i32_mul, WHOLES(x * y))
 REPEATED(i32_div, WHOLES(x / y))
 
-/* An entry of a table of bytes, found by a computed place. */
+/* An entry of a table of bytes, at a computed index. */
 REPEATED(table_byte, WHOLES(x + bytes[OPERAND(x)]))
 
 REPEATED(plain_loop, __asm volatile(""))
@@ -108,7 +106,7 @@ REPEATED(call, callee())
 REPEATED(ram_read, (void)left[0])
 REPEATED(ram_write, answer[0] = 0)
 
-/* Words of a memory, far from each other, so that no cache has them. */
+/* Words of a memory, far from each other, so that no cache holds them. */
 void read_words(uint32_t turns, const volatile uint32_t *memory) {
     for (uint32_t turn = 0; turn < turns; turn++) {
         (void)memory[turn * 67 % 8192];
@@ -120,7 +118,7 @@ REPEATED(ebi_write, *EXTERNAL = 0)
 REPEATED(port_read, (void)*PORT)
 REPEATED(port_write, *PORT_SET = 1)
 
-/* The copy loop's turn: clock high, a byte, clock low; see drivers/fpga.c. */
+/* One turn of the copy loop: clock high, a byte, clock low; see drivers/fpga.c. */
 REPEATED(transfer_byte, {
     *PORT_SET = 1;
     __asm volatile("nop\n nop\n nop");
@@ -128,7 +126,7 @@ REPEATED(transfer_byte, {
     *PORT_CLEAR = 1;
 })
 
-/* An interrupt that takes a byte into a queue, pended by the program itself. */
+/* An interrupt that queues a byte; the program itself makes it pending. */
 static volatile uint8_t queue[OPERANDS], received;
 static volatile uint32_t head;
 

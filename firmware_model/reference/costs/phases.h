@@ -1,9 +1,6 @@
-/* Phases that are timed from outside, where these two functions are entered.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef PHASES_H
-#define PHASES_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Phases that are timed from outside, at the entry of these two functions. */
+#pragma once
 
 enum phase {
     PHASE_SEARCH,
@@ -22,5 +19,3 @@ enum phase {
 
 void phase_begin(enum phase phase);
 void phase_end(enum phase phase);
-
-#endif

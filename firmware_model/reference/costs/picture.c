@@ -1,7 +1,5 @@
-/* A picture from the search to the attitude, lost in space, with the settings after a reset.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* An image from the search to the attitude, lost in space, with the settings after a reset. */
 #include "catalogue.h"
 #include "defaults.h" /* generated: DETECTION_DEFAULTS, CAMERA_DEFAULTS, MARGIN_DEFAULT */
 #include "detection.h"

@@ -1,7 +1,5 @@
-/* Start of the measuring program: what calls its functions, and counts, is outside.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Start of the measuring program, whose functions are called and timed from outside. */
 #include <stdint.h>
 
 #define INTERRUPTS 40 /* more than this part has */
@@ -9,12 +7,12 @@
 extern uint32_t stack_top, data_start, data_end, data_image, bss_start, bss_end;
 void byte_interrupt(void);
 
-/* Calls return here: nothing happens any more. */
+/* Calls return here and stay. */
 __attribute__((naked, noinline)) void returned(void) {
     __asm volatile("b .");
 }
 
-/* A fault is no end of a call. */
+/* Faults end here, so that they differ from a returned call. */
 __attribute__((naked, noinline)) static void failed(void) {
     __asm volatile("b .");
 }

@@ -1,7 +1,5 @@
-/* The camera's control bus, 100 kHz. EFM32GG Reference Manual, chapter 16.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The camera's control bus, 100 kHz. EFM32GG Reference Manual, chapter 16. */
 #include "camera_bus.h"
 
 #include "clock.h"
@@ -11,7 +9,7 @@
 #include "pins.h"
 
 #define BUS_HZ 100000u
-#define DIVIDER ((CLOCK_HZ / BUS_HZ - 4u + 7u) / 8u - 1u) /* (4 + 4)(DIV + 1) + 4 clocks a bit */
+#define DIVIDER ((CLOCK_HZ / BUS_HZ - 4u + 7u) / 8u - 1u) /* (4 + 4)(DIV + 1) + 4 clocks per bit */
 #define LONGEST_WAIT_US 10000u
 
 void camera_bus_start(void)
@@ -25,7 +23,7 @@ void camera_bus_start(void)
     CAMERA_I2C->CMD = I2C_CMD_ABORT;
 }
 
-/* Waits for one of `flags`; which came, and none after too long. */
+/* Waits for one of `flags`; returns those that are set, none after the time-out. */
 static uint32_t await(uint32_t flags)
 {
     uint64_t started = time_us();

@@ -1,12 +1,10 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Clocks, the free-running timer and sleep.
  *
  * EFM32GG Reference Manual, chapters 7 (MSC), 11 (CMU), 20 (TIMER), 22 (BURTC). TIMER0 and 1 count
- * thirds of a microsecond within one life of the program. BURTC counts on through resets, so that
- * the time goes on after one: it has 32 768 counts a second, 512 of which are 15 625 us. Until its
- * crystal has started, what lies before `timer_start` is taken to last RESTART_US.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * thirds of a microsecond from reset to reset. BURTC counts through resets, so that the time
+ * continues after one: it has 32 768 counts per second, 512 of which are 15 625 us. Until its
+ * crystal has started, the time before `timer_start` is assumed to be RESTART_US. */
 #include "clock.h"
 
 #include "core.h"
@@ -16,7 +14,7 @@
 
 #define WAIT_STATES_2 4u /* above 32 MHz */
 #define HFXO_ABOVE_32_MHZ 3u
-#define LFXO_AFTER_1K_CYCLES 1u /* else it would not be ready within a turn of the loop */
+#define LFXO_AFTER_1K_CYCLES 1u /* to be ready within a turn of the loop */
 #define SELECT_HFXO 2u
 #define BURTC_FROM_LFXO 2u
 #define BURTC_IN_EM4 3u
@@ -71,7 +69,7 @@ static uint32_t ticks(void)
     return again << 16 | low;
 }
 
-/* The time that BURTC tells, at a step of its count. */
+/* The time from BURTC, at a step of its count. */
 static uint64_t burtc_us(void)
 {
     uint32_t first = BURTC->CNT, counts;
@@ -131,7 +129,7 @@ void timer_retain(void)
     retained.clock_us += (uint64_t)slices * SLICE_US;
 }
 
-/* A turn takes three cycles. */
+/* One turn takes three cycles. */
 void spin_us(uint32_t us)
 {
     uint32_t turns = us * (CLOCK_HZ / 1000000u) / 3u;
@@ -175,7 +173,7 @@ bool sleep_until(uint64_t due_us, bool wakeable)
         uint64_t now = time_us();
         if (now < due_us)
             sleep_for(due_us - now);
-        interrupts_restore(masked); /* here the interrupt that ended the sleep is served */
+        interrupts_restore(masked); /* the interrupt that ended the sleep is served here */
         if (now >= due_us)
             return false;
     }

@@ -1,9 +1,6 @@
-/* Clocks of the part, the free-running timer, and sleep.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef CLOCK_H
-#define CLOCK_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Clocks of the part, the free-running timer, and sleep. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -17,24 +14,22 @@ void clock_start(void);
 /* Starts the free-running timer; the retention registers must be restored. */
 void timer_start(void);
 
-/* Microseconds since power-up; resets do not stop it. */
+/* Microseconds since power-up, resets included. */
 uint64_t time_us(void);
 
-/* Remembers the time for the program after a reset. */
+/* Stores the time for the program after a reset. */
 void timer_retain(void);
 
-/* Sleeps until `due_us`, or, if `wakeable`, until `wake` is called; a call that came before is not
- * lost. True: it was woken. The watchdog is fed. */
+/* Sleeps until `due_us`, or, if `wakeable`, until `wake` is called; an earlier call is not lost.
+ * Returns true if woken. Feeds the watchdog. */
 bool sleep_until(uint64_t due_us, bool wakeable);
 void wake(void);
 
-/* Sleeps for a time, whatever happens meanwhile. */
+/* Sleeps for a time, even if woken. */
 void pause_us(uint32_t us);
 
-/* Stays awake for about so long. */
+/* Busy-waits for approximately `us`. */
 void spin_us(uint32_t us);
 
-/* From `started_us` until now, in us. */
+/* Time from `started_us` until now, in us. */
 uint32_t since(uint64_t started_us);
-
-#endif

@@ -1,9 +1,7 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The SRAM on the external bus. EFM32GG Reference Manual, chapter 14.
  *
- * Eight data lines and 24 address lines, latched in two steps, for an SRAM of 55 ns.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * Eight data lines and 24 address lines, latched in two steps, for an SRAM of 55 ns. */
 #include "external_ram.h"
 
 #include "efm32gg.h"

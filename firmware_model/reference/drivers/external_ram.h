@@ -1,9 +1,6 @@
-/* The SRAM on the external bus: the picture, and the search's list behind it.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef EXTERNAL_RAM_H
-#define EXTERNAL_RAM_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The SRAM on the external bus: the image, followed by the search's list. */
+#pragma once
 
 #include <stdint.h>
 
@@ -13,5 +10,3 @@
 #define EXTERNAL_RAM_BYTES 0x100000u
 
 void external_ram_start(void);
-
-#endif

@@ -1,11 +1,9 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Flash pages, EFM32GG Reference Manual, chapter 7.
  *
- * They lie in the upper half of the flash; the program runs from the lower one, which can be read
- * while the upper one is written. The routines that write are in RAM all the same, as the manual
- * wants of parts without that.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * They are in the upper half of the flash; the program runs from the lower one, which can be read
+ * while the upper one is written. The routines that write are in RAM nevertheless, as the manual
+ * requires for parts without that feature. */
 #include "flash.h"
 
 #include "core.h"

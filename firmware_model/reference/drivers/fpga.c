@@ -1,7 +1,5 @@
-/* The pins to the FPGA board.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The pins to the FPGA board. */
 #include "fpga.h"
 
 #include "gpio.h"
@@ -40,7 +38,7 @@ bool fpga_acknowledges(void)
     return pin_read(FPGA_ACK);
 }
 
-/* The byte stands from the rising edge on; the port's synchroniser needs two clocks to see it. */
+/* The byte is valid from the rising edge on; the port's synchroniser delays it by two clocks. */
 void fpga_transfer(uint8_t *to, int count)
 {
     struct port *clock = PORT_OF(FPGA_DCLK);

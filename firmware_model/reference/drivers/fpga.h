@@ -1,14 +1,11 @@
-/* The pins to the FPGA board (CubeStar thesis, table C.2), and its transfer.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef FPGA_H
-#define FPGA_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The pins to the FPGA board (CubeStar thesis, table C.2), and its transfer. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* All control pins low: the FPGA stands by. */
+/* Sets all control pins low: the FPGA is in standby. */
 void fpga_start(void);
 
 void fpga_enable(bool on);
@@ -16,7 +13,5 @@ void fpga_read_not_write(bool read);
 void fpga_bank(bool bank);
 bool fpga_acknowledges(void);
 
-/* Strobes so many stored bytes out of the FPGA, which must be reading. */
+/* Reads `count` stored bytes from the FPGA, which must be in its read state. */
 void fpga_transfer(uint8_t *to, int count);
-
-#endif

@@ -1,20 +1,17 @@
-/* Port pins. EFM32GG Reference Manual, chapter 32.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef GPIO_H
-#define GPIO_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Port pins. EFM32GG Reference Manual, chapter 32. */
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "efm32gg.h"
 
-/* A pin is its port times 16 plus its bit, as pins.h has them. Modes of a pin, MODEL and MODEH. */
+/* Modes of a pin, MODEL and MODEH. Pins are numbered as in pins.h: port times 16 plus bit. */
 enum pin_mode {
-    PIN_DISABLED = 0, /* pulled up where DOUT is 1 */
+    PIN_DISABLED = 0, /* pulled up if DOUT is 1 */
     PIN_INPUT = 1,
-    PIN_PULLED = 2, /* up where DOUT is 1, else down */
+    PIN_PULLED = 2, /* up if DOUT is 1, else down */
     PIN_OUTPUT = 4,
     PIN_OPEN_DRAIN = 8, /* wired-and */
 };
@@ -29,7 +26,7 @@ struct port {
 #define PORT_OF(pin) ((struct port *)GPIO + (pin) / 16u)
 #define BIT_OF(pin) (1u << (pin) % 16u)
 
-/* The level is that of an output, or of a pull. */
+/* `level` is that of an output, or of a pull resistor. */
 static inline void pin_set_up(unsigned pin, enum pin_mode mode, bool level)
 {
     struct port *port = PORT_OF(pin);
@@ -54,5 +51,3 @@ static inline bool pin_read(unsigned pin)
 {
     return PORT_OF(pin)->DIN >> pin % 16u & 1;
 }
-
-#endif

@@ -1,9 +1,7 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The satellite's I2C bus. EFM32GG Reference Manual, chapter 16.
  *
- * The clock is held low from each address, byte and acknowledge until the handler has answered.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * The clock is held low from each address, byte and acknowledge until the handler has answered. */
 #include "i2c_slave.h"
 
 #include "core.h"
@@ -24,7 +22,7 @@ void i2c_slave_start(void)
     SATELLITE_I2C->SADDR = CUBESTAR_I2C_ADDRESS << I2C_SADDR_ADDR_SHIFT;
     SATELLITE_I2C->SADDRMASK = WHOLE_ADDRESS << I2C_SADDRMASK_MASK_SHIFT;
     SATELLITE_I2C->CTRL = I2C_CTRL_EN | I2C_CTRL_SLAVE;
-    SATELLITE_I2C->CMD = I2C_CMD_ABORT; /* the bus counts as idle, whatever it did before */
+    SATELLITE_I2C->CMD = I2C_CMD_ABORT; /* marks the bus as idle */
     SATELLITE_I2C->IEN = I2C_IEN_ADDR | I2C_IEN_RXDATAV | I2C_IEN_ACK | I2C_IEN_SSTOP;
     interrupt_enable(SATELLITE_I2C_IRQ);
 }

@@ -1,10 +1,8 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Resets and their causes: bits stay in RSTCAUSE until the program clears them.
  *
- * What begins with a rise of the supply hides all else; two pairs of causes have numbers of their
- * own, as firmware_model/cubestar/reset_cause.py has it.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * A rise of the supply hides all other causes; two pairs of causes have separate numbers, as in
+ * firmware_model/cubestar/reset_cause.py. */
 #include "reset.h"
 
 #include "core.h"
@@ -36,7 +34,7 @@ uint8_t reset_cause_taken(void)
 {
     uint32_t bits = RMU->RSTCAUSE;
     RMU->CMD = RMU_CMD_RCCLR;
-    EMU->AUXCTRL |= EMU_AUXCTRL_HRCCLR; /* some bits need this as well */
+    EMU->AUXCTRL |= EMU_AUXCTRL_HRCCLR; /* some bits need this too */
     EMU->AUXCTRL &= ~EMU_AUXCTRL_HRCCLR;
     for (unsigned i = 0; i < sizeof meanings / sizeof *meanings; i++)
         if ((bits & meanings[i].mask) == meanings[i].bits)

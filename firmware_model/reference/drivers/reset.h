@@ -1,15 +1,10 @@
-/* Resets and their causes. EFM32GG Reference Manual, chapter 9.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef RESET_H
-#define RESET_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Resets and their causes. EFM32GG Reference Manual, chapter 9. */
+#pragma once
 
 #include <stdint.h>
 
-/* Why the processor started, as telemetry has it; the part's register is cleared. */
+/* Reset cause for telemetry; clears the part's register. */
 uint8_t reset_cause_taken(void);
 
 _Noreturn void reset_processor(void);
-
-#endif

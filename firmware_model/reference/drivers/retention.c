@@ -1,7 +1,5 @@
-/* Retention registers of BURTC; they take whole words only.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Retention registers of BURTC; they take whole words only. */
 #include "retention.h"
 
 #include <stdint.h>
@@ -10,7 +8,7 @@
 
 #define REGISTERS ((volatile uint32_t *)&BURTC->RET0_REG)
 
-/* A system reset leaves the backup domain alone; power-on puts it into reset until this. */
+/* A system reset does not change the backup domain; power-on holds it in reset until this. */
 static void release(void)
 {
     if (RMU->CTRL & RMU_CTRL_BURSTEN)

@@ -1,16 +1,11 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Retention registers in the backup power domain: kept over resets, not over power-off.
  *
- * EFM32GG Reference Manual, chapter on the backup RTC.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef RETENTION_H
-#define RETENTION_H
+ * EFM32GG Reference Manual, chapter on the backup RTC. */
+#pragma once
 
 #define RETENTION_BYTES 512
 
-/* Whole words from and to the first register on. */
+/* Whole words, from the first register on. */
 void retention_read(void *words, unsigned size);
 void retention_write(const void *words, unsigned size);
-
-#endif

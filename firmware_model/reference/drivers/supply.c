@@ -1,11 +1,9 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* Load switches, current monitors and comparators. EFM32GG Reference Manual, chapters 26 and 28.
  *
- * A monitor's voltage goes to an input of the ADC and to a comparator, whose other input is a part
- * of the supply, in steps of a 63rd. The trip currents are assumed: a third above the highest regular
- * one for imager and FPGA, ten times it for the memory, which draws little.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * A monitor's voltage goes to an input of the ADC and to a comparator, whose other input is a
+ * fraction of the supply, in steps of 1/63. The trip currents are assumed: a third above the
+ * highest regular one for imager and FPGA, ten times it for the memory, which draws little. */
 #include "supply.h"
 
 #include "clock.h"
@@ -20,7 +18,7 @@
 #define ADC_AFTER_16_CLOCKS 4u
 #define ADC_PRESCALED_BY_4 3u
 #define ADC_COUNTS_PER_VOLT (4096.0f / 2.5f)
-#define TEMPERATURE_GRADIENT (-6.27f) /* counts a degree, at 1.25 V */
+#define TEMPERATURE_GRADIENT (-6.27f) /* counts per degree, at 1.25 V */
 
 #define COMPARE_WITH_SUPPLY 10u
 #define SUPPLY_STEPS 63.0f
@@ -49,7 +47,7 @@ static void compare(ACMP_Registers *comparator, uint32_t channel, float trip_vol
     comparator->IEN = ACMP_IEN_EDGE;
 }
 
-/* A current that is too high already makes no edge. */
+/* A current that is too high from the start causes no edge. */
 static void look_at(ACMP_Registers *comparator, enum channel channel)
 {
     if (comparator->STATUS & ACMP_STATUS_ACMPOUT)
@@ -89,7 +87,7 @@ void supply_switch(enum channel channel, bool closed)
     pin_write(channels[channel].closed, closed);
 }
 
-/* Main program and interrupts convert: one at a time. */
+/* Main program and interrupts both convert, so interrupts are off meanwhile. */
 static uint32_t converted(uint32_t input, uint32_t reference)
 {
     uint32_t masked = interrupts_off();

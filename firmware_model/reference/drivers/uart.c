@@ -1,10 +1,8 @@
+/* SPDX-License-Identifier: BSD-2-Clause */
 /* The satellite's UART. EFM32GG Reference Manual, chapter 17.
  *
- * TIMER3 runs since the latest byte: a message that stays unfinished for a hundred byte times is
- * given up.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+ * TIMER3 runs from the latest byte on: a message that stays incomplete for 100 byte times is
+ * dropped. */
 #include "uart.h"
 
 #include <stdbool.h>

@@ -1,9 +1,6 @@
-/* The satellite's UART: 8N1, by interrupt.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef UART_H
-#define UART_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* The satellite's UART: 8N1, by interrupt. */
+#pragma once
 
 #include <stdint.h>
 
@@ -11,14 +8,12 @@
 
 void uart_start(void);
 
-/* Queues bytes, which must have room (`uart_backlog`). */
+/* Queues bytes; there must be room for them (`uart_backlog`). */
 void uart_send(const uint8_t *data, int count);
 
-/* Bytes that are still to be sent, those in the peripheral included. */
+/* Number of bytes still to send, including those in the peripheral. */
 int uart_backlog(void);
 
-/* Given by the program, called by interrupts: a byte came; nothing came for long. */
+/* Implemented by the program, called by interrupts: a byte was received; a long silence. */
 void uart_received(uint8_t byte);
 void uart_silent(void);
-
-#endif

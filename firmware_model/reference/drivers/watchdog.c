@@ -1,7 +1,5 @@
-/* Watchdog, by the 1 kHz oscillator that always runs.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Watchdog, clocked by the 1 kHz oscillator that always runs. */
 #include "watchdog.h"
 
 #include "efm32gg.h"
@@ -17,6 +15,6 @@ void watchdog_start(void)
 
 void watchdog_feed(void)
 {
-    if (!(WDOG->SYNCBUSY & WDOG_SYNCBUSY_CMD)) /* the last one is still on its way */
+    if (!(WDOG->SYNCBUSY & WDOG_SYNCBUSY_CMD)) /* the last one is still being synchronised */
         WDOG->CMD = WDOG_CMD_CLEAR;
 }

@@ -1,12 +1,7 @@
-/* Watchdog, EFM32GG Reference Manual, chapter 12.
- *
- * SPDX-License-Identifier: BSD-2-Clause
- */
-#ifndef WATCHDOG_H
-#define WATCHDOG_H
+/* SPDX-License-Identifier: BSD-2-Clause */
+/* Watchdog, EFM32GG Reference Manual, chapter 12. */
+#pragma once
 
-/* Resets the processor when it is not fed for two seconds. */
+/* Resets the processor if it is not fed for two seconds. */
 void watchdog_start(void);
 void watchdog_feed(void);
-
-#endif

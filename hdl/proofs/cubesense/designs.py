@@ -39,6 +39,5 @@ def fpga(side: Side, mcu_addressing: bool = False, gateware: str = "corrected") 
 
 
 def column_row(d: SimpleNamespace) -> tuple[Value, Value]:
-    """Column and row of the SRAM's address."""
     bits = d.size.column_bits
     return d.SRAM_A[:bits], d.SRAM_A[bits:]

@@ -38,7 +38,6 @@ def gapped(design: type[CubeStarBoard]) -> Make:
 
 
 def inside(address: Value, size: SimpleNamespace) -> Value:
-    """Whether row : column is within the image."""
     bits = ceil_log2(size.columns)
     return (address[:bits] < size.columns) & (address[bits:] < size.rows)
 
@@ -58,7 +57,6 @@ def bank_rests(pins: tuple[Pin, ...], m: Module, d: SimpleNamespace) -> None:
 
 
 def ack_is_right(m: Module, d: SimpleNamespace) -> None:
-    """ACK of any board with one writer."""
     starts_in(m, ~d.ENABLE)
     properties.acknowledges(m, d, d.ACK, writer=d.PIXCLK)
 
