@@ -63,7 +63,6 @@ class CommandRefusedError(NodeError):
     """
 
     def __init__(self, command: str, code: IntEnum | int, reason: str = "") -> None:
-        """Say that ``command`` was refused with ``code``."""
         name = code.name if isinstance(code, IntEnum) else "unknown code"
         super().__init__(f"telecommand {command} refused: {name} ({int(code)}){reason}")
         self.code = code

@@ -49,7 +49,6 @@ def _corner(given: Any) -> tuple[int, int]:
 
 
 def whole(least: int, most: int | None = None) -> Kind[int]:
-    """A whole number in ``least``..``most``."""
     wanted = f"of at least {least}" if most is None else f"in {least}..{most}"
     return Kind(
         f"a whole number {wanted}",
@@ -138,7 +137,6 @@ class Options:
     """
 
     def __post_init__(self) -> None:
-        """Check every value, then all together."""
         groups: dict[str, str] = {}
         for name, declared in self.declared().items():
             if not self.given(name):

@@ -40,7 +40,6 @@ _CLOCK = VirtualClock()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Declare the options."""
     group = parser.getgroup("cubestack", "emulated CubeSat camera sensors")
     group.addoption(
         "--cubestack-seed", type=int, default=0, metavar="N", help="seed of all emulated devices"

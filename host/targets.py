@@ -79,7 +79,6 @@ class Target:
     on_close: list[Callable[[], None]] = field(default_factory=list)
 
     def close(self) -> None:
-        """Release everything."""
         for callback in reversed(self.on_close):
             callback()
 
@@ -161,7 +160,6 @@ def _open_emulated(
     record: Path | None,
     options: Mapping[str, Any],
 ) -> Target:
-    """Power a device up in this process."""
     name = text.removeprefix(EMULATED).lower()
     if name not in device_names():
         known = ", ".join(EMULATED + one for one in device_names())
@@ -226,7 +224,6 @@ def _open_real(
 
 
 def _open_service_port(target: Target, text: str, tape: HostRecorder | None) -> int:
-    """Open the service port; returns its baud rate."""
     if target.interface.service_port is None:
         target.close()
         raise TargetError(f"{target.interface.name} has no bench protocol: leave out --bench")

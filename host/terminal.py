@@ -183,11 +183,9 @@ class _Teller(Thread):
         self.over = Event()
 
     def show(self, done: int, total: int) -> None:
-        """Note how much is done."""
         self.done, self.total = done, total
 
     def run(self) -> None:
-        """Until it is over."""
         while not self.over.wait(EVERY_S):
             if _telling[-1:] == [self]:
                 say(f"{self.label}: {self._text()}")

@@ -42,7 +42,6 @@ class Command:
     module: str
 
     def load(self) -> Any:
-        """The module."""
         return import_module(self.module)
 
 

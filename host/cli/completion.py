@@ -12,12 +12,10 @@ import shtab
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="whose completion")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the script."""
     from cubestack.host.cli.main import make_parser  # it loads this module
 
     print(shtab.complete(make_parser(), args.shell))

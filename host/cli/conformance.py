@@ -29,7 +29,6 @@ DETAIL_COLUMNS = 100
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     add_target_arguments(parser)
     parser.add_argument(
         "--allow-write", action="store_true", help="send telecommands, write registers"

@@ -22,7 +22,6 @@ from cubestack.host.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="or FILE.parquet")
     parser.add_argument("--json", action="store_true", help="one object for each message, a line")

@@ -117,7 +117,6 @@ def inject_plan(
 
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument(
         "--record", type=Path, metavar="FILE", help="every byte of all ports (docs/recording.md)"
     )

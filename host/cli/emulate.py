@@ -55,7 +55,6 @@ FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out", "orbit")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     scenes = dict.fromkeys(device.default_scene_title for device in devices())
     parser.add_argument(
         "devices",
@@ -101,7 +100,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until SIGINT or SIGTERM."""
     if len(set(args.devices)) < len(args.devices):
         raise ValueError(f"name each device once: {' '.join(args.devices)}")
     if len(args.devices) > 1:
@@ -198,7 +196,6 @@ def _fly(path: Path, opened: list[AnyEmulated]) -> None:
 
 
 def _close(opened: list[AnyEmulated]) -> None:
-    """Those that there are in the end."""
     for one in opened:
         one.close()
 

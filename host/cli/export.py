@@ -22,14 +22,12 @@ from cubestack.host.export.programs import OF_INTERFACE, OF_PROCESSOR
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("device", choices=device_names(), help="device whose interface is written")
     parser.add_argument("--format", choices=(*OF_INTERFACE, *OF_PROCESSOR), required=True)
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the text."""
     found = device(args.device)
     if args.format in OF_INTERFACE:
         text = OF_INTERFACE[args.format](found.interface)

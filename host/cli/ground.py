@@ -39,7 +39,6 @@ LOOK_S = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("targets", nargs="+", metavar="TARGET", help=FORMS)
     parser.add_argument("--device", choices=device_names(), help="where a target does not tell")
     parser.add_argument("--baud", type=whole(1), help="of a serial line")

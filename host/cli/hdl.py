@@ -118,7 +118,6 @@ def add_arguments(
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what the subcommand says."""
     return int(args.act(args))
 
 

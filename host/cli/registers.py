@@ -17,7 +17,6 @@ from cubestack.host.export.switches import render_switches
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("device", choices=device_names(), help="device whose interface is listed")
     parser.add_argument("--format", choices=tuple(FORMATS), default="table", help="default: table")
     parser.add_argument(
@@ -33,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the listing."""
     found = device(args.device)
     if args.processor:
         if found.processor is None:

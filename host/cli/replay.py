@@ -34,7 +34,6 @@ LATEST_S = 1e8
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="another one than recorded")
     add_start_arguments(parser, seed=None, seed_help="another one than recorded")
@@ -46,7 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Replay and report."""
     span = _span(args)
     recording = load_recording(args.recording)
     setup = setup_for(recording, seed=args.seed, scene=args.scene, faults=args.faults, tell=say)

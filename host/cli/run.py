@@ -41,7 +41,6 @@ NACK_ERRORS = ("ENXIO", "EREMOTEIO", "EIO", "ETIMEDOUT")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument(
         "--bus", type=whole(0, 255), default=DEFAULT_BUS, metavar="N", help="/dev/i2c-N (default 7)"
     )
@@ -120,7 +119,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _emulated(args: argparse.Namespace, stack: ExitStack) -> HostBus:
-    """Power up the devices on one bus."""
     names = args.device or device_names()[:1]
     if len(names) > 1 and (args.scene or args.faults):
         raise ValueError("--scene and --faults are of one device, and several are on the bus")

@@ -32,7 +32,6 @@ HISTORY_LINES = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     add_target_arguments(parser)
     source = parser.add_mutually_exclusive_group()
     source.add_argument(

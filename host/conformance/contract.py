@@ -92,7 +92,6 @@ class CheckRun:
 
     @property
     def failed(self) -> int:
-        """Number of checks that failed."""
         return sum(check.verdict is Verdict.FAILED for check in self.checks)
 
     @property

@@ -166,7 +166,6 @@ def _camera_register(run: CheckRun, address: int) -> int:
 
 
 def _block(run: CheckRun, number: int) -> Value:
-    """A block of the picture in memory."""
     select = run.target.interface.telecommand("ImageBlockSet")
     run.perform(select.name, select.reset_values() | {"BlockNumber": number})
     return run.target.node.telemetry("ImageBlock")["Block"]

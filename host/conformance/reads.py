@@ -17,7 +17,6 @@ MEASURED_UNITS = {"s", "ms", "us", "mA", "C", "deg C", "degC"}
 
 
 def check_reads(run: CheckRun) -> None:
-    """Run them all."""
     for message in run.target.interface.telemetries:
         if message.supported:
             _check_telemetry(run, message)

@@ -16,7 +16,6 @@ class Result:
     """
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return dict(vars(self))
 
 

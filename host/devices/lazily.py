@@ -7,7 +7,6 @@ from typing import Any
 
 
 def get(what: str) -> Callable[[], Any]:
-    """A callable that gives it."""
     return partial(resolve_name, what)
 
 

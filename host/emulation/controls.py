@@ -51,11 +51,9 @@ class Controls(Protocol):
         ValueError for what is not there.
         """
 
-    def time_s(self) -> float:
-        """Virtual time."""
+    def time_s(self) -> float: ...
 
-    def advance(self, seconds: float) -> None:
-        """Let virtual time pass."""
+    def advance(self, seconds: float) -> None: ...
 
 
 def spoken(kinds: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
@@ -72,7 +70,6 @@ class EmulatedControls:
     """
 
     def __init__(self, emulated: AnyEmulated) -> None:
-        """Control ``emulated``."""
         from cubestack.emulator.faults.table import FAULTS
 
         self.on_act: Callable[[tuple[str, ...], str], None] = lambda _words, _text: None
@@ -167,11 +164,9 @@ class EmulatedControls:
         return {one.name: (one.value, one.text) for one in found}
 
     def time_s(self) -> float:
-        """Virtual time."""
         return self._emulated.time_s
 
     def advance(self, seconds: float) -> None:
-        """Let virtual time pass."""
         self._emulated.wait(seconds)
 
 
@@ -183,7 +178,6 @@ def _seconds(text: str) -> float:
 
 
 def _parameter(text: str) -> Any:
-    """A number, true or false, or a word."""
     for convert in (int, float):
         try:
             return convert(text)

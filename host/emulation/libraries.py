@@ -66,7 +66,6 @@ def _make(folder: Path, job: tuple[str, Wanted]) -> Path:
 
 
 def main() -> None:
-    """Make them all."""
     make(needed(), FOLDER, print)
 
 

@@ -84,7 +84,6 @@ class RemoteControls:
     """
 
     def __init__(self, client: ControlClient, device: str) -> None:
-        """Look what there is; raises what ``ControlClient.ask`` does."""
         self.client, self.device = client, device
         about = client.ask("GET", f"/devices/{device}")
         self.chosen = {"seed": str(about["seed"]), **about["chosen"]}
@@ -96,11 +95,9 @@ class RemoteControls:
         }
 
     def fault(self, words: list[str]) -> None:
-        """See ``Controls``."""
         self._act("fault", *words)
 
     def fault_log(self) -> list[str]:
-        """See ``Controls``."""
         return list(self.client.ask("GET", f"/devices/{self.device}/log")["log"])
 
     def scene(self, path: Path) -> None:
@@ -109,11 +106,9 @@ class RemoteControls:
         self._act("scene", document.name, text=document.text)
 
     def currents(self) -> dict[str, float]:
-        """See ``Controls``."""
         return dict(self._state()["devices"][self.device]["currents_ma"])
 
     def switch(self, channel: str, on: bool) -> None:
-        """See ``Controls``."""
         self._act("power", channel, "on" if on else "off")
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
@@ -121,7 +116,6 @@ class RemoteControls:
         raise TargetError(f"peek {what}: only where the device is emulated in this process")
 
     def time_s(self) -> float:
-        """See ``Controls``."""
         return float(self._state()["time_s"])
 
     def advance(self, seconds: float) -> None:

@@ -46,7 +46,6 @@ class VirtualClock:
     """
 
     def __init__(self) -> None:
-        """Nothing is followed yet."""
         self._devices: dict[AnyEmulated, int] = {}
         self._elapsed_ns = 0
         self._began_ns: dict[str, int] = {}

@@ -23,7 +23,6 @@ class VirtualSerial(Closable):
     """
 
     def __init__(self, line: "DirectSerial", baudrate: int, timeout: float | None = None) -> None:
-        """Plug in."""
         self._line = line
         self._ahead = bytearray()
         self.timeout = timeout
@@ -33,7 +32,6 @@ class VirtualSerial(Closable):
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that have arrived."""
         self._ahead += self._line.read(1 << 16, 0.0)
         return len(self._ahead)
 
@@ -73,22 +71,17 @@ class VirtualSerial(Closable):
         return self.read_until(size=None if size < 0 else size)
 
     def write(self, data: bytes) -> int:
-        """Start sending."""
         self._line.write(bytes(data))
         return len(data)
 
-    def flush(self) -> None:
-        """Nothing is held back."""
+    def flush(self) -> None: ...
 
     def reset_input_buffer(self) -> None:
-        """Drop what has arrived."""
         if self.in_waiting:
             self._ahead.clear()
 
-    def reset_output_buffer(self) -> None:
-        """Nothing is held back."""
+    def reset_output_buffer(self) -> None: ...
 
     def close(self) -> None:
-        """Take the plug out."""
         self._line.close()
         self.is_open = False

@@ -220,7 +220,6 @@ class AttitudeResult(Result):
 
     @property
     def ending(self) -> str:
-        """How it ended, and why."""
         return self.status
 
 
@@ -238,7 +237,6 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
     columns = ("frame", "right", "stars", "matched", "wrong", "cross", "roll", "status and flags")
 
     def count(self, options: SkyOptionsT) -> int:
-        """One result a frame."""
         return options.frames
 
     def row(self, number: int, result: AttitudeResultT) -> tuple[str, ...]:
@@ -333,5 +331,4 @@ def percentile_95(values: Iterator[float | None]) -> float | None:
 
 
 def arcsec(degrees: float | None) -> str:
-    """An angle for readers."""
     return "-" if degrees is None else f"{3600 * degrees:.1f}"

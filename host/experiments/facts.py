@@ -21,7 +21,6 @@ class Facts(Result):
     lines: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return self.facts
 
 
@@ -51,5 +50,4 @@ class Lookup(Telling[OptionsT]):
         """The facts by name; ValueError for options that make no sense."""
 
     def run(self, opened: Opener[Any, Any], options: OptionsT) -> Iterator[Facts]:
-        """Yield them."""
         yield Facts(self.look_up(options, opened.shown))

@@ -38,7 +38,6 @@ class Asked:
     strength: float | None = None
 
     def __str__(self) -> str:
-        """As it was typed."""
         return self.name if self.strength is None else f"{self.name}={self.strength:g}"
 
 

@@ -17,7 +17,6 @@ ID_BITS = 8
 
 
 def cosmos(interface: Interface) -> str:
-    """The file's text."""
     lines = [f"# {interface.name}, interface version {interface.version}."]
     for message in interface.messages:
         lines += ["", *_packet(interface.name.upper(), message)]

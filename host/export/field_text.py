@@ -38,13 +38,11 @@ def field_details(field: Field) -> str:
 
 
 def choice_rows(choices: Choices) -> list[str]:
-    """Markdown table of named numbers."""
     rows = [f"| {int(choice)} | {choice.name} |" for choice in choices]
     return ["| value | name |", "|-|-|", *rows]
 
 
 def field_json(field: Field) -> dict[str, object]:
-    """Every attribute of a field."""
     by = field.choices_by
     return {
         **picked(field, "name", "type", "bit_offset", "meaning", "unit", "scale"),
@@ -60,5 +58,4 @@ def _numbers(choices: Choices | None) -> dict[str, int] | None:
 
 
 def picked(thing: object, *names: str) -> dict[str, object]:
-    """These attributes of ``thing``."""
     return {name: getattr(thing, name) for name in names}

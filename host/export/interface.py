@@ -25,7 +25,6 @@ def _table(interface: Interface) -> str:
 
 
 def _markdown(interface: Interface) -> str:
-    """A document with one section for each message."""
     parts = [
         f"# {interface.name}: telecommands and telemetry",
         "",
@@ -62,7 +61,6 @@ def _markdown(interface: Interface) -> str:
 
 
 def _json(interface: Interface) -> str:
-    """One JSON object, for other programs."""
     content = {
         **field_text.picked(interface, "name", "version", "i2c_address", "baud"),
         "ack_errors": {error.name: int(error) for error in interface.ack_errors},
@@ -106,7 +104,6 @@ def _summary(interface: Interface) -> str:
 
 
 def _meaning(message: Message) -> str:
-    """Meaning, and what is special about the message."""
     notes = [
         text
         for applies, text in (

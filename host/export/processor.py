@@ -13,7 +13,6 @@ def render_processor(tables: Processor, format_name: str) -> str:
 
 
 def processor_header(tables: Processor) -> str:
-    """A C header."""
     head, end, _ = c_header(tables.layouts).rpartition("#endif\n")
     return f"{head}{tables.pins_header()}\n{end}"
 

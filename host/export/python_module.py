@@ -105,7 +105,6 @@ class Telemetry(Message):
 
 
 def python_module(interface: Interface) -> str:
-    """The module's text."""
     head = _HEAD.format(
         name=interface.name,
         version=interface.version,

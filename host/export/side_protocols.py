@@ -103,7 +103,6 @@ def side_json(interface: Interface) -> dict[str, object]:
 
 
 def side_c(interface: Interface) -> Iterator[str]:
-    """Lines of a C header."""
     upper = interface.name.upper()
     if interface.registers is not None:
         yield from ("", "/* Registers; two bytes are signed, the most significant first. */")

@@ -17,7 +17,6 @@ LITTLE = {"byteOrder": "leastSignificantByteFirst"}
 
 
 def xtce(interface: Interface) -> str:
-    """The document's text."""
     root = Xml.Element("SpaceSystem", {"xmlns": NAMESPACE, "name": interface.name})
     _text(root, "LongDescription", f"{interface.name}, interface version {interface.version}.")
     of_kind = {

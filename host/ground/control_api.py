@@ -56,7 +56,6 @@ class Call:
     takes: Mapping[str, tuple[type | tuple[type, ...], object]] = field(default_factory=dict)
 
     def about(self) -> JsonObject:
-        """For a reader."""
         return {"method": self.method, "path": self.path, "meaning": self.meaning} | (
             {"takes": list(self.takes)} if self.takes else {}
         )
@@ -173,7 +172,6 @@ CALLS = (
 
 
 def control_app(emulation: Emulation) -> Starlette:
-    """The application, without a guard."""
     routes = [
         Route(call.path, partial(_answer, emulation, call), methods=[call.method]) for call in CALLS
     ]
@@ -231,7 +229,6 @@ def _start_of(path: Path, count: int) -> bytes:
 
 
 async def _asked(emulation: Emulation, act: Callable[[], T]) -> T:
-    """What ``act`` gives in the emulation's thread."""
     return await asyncio.wrap_future(emulation.port.call(act))
 
 
@@ -263,7 +260,6 @@ async def _events(emulation: Emulation, socket: WebSocket) -> None:
 
 
 async def _until_gone(socket: WebSocket) -> None:
-    """Whatever a client says means nothing here."""
     while (await socket.receive())["type"] != "websocket.disconnect":
         pass
 

@@ -141,7 +141,6 @@ class Desk:
 
     @property
     def played(self) -> PlayedClient | None:
-        """The recording that it is."""
         return self.target.node if isinstance(self.target.node, PlayedClient) else None
 
     def do(self, line: str) -> "Future[JsonObject]":
@@ -203,7 +202,6 @@ class Desk:
         return self._thread.submit(self._restart, self._emulator, options, files)
 
     def close(self) -> None:
-        """Release the target."""
         if self.carried is not None:
             self.carried.give_up()
         self._thread.shutdown(cancel_futures=True)
@@ -231,7 +229,6 @@ class Desk:
         return None if device is None else device.client(self.target.node)
 
     def _has(self, method: str) -> bool:
-        """Whether its client does what not all can."""
         own = getattr(type(self._client), method, None)
         return own is not None and own is not getattr(DeviceClient, method)
 

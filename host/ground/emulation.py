@@ -47,7 +47,6 @@ class Emulation:
     bench: Bench = field(default_factory=Bench)
 
     def __post_init__(self) -> None:
-        """Nothing has been looked at."""
         self._snapshots: dict[str, int] = {}
         self._look_anew()
 
@@ -64,7 +63,6 @@ class Emulation:
         self._controls = dict(zip(names, made, strict=True))
 
     def state(self) -> JsonObject:
-        """How it is now."""
         scheduler = self.port.scheduler
         assert scheduler is not None
         return {
@@ -132,15 +130,12 @@ class Emulation:
         return pictures[name].copy()
 
     def scene_keys(self, device: str) -> JsonObject:
-        """See ``scenes.keys``."""
         return scenes.keys(self._of(device).device)
 
     def scene(self, device: str) -> JsonObject:
-        """See ``scenes.present``."""
         return scenes.present(self._of(device))
 
     def look(self, device: str, table: Mapping[str, Any]) -> JsonObject:
-        """See ``scenes.look``."""
         return scenes.look(self._of(device), table)
 
     def act(self, device: str, words: Sequence[str], text: str = "") -> None:
@@ -154,11 +149,9 @@ class Emulation:
         self._controls[device].act(Control(self.port.kernel.now, tuple(words), text))
 
     def pause(self) -> None:
-        """Hold virtual time."""
         self.port.pause()
 
     def resume(self) -> None:
-        """Let it go on."""
         self.port.resume()
 
     def step(self, events: int) -> int:
@@ -223,7 +216,6 @@ class Emulation:
         return self.past
 
     def set_pace(self, pace: Literal["real", "fast"], speed: float) -> None:
-        """Of virtual time."""
         self.port.set_pace(pace, speed)
 
     def _of(self, name: str) -> AnyEmulated:

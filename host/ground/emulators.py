@@ -35,7 +35,6 @@ class Emulator:
     """
 
     def __init__(self, device: str, options: Mapping[str, Any]) -> None:
-        """Of a registered device; nothing is started yet."""
         self._device, self.options = registered(device), dict(options)
         self._running, self._folders = ExitStack(), ExitStack()
         self._first_scene: JsonObject | None = None

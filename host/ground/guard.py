@@ -43,7 +43,6 @@ UNAUTHORISED_CLOSE = 4401
 
 
 def new_token() -> str:
-    """That nobody guesses."""
     return secrets.token_urlsafe(24)
 
 
@@ -63,7 +62,6 @@ class Guard:
     any_host: bool = False
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, or pass on."""
         headers = Headers(scope=scope)
         refusal = self._refusal(scope, headers)
         if refusal is None:

@@ -210,7 +210,6 @@ async def _carried(desk: Desk, _body: JsonObject, _path: JsonObject) -> Response
 
 
 def _file(desk: Desk, kind: str) -> dict[str, str]:
-    """Headers of what browsers save as a file."""
     name = f"{desk.target.interface.name.lower()}.{kind}"
     return {"content-disposition": f'attachment; filename="{name}"'}
 

@@ -47,7 +47,6 @@ class PlayedClient(Client):
 
     @property
     def state(self) -> JsonObject:
-        """For a page."""
         return {"time_s": self.time_s, "end_s": self.end_s, "runs": self._runs}
 
     def play(self, to_s: float | None, runs: bool) -> None:
@@ -69,11 +68,9 @@ class PlayedClient(Client):
         """Nothing can be told to a recording: TargetError."""
         raise TargetError(f"{name}: a recording takes no telecommand")
 
-    def pause(self, seconds: float) -> None:
-        """It goes on by itself."""
+    def pause(self, seconds: float) -> None: ...
 
-    def close(self) -> None:
-        """It holds no port."""
+    def close(self) -> None: ...
 
 
 def is_recording(text: str) -> bool:

@@ -34,7 +34,6 @@ async def show_scene(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObj
 
 
 async def scene(desk: Desk, _body: JsonObject, _path: JsonObject) -> JsonObject:
-    """What its cameras see now."""
     return await _of_device(desk, "GET", "scene")
 
 
@@ -49,7 +48,6 @@ async def look(desk: Desk, body: JsonObject, _path: JsonObject) -> JsonObject:
 
 
 async def stars(desk: Desk, _body: JsonObject, _path: JsonObject) -> JsonObject:
-    """The brightest of the catalogue."""
     return await ask(desk, "GET", "/stars")
 
 
@@ -73,7 +71,6 @@ async def fetched(desk: Desk, what: str) -> bytes:
 
 
 async def ask(desk: Desk, method: str, path: str, body: object = None) -> JsonObject:
-    """What the control port answers."""
     return await asyncio.to_thread(controls(desk).client.ask, method, path, body)
 
 

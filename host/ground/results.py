@@ -31,7 +31,6 @@ class ResultLog:
     """
 
     def __init__(self) -> None:
-        """Without a line."""
         self._file, path = mkstemp(prefix="cubestack-")
         os.unlink(path)
         self.count = 0
@@ -62,7 +61,6 @@ class ResultLog:
         return parquet_file(columns)
 
     def close(self) -> None:
-        """Forget them."""
         os.close(self._file)
 
     def _names(self) -> list[str]:

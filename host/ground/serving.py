@@ -72,7 +72,6 @@ class Serving:
 
     @property
     def url(self) -> str:
-        """Where it is."""
         host, port = self.address
         return f"http://{f'[{host}]' if ':' in host else host}:{port}"
 

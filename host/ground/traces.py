@@ -20,7 +20,6 @@ class Bench:
     """Where waveforms are made, one at a time."""
 
     def __init__(self) -> None:
-        """Nothing is made yet."""
         self._free = Lock()
         self._process: subprocess.Popen[str] | None = None
         self._closed = False

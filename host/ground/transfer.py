@@ -72,7 +72,6 @@ class Transfer:
         self._goes_on.clear()
 
     def go_on(self) -> None:
-        """After ``hold``."""
         self._goes_on.set()
 
     def give_up(self) -> None:

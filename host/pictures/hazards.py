@@ -17,8 +17,7 @@ RIGHT, REFUSED, WRONG = "#1a7f37", "#9a9a9a", "#c62828"
 class Limits(Protocol):
     """Gives the limits of a rate."""
 
-    def __call__(self, count: int, of: int) -> tuple[float, float]:
-        """Of ``count`` of ``of``."""
+    def __call__(self, count: int, of: int) -> tuple[float, float]: ...
 
 
 def save_sample(picture: NDArray[np.uint8], path: Path | BinaryIO) -> None:

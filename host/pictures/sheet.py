@@ -217,7 +217,6 @@ class Sheet:
 
     @property
     def _columns(self) -> Callable[[str], bool]:
-        """Whether a text fits into a line."""
         return lambda text: self._font.getlength(text) <= self.image.width - 2 * self.em
 
     def _set_bar(self, lens: Lens) -> None:

@@ -51,11 +51,9 @@ class HostRecorder:
         return _RecordingLine(self, transport, port, BITS_PER_BYTE * PS_PER_S // baud)
 
     def bus(self, bus: I2cBus) -> I2cBus:
-        """``bus``, with its transfers recorded."""
         return _RecordingBus(self, bus)
 
     def now_ps(self) -> int:
-        """Time since the beginning."""
         return (self._clock_ns() - self._start_ns) * PS_PER_NS
 
     def write(self, event: recording.LineBytes | recording.BusTransfer) -> None:

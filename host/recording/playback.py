@@ -61,7 +61,6 @@ class RecordedI2c:
     """An I2C bus of a recording, with smbus2's ``i2c_rdwr``."""
 
     def __init__(self, recording: Recording, interface: Interface) -> None:
-        """Stand at the beginning."""
         self.name = f"recorded:{recording.name}"
         self._interface = interface
         self._transfers = recording.transfers

@@ -25,7 +25,6 @@ class ControlCommands:
     target: Target
 
     def commands(self) -> list[ShellCommand]:
-        """What they are called."""
         return [
             ShellCommand(SCENE, "show another scene", self._scene, True),
             ShellCommand(FAULT, "let something break; fault clear, fault log", self._fault, True),

@@ -35,7 +35,6 @@ class Shell:
     """
 
     def __init__(self, target: Target) -> None:
-        """Use ``target``, which stays its owner's."""
         self.target = target
         self._names = Names(target)
         self._answered = False

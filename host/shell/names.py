@@ -38,7 +38,6 @@ class Names:
         return [found.name for found in self.all_of(command)]
 
     def all_of(self, command: str) -> list[Found]:
-        """What those names mean."""
         interface = self.target.interface
         found: list[Found] = []
         if command != "write":

@@ -33,7 +33,6 @@ class PortCommands:
     target: Target
 
     def commands(self) -> list[ShellCommand]:
-        """What they are called."""
         return [
             ShellCommand(IMAGE, "download the picture", self._image),
             ShellCommand(BENCH, "a letter of the bench protocol", self._bench),

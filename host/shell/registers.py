@@ -38,7 +38,6 @@ class RegisterCommands:
     on_row: Callable[[Result], None]
 
     def commands(self) -> list[ShellCommand]:
-        """What they are called."""
         return [
             ShellCommand(READ, "a telemetry frame or register; NAME may be a number", self._read),
             ShellCommand(WRITE, "send a telecommand, write a register", self._write),

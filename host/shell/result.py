@@ -36,7 +36,6 @@ class ShellCommand:
 
     @property
     def name(self) -> str:
-        """The word that calls it."""
         return self.usage.split()[0]
 
 

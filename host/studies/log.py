@@ -34,7 +34,6 @@ SECONDS = between(0, 86_400, "a number of seconds in 0..86400")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     add_target_arguments(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="default: standard output")
     parser.add_argument("--count", type=whole(1), metavar="N", help="lines; default: until Ctrl-C")

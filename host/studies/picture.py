@@ -36,7 +36,6 @@ ANGLES = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("device", choices=device_names())
     for name, (low, high, meaning) in ANGLES.items():
         angle = between(low, high, f"an angle in {low}..{high} degrees")

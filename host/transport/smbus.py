@@ -34,8 +34,7 @@ class BusLink(Protocol):
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
         """Do a call and wait for its end; result (0 or more, or a negative errno) and data."""
 
-    def close(self) -> None:
-        """Close it."""
+    def close(self) -> None: ...
 
 
 class CubeSMBus(SMBus):
@@ -91,11 +90,9 @@ class CubeSMBus(SMBus):
         self._transact(i2c_addr, force, WRITE, 0, SmbusSize.QUICK)
 
     def read_byte(self, i2c_addr: int, force: bool | None = None) -> int:
-        """SMBus receive byte."""
         return self._transact(i2c_addr, force, READ, 0, SmbusSize.BYTE)[0]
 
     def write_byte(self, i2c_addr: int, value: int, force: bool | None = None) -> None:
-        """SMBus send byte."""
         self._transact(i2c_addr, force, WRITE, value, SmbusSize.BYTE)
 
     def read_byte_data(self, i2c_addr: int, register: int, force: bool | None = None) -> int:

@@ -33,8 +33,7 @@ class Transport(Protocol):
         Empty when nothing came within ``timeout_s``; 0 does not wait. Raises TransportError.
         """
 
-    def close(self) -> None:
-        """Release the line."""
+    def close(self) -> None: ...
 
 
 def port_of(line: Transport) -> Transport:
@@ -94,7 +93,6 @@ class SerialTransport(Reopening):
 
     @property
     def baud(self) -> int:
-        """Baud rate of this end."""
         return int(self._port.baudrate)
 
     def set_baud(self, baud: int) -> bool:
@@ -123,7 +121,6 @@ class SerialTransport(Reopening):
             return first + rest
 
     def close(self) -> None:
-        """Close the port."""
         self._port.close()
 
     def _open_again(self) -> None:
@@ -151,7 +148,6 @@ class TcpTransport(Reopening):
     """
 
     def __init__(self, host: str, port: int) -> None:
-        """Connect; raises PortOpenError."""
         self.name = f"tcp://{host}:{port}"
         self._address = host, port
         try:
@@ -175,7 +171,6 @@ class TcpTransport(Reopening):
             return data
 
     def close(self) -> None:
-        """Close the connection."""
         self._socket.close()
 
     def _open_again(self) -> None:

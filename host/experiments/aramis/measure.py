@@ -152,11 +152,9 @@ class AramisResult(attitudes.AttitudeResult):
 
     @property
     def ending(self) -> str:
-        """How it ended, and why."""
         return f"{self.outcome}: {self.reason} {self.status}".rstrip()
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return {key: getattr(self, key) for key in _KEYS}
 
 
@@ -216,7 +214,6 @@ def _view(
 
 
 def _configure(aramis: Aramis, options: AramisOptions) -> None:
-    """Send what differs from the settings after power-up."""
     client = aramis.client
     client.command("SetField", FieldOfView=options.field, Round=OnOff.ON)
     if options.exposure is not None:

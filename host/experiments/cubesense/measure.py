@@ -94,7 +94,6 @@ class CubeSenseOptions(MeasureOptions):
 
     @property
     def sensors(self) -> list[Camera]:
-        """Those that measure."""
         return list(Camera) if self.sensor == "both" else [Camera[self.sensor.upper()]]
 
 

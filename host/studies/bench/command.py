@@ -22,7 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and report."""
     figures: dict[str, float] = {}
     for device in devices():
         if benchmark := device.study("bench"):

@@ -247,7 +247,6 @@ class StarCalibration(
         return fit_camera([Sight(pixels, optics.unproject(pixels))], camera, free, exact=True)
 
     def summarise(self, results: Sequence[CalibrateResult], wall_s: float) -> Iterable[str]:
-        """Parameters with deviations, and residuals."""
         for result in results:
             yield (
                 f"{result.stars} stars of {result.pictures} pictures ({result.tried} tried, "

@@ -45,7 +45,6 @@ class Row:
 
     @property
     def key(self) -> tuple[int, int]:
-        """Where it stands."""
         return self.block, self.row
 
 
@@ -70,7 +69,6 @@ def frames_of(block: Block, seed: int) -> int:
 
 
 def perform(block: Block) -> list[Row]:
-    """All rows of a block."""
     rows = list[Row]()
     a_frame, frame = rows_of(block) // block.frames, 0
     while frame < block.frames:
@@ -108,7 +106,6 @@ def _seed(seed: int, frame: int) -> int:
 
 
 def _plain(result: dict[str, Any]) -> dict[str, Any]:
-    """As it comes back from a JSON file."""
     return {name: _value(value) for name, value in result.items() if name != WALL}
 
 

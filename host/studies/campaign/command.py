@@ -39,7 +39,6 @@ WORST = 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.usage = (
         "cubestack campaign PLAN [--out FOLDER] [--resume] [--workers N | --scheduler ADDRESS]\n"
         "       cubestack campaign report FOLDER [--compare FOLDER]\n"

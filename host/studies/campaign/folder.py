@@ -115,7 +115,6 @@ class Folder:
             raise OSError(error.errno, error.strerror, str(path)) from None
 
     def sort(self) -> None:
-        """Put all rows into order."""
         _replace(self.path / ROWS, map(_line, sorted(self.rows(), key=lambda row: row.key)))
 
 

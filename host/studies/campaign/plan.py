@@ -138,7 +138,6 @@ class Plan:
         ]
 
     def blocks(self) -> Iterator[Block]:
-        """All blocks, in their order."""
         at_a_point = -(-self.frames // self.block)
         for where, point in enumerate(self.points):
             for index in range(at_a_point):
@@ -151,7 +150,6 @@ class Plan:
                 yield Block(number, self.device, *what)
 
     def _drawn(self, index: int) -> tuple[int, dict[str, Any]]:
-        """Seed and random options of a point's block."""
         generator = np.random.default_rng([self.seed, index])
         seed = int(generator.integers(1 << 31))
         drawn: dict[str, Any] = {}

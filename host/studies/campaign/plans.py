@@ -10,7 +10,6 @@ SUFFIX = ".toml"
 
 
 def known_plans() -> dict[str, Path]:
-    """Their files by name."""
     folders = (
         resources.files(package).joinpath(FOLDER)
         for device in devices()

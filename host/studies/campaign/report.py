@@ -146,7 +146,6 @@ def _changes(changes: Sequence[Change]) -> str:
 
 
 def verdict(change: Change) -> str:
-    """In a word."""
     return "worse" if change.worse else "better" if change.significant else "no change to be seen"
 
 

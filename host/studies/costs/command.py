@@ -24,7 +24,6 @@ _BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     known = [device.name for device in devices() if "costs" in device.studies]
     parser.add_argument("action", choices=("measure",), help="compile, run, count")
     parser.add_argument("device", nargs="?", choices=known, default=known[0] if known else None)

@@ -50,7 +50,6 @@ class BallOptions(Options):
 
     @property
     def angles(self) -> list[float]:
-        """The stage's."""
         return [float(angle) for angle in np.arange(0, REACH_DEG + 1e-9, self.step)]
 
 

@@ -28,7 +28,6 @@ class MemoryOptions(Options):
     set: str = option("", "switches that differ", Kind("text", str), metavar="SWITCH=VALUE,...")
 
     def check(self) -> None:
-        """The switches must exist."""
         CubeSenseSwitches.of(self.profile, self.set)
 
     def budget(self) -> tuple[Buffer, ...]:
@@ -56,7 +55,6 @@ class _Memory(Lookup[MemoryOptions]):
         yield Facts(self.look_up(options, opened.shown), (report(options.budget()),))
 
     def succeeded(self, results: Sequence[Facts]) -> bool:
-        """No memory is too small."""
         return all(memory["used"] <= memory["bytes"] for memory in results[0].facts.values())
 
 

@@ -66,7 +66,6 @@ def _firmware_ratio(device: Device[CubeStarBoard, CubeStar]) -> float:
 
 
 def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, float]:
-    """Wall times of capture and transfer."""
     engine = emulated.board.engine
     strobe_read = engine.strobe_read
     transfer_s = 0.0

@@ -87,7 +87,6 @@ def generated() -> dict[str, str]:
 
 
 def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
-    """Each build in turn."""
     compiler_version()
     pixels, sources, images = picture(), generated(), {}
     for case in _cases(levels, precisions):
@@ -120,7 +119,6 @@ def page(found: Sequence[Measurement], clock_hz: int) -> str:
 
 
 def as_data(found: Sequence[Measurement]) -> dict[str, Any]:
-    """For the file of firmware_model/mcu."""
     return {"compiler": compiler_version(), "builds": [asdict(one) for one in found]}
 
 
@@ -133,7 +131,6 @@ def _defaults() -> Mapping[str, float]:
 
 
 def costs() -> CostReport:
-    """For ``Device.costs``."""
     return CostReport(
         levels=("O0", "O2", "Os"),
         precisions=("own", "float", "literals", "double"),

@@ -36,7 +36,6 @@ STARS_DRAWN = 18
 
 
 def _field(opened: CubeStarOpener, frames: int, **how: Any) -> Figures:
-    """Rates in percent on the published field."""
     taken = list(field_shots(opened, frames, **how))
     return {
         "three": 100 * mean(shot.matched - shot.wrong > 2 for shot in taken),

@@ -121,7 +121,6 @@ class _Layouts(Experiment["CubeStarOpener", LayoutOptions, LayoutResult]):
                 yield f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins"
 
     def succeeded(self, results: Sequence[LayoutResult]) -> bool:
-        """Each gave an attitude."""
         return all(result.attitudes for result in results)
 
 

@@ -88,7 +88,6 @@ def _largest_reduction(
 
 
 def main() -> None:
-    """Write the files."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path)
     folder: Path = parser.parse_args().folder

@@ -17,7 +17,6 @@ from cubestack.host.devices.registry import devices
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     names = [one.name for one in devices() if "demo" in one.studies]
     parser.add_argument(
         "device", nargs="?", choices=names, help="show this one only; default: all of them"

@@ -29,7 +29,6 @@ class Demo:
     """
 
     def __init__(self, out: Path, name: str, title: str) -> None:
-        """Show the title."""
         self.out = out
         self.name = name
         self._started = time.monotonic()

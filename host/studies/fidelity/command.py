@@ -28,7 +28,6 @@ from cubestack.host.terminal import busy, say, tell
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     known = [device.name for device in devices() if "fidelity" in device.studies]
     parser.add_argument("device", nargs="?", choices=known, help="default: all")
     parser.add_argument(
@@ -94,7 +93,6 @@ class _Rest:
         self.started = time.monotonic()
 
     def __call__(self, job: fidelity.Job) -> int:
-        """Tell it of ``job``; how many are done."""
         self.done += 1
         self.rest_s -= job.seconds
         if not self.quiet:

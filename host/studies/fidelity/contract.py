@@ -75,7 +75,6 @@ class Fidelity:
 
     @property
     def rows(self) -> Iterator[Row]:
-        """Those of all tables."""
         for rows in self.tables.values():
             yield from rows
 

@@ -67,7 +67,6 @@ class Measured(Result):
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Those of ``COLUMNS``."""
         ours = (self.ours.get(profile, "") for profile in PROFILES)
         return (
             *(self.figure, self.source, self.published),
@@ -199,7 +198,6 @@ def measured(
 
 
 def markdown(rows: Sequence[Measured]) -> str:
-    """One table of a page."""
     lines = ["| " + " | ".join(COLUMNS) + " |", "|-" * len(COLUMNS) + "|"]
     lines += ["| " + " | ".join(row.cells) + " |" for row in rows]
     return "\n".join(lines) + "\n"

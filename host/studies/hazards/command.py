@@ -27,7 +27,6 @@ from cubestack.host.terminal import progress, say, show
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     parser.add_argument("device", nargs="?", help="default: all that take hazards")
     parser.add_argument(
         "--hazard", action="append", default=[], metavar="NAME", help="default: all; may be given "

@@ -50,7 +50,6 @@ class Point(Job):
         return self.right + self.refused + self.wrong
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
         return asdict(self)
 
 

@@ -33,12 +33,10 @@ class Part:
 
     @cached_property
     def effects(self) -> Counter[str]:
-        """How many upsets did what."""
         return Counter(one.effect for one in self.results)
 
     @cached_property
     def answers(self) -> Counter[str]:
-        """How many answers were what."""
         return Counter(one.answer for one in self.results)
 
     @property

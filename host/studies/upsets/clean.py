@@ -71,7 +71,6 @@ class CleanLoop:
 
     @property
     def start_ps(self) -> int:
-        """When it began."""
         return self.intervals[0].start_ps
 
     @property

@@ -135,7 +135,6 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
         )
 
     def summarise(self, results: Sequence[UpsetResult], wall_s: float) -> Iterable[str]:
-        """The atlas: by register."""
         yield from lines(results)
 
     def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
@@ -198,7 +197,6 @@ class _About:
     hits_a_day: float
 
     def result(self, one: Upset, outcome: Outcome) -> UpsetResult:
-        """Of one upset."""
         target, verdict = one.target, outcome.verdict
         return UpsetResult(
             *(target.name, target.bit, target.memory, one.phase, one.time_ps / PS_PER_S),
@@ -214,7 +212,6 @@ class _About:
 
 @cache
 def _registers(wiring: Callable[[], Wiring]) -> Mapping[str, int]:
-    """Registers of a wiring's design and their bits."""
     engine = CompiledEngine(wiring())
     try:
         return engine.registers
@@ -229,7 +226,6 @@ def _check(targets: Sequence[Target], sizes: Mapping[str, int]) -> None:
 
 
 def _moment(intervals: Sequence[Interval], phase: str, rng: np.random.Generator) -> int:
-    """A time in a phase, each as likely."""
     there = [one for one in intervals if one.phase == phase]
     if not there:
         raise ValueError(f"a loop has no phase {phase}: {', '.join({i.phase for i in intervals})}")

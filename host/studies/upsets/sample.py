@@ -80,7 +80,6 @@ class UpsetResult(Result):
 
     @property
     def right(self) -> bool:
-        """Whether the answer is."""
         return self.answer == "right"
 
     @property
@@ -90,7 +89,6 @@ class UpsetResult(Result):
 
     @property
     def ending(self) -> str:
-        """How it ended."""
         return self.reason or self.effect
 
 
@@ -155,7 +153,6 @@ def _left_a_trace(running: Running, upset: Upset) -> bool:
 
 
 def _followed(running: Running) -> Outcome:
-    """What comes of an upset that was."""
     clean = running.clean
     running.emulated.board.kernel.advance_to(clean.over_ps)
     found = take(running.sites, running.watch)
@@ -196,7 +193,6 @@ def _judged(running: Running, *, again: bool = False) -> Verdict:
 
 
 def effect_of(found: Snapshot, clean: Snapshot, row_bytes: int) -> Effect:
-    """What differs, the gravest first."""
     if _rises(found) < _rises(clean):
         return "no ACK"
     broken = {

@@ -17,19 +17,16 @@ class PortWatch:
     """
 
     def __init__(self, engine: FpgaPort, acknowledges: tuple[str, ...]) -> None:
-        """Stand before ``engine``."""
         self._engine = engine
         self._levels = dict.fromkeys(acknowledges, 0)
         self.data = bytearray()
         self.seen: list[tuple[int, str, int]] = []
 
     def clear(self) -> None:
-        """Forget what was."""
         self.data, self.seen = bytearray(), []
 
     @property
     def now_ps(self) -> int:
-        """Virtual time of the FPGA."""
         return self._engine.now_ps
 
     @property
@@ -39,7 +36,6 @@ class PortWatch:
 
     @property
     def driver(self) -> Driver | None:
-        """None: nobody may go past."""
         return None
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
@@ -47,11 +43,9 @@ class PortWatch:
         return self._engine.attend(reached_ps, end, camera, until_ps)
 
     def set_pin(self, name: str, value: int) -> None:
-        """Drive a pin."""
         self._engine.set_pin(name, value)
 
     def get_pin(self, name: str) -> int:
-        """Level of a pin."""
         level = self._engine.get_pin(name)
         if self._levels.get(name, level) != level:
             self._levels[name] = level
@@ -59,11 +53,9 @@ class PortWatch:
         return level
 
     def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
-        """Advance."""
         return self._engine.run(until_ps, stop_on)
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
-        """Run the transfer loop."""
         done = self._engine.strobe_read(out, period, until_ps)
         self.data += out[:done].tobytes()
         return done

@@ -217,9 +217,9 @@ def test_all_of_cubesense_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPa
     from cubestack.emulator.boards.cubesense import benchmark as board
 
     monkeypatch.setattr(cubesense, "power_up", powered(Device(clock), []))
-    monkeypatch.setattr(cubesense, "pair_with_cameras", lambda: "pair")
-    monkeypatch.setattr(cubesense, "pair_store_ms", lambda _pair, way: len(way) + 0.06)
-    monkeypatch.setattr(cubesense, "pair_scan_ms", lambda _pair: 1.44)
+    monkeypatch.setattr(board, "pair_with_cameras", lambda: "pair")
+    monkeypatch.setattr(board, "pair_store_ms", lambda _pair, way: len(way) + 0.06)
+    monkeypatch.setattr(board, "pair_scan_ms", lambda _pair: 1.44)
     monkeypatch.setattr(cubesense, "cold_build_s", lambda wiring: built(wiring, 9.04))
     found = cubesense.BENCHMARK.run(device("cubesense"))
     stored = {f"pair_{way}_ms": len(way) + 0.1 for way in board.STORES}
