@@ -1,1 +1,1 @@
-"""The boards: which pin goes where; one folder for each sensor."""
+"""The boards: a processor and what its pins lead to; one folder per sensor."""

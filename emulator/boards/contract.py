@@ -1,10 +1,10 @@
-"""What every board has: a processor with its program, supplies, serial lines and an I2C bus."""
+"""Base class of the boards: processor with program, supplies, serial lines and an I2C bus."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +23,30 @@ from cubestack.emulator.sim.processor import Program
 from cubestack.emulator.sim.virtual_time import Kernel
 
 NODE_PROTOCOL = "node protocol"
-"""Title of a serial line that has it."""
 
 SILENCE_BYTES = 100
-"""Byte times of silence after which a UART gives up half a message: assumed."""
+"""Byte times of silence after which a UART drops an incomplete message: assumed."""
 
 
 class UartLink(Protocol):
-    """What a program has behind a serial line."""
+    """A program's interrupt handlers of a serial line."""
 
-    def uart_byte(self, byte: int) -> None:
-        """Interrupt: a byte was received."""
+    def uart_byte(self, byte: int) -> None: ...
 
     def uart_silence(self) -> None:
-        """Interrupt: the line has been silent for long."""
+        """Called after ``SILENCE_BYTES`` byte times without a byte."""
 
 
 class NodeLink(UartLink, I2cTarget, Protocol):
-    """What a program has behind both ways to the satellite."""
+    """A program's interrupt handlers of the serial line and the I2C bus to the satellite."""
+
+
+class BoardOptions(TypedDict, total=False):
+    """Keyword arguments that all boards accept; see ``Board``."""
+
+    seed: int
+    kernel: Kernel | None
+    i2c_bus: I2cBus | None
 
 
 @dataclass(frozen=True)
@@ -48,9 +54,9 @@ class SerialLine:
     """A serial port of a device.
 
     Attributes:
-        name: of the port, in recordings.
-        title: what it speaks.
-        suffix: behind the name of the first line's link.
+        name: name of the port in recordings.
+        title: its protocol.
+        suffix: appended to the pty path of the first line.
         uart: the device's end.
     """
 
@@ -61,43 +67,38 @@ class SerialLine:
 
     @property
     def baud(self) -> int:
-        """Bits a second."""
         return self.uart.form.baud
 
     @property
     def has_node(self) -> bool:
-        """Whether the node protocol is spoken on it."""
+        """Whether it carries the node protocol."""
         return self.title == NODE_PROTOCOL
 
     @property
     def target(self) -> str:
-        """Its name among the targets of faults."""
+        """Its name as a target of faults."""
         return self.suffix.removeprefix(".") or self.name
 
 
 class Board(ABC):
     """One emulated device, powered up.
 
-    Several boards may share a kernel, and on it an I2C bus.
+    Several boards may share a kernel and its I2C bus.
 
     Attributes:
-        kernel: virtual time.
-        i2c_bus: the satellite's I2C bus.
-        seed: of everything random but the scene.
-        power: supplies; the place for latch-ups.
+        seed: seed of all random numbers except the scene's.
         lines: serial lines, the satellite's first.
-        on_close: what is to be done before the board is closed.
+        on_close: functions that ``close`` calls first.
         engine: FPGAs and their SRAMs; None on a board without.
-        insight: into firmware of the user's own; None where none runs.
-        processor: microcontroller with the running program.
-        program: firmware program that runs now; a reset makes a new one.
+        insight: analysis of a user's own firmware; None without one.
+        program: the running firmware program; a reset creates a new one.
     """
 
     random_stream: ClassVar[tuple[int, ...]] = ()
-    """What its random numbers are seeded with beside ``seed``."""
+    """Seed of its random numbers, in addition to ``seed``."""
 
     firmware: str = ""
-    """Own firmware that it runs, as its ``firmware`` option takes it, hash included."""
+    """Value of the option ``firmware``, with the hash, if the board runs a user's own firmware."""
 
     engine: RtlEngine | None = None
     insight: Insight | None = None
@@ -105,18 +106,23 @@ class Board(ABC):
     program: Program
 
     def __init__(
-        self, power: PowerTable, *, seed: int, kernel: Kernel | None, i2c_bus: I2cBus | None
+        self,
+        power: PowerTable,
+        *,
+        seed: int = 0,
+        kernel: Kernel | None = None,
+        i2c_bus: I2cBus | None = None,
     ) -> None:
-        """Take a place in virtual time.
+        """Power up.
 
         Args:
-            power: what draws current.
-            seed: of everything random but the scene, 0 or more.
-            kernel: virtual time, at its start; an own one unless given.
-            i2c_bus: bus of that kernel to be attached to; an own one unless given.
+            power: the supplies.
+            seed: seed of all random numbers except the scene's, 0 or more.
+            kernel: virtual time, which must be 0; by default a new one.
+            i2c_bus: the satellite's bus, on the same kernel; by default a new one.
 
         Raises:
-            ValueError: the kernel is under way, or the bus is another kernel's.
+            ValueError: the kernel's time is not 0, or the bus has another kernel.
         """
         self.kernel = kernel if kernel is not None else Kernel()
         if self.kernel.now:
@@ -133,9 +139,9 @@ class Board(ABC):
     @property
     @abstractmethod
     def scene(self) -> object:
-        """What the cameras see; a new one is seen by the next image that is rendered.
+        """What the cameras see; a new scene takes effect with the next rendered image.
 
-        Raises TypeError for a scene that they can not see.
+        Raises TypeError for a scene of the wrong type.
         """
 
     @scene.setter
@@ -144,65 +150,63 @@ class Board(ABC):
 
     @property
     def uart(self) -> Uart:
-        """Device's end of the satellite's serial line."""
+        """The device's end of the satellite's serial line."""
         return self.lines[0].uart
 
     @cached_property
     def faults(self) -> Faults:
-        """Injects faults into this board."""
         return Faults(self.sites(), self.seed)
 
     def serial(self, name: str = "uart") -> DirectSerial:
-        """Host's end of the serial line ``name``, in this process; KeyError for none."""
+        """A host's end of serial line ``name`` in this process; KeyError for an unknown line."""
         return DirectSerial(self.kernel, self.uarts[name])
 
     def i2c(self) -> DirectI2c:
-        """Host's end of the I2C bus, in this process."""
+        """A host's end of the I2C bus in this process."""
         return DirectI2c(self.kernel, self.i2c_bus)
 
     @property
     def uarts(self) -> dict[str, Uart]:
-        """Device's ends of the serial lines, by their names in recordings."""
+        """The device's ends of the serial lines, by their names in recordings."""
         return {line.name: line.uart for line in self.lines}
 
     def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
+        """Whether any activity is under way that does not wait for the host."""
         return any(line.uart.busy for line in self.lines) or not self.processor.dozing
 
     def probes(self) -> dict[str, int | str]:
-        """What a trace shows of the firmware, as it is now, by name."""
+        """Current values of the firmware for a trace, by name."""
         return {"awake": int(not self.processor.dozing), "resets": self.processor.resets}
 
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
-        """What the memories with pictures hold, each (rows, columns), by memory; live views."""
+        """Images in the memories, each (rows, columns), by memory; live views."""
         return {}
 
     def truths(self) -> dict[str, NDArray[np.float64]]:
-        """What should be measured in what was stored last, by what it is of.
+        """True values for the latest stored image, by quantity; for tests and reports only.
 
-        An attitude is a quaternion (4,), a direction a pair of angles (alpha, beta) in degrees. For
-        whoever compares results, never for the firmware.
+        An attitude is a quaternion (4,), a direction a pair of angles (alpha, beta) in degrees.
         """
         return {}
 
-    def tell(self, say: Callable[[str], None]) -> None:
-        """Give ``say`` what own firmware prints by debug channels, and reports of its faults."""
-        del say  # a modelled program has none
+    def connect_console(self, report: Callable[[str], None]) -> None:
+        """Send text on the firmware's debug channels, and reports of its faults, to ``report``."""
+        del report  # a modelled program prints nothing
 
     def close(self) -> None:
-        """Release what the board holds."""
+        """Call ``on_close``, and release the engine."""
         for act in self.on_close:
             act()
         if self.engine is not None:
             self.engine.close()
 
     def sites(self) -> Sites:
-        """Where faults can hit: here what all boards have."""
+        """Places where faults can be injected; here those of all boards."""
         uarts, buses = {line.target: line.uart for line in self.lines}, {"i2c": self.i2c_bus}
         return Sites(self.kernel, self.processor, uarts, buses, self.power, self.engine)
 
     def _node_link(self, link: Callable[[], NodeLink], baud: int, i2c_address: int) -> None:
-        """Lead the satellite's serial line and I2C bus to what ``link`` finds in the program."""
+        """Connect the satellite's serial line and I2C bus to the handlers from ``link``."""
         self._serial_line(baud, link)
         self.i2c_bus.attach(i2c_address, Forwarder(lambda: [link()]))
 
@@ -214,12 +218,12 @@ class Board(ABC):
         title: str = NODE_PROTOCOL,
         suffix: str = "",
     ) -> Uart:
-        """One more of ``lines``, which leads to what ``link`` finds in the program that runs."""
+        """Add a serial line, connected to the handlers that ``link`` returns at each interrupt."""
         deliver, silent = lambda byte: link().uart_byte(byte), lambda: link().uart_silence()
         uart = Uart(self.kernel, baud, deliver, silent, silence_bytes=SILENCE_BYTES)
         self.lines += (SerialLine(name, title, suffix, uart),)
         return uart
 
     def _scramble(self, memory: NDArray[np.uint8]) -> None:
-        """What a static RAM holds after power-up."""
+        """Fill a static RAM with its random content after power-up."""
         memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)

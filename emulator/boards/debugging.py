@@ -1,10 +1,10 @@
-"""A debugger at a board that runs firmware of the user's own.
+"""Connects a debugger to a board that runs a user's own firmware.
 
-Beside the processor's memories GDB sees, at addresses where the part has nothing:
+Besides the processor's memories GDB sees, at addresses that the part does not use:
 
 ==========  ==================================================================================
 C0000000    SRAM of the first FPGA; of each further one, 1000000 higher
-D0000000    registers of the camera, a byte for each address of its control bus
+D0000000    registers of the camera, one byte per address of its control bus
 ==========  ==================================================================================
 """
 
@@ -41,36 +41,35 @@ CAMERA_BASE = 0xD000_0000
 CAMERA_BYTES = 1 << 16
 
 SERVE_S = 0.02
-"""Wall time between two looks at anything else while the kernel is paused."""
+"""Longest wait for the debugger while the kernel is paused."""
 
 
 @dataclass(frozen=True)
 class CameraWindow:
-    """Registers of a camera, to be read."""
+    """Read-only registers of a camera."""
 
     registers: RegisterFile
 
     def read(self, offset: int, count: int) -> bytes:
-        """Bytes as they were written last; 0 where there is no register."""
+        """The bytes written last; 0 where there is no register."""
         return bytes(self.registers.peek(offset + index) & 0xFF for index in range(count))
 
     def write(self, offset: int, data: bytes) -> bool:
-        """Nothing: the control bus is the firmware's."""
+        """Always False: only the firmware writes to the control bus."""
         return False
 
 
 class DebuggedBoard(FirmwareBoard, Protocol):
-    """What a debugger needs of a board."""
+    """A board with a debugger."""
 
     processor: FirmwareProcessor
     insight: Insight
 
-    def reset_pin(self) -> None:
-        """Reset the processor by its pin."""
+    def reset_pin(self) -> None: ...
 
 
 def windows(board: DebuggedBoard) -> Mapping[MemoryRegion, Window]:
-    """Memories beside the processor's own."""
+    """Memories besides the processor's own."""
     found: dict[MemoryRegion, Window] = {}
     if board.engine is not None:
         for index, memory in enumerate(board.engine.memories.values()):
@@ -83,10 +82,8 @@ def windows(board: DebuggedBoard) -> Mapping[MemoryRegion, Window]:
 def open_debugger(board: DebuggedBoard, port: int, *, wait: bool = False) -> GdbEndpoint:
     """Serve GDB on ``port`` (0: any free one).
 
-    A scheduler of ports may serve the endpoint; without one it serves itself whenever the kernel
-    makes a step. With ``wait`` nothing runs until a client lets it.
-
-    Raises PortError when the port can not be had.
+    A scheduler of ports may serve the endpoint; otherwise it is served at steps of the kernel. With
+    ``wait``, nothing runs until a client resumes the processor. Raises PortError.
     """
     debugger = Debugger(
         board.kernel,

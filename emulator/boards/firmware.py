@@ -1,6 +1,6 @@
-"""What leads from a machine's serial units and I2C buses to a board's, for a user's own firmware.
+"""Connects a machine's serial units and I2C buses to a board's, for a user's own firmware.
 
-The peripherals are in the machine, down to their registers; here are the wires.
+The machine models the peripherals with their registers; this module has the wires.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,59 +16,52 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.efm32gg.serial import LEUART, USART
 
 BY_PIN = 0x100
-"""Units at or above it name the port pin that leads to one; see the part's api."""
+"""Unit numbers from here on identify a unit by its port pin; see the part's API."""
 
 FRAMING_ERROR = 1
 RATE_SHIFT = 8
-"""Flags of a received character: what is wrong with it, and the line's bits a second."""
+"""Flags of a received character: its error, and the line's bits per second."""
 
 CLOSE = 0.01
-"""Rates that differ by less are the same to both ends."""
+"""Largest relative difference between rates that count as equal."""
 
 PARITIES: tuple[Parity, ...] = ("N", "N", "E", "O")
 STOPS = (1.0, 1.0, 1.5, 2.0)
-"""By the field of USART_FRAME; half a stop bit is heard as a whole one."""
+"""By the field of USART_FRAME; half a stop bit counts as one."""
 
 FRAMES = [
     (instance.base + offset, layout)
     for layout, offset in ((USART, 0x004), (LEUART, 0x000))
     for instance in layout.instances
 ]
-"""Where each unit's frame is set: USART_FRAME, LEUART_CTRL."""
+"""Address of each unit's frame register: USART_FRAME, LEUART_CTRL."""
 
 
 @dataclass(eq=False)
 class SerialWire(UartTap):
-    """A serial line's device end, at two port pins.
-
-    Attributes:
-        processor: whose firmware it is.
-        tx, rx: port pins, port times 16 plus bit.
-    """
+    """The device's end of a serial line, at port pins ``tx`` and ``rx`` (16 * port + bit)."""
 
     processor: FirmwareProcessor
     tx: int
     rx: int
 
     def connect(self, uart: Uart) -> None:
-        """Be the end of ``uart``."""
         self._uart = uart
         self._nominal = uart.form
         uart.taps.append(self)
 
     def uart_byte(self, byte: int) -> None:
-        """A character has arrived."""
         self._receive(byte, 0)
 
     def uart_silence(self) -> None:
-        """Silence is nothing that a pin would tell of."""
+        """Ignored: silence does not change a pin."""
 
     def framing_error(self, time_ps: int) -> None:
-        """A character with a wrong stop bit has arrived; what its bits were is not known."""
+        """Receive a character with a wrong stop bit; its data bits are unknown."""
         self._receive(0, FRAMING_ERROR)
 
     def sent(self, one: Outgoing) -> None:
-        """The machine's transmitter begins a character; a rate close to the host's is the same."""
+        """Send the character that the machine's transmitter begins, at the host's rate if close."""
         if one.unit >> 8 != self.tx:
             return
         form = self._frame(one.unit & 0xFF)
@@ -78,22 +71,19 @@ class SerialWire(UartTap):
             if abs(rate - known.baud) < CLOSE * known.baud:
                 form = replace(form, baud=known.baud)
                 break
-        self._take(form)
+        if form != self._uart.form:
+            self._uart.form, self._uart.byte_ps = form, form.character_ps
         self._uart.send(bytes([one.value & 0xFF]))
 
     def _frame(self, unit: int) -> LineFormat:
-        """Bits of a unit's characters by its registers; at any rate."""
-        address, where = FRAMES[unit]
+        """Format of a unit's characters from its registers, with a dummy rate."""
+        address, layout = FRAMES[unit]
         word = int.from_bytes(self.processor.machine.peek(address, 4), "little")
-        if where is LEUART:  # a ninth data bit is not one of a serial line's
+        if layout is LEUART:  # a ninth data bit does not exist on a serial line
             parity, stops = word >> 2 & 3, 2 if word >> 4 & 1 else 1
             return LineFormat(1, 8, PARITIES[parity], stops)
         data = min(max((word & 15) + 3, 5), 8)
         return LineFormat(1, data, PARITIES[word >> 8 & 3], STOPS[word >> 12 & 3])
-
-    def _take(self, form: LineFormat) -> None:
-        if form != self._uart.form:
-            self._uart.form, self._uart.byte_ps = form, form.character_ps
 
     def _receive(self, byte: int, flags: int) -> None:
         machine, unit = self.processor.machine, BY_PIN | self.rx
@@ -109,12 +99,11 @@ class Core:
 
     @property
     def registers(self) -> Mapping[str, int]:
-        """Those that hold state, and how many bits they have."""
+        """Width of each register with state."""
         special = {"xpsr": 32, "primask": 1, "basepri": 8, "faultmask": 1, "control": 2}
         return {name: special.get(name, 32) for name in REGISTERS if name != "sp"}
 
     def flip(self, register: str, bit: int) -> None:
-        """Turn over a bit, now."""
         machine = self.processor.machine
         value = machine.register(register) ^ 1 << bit
         self.processor.give(lambda: machine.set_register(register, value))
@@ -122,19 +111,14 @@ class Core:
 
 @dataclass(eq=False)
 class SlaveWire:
-    """The machine's I2C slave as a target that knows its addresses by its own registers.
-
-    Attributes:
-        processor: whose firmware it is.
-        sda: port pin of the data line.
-    """
+    """The machine's I2C slave at port pin ``sda`` (data line), which matches addresses itself."""
 
     processor: FirmwareProcessor
     sda: int
-    _asked: bool = field(default=False, init=False)
+    _pending: bool = field(default=False, init=False)
 
     def i2c_address(self, address: int, read: bool) -> bool | None:
-        """A start; None until the firmware has decided."""
+        """Handle a start; None until the firmware has decided."""
         answer = self._ask(lambda machine: machine.i2c_slave_start(self._unit, address << 1 | read))
         return None if answer is None else bool(answer)
 
@@ -142,17 +126,15 @@ class SlaveWire:
         """Not called: see ``i2c_address``."""
 
     def i2c_write(self, byte: int) -> bool | None:
-        """A byte came."""
         answer = self._ask(lambda machine: machine.i2c_slave_write(self._unit, byte))
         return None if answer is None else bool(answer)
 
     def i2c_read(self) -> int | None:
-        """The next byte."""
         return self._ask(lambda machine: machine.i2c_slave_read(self._unit))
 
     def i2c_stop(self) -> None:
-        """The transfer ended; whoever stretched the clock is asked no longer."""
-        self._asked = False
+        """End the transfer, and a pending question."""
+        self._pending = False
         machine = self.processor.machine
         self.processor.give(lambda: machine.i2c_slave_stop(self._unit))
 
@@ -161,23 +143,18 @@ class SlaveWire:
         return BY_PIN | self.sda
 
     def _ask(self, first: Callable[[Machine], int | None]) -> int | None:
-        """The answer; the same question again is about the same byte."""
+        """The machine's answer; while it is None, further calls concern the same byte."""
         machine = self.processor.machine
         self.processor.catch_up()
-        answer = machine.i2c_slave_poll(self._unit) if self._asked else first(machine)
-        self._asked = answer is None
+        answer = machine.i2c_slave_poll(self._unit) if self._pending else first(machine)
+        self._pending = answer is None
         self.processor.wake()
         return answer
 
 
 @dataclass(eq=False)
 class CameraWire:
-    """A camera's control bus, whose master the machine is.
-
-    Attributes:
-        camera: the only one on it.
-        sda: port pin of the data line.
-    """
+    """A camera's control bus with the machine as master, whose data line is port pin ``sda``."""
 
     camera: StarSensor
     sda: int
@@ -185,8 +162,8 @@ class CameraWire:
     _written: bytearray | None = field(default=None, init=False)
     _read: bytes = field(default=b"", init=False)
 
-    def happened(self, machine: Machine, one: Outgoing) -> None:
-        """The master does something; on ``Kind.I2C_*`` of its pins."""
+    def handle(self, machine: Machine, one: Outgoing) -> None:
+        """Handle an output ``Kind.I2C_*`` of the machine, if it concerns these pins."""
         if one.unit >> 8 != self.sda:
             return
         unit = one.unit & 0xFF
@@ -204,7 +181,7 @@ class CameraWire:
                 self._finish(one.time_ps)
 
     def _start(self, address_byte: int, now_ps: int) -> bool:
-        """Whether the camera answers to its address."""
+        """Whether the camera acknowledges its address."""
         self._address, reads = address_byte >> 1, bool(address_byte & 1)
         if reads:
             self._read = b""
@@ -214,14 +191,14 @@ class CameraWire:
         return answers
 
     def _next(self, now_ps: int) -> int:
-        """The next byte of the camera; the pulled-up line where it is gone."""
+        """The camera's next byte; 0xFF, from the pull-up, if it does not answer."""
         if not self._read:
             self._read = self.camera.i2c_read(self._address, self.camera.word_bytes, now_ps) or b""
         byte, self._read = (self._read[0], self._read[1:]) if self._read else (0xFF, b"")
         return byte
 
     def _finish(self, now_ps: int) -> None:
-        """What was written takes effect at the end."""
+        """Write the collected bytes to the camera."""
         if self._written is not None:
             self.camera.i2c_write(self._address, bytes(self._written), now_ps)
             self._written = None

@@ -1,4 +1,4 @@
-"""What a board that runs firmware of the user's own can tell of it: profile, coverage, history."""
+"""Analysis of a user's own firmware on a board: profile, coverage, history."""
 
 from functools import cached_property
 
@@ -10,20 +10,14 @@ from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
 
 class Insight:
-    """Looks at a machine from the first use on; until then the machine runs at full speed.
-
-    Attributes:
-        machine: it.
-    """
+    """Observes a loaded machine from the first use on; until then it runs at full speed."""
 
     def __init__(self, machine: Machine) -> None:
-        """Look at ``machine``, which is loaded."""
         self.machine = machine
         self._observed = False
 
     @cached_property
     def symbols(self) -> Symbols:
-        """Names of the program."""
         return Symbols.of(self.machine.image)
 
     @cached_property
@@ -34,7 +28,7 @@ class Insight:
 
     @cached_property
     def history(self) -> History:
-        """Takes note of each function and exception; who wants it must take what it finds."""
+        """Records each function and exception; the caller must call ``take`` regularly."""
         interrupts = {
             number: name
             for layout in LAYOUTS
@@ -44,6 +38,6 @@ class Insight:
         return History(self.observer, interrupts)
 
     def close(self) -> None:
-        """Look no longer; what was counted stays."""
+        """Stop observing; the results remain."""
         if self._observed:
             self.observer.close()

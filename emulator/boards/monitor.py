@@ -1,4 +1,4 @@
-"""What ``monitor`` commands of a debugger tell of a board, and do to it."""
+"""A debugger's ``monitor`` commands that concern the board."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -18,46 +18,41 @@ camera            registers of the camera
 power             supply currents
 pins              FPGA pins from and to the processor
 regs [WHAT]       a peripheral, UNIT.REGISTER, a variable or an address
-faults            what can be injected
+faults            kinds of faults and their targets
 faults inject KIND [TARGET] [PARAMETER=VALUE ...]
-faults log|clear  what faults have done; end them
+faults log|clear  effects of the faults; end all faults
 symbols WHAT      an address, or a name
 report            last fault of the firmware, registers, backtrace"""
 
 
 class Camera(Protocol):
-    """What the commands need of a camera."""
+    """A camera with registers."""
 
     @property
-    def registers(self) -> RegisterFile:
-        """Its registers."""
+    def registers(self) -> RegisterFile: ...
 
 
 class FirmwareBoard(Protocol):
-    """What the commands need of a board."""
+    """A board that runs a user's own firmware."""
 
     kernel: Kernel
     machine: Machine
     power: PowerModel
 
     @property
-    def engine(self) -> RtlEngine | None:
-        """Its FPGAs."""
+    def engine(self) -> RtlEngine | None: ...
 
     @property
-    def faults(self) -> Faults:
-        """Injects faults into it."""
+    def faults(self) -> Faults: ...
 
     @property
-    def camera(self) -> Camera:
-        """Its camera."""
+    def camera(self) -> Camera: ...
 
 
 class Monitor:
     """The commands on one board."""
 
     def __init__(self, board: FirmwareBoard, symbols: Symbols) -> None:
-        """Answer for ``board``, whose program has ``symbols``."""
         self._board = board
         self._symbols = symbols
         self._commands: Mapping[str, Callable[[list[str]], str]] = {
@@ -73,7 +68,7 @@ class Monitor:
         }
 
     def __call__(self, words: list[str]) -> str:
-        """What a command answers; ValueError for one that makes no sense."""
+        """Output of the command ``words``; ValueError for an invalid one."""
         command = self._commands.get(words[0])
         if command is None:
             known = ", ".join(["reset", "catch", *self._commands])
@@ -127,7 +122,7 @@ class Monitor:
                 given = dict(word.split("=", 1) for word in rest if "=" in word)
                 targets = [word for word in rest if "=" not in word]
                 if len(targets) > 1:
-                    raise ValueError(f"one target, not {' '.join(targets)}")
+                    raise ValueError(f"a fault has one target, not {' '.join(targets)}")
                 for_s = given.pop("for_s", None)
                 faults.inject(
                     kind,
@@ -154,7 +149,7 @@ class Monitor:
 
 
 def _value(text: str) -> Any:
-    """A number, true or false, or a word."""
+    """A number, a truth value, or the text itself."""
     for convert in (lambda word: int(word, 0), float):
         try:
             return convert(text)

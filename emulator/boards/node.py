@@ -1,15 +1,13 @@
-"""The board of a plain node: one microcontroller with a ``NodeProgram``, and an FPGA if need be."""
+"""The board of a plain node: a microcontroller with a ``NodeProgram``, optionally an FPGA."""
 
 from abc import abstractmethod
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar, Unpack
 
-from cubestack.emulator.boards.contract import Board
-from cubestack.emulator.bus.i2c import I2cBus
+from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import PowerTable
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
 from cubestack.firmware_model.node.program import POWER_ON, NodeProgram
@@ -19,14 +17,13 @@ SceneT = TypeVar("SceneT")
 
 
 class NodeBoard(Board, Generic[ProgramT, SceneT]):
-    """One emulated node; a sensor says what is particular to it.
+    """One emulated node; a sensor's subclass defines the class attributes.
 
     Attributes:
         interface: its messages.
-        supplies: what draws current: a part "processor" with the states "sleep" and "run" is among
-            it.
-        costs: of the processor's operations.
-        scene_type: class of the scenes that it sees.
+        supplies: must contain a part "processor" with the states "sleep" and "run".
+        costs: cycles of the processor's operations.
+        scene_type: class of its scenes.
         boot_us: time from reset to the first instruction of ``main``.
     """
 
@@ -41,21 +38,19 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         self,
         scene: SceneT,
         *,
-        seed: int = 0,
         engine: EngineKind = "auto",
         baud: int | None = None,
-        kernel: Kernel | None = None,
-        i2c_bus: I2cBus | None = None,
+        **common: Unpack[BoardOptions],
     ) -> None:
         """Power up.
 
         Args:
             scene: what it sees.
-            engine: see ``make_engine``; ValueError for any but "auto" without an FPGA.
-            baud: of the satellite's UART; None for the interface's.
-            seed, kernel, i2c_bus: see ``Board``.
+            engine: see ``make_engine``; without an FPGA, ValueError for any but "auto".
+            baud: rate of the satellite's UART; None for the interface's.
+            common: seed, kernel and i2c_bus, see ``Board``.
         """
-        super().__init__(self.supplies, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        super().__init__(self.supplies, **common)
         self.scene = scene
         wiring = self._wiring()
         if wiring is not None:
@@ -63,7 +58,7 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
             for memory in self.engine.memories.values():
                 self._scramble(memory)
         elif engine != "auto":
-            raise ValueError(f"{self.interface.name} has no FPGA: leave engine {engine!r} out")
+            raise ValueError(f"{self.interface.name} has no FPGA; omit engine {engine!r}")
         self._node_link(
             lambda: self.program.link, baud or self.interface.baud, self.interface.i2c_address
         )
@@ -86,20 +81,19 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
 
     @abstractmethod
     def _boot(self, meter: Meter) -> ProgramT:
-        """The program after a reset, which charges ``meter``."""
+        """The program after a reset, which charges its cycles to ``meter``."""
 
     def _wiring(self) -> Wiring | None:
-        """What is soldered to its FPGA; None without one."""
+        """Wiring of its FPGA; None without one."""
         return None
 
     @property
     def scene(self) -> SceneT:
-        """What it sees; see ``Board``."""
         return self._scene
 
     @scene.setter
     def scene(self, scene: object) -> None:
         if not isinstance(scene, self.scene_type):
             known = self.scene_type.__name__
-            raise TypeError(f"{self.interface.name} sees a {known}, not {scene!r}")
+            raise TypeError(f"a scene of {self.interface.name} is a {known}, not {scene!r}")
         self._scene: SceneT = scene

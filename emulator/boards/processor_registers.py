@@ -1,4 +1,4 @@
-"""Registers of a running part by the names of its tables, as a debugger sees them."""
+"""Reads registers of a running part by their names, for a debugger."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,8 @@ from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout
 WORD = 4
 
 
-class Peeked(NamedTuple):
-    """A word that was looked at; ``value`` is None where nothing can be read."""
+class RegisterValue(NamedTuple):
+    """A word of memory and its fields; ``value`` is None if it can not be read."""
 
     name: str
     value: int | None
@@ -19,7 +19,7 @@ class Peeked(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Value and the fields that are not 0."""
+        """The value, and the fields that are not 0."""
         if self.value is None:
             return "can not be read"
         shown = (f"{name}={value:#x}" for name, value in self.fields.items() if value)
@@ -27,18 +27,17 @@ class Peeked(NamedTuple):
 
 
 def peripherals() -> list[str]:
-    """Their names."""
     return [instance.name for layout in LAYOUTS for instance in layout.instances]
 
 
-def peek(machine: Machine, symbols: Symbols, what: str) -> list[Peeked]:
-    """A peripheral, a register (``CMU.CTRL``), a variable's words or an address, by name.
+def peek(machine: Machine, symbols: Symbols, what: str) -> list[RegisterValue]:
+    """The words of a peripheral, a register (``CMU.CTRL``), a variable or an address.
 
-    ValueError for anything else.
+    Raises ValueError for anything else.
     """
     unit, _, name = what.upper().partition(".")
     if unit in peripherals():
-        return _registers(machine, *_find(unit), name)
+        return _registers(machine, *find_instance(unit), name)
     variable = symbols.variables.get(what)
     if variable is not None:
         words = range(variable.address & -WORD, variable.address + variable.size, WORD)
@@ -51,7 +50,7 @@ def peek(machine: Machine, symbols: Symbols, what: str) -> list[Peeked]:
     return [_word(machine, address & 0xFFFF_FFFC, "")]
 
 
-def _find(unit: str) -> tuple[Layout, Instance]:
+def find_instance(unit: str) -> tuple[Layout, Instance]:
     return next(
         (layout, instance)
         for layout in LAYOUTS
@@ -60,12 +59,14 @@ def _find(unit: str) -> tuple[Layout, Instance]:
     )
 
 
-def _registers(machine: Machine, layout: Layout, instance: Instance, name: str) -> list[Peeked]:
+def _registers(
+    machine: Machine, layout: Layout, instance: Instance, name: str
+) -> list[RegisterValue]:
     found = [one for one in layout.registers if name in ("", one.name)]
     if not found:
         known = ", ".join(one.name for one in layout.registers)
         raise ValueError(f"{instance.name} has no register {name}; known: {known}")
-    peeked = []
+    values = []
     for register in found:
         value = _value(machine, instance.base + register.offset)
         fields = {
@@ -73,12 +74,12 @@ def _registers(machine: Machine, layout: Layout, instance: Instance, name: str) 
             for bits in register.fields
             if bits.name and value is not None
         }
-        peeked.append(Peeked(f"{instance.name}.{register.name}", value, fields))
-    return peeked
+        values.append(RegisterValue(f"{instance.name}.{register.name}", value, fields))
+    return values
 
 
-def _word(machine: Machine, address: int, name: str) -> Peeked:
-    return Peeked(f"{name} {address:08x}".lstrip(), _value(machine, address), {})
+def _word(machine: Machine, address: int, name: str) -> RegisterValue:
+    return RegisterValue(f"{name} {address:08x}".lstrip(), _value(machine, address), {})
 
 
 def _value(machine: Machine, address: int) -> int | None:

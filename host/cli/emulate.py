@@ -202,7 +202,7 @@ def _close(opened: list[AnyEmulated]) -> None:
 
 def _listen(emulated: AnyEmulated) -> None:
     """Tell what it has to say, and what its faults do."""
-    emulated.board.tell(say)
+    emulated.board.connect_console(say)
     emulated.faults.on_event = lambda event: say(str(event))
 
 

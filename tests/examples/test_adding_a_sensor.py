@@ -64,11 +64,11 @@ def test_shell(cubestack: Command) -> None:
 
 
 def test_what_it_can_not_have_is_told() -> None:
-    with pytest.raises(ValueError, match="Glow has no FPGA: leave engine 'python' out"):
+    with pytest.raises(ValueError, match="Glow has no FPGA; omit engine 'python'"):
         library.open_device("glow", engine="python")
     with (
         library.open_device("glow") as opened,
-        pytest.raises(TypeError, match="Glow sees a LightScene, not 3"),
+        pytest.raises(TypeError, match="a scene of Glow is a LightScene, not 3"),
     ):
         opened.scene = 3
 

@@ -46,7 +46,7 @@ def board(star: AnyEmulated) -> CubeStarFirmwareBoard:
 
 def test_serial_line_and_trace_channel(star: AnyEmulated) -> None:
     lines: list[str] = []
-    star.board.tell(lines.append)
+    star.board.connect_console(lines.append)
     port = star.serial(timeout=0.05)
     assert port.read(64) == b"boot 1\n"
     assert answer(star, b"h") == b"hello\n"
@@ -58,7 +58,7 @@ def test_semihosting_prints_where_it_is_wanted(elf: Path) -> None:
     for on in (True, False):
         with open_device("cubestar", firmware=str(elf), semihosting=on) as star:
             lines: list[str] = []
-            star.board.tell(lines.append)
+            star.board.connect_console(lines.append)
             star.wait(0.02)
             assert answer(star, b"s") == (b"said\n" if on else b"")
             assert ("by the debugger" in lines) == on

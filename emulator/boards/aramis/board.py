@@ -1,22 +1,21 @@
-"""AraMiS' star tracker: which pin goes where.
+"""AraMiS' star tracker board.
 
-AraMiS thesis, sections 2.3 to 2.5 and figures 2.2 and 2.12: the camera unit's pixel lines go
-straight into the Blackfin's parallel peripheral interface, its registers hang on a two-wire bus;
-flash and SDRAM; the satellite's UART and I2C. There is no FPGA.
+AraMiS thesis, sections 2.3 to 2.5 and figures 2.2 and 2.12: the camera's pixel lines lead directly
+to the Blackfin's parallel peripheral interface, its registers to a two-wire bus; flash and SDRAM;
+the satellite's UART and I2C. There is no FPGA.
 """
 
 from collections import deque
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.boards.aramis.power import ARAMIS_POWER
 from cubestack.emulator.boards.aramis.ppi import Ppi
-from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.boards.peripherals import I2cCameraBus, NodePeripherals
-from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mt9m001.noise import NoiseTerms
@@ -26,7 +25,6 @@ from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.catalogue.flash_store import flash_image
 from cubestack.firmware_model.aramis.hardware import FrameEnd
@@ -44,18 +42,17 @@ BOOT_US = 50_000
 """Reset to main: the boot code copies the program from flash to memory (assumed)."""
 
 CAMERA_BUS_HZ = 100_000
-"""Standard mode; the part has no such interface, its program moves two pins (assumed rate)."""
+"""Standard mode (assumed); the part has no I2C unit, so its program drives two pins."""
 
 REMEMBERED = 8
-"""Frames whose exposure is kept."""
+"""Number of frames whose exposure is stored."""
 
 
 class AramisBoard(Board):
     """One emulated star tracker.
 
     Attributes:
-        camera: image sensor, which looks at the scene.
-        ppi: interface between the two.
+        ppi: interface between camera and processor.
         sdram: external memory, shape (bytes,), uint8.
         catalogue_flash: flash of the coded catalogue, shape (bytes,), uint8.
     """
@@ -68,36 +65,34 @@ class AramisBoard(Board):
         scene: Scene | SkyView,
         catalogue: Database | None,
         *,
-        seed: int = 0,
         engine: EngineKind = "auto",
         baud: int = INTERFACE.baud,
-        kernel: Kernel | None = None,
-        i2c_bus: I2cBus | None = None,
         noise: NoiseTerms | None = None,
         i2c_address: int = INTERFACE.i2c_address,
         switches: AramisSwitches = DEFAULT_SWITCHES,
+        **common: Unpack[BoardOptions],
     ) -> None:
         """Power up.
 
         Args:
             scene: what the camera sees.
-            catalogue: stars and triangles in flash; None leaves it erased.
-            seed, kernel, i2c_bus: see ``Board``.
-            engine: there is no FPGA: ValueError for anything but "auto".
-            baud: of the satellite's UART.
-            noise: which terms of noise the sensor has, all unless given.
+            catalogue: stars and triangles in flash; None leaves the flash erased.
+            engine: there is no FPGA, so ValueError for anything but "auto".
+            baud: rate of the satellite's UART.
+            noise: terms of the sensor's noise; default all.
             i2c_address: 7-bit address on the satellite's bus.
-            switches: of the program.
+            switches: variants of the program.
+            common: seed, kernel and i2c_bus, see ``Board``.
         """
         if engine != "auto":
             raise ValueError(f"AraMiS has no FPGA: its engine must be 'auto', not {engine!r}")
-        super().__init__(ARAMIS_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        super().__init__(ARAMIS_POWER, **common)
         self.sdram = self._rng.integers(1 << 32, size=SDRAM_BYTES // 4, dtype="<u4").view(np.uint8)
         self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
         if catalogue is not None:
             coded = flash_image(catalogue.pack())
             self.catalogue_flash[: len(coded)] = coded
-        self.camera = Mt9m001(scene, seed=seed, noise=noise)
+        self.camera = Mt9m001(scene, seed=self.seed, noise=noise)
         self.ppi = Ppi(self.kernel, self.camera)
         self.ppi.on_end, self.camera.on_change = self._frame_ended, self._camera_changed
         self._node_link(lambda: self.program.link, baud, i2c_address)
@@ -128,7 +123,6 @@ class AramisBoard(Board):
 
     @property
     def scene(self) -> Scene:
-        """What the camera sees; see ``Board``."""
         return self.camera.scene
 
     @scene.setter
@@ -136,11 +130,9 @@ class AramisBoard(Board):
         self.camera.scene = scene
 
     def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
         return super().busy() or self.ppi.busy
 
     def probes(self) -> dict[str, int | str]:
-        """What a trace shows: state and latest outcome beside what all boards show."""
         state = self.program.state
         return super().probes() | {
             "task": SensorState(state.sensor).name,
@@ -148,13 +140,10 @@ class AramisBoard(Board):
         }
 
     def truth(self, frame: int | None = None) -> NDArray[np.float64] | None:
-        """Attitude (4,) at the mid-exposure of the middle row of a stored frame.
+        """Attitude (4,) at mid-exposure of the middle row of a stored frame.
 
-        For whoever compares results; None when that frame is not known (any longer) or the scene
-        has no attitude.
-
-        Args:
-            frame: its number since the program started; None: the one stored last.
+        ``frame`` is its number since the program's start; None: the latest one. Returns None if
+        that frame's exposure is not stored (any more), or the scene has no attitude.
         """
         age = 0 if frame is None else self._frame - frame
         if not 0 <= age < len(self._frames):
@@ -162,28 +151,25 @@ class AramisBoard(Board):
         return self.scene.truth(self._frames[-1 - age].mid_exposure_ps((ROWS - 1) / 2))
 
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
-        """See ``Board``."""
         return {
             f"picture {place}": self.sdram[at : at + IMAGE_BYTES].reshape(ROWS, COLUMNS)
             for place, at in enumerate(PICTURES_AT)
         }
 
     def truths(self) -> dict[str, NDArray[np.float64]]:
-        """See ``Board``."""
         truth = self.truth()
         return {} if truth is None else {"attitude": truth}
 
     def irradiate(self, memory: Literal["flash", "sdram"], rate: float) -> int:
-        """Turn over each bit of the catalogue's flash or of the SDRAM with probability ``rate``.
+        """Invert each bit of the catalogue's flash or of the SDRAM with probability ``rate``.
 
-        Returns how many; ValueError for a rate that is no probability.
+        Returns their number; ValueError for a rate outside 0..1.
         """
         target = self.catalogue_flash if memory == "flash" else self.sdram
         return flip_bits(target, rate, self._rng)
 
     def sites(self) -> Sites:
-        """Where faults can hit."""
-        # Its camera and processor have no faults of their own.
+        # Its camera and processor have no specific faults.
         memories = {"sdram": self.sdram, "flash": self.catalogue_flash}
         return replace(super().sites(), memories=memories)
 
@@ -202,7 +188,7 @@ class AramisBoard(Board):
 
 
 class _Blackfin(NodePeripherals):
-    """The processor's peripherals, as its program sees them."""
+    """The processor's peripherals, as its program uses them."""
 
     def __init__(self, board: AramisBoard) -> None:
         super().__init__(board)

@@ -1,15 +1,15 @@
-"""The ground tool that compiles AraMiS' star and triangle database from the sky.
+"""Compiles AraMiS' star and triangle database from the sky.
 
 AraMiS thesis, sections 4.5.2 (star selection), 5.5 (triangles), 5.6 (k-vectors), 5.9 (faces) and
 7.1. The sky is scanned in steps of right ascension and declination; each field keeps its brightest
 stars, and every triangle whose sides are all shorter than the field is listed.
 
-The thesis counts 1312 stars and 265 292 triangles in the Bright Star Catalogue at epoch 2000; those
-from Hipparcos are 1324 and 267 128. Magnitudes are enough to explain that: each field's sixth star
-hangs on them, and magnitudes shifted at random by 0.05 give 1316 to 1330 stars and 262 560 to
-273 131 triangles in five trials. Double stars closer than 30 arcsec taken as one would give 1325
-and 268 137. The stars' numbers are Hipparcos' too: the package that carries the catalogue has no
-cross-identification with the Harvard Revised numbers that the thesis reports.
+The thesis counts 1312 stars and 265 292 triangles in the Bright Star Catalogue at epoch 2000; from
+Hipparcos they are 1324 and 267 128. The magnitudes explain the difference, as they determine the
+sixth star of each field: random shifts of 0.05 result in 1316 to 1330 stars and 262 560 to 273 131
+triangles in five trials. Double stars closer than 30 arcsec counted as one would result in 1325 and
+268 137. Star numbers are also those of Hipparcos: the package with the catalogue has no
+cross-identification with the Harvard Revised numbers of the thesis.
 """
 
 import hashlib
@@ -33,13 +33,13 @@ from cubestack.firmware_model.aramis.field import FOV_DEG
 from cubestack.firmware_model.values import DeclaredValues, number, whole
 
 Progress = Callable[[Iterable[int], int, str], Iterable[int]]
-"""Passes items through and shows how many of a total are done, under a label."""
+"""Passes items through, and reports the progress: number done of a total, and a label."""
 
 PUBLISHED = {"stars": 1312, "triangles": 265_292}
-"""Sections 4.5.2 and 5.5; shown beside ours, which are not fitted to them."""
+"""Sections 4.5.2 and 5.5; for comparison, ours are not fitted to them."""
 
 MOST_TRIANGLES = 1_400_000
-"""More, at 22 bytes each, would not fit the 32 MB of RAM of the thesis' appendix A."""
+"""Limit for the 32 MB of RAM of the thesis' appendix A, at 22 bytes each."""
 
 MOST_STARS = 6000
 
@@ -50,7 +50,7 @@ ADVICE = "change fov_deg, stars_per_field, longest_side_deg or mag_limit"
 
 @dataclass(frozen=True)
 class CatalogueParameters(DeclaredValues):
-    """What a database is made for; the defaults are the published ones."""
+    """Parameters of a database; the defaults are the published ones."""
 
     fov_deg: float = number(FOV_DEG, "diameter of the round field of view", 1, 60)
     stars_per_field: int = whole(6, "brightest stars that each field keeps", 3, 50)
@@ -97,11 +97,7 @@ def select_stars(
 def build_database(
     parameters: CatalogueParameters | None = None, progress: Progress = _silent
 ) -> Database:
-    """Compile the database.
-
-    Raises:
-        ValueError: when the parameters leave no triangle, or more than fit.
-    """
+    """Compile the database; ValueError if the parameters result in no triangle, or too many."""
     parameters = parameters or CatalogueParameters()
     sky = load_sky(parameters.epoch)
     chosen = np.sort(select_stars(sky, parameters, progress))
@@ -113,7 +109,7 @@ def build_database(
     order = np.argsort(areas, kind="stable")
     order = order[areas[order] > 0]
     if len(order) == 0:
-        raise ValueError(f"{len(chosen)} stars give no triangle; {ADVICE}")
+        raise ValueError(f"{len(chosen)} stars form no triangle; {ADVICE}")
     triples, areas, moments = triples[order], areas[order], moments[order]
     by_moment = np.argsort(moments, kind="stable")
     sphere = geodesic_sphere()
@@ -135,14 +131,14 @@ def build_database(
 
 
 def onboard_database(field_deg: float = FOV_DEG, progress: Progress = _silent) -> Database:
-    """The onboard catalogue for a lens of this field of view in degrees; the last two are kept."""
+    """The onboard catalogue for a lens with this field of view; the latest two are cached."""
     usual = abs(field_deg - FOV_DEG) < SAME_FIELD_DEG
     parameters = CatalogueParameters(fov_deg=FOV_DEG if usual else field_deg)
     if parameters not in _kept:
-        made = cached_database(parameters, progress)
+        built = cached_database(parameters, progress)
         while len(_kept) > 1:
             del _kept[next(iter(_kept))]
-        _kept[parameters] = made
+        _kept[parameters] = built
     return _kept[parameters]
 
 
@@ -151,10 +147,10 @@ def cached_database(
     progress: Progress = _silent,
     folder: Path | None = None,
 ) -> Database:
-    """The database from the user's cache folder, or built now and put there.
+    """The database from the user's cache folder, or built now and stored there.
 
     ``folder`` replaces :func:`cubestack.emulator.native.cache.cache_folder`. A damaged file is
-    built anew; a folder that can not be written to costs the time of building, nothing else.
+    replaced; without write access to the folder, the database is built each time.
     """
     parameters = parameters or CatalogueParameters()
     folder = cache_folder() if folder is None else folder
@@ -172,7 +168,7 @@ def cached_database(
 
 
 def _key(parameters: CatalogueParameters) -> str:
-    """Hash of everything that the database depends on, this code included."""
+    """Hash of everything that the database depends on, including this code."""
     digest = hashlib.sha256(repr(sorted(asdict(parameters).items())).encode())
     digest.update(CATALOGUE_SHA256.encode())
     for source in (__file__, database.__file__, geodesic.__file__, kvector.__file__):
@@ -181,7 +177,7 @@ def _key(parameters: CatalogueParameters) -> str:
 
 
 def _fields(declination: float, step_deg: float) -> NDArray[np.float64]:
-    """Middles (k, 3) of the fields of one declination in rad."""
+    """Centres (k, 3) of the fields at one declination in rad."""
     ascension, across = np.radians(np.arange(0.0, 360.0, step_deg)), np.cos(declination)
     up = np.full_like(ascension, np.sin(declination))
     return np.stack([across * np.cos(ascension), across * np.sin(ascension), up], axis=1)
@@ -190,7 +186,7 @@ def _fields(declination: float, step_deg: float) -> NDArray[np.float64]:
 def _triples(
     vectors: NDArray[np.float64], limit_rad: float, progress: Progress
 ) -> NDArray[np.intp]:
-    """Index triples (m, 3), rising, of stars that are pairwise closer than the limit."""
+    """Index triples (m, 3), ascending, of stars that are pairwise closer than the limit."""
     near = vectors @ vectors.T > np.cos(limit_rad)
     parts, count = [np.zeros((0, 3), dtype=np.intp)], 0
     for first in progress(range(len(vectors)), len(vectors), "listing triangles"):
@@ -215,7 +211,7 @@ def _properties(corners: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDAr
 
 
 def _faces(corners: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.uint16]:
-    """Face (m,) whose centre is nearest to each triangle's middle."""
+    """Face (m,) whose centre is closest to each triangle's centre."""
     middles = corners.sum(axis=1)
     parts: list[NDArray[Any]] = [
         np.argmax(middles[start : start + 20_000] @ centres.T, axis=1)

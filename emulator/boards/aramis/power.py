@@ -1,9 +1,9 @@
-"""What the parts of AraMiS' star tracker draw, by state, and behind which load switch they are."""
+"""Supply currents and load switches of AraMiS' star tracker."""
 
 from cubestack.emulator.sim.power import Part, PowerTable
 
-#: MT9M001 data sheet: 363 mW working, 294 uW in standby, at 3.3 V. The others are assumed; the
-#: thesis sums its parts in a figure only (2.16).
+#: MT9M001 data sheet: 363 mW working, 294 uW in standby, at 3.3 V. Other parts are assumed: the
+#: thesis has only a figure with their sum (2.16).
 ARAMIS_POWER = PowerTable(
     volts=3.3,
     parts={

@@ -2,12 +2,12 @@
 
 ADSP-BF533 Hardware Reference, chapter "Parallel Peripheral Interface" (general-purpose input with
 two external syncs), AraMiS thesis, section 2.5.2: FRAME_VALID and LINE_VALID are the frame and line
-syncs, PIXCLK is the clock, and no other part stands in between.
+syncs, PIXCLK is the clock; camera and interface are connected directly.
 
-Started, it waits for FRAME_VALID to rise and then takes lines. A line with more or fewer clocks
-than programmed is an error that is only reported, with what there was of it in memory. When
-FRAME_VALID falls before all lines came, the frame is given up. The memory is written when the frame
-ends: nobody looks at it before.
+After its start, it waits for a rising FRAME_VALID and then reads lines. A line with more or fewer
+clocks than programmed is stored as received, and reported as an error. If FRAME_VALID falls before
+the last line, the frame is aborted. The memory is written at the end of the frame, as nothing reads
+it before.
 """
 
 from collections.abc import Callable, Generator
@@ -27,12 +27,12 @@ class Ppi:
     """The interface and its DMA channel.
 
     Attributes:
-        on_end: interrupt: a frame came to its end.
-        stored: exposure of the frame that was stored last; for whoever compares results.
+        on_end: interrupt: a frame ended.
+        stored: exposure of the latest stored frame; for tests and reports.
     """
 
     def __init__(self, env: Kernel, camera: Mt9m001) -> None:
-        """Connect to ``camera``'s lines; nothing is taken before ``start``."""
+        """Connect to ``camera``; nothing is stored before ``start``."""
         self._env = env
         self._camera = camera
         camera.on_change = self.lines_changed
@@ -43,26 +43,26 @@ class Ppi:
 
     @property
     def busy(self) -> bool:
-        """Whether it waits for a frame or takes one."""
+        """Whether it waits for a frame or reads one."""
         return self._run % 2 == 1
 
     def start(self, target: NDArray[np.uint8]) -> None:
-        """Take the next whole frame into ``target``, shape (rows, columns); gives up another."""
+        """Store the next whole frame in ``target`` (rows, columns); aborts the current one."""
         self.stop()
         self._run += 1
-        self._env.process(self._take(self._run, target))
+        self._env.process(self._read_frame(self._run, target))
 
     def stop(self) -> None:
-        """Give up the frame that is waited for or taken; no interrupt comes."""
+        """Abort the current frame, without an interrupt."""
         self._run += self._run % 2
         self.lines_changed()
 
     def lines_changed(self) -> None:
-        """The camera's output from now on is another than it announced."""
+        """Call when the camera's output changes before the end of the announced segment."""
         changed, self._changed = self._changed, self._env.event()
         changed.succeed()
 
-    def _take(self, run: int, target: NDArray[np.uint8]) -> Generator[simpy.Event, Any, None]:
+    def _read_frame(self, run: int, target: NDArray[np.uint8]) -> Generator[simpy.Event, Any, None]:
         rows, columns = target.shape
         pieces: list[NDArray[np.uint8]] = []
         taken, wrong_lines, shutter = 0, False, None
@@ -87,9 +87,9 @@ class Ppi:
             end_ps = int(segment.start_ps + clocks * self._camera.period)
             if (yield from self._until(end_ps)) and lines:
                 assert segment.pixels is not None
-                picture = segment.pixels()[:lines]
-                wrong_lines |= picture.shape[1] != columns
-                pieces.append(picture)
+                piece = segment.pixels()[:lines]
+                wrong_lines |= piece.shape[1] != columns
+                pieces.append(piece)
                 taken += lines
             if taken == rows and run == self._run:
                 _store(pieces, target)
@@ -98,7 +98,7 @@ class Ppi:
                 return
 
     def _until(self, end_ps: int) -> Generator[simpy.Event, Any, bool]:
-        """Wait for the end of a segment; False when the lines changed before."""
+        """Wait for the end of a segment; False if the lines changed before."""
         changed = self._changed
         timeout = self._env.timeout(max(0, end_ps - self._env.now))
         yield simpy.AnyOf(self._env, [timeout, changed])

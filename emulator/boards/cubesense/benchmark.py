@@ -1,4 +1,4 @@
-"""How fast the compiled engine is with CubeSense's two FPGAs."""
+"""Measures the compiled engine with CubeSense's two FPGAs."""
 
 import time
 from fractions import Fraction
@@ -18,7 +18,7 @@ from cubestack.firmware_model.interface.cubesense.pins import ACKNOWLEDGE, CONTR
 
 _SUN, _NADIR = ACKNOWLEDGE.values()
 
-#: Ways to store: levels of SHIFT, EDGE, RNW, SUNEN and NADEN, and the acknowledges.
+#: Commands to store: levels of SHIFT, EDGE, RNW, SUNEN and NADEN, and the acknowledges.
 STORES = {
     "own": ((0, 0, 0, 0, 1), (_SUN,)),
     "linked": ((1, 0, 0, 0, 0), (_NADIR,)),
@@ -29,11 +29,11 @@ _PERIOD = Fraction(PS_PER_S, ov7620.PIXEL_CLOCK_HZ)
 
 
 def pair_store_ms(engine: RtlEngine, way: str, rounds: int = ROUNDS) -> float:
-    """Wall time in which the ``engine`` of ``pair_with_cameras`` stores a frame in a way."""
+    """Shortest wall time in ms to store a frame by command ``way`` of ``STORES``."""
     levels, acknowledges = STORES[way]
     best = float("inf")
     for _ in range(rounds):
-        # From standby in the middle of the gap between two frames.
+        # Start from standby, in the gap between two frames.
         _command(engine, 0, 0, 0, 1, 1)
         frame_ps = CLOCKS_PER_LINE * LINES_PER_FRAME * _PERIOD
         engine.run(int((engine.now_ps // frame_ps + 1) * frame_ps))
@@ -46,7 +46,7 @@ def pair_store_ms(engine: RtlEngine, way: str, rounds: int = ROUNDS) -> float:
 
 
 def pair_scan_ms(engine: RtlEngine, rounds: int = ROUNDS) -> float:
-    """Wall time of a nadir scan from the nadir's memory."""
+    """Wall time in ms of a nadir scan from the nadir camera's memory."""
     out = np.empty(FULL_SIZE.scan_clocks, np.uint8)
     best = float("inf")
     for _ in range(rounds):
@@ -61,7 +61,7 @@ def pair_scan_ms(engine: RtlEngine, rounds: int = ROUNDS) -> float:
 
 
 def pair_with_cameras() -> RtlEngine:
-    """Both FPGAs with cameras that send the same frames for ever."""
+    """An engine with both FPGAs, and cameras that repeat one frame."""
     engine = make_engine(cubesense_wiring(), "compiled")
     rng = np.random.default_rng(0)
     blank = CLOCKS_PER_LINE * (LINES_PER_FRAME - FULL_SIZE.rows)

@@ -1,21 +1,22 @@
-"""CubeSense's board: which pin goes where.
+"""CubeSense's board.
 
 CubeSense thesis, figure 3.9 and tables 3.3 and 3.4: two halves of camera, FPGA and SRAM, one
-microcontroller for both, its buses to the satellite, and its switches and current monitors.
+microcontroller for both, its buses to the satellite, its switches and current monitors.
 """
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.boards.cubesense.gpio import GpioPins
 from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
 from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
-from cubestack.emulator.bus.i2c import Forwarder, I2cBus
+from cubestack.emulator.bus.i2c import Forwarder
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, drawn_lens
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
@@ -26,7 +27,7 @@ from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import PS_PER_US, Kernel
+from cubestack.emulator.sim.virtual_time import PS_PER_US
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.interface.cubesense.codes import COLUMNS, ROWS, Camera, Sram
@@ -43,13 +44,13 @@ from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
 from cubestack.hdl.cubesense.pair import CubeSensePair
 
 BOOT_US = 1_000
-"""Oscillator start-up and the C library's own start: assumed."""
+"""Start-up of the oscillator and of the C library: assumed."""
 
 HALVES = {Camera.SUN: "sun", Camera.NADIR: "nadir"}
-"""Name of each half's camera and memory in the engine, and of its parts in the power table."""
+"""Names of each half's camera and memory in the engine, and prefix in the power table."""
 
 ROW_BYTES = 1024
-"""Of a memory; a power of two, as addresses are row and column."""
+"""Bytes per row of a memory: a power of two, as an address is row and column."""
 
 STORING = (Action.STORE, Action.STORE_OTHER)
 CLOCKED = (*STORING, Action.SEND_PICTURE)
@@ -57,10 +58,7 @@ CLOCKED = (*STORING, Action.SEND_PICTURE)
 
 @lru_cache(maxsize=4)
 def wiring_of(gateware: str, *, mcu_addressing: bool = False) -> Wiring:
-    """The FPGAs with the gateware that a switch names.
-
-    Kept, as an engine knows its library by the design's text, a slow thing.
-    """
+    """The FPGAs with gateware ``gateware``; cached, as the hash of the design is slow."""
     return cubesense_wiring(CubeSensePair(READ_OUTS[gateware], mcu_addressing))
 
 
@@ -68,9 +66,8 @@ class CubeSenseBoard(Board):
     """One emulated CubeSense.
 
     Attributes:
-        cameras: both image sensors.
-        hardware: the processor's peripherals, as its program sees them.
-        bench_uart: device's end of the serial line with the bench protocol.
+        hardware: the processor's peripherals, as its program uses them.
+        bench_uart: the device's end of the serial line with the bench protocol.
     """
 
     engine: RtlEngine
@@ -80,40 +77,38 @@ class CubeSenseBoard(Board):
         self,
         scene: EarthSunScene | EarthSunView,
         *,
-        seed: int = 0,
         engine: EngineKind = "auto",
         baud: int | None = None,
-        kernel: Kernel | None = None,
-        i2c_bus: I2cBus | None = None,
         mcu_addressing: bool = False,
         uart: str = "node",
         bench_baud: int = SERVICE_PORT.baud,
         i2c_address: int = INTERFACE.i2c_address,
         register_address: int = REGISTERS.i2c_address,
         switches: CubeSenseSwitches = DEFAULT_SWITCHES,
+        **common: Unpack[BoardOptions],
     ) -> None:
         """Power up.
 
         Args:
             scene: what the cameras see.
-            seed, kernel, i2c_bus: see ``Board``.
             engine: see ``make_engine``.
-            baud, bench_baud: of the serial lines with the node and the bench protocol; None for
-                the published rate.
-            uart: protocol of the first of them: "node" or "registers".
-            mcu_addressing: FPGAs with the option that lets the processor choose addresses.
-            i2c_address, register_address: 7 bits, of the node and the register-pointer protocol.
-            switches: of the program, the FPGAs' gateware, and the lenses, which are those of unit
-                ``seed``.
+            baud, bench_baud: rates of the satellite's serial line and of the one with the bench
+                protocol; None for the published rate.
+            mcu_addressing: FPGAs with the option that the processor chooses addresses.
+            uart: protocol of the satellite's serial line, "node" or "registers".
+            i2c_address, register_address: 7-bit addresses of the node and the register protocol.
+            switches: variants of the program, the gateware and the lenses; the lens errors are
+                those of unit ``seed``.
+            common: seed, kernel and i2c_bus, see ``Board``.
         """
-        super().__init__(CUBESENSE_POWER, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        super().__init__(CUBESENSE_POWER, **common)
         self.engine = make_engine(
             wiring_of(switches.gateware, mcu_addressing=mcu_addressing), engine
         )
         drawn = switches.lens == "residuals"
         self.cameras = {
             Camera[target.name]: Ov7620(
-                scene, target, lens=drawn_lens(target, seed) if drawn else NOMINAL
+                scene, target, lens=drawn_lens(target, self.seed) if drawn else NOMINAL
             )
             for target in Target
         }
@@ -158,7 +153,6 @@ class CubeSenseBoard(Board):
 
     @property
     def scene(self) -> EarthSunScene:
-        """What the cameras see; see ``Board``."""
         return self.cameras[Camera.SUN].scene
 
     @scene.setter
@@ -167,7 +161,6 @@ class CubeSenseBoard(Board):
             camera.scene = scene
 
     def probes(self) -> dict[str, int | str]:
-        """What a trace shows: each camera's latest results beside what all boards show."""
         probes = super().probes()
         for camera, half in HALVES.items():
             result = self.program.state.results[camera]
@@ -176,7 +169,6 @@ class CubeSenseBoard(Board):
         return probes
 
     def sites(self) -> Sites:
-        """Where faults can hit."""
         return replace(
             super().sites(),
             controls=(pins.RNW, pins.EDGE, pins.SHIFT, *ENABLE),
@@ -187,17 +179,14 @@ class CubeSenseBoard(Board):
         )
 
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
-        """See ``Board``; a row has a place for 1024 pixels."""
+        """See ``Board``; a memory row has 1024 bytes."""
         return {
             f"memory {name}": memory.reshape(-1, ROW_BYTES)[:ROWS, :COLUMNS]
             for name, memory in self.engine.memories.items()
         }
 
     def truth(self, camera: Camera) -> SensorTruth | None:
-        """What ``camera`` should have measured at mid-exposure of the stored frame's middle row.
-
-        For whoever compares results; None when nothing was stored.
-        """
+        """True values for ``camera`` at mid-exposure of the stored frame's middle row, or None."""
         shutter = self.stored_frame(camera)
         if shutter is None:
             return None
@@ -205,7 +194,6 @@ class CubeSenseBoard(Board):
         return self.scene.truth(Target[camera.name], middle_ps, FIELD_DEG)
 
     def truths(self) -> dict[str, NDArray[np.float64]]:
-        """See ``Board``; of what a camera sees."""
         found = {camera.name.lower(): self.truth(camera) for camera in self.cameras}
         return {
             name: np.array([truth.alpha_deg, truth.beta_deg])
@@ -214,7 +202,7 @@ class CubeSenseBoard(Board):
         }
 
     def stored_frame(self, camera: Camera) -> RollingShutter | None:
-        """Exposure of the frame of ``camera`` that was stored last; None before."""
+        """Exposure of the frame of ``camera`` that was stored last; None before the first."""
         return self._stored.get(camera)
 
     def _connect(self, camera: Camera) -> None:
@@ -223,11 +211,11 @@ class CubeSenseBoard(Board):
         self.engine.attach(sensor, half)
 
     def _advance_engine(self) -> None:
-        """Bring the engine up to now; it may have run ahead, see emulator/sim/processor.py."""
+        """Run the engine to the present; it may be ahead, see emulator/sim/processor.py."""
         self.engine.run(max(self.kernel.now, self.engine.now_ps))
 
     def _release_pins(self) -> None:
-        """The processor is reset: its pins float to where resistors pull them."""
+        """Set all pins to their level in reset, which resistors define."""
         self._advance_engine()
         for pin in (*ENABLE, *pins.COMMON_PINS):
             self.engine.set_pin(pin, pin.level)
@@ -243,7 +231,7 @@ class CubeSenseBoard(Board):
             self._command()
 
     def _command(self) -> None:
-        """Follow what the control lines command: currents, and which frame is stored."""
+        """Update currents and stored frames after a change of the control lines."""
         commanded = actions(*(self.engine.get_pin(pin) for pin in CONTROLS))
         before, self._commanded = self._commanded, dict(zip(Camera, commanded, strict=True))
         for camera, action in self._commanded.items():
@@ -251,17 +239,17 @@ class CubeSenseBoard(Board):
             self.power.set_state(f"{HALVES[camera]}_fpga", "imaging" if clocked else "idle")
             self.power.set_state(Sram(camera).name.lower(), memory)
         for camera in Camera:
-            was, stores = (_stores(commanded, camera) for commanded in (before, self._commanded))
-            if stores and not was:
+            stored, stores = (_stores(commanded, camera) for commanded in (before, self._commanded))
+            if stores and not stored:
                 self._storing_since_ps[camera] = self.kernel.now
-            elif was and not stores:
+            elif stored and not stores:
                 self._note_stored(camera)
 
     def _note_stored(self, camera: Camera) -> None:
         sensor = self.cameras[camera]
         if not sensor.running:
             return
-        # The FPGA stores the first frame whose gap it has seen from its start on.
+        # The FPGA stores the first frame that follows a complete gap.
         since_ps = self._storing_since_ps[camera] + round(FULL_SIZE.frame_gap * sensor.period)
         shutter = sensor.frame_from(since_ps)
         if self.kernel.now >= shutter.readout_ps + ROWS * shutter.line_ps:
@@ -279,6 +267,6 @@ class CubeSenseBoard(Board):
 
 
 def _stores(commanded: dict[Camera, Action], camera: Camera) -> bool:
-    """Whether ``camera``'s picture is being stored, in whichever memory."""
+    """Whether ``camera``'s image is being stored, in either memory."""
     other = Camera(1 - camera)
     return commanded[camera] is Action.STORE or commanded[other] is Action.STORE_OTHER

@@ -1,4 +1,4 @@
-"""CubeSense's pins of the microcontroller that do not lead to the FPGAs.
+"""CubeSense's microcontroller pins that do not lead to the FPGAs.
 
 CubeSense thesis, sections 3.2 and 6.4.1: each camera's two control lines, open drain with pull-up
 resistors, and the switches of memories and cameras.
@@ -13,7 +13,7 @@ from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cubesense import pins
 from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 
-#: Load switch of the power table behind each switching pin.
+#: Load switch in the power table, by the pin that controls it.
 CHANNELS = {
     **{pins.SRAM_POWER[sram]: sram.name for sram in Sram},
     **{pin: f"{camera.name.lower()}_camera" for camera, pin in pins.CAMERA_POWER.items()},
@@ -34,23 +34,20 @@ class GpioPins:
     _power: PowerModel
 
     def __post_init__(self) -> None:
-        """Start released: control lines high, all switches off."""
         self._driven: dict[str, int] = {}
         self.release()
 
     def __contains__(self, pin: object) -> bool:
-        """Whether ``pin`` is one of these."""
         return pin in _CONTROL or pin in CHANNELS
 
     def release(self) -> None:
-        """The processor was reset: resistors pull control lines up and switches off."""
+        """Set all pins to their level in reset: control lines pulled up, switches off."""
         for pin in CHANNELS:
             self.set_pin(pin, 0)
         for pin in _CONTROL:
             self.set_pin(pin, 1)
 
     def set_pin(self, pin: str, level: int) -> None:
-        """Drive a pin."""
         self._driven[pin] = level
         if pin in CHANNELS:
             self._power.switch(CHANNELS[pin], bool(level))

@@ -1,4 +1,4 @@
-"""What the parts of CubeSense's board draw, by state, and behind which load switch they are."""
+"""Supply currents and load switches of CubeSense's board."""
 
 from cubestack.emulator.sim.power import Part, PowerTable
 
@@ -6,10 +6,10 @@ _SRAM = {"standby": 4.6, "active": 7.6}  # fitted, as all below
 _CAMERA = {"on": 25.15}
 
 #: CubeSense thesis, table 7.1: the whole board's current at 5 V in eight states. Each figure is
-#: fitted to it, as the mean of what the two halves add: 4.4 and 4.8 mA a memory, 27.8 and 22.5 mA a
-#: camera, 7.4 and 7.2 mA a side that is imaging. How the last divides is assumed. Reading
-#: has a ninetieth of imaging's clock, so it counts as none. Currents are measured at 5 V, ahead of
-#: linear regulators, so each is also the part's own.
+#: fitted to it, as the mean over both halves: 4.4 and 4.8 mA per memory, 27.8 and 22.5 mA per
+#: camera, 7.4 and 7.2 mA per half that is imaging. The split of the last is assumed. Reading has a
+#: ninetieth of imaging's clock, so its current is neglected. Currents are measured at 5 V, ahead of
+#: linear regulators, so they equal the parts' own currents.
 CUBESENSE_POWER = PowerTable(
     volts=5.0,
     parts={

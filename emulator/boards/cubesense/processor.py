@@ -1,4 +1,4 @@
-"""CubeSense's microcontroller: its peripherals as its program sees them.
+"""Peripherals of CubeSense's microcontroller, as its program uses them.
 
 CubeSense thesis, table 3.3: two serial ports, the converter behind the current monitors, a timer.
 """
@@ -18,22 +18,19 @@ class Pic18f45k20(NodePeripherals):
     serial_number = "CSEMU1"
 
     def __init__(self, board: Board, *, mcu_addressing: bool) -> None:
-        """Be part of ``board``, whose serial lines are those of ``Port``."""
         super().__init__(board)
         self._reset_ps = 0
         self._uarts = dict(zip(Port, board.uarts.values(), strict=True))
         self.mcu_addressing = mcu_addressing
 
     def reset(self) -> None:
-        """The part starts anew, its timer from 0."""
+        """Reset the part: its timer restarts from 0."""
         self._reset_ps = self._board.kernel.now
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
-        """Queue ``data`` for ``port``."""
         self._uarts[port].send(data)
 
     def uart_backlog(self, port: Port = Port.NODE) -> int:
-        """Bytes that ``port`` still has to send."""
         return self._uarts[port].backlog
 
     def adc_counts(self, monitor: Monitor) -> int:

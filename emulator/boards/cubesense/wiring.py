@@ -1,4 +1,4 @@
-"""What is soldered to CubeSense's two FPGAs."""
+"""Wiring of CubeSense's two FPGAs."""
 
 from collections.abc import Collection
 from functools import cache
@@ -13,8 +13,8 @@ from cubestack.hdl.cubesense.pair import CubeSensePair
 def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool = False) -> Wiring:
     """Both FPGAs: cameras and memories "sun" and "nadir".
 
-    A pixel clock changes something while an FPGA stores with it that has not raised its ACK.
-    ``mcu_addressing`` is that of the full-size pair, which is taken when none is given.
+    A camera's pixel clock has an effect while an FPGA stores its image and has not raised ACK.
+    Without ``pair``, the full-size pair with ``mcu_addressing`` is used.
     """
     if pair is None:
         pair = CubeSensePair(mcu_addressing=mcu_addressing)
@@ -36,8 +36,8 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
         data=pins.DATA,
         acknowledges=acks,
         storing=storing,
-        # Two release the reset, one ends the store, one the line;
-        # then the pause between two frames is counted.
+        # Two clocks release the reset, one ends the store, one the line;
+        # then the gap between two frames is counted.
         settling_clocks=8 + pair.read_out.frame_gap,
         contention=pins.CONTENTION,
         burst_levels=tuple(
@@ -50,7 +50,7 @@ def cubesense_wiring(pair: CubeSensePair | None = None, *, mcu_addressing: bool 
 
 @cache
 def _clocks_used(*controls: int) -> tuple[str | None, str | None]:
-    """Camera whose clock stores into the sun's memory, and into the nadir's."""
+    """The cameras whose images are stored in the Sun's memory, and in the nadir's."""
     acts = actions(*controls)
     sun = {Action.STORE: "sun", Action.STORE_OTHER: "nadir"}.get(acts.sun)
     nadir = {Action.STORE: "nadir", Action.STORE_OTHER: "sun"}.get(acts.nadir)

@@ -1,1 +1,1 @@
-"""CubeStar's board."""
+"""CubeStar's boards."""

@@ -1,4 +1,4 @@
-"""How fast the compiled engine is with CubeStar's FPGA."""
+"""Measures the compiled engine with CubeStar's FPGA."""
 
 import time
 from fractions import Fraction
@@ -19,17 +19,17 @@ PERIOD = Fraction(PS_PER_S, CRYSTAL_HZ)
 
 
 def rtl_clocks_per_s(rounds: int = ROUNDS) -> float:
-    """Pixel clocks for each second of wall time while a full frame is stored, none skipped."""
+    """Pixel clocks per second of wall time while a full frame is stored, none skipped."""
     return max(stored_frame(skipping=False)[0] for _ in range(rounds))
 
 
 def strides_per_s(rounds: int = ROUNDS) -> float:
-    """The same with the design's strides, and without clocks that change nothing."""
+    """The same with the design's strides, skipping clocks that change nothing."""
     return max(stored_frame(skipping=True)[0] for _ in range(rounds))
 
 
 def strobes_per_s(rounds: int = ROUNDS) -> float:
-    """Data clock cycles for each second of wall time while that frame is read back."""
+    """Data clock cycles per second of wall time while that frame is read back."""
     _, engine = stored_frame(skipping=True)
     engine.set_pin(ENABLE, 0)
     engine.set_pin(RNW, 1)
@@ -46,7 +46,7 @@ def strobes_per_s(rounds: int = ROUNDS) -> float:
 
 
 def stored_frame(*, skipping: bool) -> tuple[float, RtlEngine]:
-    """Store a frame: pixel clocks for each second of wall time, and the engine after it."""
+    """Store a frame; returns pixel clocks per second of wall time, and the engine."""
     top = CubeStarTop()
     engine = make_engine(cubestar_wiring(top), "compiled", skipping=skipping)
     rng = np.random.default_rng(0)

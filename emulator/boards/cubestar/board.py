@@ -1,4 +1,4 @@
-"""CubeStar with this project's program: what the processor's peripherals lead to.
+"""CubeStar with this project's program.
 
 CubeStar thesis, section 5.2 and tables C.1 to C.4.
 """
@@ -6,16 +6,16 @@ CubeStar thesis, section 5.2 and tables C.1 to C.4.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Unpack
 
+from cubestack.emulator.boards.contract import BoardOptions
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
 from cubestack.emulator.boards.peripherals import I2cCameraBus, NodePeripherals
-from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.processor import Processor
-from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import WATCHDOG_US
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
@@ -36,7 +36,7 @@ CAMERA_BUS_HZ = 100_000
 """Standard mode; the sources give no rate."""
 
 EBI_READ_CYCLES = CORTEX_M3.operations["ebi_read"].cycles
-"""Of the processor, for a byte that an interrupt reads over its external bus."""
+"""Processor cycles per byte that an interrupt reads over the external bus."""
 
 
 class CubeStarBoard(CubeStarStack):
@@ -50,30 +50,26 @@ class CubeStarBoard(CubeStarStack):
         scene: Scene | SkyView,
         catalogue: StarCatalogue,
         *,
-        seed: int = 0,
         engine: EngineKind = "auto",
         baud: int = INTERFACE.baud,
-        kernel: Kernel | None = None,
-        i2c_bus: I2cBus | None = None,
         layout: Layout = Layout.COPIED,
         i2c_address: int = INTERFACE.i2c_address,
         switches: CubeStarSwitches = DEFAULT_SWITCHES,
+        **common: Unpack[BoardOptions],
     ) -> None:
         """Power up.
 
         Args:
             scene: what the camera sees.
             catalogue: star catalogue in the processor's flash.
-            seed, kernel, i2c_bus: see ``Board``.
             engine: see ``make_engine``.
-            baud: of the satellite's UART.
-            layout: memory layout, with the program that belongs to it.
+            baud: rate of the satellite's UART.
+            layout: memory layout, with the program for it.
             i2c_address: 7-bit address on the satellite's bus.
-            switches: of the program.
+            switches: variants of the program.
+            common: seed, kernel and i2c_bus, see ``Board``.
         """
-        super().__init__(
-            scene, seed=seed, engine=engine, kernel=kernel, i2c_bus=i2c_bus, layout=layout
-        )
+        super().__init__(scene, engine=engine, layout=layout, **common)
         self._node_link(lambda: self.program.link, baud, i2c_address)
         meter = Meter(CORTEX_M3)
 
@@ -94,7 +90,7 @@ class CubeStarBoard(CubeStarStack):
             on_pin=self._pin_changed,
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
             on_access=self._accessed,
-            on_forced_reset=self._reset_by_force,
+            on_forced_reset=self._release_pins,
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)
         self.power.on_switch = self._supply_switched
@@ -105,27 +101,24 @@ class CubeStarBoard(CubeStarStack):
         return self._hardware.flash
 
     def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
         return super().busy() or not self.processor.waiting
 
     def probes(self) -> dict[str, int | str]:
-        """What a trace shows: the main task's status beside what all boards show."""
         return super().probes() | {"task": TaskStatus(self.program.state.task_status).name}
 
     def sites(self) -> Sites:
-        """Where faults can hit."""
         return replace(super().sites(), resets=self._resets())
 
     def _resets(self) -> dict[str, Callable[[], None]]:
-        """What resets the processor against its program's will, the usual one first."""
+        """Resets that the program did not request, the most common one first."""
         hangs = {ResetCause.WATCHDOG: WATCHDOG_US}
         return {
             name: partial(self.processor.reset, cause, hangs.get(cause, 0))
             for name, cause in FORCED_RESETS.items()
         }
 
-    def _reset_by_force(self) -> None:
-        """Pins go low (pulled down: assumed); the retention registers are always up to date."""
+    def _release_pins(self) -> None:
+        """Pull the pins low (assumed) in a reset; the retention registers are up to date."""
         for pin in self.layout.controls:
             if self._pins[pin] and self.processor.fpga is not None:
                 self.processor.fpga.set_pin(pin, 0)
@@ -134,8 +127,6 @@ class CubeStarBoard(CubeStarStack):
 
 
 class _Efm32gg(NodePeripherals):
-    """The processor's peripherals, as its program sees them."""
-
     _board: CubeStarBoard
 
     def __init__(self, board: CubeStarBoard) -> None:

@@ -1,18 +1,18 @@
-"""CubeStar with firmware of the user's own: what the pins of its processor lead to.
+"""CubeStar with a user's own firmware.
 
-:mod:`cubestack.firmware_model.interface.cubestar.processor_pins` says which pin is which; what the
-boards are is in ``stack``. Only the published memory layout has its FPGA at these pins.
+:mod:`cubestack.firmware_model.interface.cubestar.processor_pins` has the assignment of pins,
+``stack`` the boards. These pins are defined for the published memory layout only.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Unpack
 
-from cubestack.emulator.boards.contract import NODE_PROTOCOL
+from cubestack.emulator.boards.contract import BoardOptions
 from cubestack.emulator.boards.cubestar.stack import FORCED_RESETS, CubeStarStack
 from cubestack.emulator.boards.firmware import CameraWire, Core, SerialWire, SlaveWire
 from cubestack.emulator.boards.insight import Insight
-from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.bus.line_format import LineFormat
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
@@ -24,7 +24,6 @@ from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling, FpgaPin
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.fpga_port import FpgaPort
-from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cubestar import INTERFACE, pins
 from cubestack.firmware_model.interface.cubestar import processor_pins as wired
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
@@ -32,7 +31,7 @@ from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.interface.efm32gg.pins import pin_number
 
 HANG_US = 1
-"""Any time: a hanging program is ended by its own watchdog, or not at all."""
+"""Any value: only its own watchdog can end a hanging program."""
 
 CAUSES: Mapping[int, int] = {
     ResetCause.POWER_ON: 1 << 0,
@@ -46,7 +45,7 @@ CAUSES: Mapping[int, int] = {
 
 TEMPERATURE, SUPPLY = 8, 9
 COMPARATOR = (10, 18)
-"""Analog inputs of the part beside the ADC's channels 0 to 7: see its analog.h."""
+"""Analog inputs of the part besides the ADC's channels 0 to 7: see its analog.h."""
 
 _INPUTS = (pins.ACK, pins.DATA)
 _CONTROLS = (pins.ENABLE, pins.RNW, pins.BANK)
@@ -55,11 +54,11 @@ _SWITCH_PINS = {pin_number(pin): channel for channel, pin in wired.SWITCHES.item
 
 
 class CubeStarFirmwareBoard(CubeStarStack):
-    """One emulated CubeStar, with an image of the user's.
+    """One emulated CubeStar with a user's firmware.
 
     Attributes:
         machine: its processor: memories, registers, pins.
-        image: what runs on it.
+        image: the firmware.
     """
 
     processor: FirmwareProcessor
@@ -70,33 +69,29 @@ class CubeStarFirmwareBoard(CubeStarStack):
         scene: Scene | SkyView,
         image: Image,
         *,
-        seed: int = 0,
         engine: EngineKind = "auto",
         baud: int = INTERFACE.baud,
-        kernel: Kernel | None = None,
-        i2c_bus: I2cBus | None = None,
         layout: Layout = Layout.COPIED,
         callbacks: bool = False,
+        **common: Unpack[BoardOptions],
     ) -> None:
         """Power up.
 
         Args:
             scene: what the camera sees.
             image: program in the processor's flash.
-            seed, kernel, i2c_bus: see ``Board``.
             engine: see ``make_engine``.
-            baud: of the host's end of the satellite's UART; the firmware sets its own.
+            baud: rate of the host's end of the satellite's UART; the firmware sets its own.
             layout: memory layout; ValueError for any but the published one.
-            callbacks: reach the FPGA pin by pin, even a compiled one, for tests.
+            callbacks: connect even a compiled FPGA pin by pin, for tests.
+            common: seed, kernel and i2c_bus, see ``Board``.
         """
         if layout is not Layout.COPIED:
             raise ValueError(
                 f"own firmware runs on memory layout {Layout.COPIED.value}, not {layout.value}: "
-                "the processor's pins to the other ones are not laid down"
+                "the processor's pins for other layouts are not defined"
             )
-        super().__init__(
-            scene, seed=seed, engine=engine, kernel=kernel, i2c_bus=i2c_bus, layout=layout
-        )
+        super().__init__(scene, engine=engine, layout=layout, **common)
         self.image = image
         self.machine = Machine(external_bytes=self.external_ram.size)
         self.machine.external[:] = self.external_ram
@@ -124,35 +119,30 @@ class CubeStarFirmwareBoard(CubeStarStack):
         self._serial = SerialWire(
             self.processor, wired.SATELLITE_UART.pin("TX"), wired.SATELLITE_UART.pin("RX")
         )
-        self._serial.connect(self._serial_line(baud, lambda: self._serial, title=NODE_PROTOCOL))
+        self._serial.connect(self._serial_line(baud, lambda: self._serial))
         self.i2c_bus.attach_open(SlaveWire(self.processor, wired.SATELLITE_I2C.pin("SDA")))
         self.power.on_switch = self._supply_switched
         self.power.on_change = self._current_changed
 
     def busy(self) -> bool:
-        """Whether anything is under way that does not wait for the host."""
         return any(line.uart.busy for line in self.lines) or not self.processor.waiting
 
     def probes(self) -> dict[str, int | str]:
-        """What a trace shows: the energy mode (0: awake) beside what all boards show."""
+        """The energy mode (0: awake) in addition to the base class's probes."""
         return super().probes() | {"energy_mode": self.processor.energy_mode}
 
-    def tell(self, say: Callable[[str], None]) -> None:
-        """Give ``say`` what the firmware prints, and reports of its faults."""
-        self.processor.console = self.processor.on_fault = say
+    def connect_console(self, report: Callable[[str], None]) -> None:
+        self.processor.console = self.processor.on_fault = report
 
     def reset_pin(self) -> None:
-        """Reset the processor by its pin."""
         self.processor.reset(ResetCause.EXTERNAL_PIN)
 
     def close(self) -> None:
-        """Release what the board holds."""
         super().close()
         self.insight.close()
         self.machine.close()
 
     def sites(self) -> Sites:
-        """Where faults can hit."""
         sites, machine = super().sites(), self.machine
         return replace(
             sites,
@@ -163,13 +153,12 @@ class CubeStarFirmwareBoard(CubeStarStack):
         )
 
     def _memory_changed(self, name: str, first: int, count: int) -> None:
-        """What was decoded of code that has changed is wrong."""
+        """Discard decoded instructions of changed code."""
         bases = {"ram": RAM_BASE, "flash": FLASH_BASE}
         if name in bases:
             self.machine.invalidate(bases[name] + first, count)
 
     def _resets(self) -> dict[str, Callable[[], None]]:
-        """What resets the processor against its program's will, the usual one first."""
         return {
             name: partial(self.processor.reset, cause, HANG_US if name == "hang" else 0)
             for name, cause in FORCED_RESETS.items()
@@ -178,7 +167,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
     # --- pins -----------------------------------------------------------------------------------
 
     def _couple(self, fpga: FpgaPort, *, compiled: bool) -> FpgaCoupling:
-        """Lead the machine's pins to the FPGA, or to what stands before it."""
+        """Connect the machine's pins to the FPGA, or to a fault in front of it."""
         found = [
             FpgaPin(
                 name,
@@ -193,7 +182,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
         return self._coupling
 
     def _pin(self, one: Outgoing) -> None:
-        """A pin has another level; -1: it floats, and what is soldered to it pulls it."""
+        """Handle a change of a pin; at -1 it floats, and a resistor defines its level."""
         if one.unit in _CONTROL_PINS:
             name, level = _CONTROL_PINS[one.unit], max(0, one.value)  # pulled down
             self._coupling.set_pin(name, level, one.time_ps)
@@ -207,7 +196,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
 
     def _camera_bus(self, one: Outgoing) -> None:
         self.engine.run(max(self.engine.now_ps, one.time_ps))
-        self._camera_wire.happened(self.machine, one)
+        self._camera_wire.handle(self.machine, one)
 
     # --- analog inputs --------------------------------------------------------------------------
 

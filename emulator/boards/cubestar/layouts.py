@@ -1,10 +1,10 @@
-"""CubeStar's memory layouts as boards: which FPGA designs, what draws which current.
+"""CubeStar's memory layouts as boards: FPGA designs and supply currents.
 
 CubeStar thesis, section 3.3, table 6.2 and section 7.2. The currents of the layouts that were never
-built follow from those of the published one: its FPGA board contains an SRAM, whose current is
-taken to be that of the processor's and stands alone here, because the program's
-supply channel "memory" watches the memory with the picture. An FPGA whose bus is open draws what it
-draws standing by; only accesses draw as much as reading.
+built are derived from the published one. Its FPGA board contains an SRAM, whose current is assumed
+equal to that of the processor's SRAM; here it is a separate part, because the program's supply
+channel "memory" monitors the memory with the image. An FPGA with an open bus draws its standby
+current; an access draws as much as reading.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,12 +29,10 @@ class LayoutBoard:
 
     Attributes:
         top: name of the design in each of its FPGAs.
-        wiring: of them.
-        power: what draws current.
-        states: of the parts "fpga"... and "memory", by the control pins and whether the processor
-            accesses a memory.
-        boards: what is before the names of each FPGA's control pins.
-        external_ram: the processor has a memory of its own.
+        states: states of the parts "fpga"... and "memory", from the control pins and whether the
+            processor accesses a memory.
+        boards: prefixes of the FPGAs' control pins.
+        external_ram: the processor has a separate memory.
     """
 
     top: str
@@ -50,12 +48,12 @@ class LayoutBoard:
         return tuple(board + pin for board in self.boards for pin in (ENABLE, RNW))
 
     def storing(self, pins: Pins) -> int:
-        """How many memories a camera's picture may go to, by the control pins."""
+        """Number of memories that store images, from the control pins."""
         return sum(_stores(pins, board) for board in self.boards)
 
 
 def _powered(fpgas: tuple[str, ...], memories: int) -> PowerTable:
-    """Currents with ``fpgas`` boards and so many memories, each for itself."""
+    """Currents with ``fpgas`` boards and ``memories`` memories as separate parts."""
     parts = dict(CUBESTAR_POWER.parts)
     whole, sram = parts.pop("fpga").ma, parts.pop("memory").ma
     idle, used = sram["standby"], sram["transfer"]
@@ -77,14 +75,14 @@ def _copied_states(pins: Pins, _accessed: bool) -> States:
 
 
 def _one_fpga_states(pins: Pins, accessed: bool) -> States:
-    """Both at once only where there are two memories."""
+    """Storing and access at once occur only with two memories."""
     storing = _stores(pins)
     state = "storing" if storing else "reading" if accessed else "standby"
     return {"fpga": state, "memory": f"{storing + accessed} used"}
 
 
 def _two_board_states(pins: Pins, accessed: bool) -> States:
-    """A board that stores is not accessed; else it is the first one that is."""
+    """An access goes to the first board that does not store."""
     storing = [_stores(pins, board) for board in BOARD_PREFIXES]
     reading = storing.index(False) if accessed and not all(storing) else None
     states = {
@@ -94,7 +92,6 @@ def _two_board_states(pins: Pins, accessed: bool) -> States:
     return {**states, "memory": f"{sum(storing) + (reading is not None)} used"}
 
 
-#: Every layout.
 BOARDS = {
     Layout.COPIED: LayoutBoard(
         "cubestar", wiring.cubestar_wiring, CUBESTAR_POWER, _copied_states, external_ram=True
@@ -117,12 +114,7 @@ BOARDS = {
 
 @dataclass(frozen=True)
 class Fpga:
-    """What each FPGA of a layout takes of its part.
-
-    Attributes:
-        pins, tiles: taken.
-        part_pins, part_tiles: there are.
-    """
+    """Pins and tiles that each FPGA of a layout uses, and those of the part."""
 
     pins: int
     tiles: int
@@ -131,12 +123,11 @@ class Fpga:
 
     @property
     def fits(self) -> bool:
-        """Whether it can be built."""
         return self.pins <= self.part_pins and self.tiles <= self.part_tiles
 
 
 def fpga_of(layout: Layout) -> Fpga:
-    """Pins of the design, and the tiles that ``hdl/cubestar/area.json`` has for it."""
+    """Pins of the design, and its tiles in ``hdl/cubestar/area.json``."""
     from cubestack.hdl.cubestar.tops import AREA_FILE, TOPS
     from cubestack.hdl.flow.area import AGLN030_PINS, AGLN030_TILES
     from cubestack.hdl.flow.area_report import recorded_areas
@@ -144,6 +135,6 @@ def fpga_of(layout: Layout) -> Fpga:
 
     name = BOARDS[layout].top
     component = tops_in(TOPS)[name].make()
-    Fragment.get(component, None)  # Amaranth complains of a design that was never made
+    Fragment.get(component, None)  # Amaranth warns of a design that was never elaborated
     pins = sum(pin.width for pin in component.pins)
     return Fpga(pins, recorded_areas(AREA_FILE)[name]["tiles"], AGLN030_PINS, AGLN030_TILES)

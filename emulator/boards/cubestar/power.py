@@ -1,12 +1,12 @@
-"""What the parts of CubeStar's boards draw, by state, and behind which load switch they are."""
+"""Supply currents and load switches of CubeStar's boards."""
 
 from cubestack.emulator.sim.power import Part, PowerTable
 
 #: CubeStar thesis, sections 5.2.3 and 6.3, table 6.2: the whole stack's current in four modes. The
-#: split into parts is fitted to them, one current to each, with two parts known otherwise: the two
-#: LEDs (396.2 mW less 350 mW), and the processor's 200 uA/MHz running and 50 uA/MHz asleep
-#: (appendix E). Trip currents are assumed: a third above the highest regular one for the boards
-#: with imager and FPGA, ten times it for the memory, which draws little.
+#: split into parts is fitted to them, one current per mode; two parts are known: the two LEDs
+#: (396.2 mW less 350 mW), and the processor with 200 uA/MHz running and 50 uA/MHz asleep
+#: (appendix E). Trip currents are assumed: a third above the highest regular current for the boards
+#: with imager and FPGA, ten times the highest for the memory, which draws little.
 CUBESTAR_POWER = PowerTable(
     volts=3.3,
     parts={

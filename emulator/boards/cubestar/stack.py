@@ -1,20 +1,20 @@
-"""The CubeStar stack: which pin goes where, whatever runs on its processor.
+"""The boards of a CubeStar without the processor's program.
 
-CubeStar thesis, section 5.2 and tables C.1 to C.4. Camera to FPGA and SRAM, FPGA to processor, and
-the supplies of all three boards. Other memory layouts than the published one are in
-:mod:`cubestack.emulator.boards.cubestar.layouts`.
+CubeStar thesis, section 5.2 and tables C.1 to C.4: camera, FPGA, SRAM and processor, and the
+supplies of all three boards. :mod:`cubestack.emulator.boards.cubestar.layouts` has the memory
+layouts.
 """
 
 from collections import deque
 from dataclasses import replace
 from functools import lru_cache
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.boards.contract import Board
+from cubestack.emulator.boards.contract import Board, BoardOptions
 from cubestack.emulator.boards.cubestar.layouts import BOARDS
-from cubestack.emulator.bus.i2c import I2cBus
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.sensor import Mlx75412
@@ -23,7 +23,6 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.scene.sky import Scene
-from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar.codes import ResetCause
@@ -36,24 +35,22 @@ FORCED_RESETS = {
     "hang": ResetCause.WATCHDOG,
     "lock-up": ResetCause.LOCKUP,
 }
-"""What resets the processor against its program's will, the usual one first, and its cause."""
+"""Causes of resets that the program did not request, the most common one first."""
 
 
 @lru_cache(maxsize=len(BOARDS))
 def _wiring(layout: Layout) -> Wiring:
-    """Kept, as an engine knows its library by the design's text, a slow thing."""
+    """Cached, as the hash of the design, with which an engine finds its library, is slow."""
     return BOARDS[layout].wiring()
 
 
 class CubeStarStack(Board):
-    """The boards of a CubeStar, whatever runs on its processor.
+    """The boards of a CubeStar; a subclass adds the processor.
 
     Attributes:
-        camera: image sensor, which looks at the scene.
-        layout: which boards these are.
-        external_ram: SRAM on the processor's external bus, empty where it has none.
+        external_ram: SRAM on the processor's external bus, empty if there is none.
         stored: exposures of the frames stored last, the newest one at the end; None for a frame
-            that was not sent.
+            that the camera did not send.
     """
 
     engine: RtlEngine
@@ -62,19 +59,17 @@ class CubeStarStack(Board):
         self,
         scene: Scene | SkyView,
         *,
-        seed: int,
         engine: EngineKind,
-        kernel: Kernel | None,
-        i2c_bus: I2cBus | None,
         layout: Layout,
+        **common: Unpack[BoardOptions],
     ) -> None:
-        """Power up all but the processor; the arguments are those of ``CubeStarBoard``."""
+        """Power up all but the processor; arguments as for ``CubeStarBoard``."""
         self.layout = BOARDS[layout]
-        super().__init__(self.layout.power, seed=seed, kernel=kernel, i2c_bus=i2c_bus)
+        super().__init__(self.layout.power, **common)
         self.engine = make_engine(_wiring(layout), kind=engine)
-        self.camera = Mlx75412(scene, seed=seed)
-        bytes_there = EXTERNAL_RAM_BYTES if self.layout.external_ram else 0
-        self.external_ram = np.zeros(bytes_there, np.uint8)
+        self.camera = Mlx75412(scene, seed=self.seed)
+        ram_bytes = EXTERNAL_RAM_BYTES if self.layout.external_ram else 0
+        self.external_ram = np.zeros(ram_bytes, np.uint8)
         self._scramble(self.external_ram)
         for memory in self.engine.memories.values():
             self._scramble(memory)
@@ -87,7 +82,6 @@ class CubeStarStack(Board):
 
     @property
     def scene(self) -> Scene:
-        """What the camera sees; see ``Board``."""
         return self.camera.scene
 
     @scene.setter
@@ -95,7 +89,6 @@ class CubeStarStack(Board):
         self.camera.scene = scene
 
     def sites(self) -> Sites:
-        """Where faults can hit."""
         return replace(
             super().sites(),
             controls=self.layout.controls,
@@ -104,7 +97,7 @@ class CubeStarStack(Board):
         )
 
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
-        """See ``Board``; the banks of a memory apart."""
+        """See ``Board``; one image per bank of a memory."""
         found = {}
         for name, memory in self.engine.memories.items():
             banks = memory[: memory.size // (ROWS * COLUMNS) * ROWS * COLUMNS]
@@ -113,7 +106,6 @@ class CubeStarStack(Board):
         return found
 
     def truths(self) -> dict[str, NDArray[np.float64]]:
-        """See ``Board``."""
         truth = self.truth()
         return {} if truth is None else {"attitude": truth}
 
@@ -122,10 +114,7 @@ class CubeStarStack(Board):
         self.power.set_state("imager", "enabled" if self.camera.enabled else "disabled")
 
     def truth(self) -> NDArray[np.float64] | None:
-        """Attitude (4,) at the mid-exposure of the middle row of the frame stored last.
-
-        For whoever compares results; None when nothing was stored or the scene has no attitude.
-        """
+        """Attitude (4,) at mid-exposure of the middle row of the latest stored frame, or None."""
         latest = self.stored[-1]
         if latest is None:
             return None
@@ -137,7 +126,7 @@ class CubeStarStack(Board):
         if stores > stored:
             self._storing_since_ps = self.kernel.now
         elif stores < stored:
-            # The first whole frame was stored, however long the program let the FPGA go on.
+            # The FPGA stored the first whole frame, even if the program stopped it later.
             self.stored.append(self.camera.frame_from(self._storing_since_ps))
         self._set_states()
 
@@ -150,17 +139,17 @@ class CubeStarStack(Board):
             self.power.set_state(part, state)
 
     def _supply_switched(self, channel: str, on: bool) -> None:
-        # A latch-up comes from outside, so the FPGA may have run ahead; see sim/processor.py.
+        # At a latch-up, the FPGA may be ahead of the kernel; see sim/processor.py.
         now_ps = max(self.kernel.now, self.engine.now_ps)
         self.engine.run(now_ps)
         if channel == "imager":
             self.camera.power(on, now_ps)
         srams, external = self.engine.memories, self.layout.external_ram
         if not external:
-            # Without supply an FPGA leads nowhere, as a memory without supply does.
-            reached = all(self.power.is_on(name) for name in ("imager", "memory"))
+            # A memory is accessible only if both it and the FPGA have supply.
+            accessible = all(self.power.is_on(name) for name in ("imager", "memory"))
             for name in srams:
-                self.engine.power_memory(name, reached)
+                self.engine.power_memory(name, accessible)
         if not on:
             feeds_srams = channel == ("imager" if external else "memory")
             for memory in srams.values() if feeds_srams else [self.external_ram]:

@@ -1,4 +1,4 @@
-"""What is soldered to the FPGAs of CubeStar's boards, in each of its memory layouts."""
+"""Wiring of the FPGAs in each of CubeStar's memory layouts."""
 
 from collections.abc import Collection
 
@@ -13,7 +13,7 @@ from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 
 _IMAGER = CameraPins("imager", pins.PIXCLK, pins.PIXDATA, pins.HSYNC, pins.VSYNC)
 
-#: A board while it stores, and the external bus between two accesses.
+#: Levels of a board that stores, and of the external bus between two accesses.
 _STORING: Levels = ((pins.ENABLE, 1), (pins.RNW, 0))
 _AT_REST: Levels = ((pins.ALE, 0), (pins.RE_N, 1), (pins.WE_N, 1))
 
@@ -26,7 +26,8 @@ def _stores(level: Level, board: str = "") -> bool:
 def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
     """The FPGA board: one camera, "imager", and one memory, "SRAM".
 
-    Not storing, its pixel clock domain is in reset; with ACK high its writer follows the lines.
+    While it does not store, its pixel clock domain is in reset; while ACK is high, its writer still
+    follows the lines.
     """
 
     def storing(level: Level) -> Collection[str]:
@@ -44,7 +45,7 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
         acknowledges=(pins.ACK,),
         storing=storing,
         stored=stored,
-        # Two release the reset, one ends the store, one the line.
+        # Two clocks release the reset, one ends the store, one the line.
         settling_clocks=8,
         burst_levels=(((pins.DCLK, 0), *_STORING),),
     )
@@ -56,7 +57,7 @@ def cubestar_shared_wiring(top: CubeStarShared | None = None) -> Wiring:
 
 
 def cubestar_double_wiring(top: CubeStarDouble | None = None) -> Wiring:
-    """The FPGA board with two memories in turn, "SRAM1" and "SRAM2"."""
+    """The FPGA board with two alternating memories, "SRAM1" and "SRAM2"."""
     names = ("SRAM1", "SRAM2")
     memories = tuple(MemoryPins(name, part=name) for name in names)
     return _on_bus(top or CubeStarDouble(), memories, ((*_STORING, *_AT_REST, (pins.CS_N, 1)),))
@@ -82,14 +83,14 @@ def _on_bus(
     boards: tuple[str, ...] = ("",),
     contention: str | None = None,
 ) -> Wiring:
-    """Boards on the external bus; ``boards`` goes before the names of their own pins."""
+    """Boards on the external bus; ``boards`` are prefixes of their own pins."""
 
     def storing(level: Level) -> Collection[str]:
         stores = any(_stores(level, board) for board in boards)
         return ("imager",) if stores else ()
 
     def stored(level: Level) -> Collection[str]:
-        # One camera for all: until none of them stores any more.
+        # All boards share one camera, so all must have finished.
         waits = (level(board + pins.ACK) or not _stores(level, board) for board in boards)
         return ("imager",) if all(waits) else ()
 

@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 from cubestack.emulator.boards.cubestar.compiled import operations
-from cubestack.emulator.boards.cubestar.compiled.build import Build, compiled, compiler_version
-from cubestack.emulator.boards.cubestar.compiled.machine import Timing, started
-from cubestack.emulator.boards.cubestar.compiled.picture import charged, defaults, run
+from cubestack.emulator.boards.cubestar.compiled.build import (
+    Build,
+    compile_program,
+    compiler_version,
+)
+from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_program
+from cubestack.emulator.boards.cubestar.compiled.picture import default_settings, run, run_model
 from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
@@ -83,7 +87,7 @@ def picture() -> NDArray[np.uint8]:
 
 def generated() -> dict[str, str]:
     """Sources and headers of the measuring program that are made of tables."""
-    return {**catalogue_tables(), "defaults.h": defaults(), "efm32gg.h": c_header(LAYOUTS)}
+    return {**catalogue_tables(), "defaults.h": default_settings(), "efm32gg.h": c_header(LAYOUTS)}
 
 
 def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
@@ -91,8 +95,8 @@ def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measur
     pixels, sources, images = picture(), generated(), {}
     for case in _cases(levels, precisions):
         if case.build not in images:
-            images[case.build] = compiled(case.build, sources)
-        calls = started(images[case.build], case.timing)
+            images[case.build] = compile_program(case.build, sources)
+        calls = start_program(images[case.build], case.timing)
         phases = run(calls, pixels).cycles
         cycles = operations.measure(calls, double=case.build.precision == "double")
         calls.machine.close()
@@ -105,7 +109,7 @@ def page(found: Sequence[Measurement], clock_hz: int) -> str:
         f"| build | memory | {' | '.join(COLUMNS)} | sum, ms |",
         "|-" * (len(COLUMNS) + 3) + "|",
     ]
-    charges = charged(picture(), onboard_catalogue(), Meter(CORTEX_M3)).cycles
+    charges = run_model(picture(), onboard_catalogue(), Meter(CORTEX_M3)).cycles
     rows: list[tuple[str, str, Mapping[str, int]]] = [
         ("charged by the Python program", "its own table", charges),
         *((f"`{one.build}`", one.timing, one.phases) for one in found),

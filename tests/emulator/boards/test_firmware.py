@@ -74,7 +74,7 @@ class Bus:
     def say(self, kind: Kind, value: int = 0, unit: int = SDA << 8 | 1) -> Any:
         """What the machine is told of it; nothing for nothing."""
         del self.machine.given[:]
-        self.wire.happened(self.machine, Outgoing(kind, unit, value, 0, 5))
+        self.wire.handle(self.machine, Outgoing(kind, unit, value, 0, 5))
         assert len(self.machine.given) <= 1
         if not self.machine.given:
             return None

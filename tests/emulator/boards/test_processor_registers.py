@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.emulator.boards.processor_registers import Peeked, peek, peripherals
+from cubestack.emulator.boards.processor_registers import RegisterValue, peek, peripherals
 from cubestack.emulator.iss.insight.symbols import Symbols, Variable
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
@@ -19,7 +19,7 @@ class Memory:
         return b"" if address >= 0x6000_0000 else address.to_bytes(4, "little")[:count]
 
 
-def look(what: str, **variables: Variable) -> list[Peeked]:
+def look(what: str, **variables: Variable) -> list[RegisterValue]:
     symbols, memory = Symbols(None), Memory()
     symbols.variables |= variables
     machine: Any = memory
@@ -29,7 +29,7 @@ def look(what: str, **variables: Variable) -> list[Peeked]:
 @pytest.mark.parametrize("offset", [0, 1, 2, 3])
 def test_an_address_is_that_of_its_word(offset: int) -> None:
     for what in (hex(RAM + 8 + offset), str(RAM + 8 + offset)):
-        assert look(what) == [Peeked("20000008", RAM + 8, {})]
+        assert look(what) == [RegisterValue("20000008", RAM + 8, {})]
 
 
 def test_a_variable_s_words_are_all_that_it_touches() -> None:

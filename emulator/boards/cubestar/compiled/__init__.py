@@ -1,1 +1,1 @@
-"""What compiled code costs on CubeStar's processor: builds, operations, phases of a picture."""
+"""Costs of compiled code on CubeStar's processor: builds, operations, phases of an image."""

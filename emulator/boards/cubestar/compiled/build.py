@@ -1,14 +1,14 @@
 """Builds of the measuring program (``firmware_model/reference/costs``) by arm-none-eabi-gcc.
 
-What a program costs hangs on how it is written as much as on the compiler's options, so a build
-also says what becomes of the algorithms' sources:
+A program's cost depends on how it is written as much as on the compiler's options, so a build also
+defines a variant of the algorithms' sources:
 
-- `own`: as they are, in single precision, with functions of their own for arc cosine and the like.
+- `own`: unchanged, in single precision, with its own functions for arc cosine and the like.
 - `float`: in single precision, with the library's functions.
-- `literals`: as of a programmer who does not write the `f` behind a constant and calls the square
-  root and the arc cosine by their usual names. Variables stay single, every expression with a
-  constant is computed in double precision.
-- `double`: all in double precision; star list and pair list stay single.
+- `literals`: constants without the suffix `f`, and the library's double functions for square root
+  and arc cosine. Variables stay single; expressions with a constant are computed in double
+  precision.
+- `double`: all in double precision, except star list and pair list.
 """
 
 import re
@@ -27,7 +27,6 @@ LEVELS = ("O0", "O1", "O2", "O3", "Os")
 PRECISIONS = ("own", "float", "literals", "double")
 COMPILER = "arm-none-eabi-gcc"
 
-#: Options of every build.
 FLAGS = (
     *("-std=gnu11", "-mcpu=cortex-m3", "-mthumb", "-ffp-contract=off", "-fno-math-errno"),
     *("-nostartfiles", "--specs=nosys.specs", "-Wl,--no-warn-rwx-segments"),
@@ -37,18 +36,17 @@ _LITERAL = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|0x[0-9a-f.]+p[+-]?\d+)
 
 
 class NoCrossCompilerError(CompilerError):
-    """The compiler for the part is not there."""
+    """The cross compiler is not installed."""
 
 
 @dataclass(frozen=True)
 class Build:
-    """How the program is compiled."""
+    """Optimisation level and variant of the sources; ValueError for unknown ones."""
 
     level: str = "O2"
     precision: str = "own"
 
     def __post_init__(self) -> None:
-        """Refuse what is not known."""
         if self.level not in LEVELS or self.precision not in PRECISIONS:
             raise ValueError(
                 f"a build is one of {', '.join(LEVELS)} and one of {', '.join(PRECISIONS)}, "
@@ -56,16 +54,12 @@ class Build:
             )
 
     def __str__(self) -> str:
-        """For tables."""
         return f"-{self.level} {self.precision}"
 
 
 @lru_cache(maxsize=1)
 def compiler_version() -> str:
-    """First line of what the compiler says of itself.
-
-    Raises NoCrossCompilerError.
-    """
+    """First line of the compiler's version text; raises NoCrossCompilerError."""
     program = shutil.which(COMPILER)
     if program is None:
         raise NoCrossCompilerError(
@@ -75,8 +69,8 @@ def compiler_version() -> str:
     return answer.stdout.splitlines()[0]
 
 
-def rewritten(text: str, precision: str) -> str:
-    """A C source or header as it would be in ``precision``."""
+def rewrite_source(text: str, precision: str) -> str:
+    """The variant of a C source or header for ``precision``."""
     if precision in ("own", "float"):
         return text
     text = _LITERAL.sub(r"\1", text)
@@ -90,8 +84,8 @@ def rewritten(text: str, precision: str) -> str:
     return text
 
 
-def compiled(build: Build, generated: dict[str, str]) -> Image:
-    """The program; ``generated`` are texts of further sources and headers by name.
+def compile_program(build: Build, generated: dict[str, str]) -> Image:
+    """The program; ``generated`` has texts of further sources and headers by file name.
 
     Raises NoCrossCompilerError.
     """
@@ -99,7 +93,9 @@ def compiled(build: Build, generated: dict[str, str]) -> Image:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for path in (*_sources("algorithms"), *_sources("costs")):
-            (folder / path.name).write_text(rewritten(path.read_text("utf-8"), build.precision))
+            (folder / path.name).write_text(
+                rewrite_source(path.read_text("utf-8"), build.precision)
+            )
         unused = "library_functions.c" if build.precision == "own" else "float_functions.c"
         (folder / unused).unlink()
         for file, text in generated.items():

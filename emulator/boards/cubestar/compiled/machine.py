@@ -1,16 +1,16 @@
-"""The measuring program on a machine whose memories have chosen waits.
+"""The measuring program on a machine with selectable wait states of the memories.
 
 EFM32GG Reference Manual, sections 7.3 (flash waits, prefetch, instruction cache) and 14.3 (timing
-of the external bus). The processor's clock does not matter: everything is counted in its cycles.
+of the external bus). All times are in core cycles, so the clock frequency does not matter.
 """
 
 from dataclasses import dataclass
 
+from cubestack.emulator.boards.processor_registers import find_instance
 from cubestack.emulator.iss.calls import Calls
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.iss.machine import EXTERNAL_BASE, Machine
 from cubestack.firmware_model.cubestar.memory import EXTERNAL_RAM_BYTES
-from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 
 _READ_MODES = (0, 1, 4)  # MSC_READCTRL.MODE by wait states
@@ -23,7 +23,7 @@ _BUS_CLOCKS = 0xFFFF_FFFF
 
 @dataclass(frozen=True)
 class Timing:
-    """Waits of the memories, in cycles.
+    """Waits of the memories in cycles; ValueError for values that the registers can not hold.
 
     Attributes:
         flash_waits: wait states, 0 to 2; two are needed above 32 MHz.
@@ -38,7 +38,6 @@ class Timing:
     bus: tuple[int, int, int, int] = (1, 1, 3, 0)
 
     def __post_init__(self) -> None:
-        """Refuse what the registers can not hold."""
         limits = (3, 3, 63, 3)
         if self.flash_waits not in range(3) or any(
             not 0 <= value <= limit for value, limit in zip(self.bus, limits, strict=True)
@@ -46,25 +45,18 @@ class Timing:
             raise ValueError("flash waits are 0 to 2, waits of the bus 0 to 3, 3, 63 and 3")
 
     def __str__(self) -> str:
-        """For tables."""
         cache = "cache" if self.cache else "no cache"
         ahead = ", prefetch" if self.prefetch else ""
         return f"{self.flash_waits} flash waits, {cache}{ahead}, bus {'-'.join(map(str, self.bus))}"
 
 
-def register(peripheral: str, name: str) -> int:
-    """Address of a register of the part."""
-    for layout in LAYOUTS:
-        for instance in layout.instances:
-            if instance.name == peripheral:
-                for declared in layout.registers:
-                    if declared.name == name:
-                        return instance.base + declared.offset
-    raise KeyError(f"{peripheral}_{name}")
+def _address(peripheral: str, name: str) -> int:
+    layout, instance = find_instance(peripheral)
+    return instance.base + next(one.offset for one in layout.registers if one.name == name)
 
 
-def started(image: Image, timing: Timing | None) -> Calls:
-    """The program, after its start, on a new machine with ``timing``; None: without waits."""
+def start_program(image: Image, timing: Timing | None) -> Calls:
+    """The started program on a new machine with ``timing``; None: without waits."""
     bare_hz = CORTEX_M3.clock_hz if timing is None else None
     calls = Calls(Machine(external_bytes=EXTERNAL_RAM_BYTES, bare_hz=bare_hz), image)
     if timing is None:
@@ -81,7 +73,7 @@ def started(image: Image, timing: Timing | None) -> Calls:
         ("EBI", "ROUTE", _BUS_PINS),
         ("EBI", "CTRL", _D8A24ALE | _BANK_0),
     ):
-        if not calls.machine.write(register(peripheral, name), value):
+        if not calls.machine.write(_address(peripheral, name), value):
             raise RuntimeError(f"{peripheral}_{name} can not be written")
     assert EXTERNAL_BASE == 0x8000_0000, "picture.c has it there"
     return calls

@@ -1,6 +1,6 @@
-"""Cycles of single operations, out of ``firmware_model/reference/costs/operations.c``.
+"""Measures cycles of single operations by ``firmware_model/reference/costs/operations.c``.
 
-Each is the difference of two functions, with and without it, over a thousand turns.
+Each result is the difference of two functions, with and without it, over a thousand iterations.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.iss.calls import Calls
 from cubestack.emulator.iss.machine import RAM_BASE
 
-#: Each operation's function, by name, and the one that does all but the operation.
+#: Function of each operation, and the one that does everything except the operation.
 OPERATIONS: Mapping[str, str | None] = {
     **dict.fromkeys(("f32_add", "f32_mul", "f32_div"), "plain_formula"),
     "f32_compare": "plain_compare",
@@ -25,15 +25,15 @@ OPERATIONS: Mapping[str, str | None] = {
 }
 
 FEW, MANY = 200, 1200
-_OPERANDS, _IN_A_FORMULA = 64, 8  # as operations.c has them
+_OPERANDS, _IN_A_FORMULA = 64, 8  # as in operations.c
 _FIELD_RAD = 0.73
-"""Two stars are no farther apart than the pair list's limit."""
+"""Largest angle between two stars: the pair list's limit."""
 _INTERRUPT_ENABLE, _INTERRUPT_CLEAR, _INTERRUPT_UNPEND = 0xE000_E100, 0xE000_E180, 0xE000_E280
 _SEED = 2013
 
 
 def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
-    """Cycles of each operation by name."""
+    """Cycles of each operation, by name."""
     rng = np.random.default_rng(_SEED)
     kind = np.float64 if double else np.float32
     operands = {
@@ -50,25 +50,25 @@ def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
     for name, plain in OPERATIONS.items():
         units = {"f32_sqrt": np.abs(operands["unit"]), "f32_acos": cosines}
         calls.put("unit", units.get(name, operands["unit"]).tobytes())
-        cycles = _turn(calls, "plain_loop" if name == "loop" else name)
-        beyond = cycles - (_turn(calls, plain) if plain else 0)
+        cycles = _iteration(calls, "plain_loop" if name == "loop" else name)
+        beyond = cycles - (_iteration(calls, plain) if plain else 0)
         found[name] = round(beyond / (_IN_A_FORMULA if plain == "plain_formula" else 1), 1)
     flash, ram = calls.symbols["pair_angle"], RAM_BASE
-    beyond_ram = _turn(calls, "read_words", flash) - _turn(calls, "read_words", ram)
+    beyond_ram = _iteration(calls, "read_words", flash) - _iteration(calls, "read_words", ram)
     found["flash_read"] = round(found["ram_read"] + beyond_ram, 1)
     found["uart_interrupt"] = found["i2c_interrupt"] = round(_interrupt(calls), 1)
     return found
 
 
 def _around_one(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Factors and summands of both signs with which no chain of them runs away."""
+    """Factors and summands of both signs that keep chains of them in range."""
     signs: NDArray[np.float64] = rng.choice([-1.0, 1.0], _OPERANDS)
     return rng.uniform(0.5, 1.6, _OPERANDS) * signs
 
 
-def _turn(calls: Calls, name: str, *arguments: int) -> float:
-    """Cycles of one turn of a function's loop."""
-    for _ in range(2):  # the second time the cache is warm
+def _iteration(calls: Calls, name: str, *arguments: int) -> float:
+    """Cycles of one iteration of a function's loop."""
+    for _ in range(2):  # in the second run the cache is warm
         few, many = (calls.call(name, turns, *arguments) for turns in (FEW, MANY))
     return (many - few) / (MANY - FEW)
 
@@ -76,9 +76,9 @@ def _turn(calls: Calls, name: str, *arguments: int) -> float:
 def _interrupt(calls: Calls) -> float:
     """Entry, a byte through a queue, and return."""
     machine = calls.machine
-    masked = _turn(calls, "byte_interrupt_taken")
+    masked = _iteration(calls, "byte_interrupt_taken")
     machine.write(_INTERRUPT_UNPEND, 1)
     machine.write(_INTERRUPT_ENABLE, 1)
-    taken = _turn(calls, "byte_interrupt_taken")
+    taken = _iteration(calls, "byte_interrupt_taken")
     machine.write(_INTERRUPT_CLEAR, 1)
     return taken - masked

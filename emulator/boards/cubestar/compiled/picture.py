@@ -1,4 +1,4 @@
-"""A whole picture through the compiled algorithms: the cycles of each phase, and what they found.
+"""Processes a whole image by the compiled algorithms: cycles of each phase, and the results.
 
 ``firmware_model/reference/costs/picture.c``: search to attitude, lost in space, profile published,
 settings as after a reset.
@@ -27,7 +27,7 @@ PHASES = (
     *("search", "centroid", "correction", "vectors", "reduction", "distances", "votes"),
     *("identities", "verification", "selection", "prediction", "attitude"),
 )
-#: Those of the thesis' two steps, figure 5.7.
+#: Phases of the thesis' step "detection", figure 5.7.
 DETECTION = ("search", "centroid", "correction", "vectors")
 
 _CONFIG = (
@@ -38,13 +38,13 @@ _CAMERA = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 
 
 @dataclass(frozen=True)
-class Solved:
-    """What came of a picture.
+class Solution:
+    """Cycles and results of an image.
 
     Attributes:
-        cycles: of each phase that was entered.
-        quaternion: bits of its four components, as whole numbers.
-        stars: centroids.
+        cycles: cycles of each phase that ran.
+        quaternion: bits of its four components, as integers.
+        stars: number of centroids.
     """
 
     cycles: dict[str, int]
@@ -52,8 +52,8 @@ class Solved:
     stars: int
 
 
-def defaults() -> str:
-    """``defaults.h``: the settings after a reset, as C initialisers."""
+def default_settings() -> str:
+    """Text of ``defaults.h``: the settings after a reset, as C initialisers."""
     settings = Settings(INTERFACE, SETTING_COMMANDS)
     config, camera = detection_config(settings), camera_parameters(settings)
     fields = ", ".join(f".{name} = {getattr(config, name)}" for name in _CONFIG)
@@ -66,8 +66,8 @@ def defaults() -> str:
     )
 
 
-def run(calls: Calls, picture: NDArray[np.uint8]) -> Solved:
-    """Process a picture (rows, columns)."""
+def run(calls: Calls, picture: NDArray[np.uint8]) -> Solution:
+    """Process an image (rows, columns)."""
     calls.machine.external[: picture.size] = picture.reshape(-1)
     cycles: dict[str, int] = {}
     stack: list[str] = []
@@ -90,11 +90,11 @@ def run(calls: Calls, picture: NDArray[np.uint8]) -> Solved:
     machine = calls.machine
     quaternion = np.frombuffer(machine.peek(calls.symbols["quaternion"], 16), np.uint32)
     (stars,) = np.frombuffer(machine.peek(calls.symbols["found"], 4), np.int32)
-    return Solved(cycles, tuple(map(int, quaternion)), int(stars))
+    return Solution(cycles, tuple(map(int, quaternion)), int(stars))
 
 
-def charged(picture: NDArray[np.uint8], catalogue: StarCatalogue, meter: Meter) -> Solved:
-    """What the Python program makes of it, with what it charges."""
+def run_model(picture: NDArray[np.uint8], catalogue: StarCatalogue, meter: Meter) -> Solution:
+    """Process an image by the Python program; its cycles are those that it charges."""
     switches, settings = CubeStarSwitches(), Settings(INTERFACE, SETTING_COMMANDS)
     listed = catalogue.limited(float(switches.pair_limit))
     config = detection_config(settings, plain_weights=switches.weights == "intensity")
@@ -111,4 +111,4 @@ def charged(picture: NDArray[np.uint8], catalogue: StarCatalogue, meter: Meter) 
         quaternion = quest(vectors[kept], listed.vectors[found.stars[kept]], weights, meter)
         dcm(quaternion, meter)
     bits = quaternion.view(np.uint32)
-    return Solved(dict(meter.phases), tuple(map(int, bits)), len(detection.sizes))
+    return Solution(dict(meter.phases), tuple(map(int, bits)), len(detection.sizes))

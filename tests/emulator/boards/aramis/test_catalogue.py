@@ -184,7 +184,7 @@ def test_progress_is_told() -> None:
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
-        (CatalogueParameters(fov_deg=1, mag_limit=1, step_deg=10), "stars give no triangle"),
+        (CatalogueParameters(fov_deg=1, mag_limit=1, step_deg=10), "stars form no triangle"),
         (CatalogueParameters(fov_deg=60, stars_per_field=50, step_deg=10), "more than 1400000"),
     ],
 )

@@ -85,7 +85,7 @@ def test_bad_firmware(write):
     code.forever()
     board = CubeStarFirmwareBoard(SKY, Image(((0, code.finish()),)), seed=1)
     told: list[str] = []
-    board.tell(told.append)
+    board.connect_console(told.append)
     try:
         board.kernel.advance_to(60 * PS_PER_MS)
     finally:

@@ -292,7 +292,7 @@ def test_the_port_is_on_this_machine_only(endpoint: GdbEndpoint) -> None:
 
 def test_a_fault_that_nobody_handles_is_reported_once(board: CubeStarFirmwareBoard) -> None:
     said: list[str] = []
-    board.tell(said.append)
+    board.connect_console(said.append)
     send_bytes(board, b"a\0")
     board.kernel.advance_to(200 * PS_PER_MS)
     (report,) = said

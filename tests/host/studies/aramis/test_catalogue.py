@@ -45,7 +45,7 @@ def test_for_people(run: Run) -> None:
         (("cubestar", "--output", "x"), "--output has no effect for cubestar"),
         (("aramis", "--fov", "100"), "fov_deg must be 1 to 60 deg, not 100.0"),
         (("aramis", "--mag-limit", "9"), "mag_limit must be 0 to 7.5, not 9.0"),
-        (("aramis", "--fov", "1", "--mag-limit", "1"), "stars give no triangle"),
+        (("aramis", "--fov", "1", "--mag-limit", "1"), "stars form no triangle"),
     ],
 )
 def test_wrong_calls(run: Run, arguments: tuple[str, ...], words: str) -> None:

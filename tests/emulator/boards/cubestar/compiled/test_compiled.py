@@ -13,11 +13,11 @@ from cubestack.emulator.boards.cubestar.compiled import operations, picture
 from cubestack.emulator.boards.cubestar.compiled.build import (
     COMPILER,
     Build,
-    compiled,
+    compile_program,
     compiler_version,
-    rewritten,
+    rewrite_source,
 )
-from cubestack.emulator.boards.cubestar.compiled.machine import Timing, started
+from cubestack.emulator.boards.cubestar.compiled.machine import Timing, start_program
 from cubestack.emulator.boards.processor_registers import peek
 from cubestack.emulator.iss.calls import CallError, Calls
 from cubestack.emulator.iss.insight.symbols import Symbols
@@ -40,7 +40,7 @@ def shot() -> NDArray[np.uint8]:
 
 @pytest.fixture(scope="module")
 def fast() -> Calls:
-    return started(compiled(Build("O2"), generated()), Timing())
+    return start_program(compile_program(Build("O2"), generated()), Timing())
 
 
 @needs_compiler
@@ -48,8 +48,8 @@ def fast() -> Calls:
 def test_the_compiled_program_finds_the_same_attitude_to_the_bit(
     level: str, shot: NDArray[np.uint8]
 ) -> None:
-    calls = started(compiled(Build(level), generated()), Timing())
-    expected = picture.charged(shot, onboard_catalogue(), Meter(CORTEX_M3))
+    calls = start_program(compile_program(Build(level), generated()), Timing())
+    expected = picture.run_model(shot, onboard_catalogue(), Meter(CORTEX_M3))
     found = picture.run(calls, shot)
     assert (found.stars, found.quaternion) == (expected.stars, expected.quaternion)
     assert found.cycles.keys() == expected.cycles.keys()
@@ -77,9 +77,9 @@ def test_operations_cost_what_was_recorded(fast: Calls) -> None:
 
 @needs_compiler
 def test_waits_of_the_memories_cost_cycles(shot: NDArray[np.uint8]) -> None:
-    image = compiled(Build("O2"), generated())
+    image = compile_program(Build("O2"), generated())
     cycles = [
-        sum(picture.run(started(image, timing), shot).cycles.values())
+        sum(picture.run(start_program(image, timing), shot).cycles.values())
         for timing in (
             Timing(flash_waits=0),
             Timing(),
@@ -101,7 +101,7 @@ def test_a_call_that_faults_or_is_none_is_told(fast: Calls) -> None:
 
 @needs_compiler
 def test_a_fault_takes_no_stack_from_the_calls_after_it() -> None:
-    calls = started(compiled(Build("O2"), generated()), Timing())
+    calls = start_program(compile_program(Build("O2"), generated()), Timing())
     calls.call("read_words", 1, 0)
     before = calls.machine.register("sp")
     with pytest.raises(CallError):
@@ -112,10 +112,12 @@ def test_a_fault_takes_no_stack_from_the_calls_after_it() -> None:
 
 def test_sources_are_rewritten_as_a_careless_programmer_has_them() -> None:
     line = "float y = 0.5f * sqrtf(x) + 0x1.8p+1f; // pair_2.0f"
-    assert rewritten(line, "own") == line
-    assert rewritten("float y = 0.5f * sqrtf(x);", "literals") == "float y = 0.5 * sqrt(x);"
-    assert rewritten("float y = 1e-3f;", "double") == "double y = 1e-3f;"
-    assert rewritten("typedef float stored_float;\n", "double") == "typedef float stored_float;\n"
+    assert rewrite_source(line, "own") == line
+    assert rewrite_source("float y = 0.5f * sqrtf(x);", "literals") == "float y = 0.5 * sqrt(x);"
+    assert rewrite_source("float y = 1e-3f;", "double") == "double y = 1e-3f;"
+    assert (
+        rewrite_source("typedef float stored_float;\n", "double") == "typedef float stored_float;\n"
+    )
     with pytest.raises(ValueError, match="not O9"):
         Build("O9")
 
@@ -130,7 +132,7 @@ def test_the_python_program_charges_what_the_compiled_one_takes(fast: Calls, see
     """
     pose = Rotation.random(rng=np.random.default_rng(seed))
     taken = take(onboard_catalogue(), pose).picture
-    charges = picture.charged(taken, onboard_catalogue(), Meter(CORTEX_M3)).cycles
+    charges = picture.run_model(taken, onboard_catalogue(), Meter(CORTEX_M3)).cycles
     cycles = picture.run(fast, taken).cycles
     assert sum(charges.values()) == pytest.approx(sum(cycles.values()), rel=0.08)
     for phase, count in cycles.items():
@@ -154,7 +156,7 @@ def test_the_python_program_charges_what_the_compiled_one_takes(fast: Calls, see
 )
 def test_the_part_s_registers_say_the_timing(timing: Timing, mode: int) -> None:
     """By the fields' names: MSC, EBI and CMU of the EFM32GG Reference Manual."""
-    machine = started(compiled(Build("O2"), generated()), timing).machine
+    machine = start_program(compile_program(Build("O2"), generated()), timing).machine
 
     def fields(what: str) -> dict[str, int]:
         (found,) = peek(machine, Symbols(None), what)
