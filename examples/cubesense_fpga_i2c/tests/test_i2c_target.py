@@ -119,11 +119,11 @@ def test_documented_times_are_the_bus_own() -> None:
     size = FULL_SIZE
     wanted = {
         "a command": i2c_times.COMMAND,
-        "one look at STATUS": i2c_times.STATUS,
+        "one read of STATUS": i2c_times.STATUS,
         "a single pixel": i2c_times.PIXEL,
-        "Sun's place and window": i2c_times.window(),
+        "Sun position and window": i2c_times.window(),
         "scan of 9920 samples": i2c_times.scan(),
-        "whole picture": i2c_times.PICTURE,
+        "whole image": i2c_times.PICTURE,
     }
     assert sum(1 for pixel in size.scan() if pixel) == 9920
     table = {row[0]: row[1:] for row in rows("Time")}
