@@ -89,7 +89,7 @@ def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any
     return options
 
 
-def tell_notices(
+def show_notices(
     device: AnyDevice, options: Mapping[str, Any], tell: Callable[[str], None]
 ) -> None:
     """Tell what a user must know of the chosen ``options``."""

@@ -37,7 +37,7 @@ from cubestack.host.cli.arguments import whole
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
-from cubestack.host.emulation.history import Past
+from cubestack.host.emulation.history import History
 from cubestack.host.emulation.orbit import follow
 from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.options import flag
@@ -51,7 +51,10 @@ ONE_DEVICE = (
 """Options that belong to one device."""
 
 FORWARD_ONLY = ("trace", "gdb", "profile_out", "coverage_out", "orbit")
-"""Options whose files or whose doings can not be taken back."""
+"""Options whose effects can't be undone, so going back in time is off."""
+
+Served = Sequence[tuple[AnyEmulated, SerialLine, SerialPort]]
+"""Owner, line and port of each serial line."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,54 +103,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    if len(set(args.devices)) < len(args.devices):
-        raise ValueError(f"name each device once: {' '.join(args.devices)}")
-    if len(args.devices) > 1:
-        for name in ONE_DEVICE:
-            value = getattr(args, name)
-            if value not in (None, "") and value is not False:
-                raise ValueError(f"{flag(name)} belongs to one device, and there are several")
-    if args.i2c is not None:
-        check_linux()
+    """Serve until SIGINT or SIGTERM."""
+    _check(args)
     with ExitStack() as stack:
-        opened: list[AnyEmulated] = []
-        setups: list[Setup] = []
+        opened, setups = _power_up(args, stack)
+        first = opened[0]
         gdb = None
-        stack.callback(_close, opened)
-        for name in args.devices:
-            found = device(name)
-            options = device_options.chosen_options(args, found)
-            with busy(f"starting {found.title}"):
-                found.prepare(progress)
-                emulated = power_up(
-                    found,
-                    args.scene,
-                    seed=args.seed,
-                    engine=args.engine,
-                    baud=args.baud,
-                    beside=opened[0] if opened else None,
-                    **options,
-                )
-            opened.append(emulated)
-            setups.append(emulated_setup(args.seed, args.scene, args.faults, options))
-            device_options.tell_notices(found, options, say)
         if len(opened) == 1:
-            device_options.inject_plan(emulated.faults, args.faults)
-            gdb = device_options.insight(args, stack)(emulated)
+            device_options.inject_plan(first.faults, args.faults)
+            gdb = device_options.insight(args, stack)(first)
         if args.orbit is not None:
-            _fly(args.orbit, opened)
+            _follow_orbit(args.orbit, opened)
         for one in opened:
-            _listen(one)
-        past = _past(args, opened, setups, stack)
-        board = emulated.board  # what records may have taken the place of its bus
+            _report_events(one)
+        history = _history(args, opened, setups, stack)
+        board = first.board  # a recording may have replaced its I2C bus
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
         served = open_ports(args, opened, stack)
         lifeline = None if args.lifeline is None else Lifeline(args.lifeline)
-        control = _control(args, opened, served, past, stack)
-        calls = []
+        control = _control(args, opened, served, history, stack)
+        i2c_ports = []
         if args.i2c is not None:
-            calls.append(I2cServer(socket_path(args.i2c), adapter))
-            stack.callback(calls[0].close)
+            i2c_ports.append(I2cServer(socket_path(args.i2c), adapter))
+            stack.callback(i2c_ports[0].close)
         scheduler = stack.enter_context(
             open_scheduler(
                 board.kernel,
@@ -157,8 +135,8 @@ def run(args: argparse.Namespace) -> int:
                 ],
                 lambda: any(one.board.busy() for one in opened),
                 pace=args.pace,
-                i2c=adapter if calls else None,
-                i2c_ports=calls,
+                i2c=adapter if i2c_ports else None,
+                i2c_ports=i2c_ports,
                 report=say,
             )
         )
@@ -169,25 +147,55 @@ def run(args: argparse.Namespace) -> int:
             lifeline.on_end = scheduler.stop
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: scheduler.stop())
-        for one in opened:
-            ports = [
-                f"{'' if line.has_node else line.title + ' on '}{end.name} at {line.baud} baud"
-                for owner, line, end in served
-                if owner is one
-            ]
-            say(f"{one.device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
-        if args.i2c is not None:
-            say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
-        if isinstance(past, Past):
-            past.on_arrival = _listen
-            past.bus = adapter
-            past.ports = [(opened.index(owner), line.name, end) for owner, line, end in served]
+        _announce(args, opened, served)
+        if isinstance(history, History):
+            history.on_arrival = _report_events
+            history.bus = adapter
+            history.ports = [(opened.index(owner), line.name, end) for owner, line, end in served]
         scheduler.run()
     return 0
 
 
-def _fly(path: Path, opened: list[AnyEmulated]) -> None:
-    """Have all see what there is on the orbit of a file."""
+def _check(args: argparse.Namespace) -> None:
+    """Raise ValueError for options that exclude each other."""
+    if len(set(args.devices)) < len(args.devices):
+        raise ValueError(f"name each device once: {' '.join(args.devices)}")
+    if len(args.devices) > 1:
+        for name in ONE_DEVICE:
+            value = getattr(args, name)
+            if value not in (None, "") and value is not False:
+                raise ValueError(f"{flag(name)} applies to one device, but several are given")
+    if args.i2c is not None:
+        check_linux()
+
+
+def _power_up(args: argparse.Namespace, stack: ExitStack) -> tuple[list[AnyEmulated], list[Setup]]:
+    """The devices in their order, sharing kernel and I2C bus; ``stack`` closes them."""
+    opened: list[AnyEmulated] = []
+    setups: list[Setup] = []
+    stack.callback(lambda: [one.close() for one in opened])  # those that replaced others, too
+    for name in args.devices:
+        found = device(name)
+        options = device_options.chosen_options(args, found)
+        with busy(f"starting {found.title}"):
+            found.prepare(progress)
+            emulated = power_up(
+                found,
+                args.scene,
+                seed=args.seed,
+                engine=args.engine,
+                baud=args.baud,
+                beside=opened[0] if opened else None,
+                **options,
+            )
+        opened.append(emulated)
+        setups.append(emulated_setup(args.seed, args.scene, args.faults, options))
+        device_options.show_notices(found, options, say)
+    return opened, setups
+
+
+def _follow_orbit(path: Path, opened: list[AnyEmulated]) -> None:
+    """Drive the scenes from an orbit file; ValueError names the file."""
     orbit = load_orbit(path)
     try:
         follow(orbit, opened)
@@ -195,41 +203,48 @@ def _fly(path: Path, opened: list[AnyEmulated]) -> None:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _close(opened: list[AnyEmulated]) -> None:
+def _announce(args: argparse.Namespace, opened: list[AnyEmulated], served: Served) -> None:
     for one in opened:
-        one.close()
+        ports = [
+            f"{'' if line.has_node else line.title + ' on '}{end.name} at {line.baud} baud"
+            for owner, line, end in served
+            if owner is one
+        ]
+        say(f"{one.device.title} serves on {', '.join(ports)}; Ctrl-C ends it")
+    if args.i2c is not None:
+        say(f"I2C bus {args.i2c}: cubestack run --attach --bus {args.i2c} -- PROGRAM")
 
 
-def _listen(emulated: AnyEmulated) -> None:
-    """Tell what it has to say, and what its faults do."""
+def _report_events(emulated: AnyEmulated) -> None:
+    """Print what board and faults report."""
     emulated.board.connect_console(say)
     emulated.faults.on_event = lambda event: say(str(event))
 
 
-def _past(
+def _history(
     args: argparse.Namespace, opened: list[AnyEmulated], setups: Sequence[Setup], stack: ExitStack
-) -> Past | str:
-    """What is kept of all that is done; or why nothing is by which one could go back."""
+) -> History | str:
+    """The history that the control port can go back in, or why there is none."""
     given = [flag(name) for name in FORWARD_ONLY if getattr(args, name) is not None]
     if args.control is None or given:
         if len(opened) == 1:
             device_options.record(args, opened[0], stack, setups[0])
-        return f"{given[0]} goes forward only" if given else "nothing is on record"
+        return f"{given[0]} can't be undone" if given else "nothing is recorded"
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cubestack-")))
     files = [args.record or folder / f"{one.device.name}.rec" for one in opened]
-    past = Past(opened, setups, files, args.engine)
-    stack.callback(past.close)
-    return past
+    history = History(opened, setups, files, args.engine)
+    stack.callback(history.close)
+    return history
 
 
 def _control(
     args: argparse.Namespace,
     opened: Sequence[AnyEmulated],
-    served: Sequence[tuple[AnyEmulated, SerialLine, SerialPort]],
-    past: Past | str,
+    served: Served,
+    history: History | str,
     stack: ExitStack,
 ) -> ControlPort | None:
-    """The control port, served in a thread, if there is to be one."""
+    """The control port, served by a thread, or None."""
     if args.control is None:
         return None
     from cubestack.host.ground.control_api import control_app
@@ -242,11 +257,11 @@ def _control(
     for owner, _, endpoint in served:
         ports.setdefault(owner.device.name, []).append(endpoint.name)
     token = os.environ.get(TOKEN) or new_token()
-    emulation = Emulation(port, opened, ports, past)
+    emulation = Emulation(port, opened, ports, history)
     guard = Guard(control_app(emulation), token, any_host=args.allow_remote)
     serving = Serving(guard, args.listen, args.control, allow_remote=args.allow_remote)
     stack.enter_context(serving.running())
     stack.callback(emulation.bench.close)
-    stack.callback(port.close)  # first, so that nobody waits for an answer any more
+    stack.callback(port.close)  # first: it answers the requests that still wait
     say(f"control on {serving.url}, token {token}")
     return port

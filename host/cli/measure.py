@@ -26,7 +26,7 @@ from cubestack.host.cli.device_options import (
     add_insight_arguments,
     add_option,
     insight,
-    tell_notices,
+    show_notices,
 )
 from cubestack.host.devices.device import AnyDevice, BoardOption
 from cubestack.host.devices.experiment import AnyExperiment, Result
@@ -103,7 +103,7 @@ def run_experiment(args: argparse.Namespace, device: AnyDevice, experiment: AnyE
         board = board_as_said(device, options, board)
     runs = running(device, experiment, board)
     if not args.json:
-        tell_notices(device, board, say)
+        show_notices(device, board, say)
 
     def bar(items: Iterable[Any], total: int, label: str) -> Iterator[Any]:
         return progress(items, total, label, quiet=args.json or not label)

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from cubestack.host.cli.arguments import whole
-from cubestack.host.cli.device_options import add_board_arguments, given_options, tell_notices
+from cubestack.host.cli.device_options import add_board_arguments, given_options, show_notices
 from cubestack.host.devices.registry import device_names
 from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.targets import FORMS, Target, open_target
@@ -46,5 +46,5 @@ def open_any_target(text: str, args: argparse.Namespace) -> Target:
             options=options,
         )
     if target.device is not None:
-        tell_notices(target.device, options, say)
+        show_notices(target.device, options, say)
     return target

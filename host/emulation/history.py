@@ -75,7 +75,7 @@ class _Kept:
     stack: ExitStack
 
 
-class Past:
+class History:
     """Keeps the records of devices that share one virtual time.
 
     Attributes:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from cubestack.emulator.ports.control import ControlPort
-    from cubestack.host.emulation.history import Past
+    from cubestack.host.emulation.history import History
 
 JsonObject = dict[str, Any]
 
@@ -43,7 +43,7 @@ class Emulation:
     port: "ControlPort"
     emulated: Sequence[AnyEmulated]
     ports: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    past: "Past | str" = "nothing is on record"
+    past: "History | str" = "nothing is recorded"
     bench: Bench = field(default_factory=Bench)
 
     def __post_init__(self) -> None:
@@ -210,7 +210,7 @@ class Emulation:
             raise ValueError(f"a waveform has {span}, not {from_s:g} to {to_s:g} s")
         return Trace(self.bench, *self.recording(device), from_s, to_s)
 
-    def _recorded(self) -> "Past":
+    def _recorded(self) -> "History":
         if isinstance(self.past, str):
             raise TargetError(f"there is no way back: {self.past}")
         return self.past

@@ -182,7 +182,7 @@ def test_options_of_one_device_are_refused_for_several(
 ) -> None:
     found = run("emulate", "cubestar", "aramis", f"--{option}", *([given] if given else []))
     assert found.code == 2
-    assert found.line.endswith(f"--{option} belongs to one device, and there are several")
+    assert found.line.endswith(f"--{option} applies to one device, but several are given")
 
 
 def test_an_orbit_that_does_not_fit_is_told_with_its_file(run: Run, tmp_path: Path) -> None:
@@ -197,12 +197,12 @@ def test_an_orbit_that_does_not_fit_is_told_with_its_file(run: Run, tmp_path: Pa
 @pytest.mark.parametrize(
     ("given", "past"),
     [
-        ({"control": None}, "nothing is on record"),
-        ({"control": 1, "trace": "x"}, "--trace goes forward only"),
-        ({"control": None, "gdb": 7, "orbit": "x"}, "--gdb goes forward only"),
-        ({"control": 1, "profile_out": "x"}, "--profile-out goes forward only"),
-        ({"control": 1, "coverage_out": "x"}, "--coverage-out goes forward only"),
-        ({"control": 1, "orbit": "x"}, "--orbit goes forward only"),
+        ({"control": None}, "nothing is recorded"),
+        ({"control": 1, "trace": "x"}, "--trace can't be undone"),
+        ({"control": None, "gdb": 7, "orbit": "x"}, "--gdb can't be undone"),
+        ({"control": 1, "profile_out": "x"}, "--profile-out can't be undone"),
+        ({"control": 1, "coverage_out": "x"}, "--coverage-out can't be undone"),
+        ({"control": 1, "orbit": "x"}, "--orbit can't be undone"),
     ],
 )
 @pytest.mark.parametrize("devices", [1, 2])
@@ -217,5 +217,5 @@ def test_why_nobody_can_go_back(
     nothing = dict.fromkeys(("control", *emulate.FORWARD_ONLY))
     opened: list[Any] = [object()] * devices
     args = Namespace(**nothing | given, record=None)
-    assert emulate._past(args, opened, [None] * devices, ExitStack()) == past  # type: ignore[list-item]
+    assert emulate._history(args, opened, [None] * devices, ExitStack()) == past  # type: ignore[list-item]
     assert recorded == (opened if devices == 1 else [])

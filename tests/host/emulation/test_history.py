@@ -14,26 +14,26 @@ from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
-from cubestack.host.emulation.history import Past
+from cubestack.host.emulation.history import History
 from cubestack.host.recording.setups import emulated_setup
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
-Make = Callable[..., tuple[list[AnyEmulated], Past]]
+Make = Callable[..., tuple[list[AnyEmulated], History]]
 
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
     with ExitStack() as stack:
 
-        def recorded(*names: str, scene: Path | None = None) -> tuple[list[AnyEmulated], Past]:
+        def recorded(*names: str, scene: Path | None = None) -> tuple[list[AnyEmulated], History]:
             devices: list[AnyEmulated] = []
             for name in names:
                 beside = devices[0] if devices else None
                 devices.append(open_device(name, scene, seed=4, beside=beside))
             files = [tmp_path / f"{name}.rec" for name in names]
-            past = Past(devices, [emulated_setup(4, scene)] * len(names), files)
+            past = History(devices, [emulated_setup(4, scene)] * len(names), files)
             stack.callback(past.close)
             return devices, past
 
@@ -140,7 +140,7 @@ class FakeClient(SerialPort):
         super().__init__(uart)
         self.writes, self.got = bytearray(), bytearray()
 
-    def _look(self):
+    def _find_client(self):
         return self
 
     def _read(self, max_bytes):

@@ -15,7 +15,7 @@ from cubestack.emulator.ports.pace import Pace
 from cubestack.emulator.ports.realtime import RealtimeScheduler
 from cubestack.host.devices.registry import device_names
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
-from cubestack.host.emulation.history import Past
+from cubestack.host.emulation.history import History
 from cubestack.host.ground.control_api import control_app
 from cubestack.host.ground.emulation import Emulation
 from cubestack.host.ground.guard import Guard
@@ -73,7 +73,7 @@ class Controlled:
 def controlled(tmp_path: Path) -> Iterator[Controlled]:
     emulated = open_device("cubestar")
     devices = [emulated]
-    past = Past(devices, [emulated_setup(0, None)], [tmp_path / "a.rec"])
+    past = History(devices, [emulated_setup(0, None)], [tmp_path / "a.rec"])
     kernel = emulated.board.kernel
     port = ControlPort(kernel)
     scheduler = RealtimeScheduler(
