@@ -1,1 +1,1 @@
-"""What camera models share: conditions, optics, exposure, imagers, pixel stream, registers."""
+"""Common parts of the camera models: conditions, optics, exposure, imagers, streams, registers."""

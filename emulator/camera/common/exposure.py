@@ -1,13 +1,13 @@
-"""Starlight on the sensor: where each star's electrons land while the camera turns.
+"""Starlight on the sensor: the electrons of each star while the camera turns.
 
 CubeStar thesis, section 4.1.1 (defocused stars as a two-dimensional Gaussian, eq. 4.1.7) and
-appendix C (rolling shutter). The Gaussian is integrated over each pixel's square, as a detector
-does, not sampled at its centre.
+appendix C (rolling shutter). The Gaussian is integrated over each pixel's square, as in a detector,
+not sampled at its centre.
 
-Motion is a sum over instants of the exposure, closer together than one sigma of the spot. A star
-is taken at the instants of the row that it then falls on, so a rolling shutter shifts, bends
-and stretches its streak. Within one spot all rows share that row's instants: what is neglected is
-a shear of the spot by the motion in one line time, a hundredth of a pixel a row at 4 deg/s.
+Motion is a sum over instants of the exposure, closer together than one sigma of the spot. Each star
+is placed at the instants of its own row, so a rolling shutter shifts, bends and stretches its
+streak. Within one spot all rows share those instants: this neglects a shear of the spot by the
+motion in one line time, a hundredth of a pixel per row at 4 deg/s.
 """
 
 import math
@@ -26,20 +26,20 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 FAINTEST_V = 8.0
-"""Stars beyond it are left out: at the longest exposure their peak is below one count of 8 bits."""
+"""Magnitude limit: at the longest exposure, fainter stars peak below one count of 8 bits."""
 
 SPOT_SIGMAS = 5.0
-CELLS_AT_ONCE = 3_400_000  # of all spots: bounds the memory of long streaks and wide spots
+CELLS_AT_ONCE = 3_400_000  # limits the memory for long streaks and wide spots
 VELOCITY_STEP_S = 0.01
-MOST_GLOWS = 8  # instants of an exposure at which a glow is evaluated, at most
+MOST_GLOWS = 8  # limit of the instants of an exposure at which a glow is evaluated
 
 _Z = np.arange(-8.0, 8.0, 1 / 512)
-#: The normal distribution function; linear interpolation in it is good to 1e-7.
+#: The normal distribution function; linear interpolation in it is accurate to 1e-7.
 _PHI = np.array([0.5 * (1 + math.erf(z / math.sqrt(2))) for z in _Z])
 
 
 def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDArray[np.float32]:
-    """Mean number of electrons that starlight frees in each pixel, shape (rows, columns)."""
+    """Mean number of electrons from starlight in each pixel, shape (rows, columns)."""
     vectors, rates = _stars(scene, optics, shutter)
     phases = _phases(scene, optics, shutter)
     pixels, light = [], []
@@ -71,7 +71,7 @@ def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDAr
 def looking(
     scene: SkyScene, optics: Optics, shutter: RollingShutter, phase: float = 0.5
 ) -> Looking:
-    """What hazards may know of the camera at the instant ``phase`` of the middle row's exposure."""
+    """The camera's state for hazards at the instant ``phase`` of the middle row's exposure."""
     now = _time_ps(optics, shutter, phase)
     return looking_along(
         scene.truth(now), optics, time_s=now / PS_PER_S, exposure_s=shutter.exposure_s
@@ -81,7 +81,7 @@ def looking(
 def looking_along(
     quaternion: ArrayLike, optics: Optics, time_s: float = 0.0, exposure_s: float = 0.0
 ) -> Looking:
-    """What hazards may know of a camera with the attitude (4,) ``quaternion``."""
+    """The state for hazards of a camera with attitude ``quaternion`` (4,)."""
     x, y = optics.columns - 0.5, optics.rows - 0.5
     middle_x, middle_y = (x - 0.5) / 2, (y - 0.5) / 2
     edges = np.array([[-0.5, middle_y], [x, middle_y], [middle_x, -0.5], [middle_x, y]])
@@ -100,19 +100,18 @@ def looking_along(
 def star_pixels(
     scene: SkyScene, optics: Optics, shutter: RollingShutter
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Where the stars' centres are at the middle of their exposure: for tests and drawings.
+    """Hipparcos numbers (n,) and pixels (n, 2) of the stars on the sensor, at mid-exposure.
 
-    Returns:
-        Hipparcos numbers (n,) and pixel coordinates (n, 2) of the stars on the sensor.
+    For tests and drawings.
     """
     sky = load_sky(scene.epoch, _limit(scene))
     vectors, covered = _through(scene, looking(scene, optics, shutter), sky.vectors)
     pixels, _ = _instant(scene, optics, shutter, vectors, 0.5)
     columns, rows = optics.columns, optics.rows
     x, y = pixels.T
-    seen = (np.abs(x - (columns - 1) / 2) <= columns / 2) & (np.abs(y - (rows - 1) / 2) <= rows / 2)
-    seen &= ~covered
-    return sky.hip[seen], pixels[seen]
+    on = (np.abs(x - (columns - 1) / 2) <= columns / 2) & (np.abs(y - (rows - 1) / 2) <= rows / 2)
+    on &= ~covered
+    return sky.hip[on], pixels[on]
 
 
 def _limit(scene: SkyScene) -> float:
@@ -135,7 +134,7 @@ def _stars(
         vectors, rates = vectors[~covered], rates[~covered]
     if scene.atmosphere is None:
         return vectors, rates
-    # By frame time, as the sensor's noise.
+    # Seeded by the frame time, like the sensor's noise.
     generator = np.random.default_rng([scene.seed, 0xA12, max(0, shutter.readout_ps)])
     vectors, share = scene.atmosphere.seen(
         vectors, middle / PS_PER_S, shutter.exposure_s, optics.aperture_mm, generator
@@ -146,10 +145,9 @@ def _stars(
 def _through(
     scene: SkyScene, now: Looking, vectors: Vectors, depth: int = -1
 ) -> tuple[Vectors, NDArray[np.bool_]]:
-    """Where the hazards let light at ``vectors`` (n, 3) seem to come from, and what they hide.
+    """Apparent directions (n, 3) of light from ``vectors``, and which (n,) hazards hide.
 
-    Returns:
-        Unit vectors (n, 3), and whether something nearer than ``depth`` stands in front (n,).
+    Only hazards nearer than ``depth`` hide light.
     """
     covered = np.zeros(len(vectors), bool)
     for hazard in scene.hazards:
@@ -164,7 +162,7 @@ def _through(
 def _hazard_lights(
     scene: SkyScene, optics: Optics, shutter: RollingShutter
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Pixels (n, 2) of the hazards' points of light and their electrons a second (n,)."""
+    """Pixels (n, 2) of the hazards' points of light, and their electrons (n,) per second."""
     for hazard in scene.hazards:
         phases = _phases(scene, optics, shutter, hazard.speed_deg_s)
         for phase in phases:
@@ -181,8 +179,8 @@ def _hazard_lights(
 def _phases(
     scene: SkyScene, optics: Optics, shutter: RollingShutter, own_deg_s: float = 0.0
 ) -> NDArray[np.float64]:
-    """Instants to sum over, as fractions of the exposure, for lights that move by themselves."""
-    # The scale of the picture is largest at its corners, by a fifth or so.
+    """Instants to sum over, as fractions of the exposure; ``own_deg_s``: speed of the light."""
+    # The image scale is largest at the corners, by about a fifth.
     px_per_deg = 1.25 * optics.fx * math.pi / 180
     travel_px = (scene.speed_deg_s + own_deg_s) * shutter.exposure_s * px_per_deg
     samples = max(1, math.ceil(travel_px / optics.psf_sigma_px))
@@ -203,18 +201,16 @@ def _instant(
     vectors: NDArray[np.float64],
     phase: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Stars at the instant ``phase`` of the exposures of their own rows.
+    """Pixels (n, 2) of stars at the instant ``phase`` of their own rows, and weights (n,).
 
-    Returns:
-        Pixels (n, 2), and weights (n,) of the light there: a star that moves down with the
-        read-out is exposed by more rows, each for the full time.
+    A star that moves down with the read-out is exposed by more rows, each for the full time.
     """
     now = _time_ps(optics, shutter, phase)
     in_camera = vectors @ matrix_from_quaternion(scene.truth(now)).T
     pixels, weights = optics.project(in_camera), optics.transmission(in_camera)
     if not scene.speed_deg_s:
         return pixels, weights
-    # The pose that holds now, even where the next one begins: its velocity is wanted.
+    # The present pose, even if the next one begins in between, for its velocity.
     later = scene.pose_at(now).at(now / PS_PER_S + VELOCITY_STEP_S)
     moved = optics.project(vectors @ matrix_from_quaternion(later).T)
     per_line = (moved - pixels) * (shutter.line_s / VELOCITY_STEP_S)
@@ -227,14 +223,14 @@ def _instant(
 def _spots(
     pixels: NDArray[np.float64], electrons: NDArray[np.float64], optics: Optics
 ) -> NDArray[np.float32]:
-    """Sum of Gaussian spots at ``pixels`` (n, 2), NaN left out, on the sensor's (rows, columns)."""
+    """Sum of Gaussian spots at ``pixels`` (n, 2) on the sensor (rows, columns); skips NaN."""
     sigma_px = optics.psf_sigma_px
     half = math.ceil(SPOT_SIGMAS * sigma_px) + 1
     columns, rows = optics.columns, optics.rows
     with np.errstate(invalid="ignore"):
-        seen = np.all((pixels > -half) & (pixels < (columns - 1 + half, rows - 1 + half)), axis=1)
-    pixels, electrons = pixels[seen], electrons[seen]
-    # A canvas with a margin, so that the spots of all these stars lie on it.
+        near = np.all((pixels > -half) & (pixels < (columns - 1 + half, rows - 1 + half)), axis=1)
+    pixels, electrons = pixels[near], electrons[near]
+    # A canvas with a margin, which contains the spots of all these stars.
     margin = 2 * half + 1
     height, width = rows + 2 * margin, columns + 2 * margin
     canvas = np.zeros(height * width)

@@ -1,8 +1,8 @@
-"""Light of hazards that is no point: surface brightness on the sensor's pixels.
+"""Extended light of hazards: surface brightness on the sensor's pixels.
 
-Smooth brightness is evaluated every 16 px and interpolated; where a hazard says that it is not
-smooth, at each pixel, and the lens' spot then blurs it. A glow is taken as of the middle row: what
-is neglected is its shift between the first and the last row of a rolling shutter.
+Smooth brightness is evaluated every 16 px and interpolated. Where a hazard declares that it is not
+smooth, it is evaluated at each pixel, and then blurred by the lens' spot. A glow is computed for
+the middle row: this neglects its shift between the first and the last row of a rolling shutter.
 """
 
 import math
@@ -22,24 +22,21 @@ Values = NDArray[np.float32]
 def glow_electrons(
     hazards: Sequence[SkyHazard], instants: Sequence[Looking], optics: Optics
 ) -> Values | None:
-    """Mean number of electrons a second in each pixel (rows, columns), over ``instants``.
-
-    None when no hazard glows.
-    """
-    pictures = [_picture(hazards, now, optics) for now in instants]
-    seen = [picture for picture in pictures if picture is not None]
-    if not seen:
+    """Mean electrons per second in each pixel (rows, columns) over ``instants``, or None."""
+    all_maps = [_brightness_map(hazards, now, optics) for now in instants]
+    maps = [one for one in all_maps if one is not None]
+    if not maps:
         return None
-    total = sum(seen[1:], start=seen[0])
-    return np.asarray(total * (_field(optics)[1] * np.float32(1 / len(pictures))), np.float32)
+    total = sum(maps[1:], start=maps[0])
+    return np.asarray(total * (_field(optics)[1] * np.float32(1 / len(all_maps))), np.float32)
 
 
 def brightness(
     hazards: Sequence[SkyHazard], now: Looking, vectors: NDArray[np.float64]
 ) -> Values | None:
-    """Surface brightness (n,) of all hazards along ``vectors`` (n, 3) of the scene's axes.
+    """Surface brightness (n,) of all hazards along ``vectors`` (n, 3) in the scene's axes.
 
-    In V = 0 stars a steradian; None when none glows.
+    Unit: V = 0 stars per steradian; None if no hazard glows.
     """
     glows = [(hazard, hazard.glow(now, vectors)) for hazard in hazards]
     if all(glow is None for _, glow in glows):
@@ -56,7 +53,7 @@ def brightness(
     return total
 
 
-def _picture(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) -> Values | None:
+def _brightness_map(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) -> Values | None:
     """Surface brightness (rows, columns)."""
     (x, y), nodes = _grid(optics)
     directions = nodes @ now.axes
@@ -64,40 +61,40 @@ def _picture(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) -> Valu
     if coarse is None:
         return None
     down, across = _hats(optics.rows, y), _hats(optics.columns, x)
-    picture = np.asarray(down @ coarse.reshape(len(y), len(x)) @ across.T, np.float32)
+    image = np.asarray(down @ coarse.reshape(len(y), len(x)) @ across.T, np.float32)
     fine = _not_smooth(hazards, now, directions.reshape(len(y), len(x), 3))
     if not fine.any():
-        return picture
+        return image
     rows = np.minimum(np.searchsorted(y, np.arange(optics.rows), "right"), len(y) - 1) - 1
     columns = np.minimum(np.searchsorted(x, np.arange(optics.columns), "right"), len(x) - 1) - 1
     places = np.flatnonzero(fine[rows][:, columns])
     exact = _field(optics)[0][places].astype(np.float64) @ now.axes
-    picture.ravel()[places] = brightness(hazards, now, exact)
-    _blur(picture, places, optics.psf_sigma_px)
-    return picture
+    image.ravel()[places] = brightness(hazards, now, exact)
+    _blur(image, places, optics.psf_sigma_px)
+    return image
 
 
 def _not_smooth(
     hazards: Sequence[SkyHazard], now: Looking, nodes: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Which cells of the grid of ``nodes`` (ny, nx, 3) a line can not stand for, (ny-1, nx-1)."""
+    """Cells (ny-1, nx-1) of the grid of ``nodes`` (ny, nx, 3) that need all their pixels."""
     cell = np.linalg.norm(nodes[1:, 1:] - nodes[:-1, :-1], axis=2)
     fine = np.zeros(cell.shape, bool)
     for hazard in hazards:
         for ring in hazard.rings(now):
-            # From a corner of the cell; no point of it is farther from there than the diagonal.
+            # Measured from a corner of the cell, whose points are at most a diagonal away.
             angle = angles_rad(nodes[:-1, :-1], ring.centre)
             fine |= (angle < ring.outer_rad + 1.1 * cell) & (angle > ring.inner_rad - 1.1 * cell)
     return fine
 
 
-def _blur(picture: Values, places: NDArray[np.int64], sigma_px: float) -> None:
-    """Blur the part of ``picture`` that holds the flat ``places`` with the lens' spot."""
+def _blur(image: Values, places: NDArray[np.int64], sigma_px: float) -> None:
+    """Blur the part of ``image`` with the flat ``places`` by the lens' spot."""
     half = math.ceil(4 * sigma_px)
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / sigma_px) ** 2)
     kernel = (kernel / kernel.sum()).astype(np.float32)
-    rows, columns = np.divmod(places, picture.shape[1])
-    part = picture[
+    rows, columns = np.divmod(places, image.shape[1])
+    part = image[
         max(0, rows.min() - half) : rows.max() + half + 1,
         max(0, columns.min() - half) : columns.max() + half + 1,
     ]
@@ -113,7 +110,7 @@ def _blur(picture: Values, places: NDArray[np.int64], sigma_px: float) -> None:
 def _grid(
     optics: Optics,
 ) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]:
-    """Columns (nx,) and rows (ny,) of the grid, and its directions (ny * nx, 3), camera axes."""
+    """Columns (nx,) and rows (ny,) of the grid, and its directions (ny * nx, 3) in camera axes."""
     x, y = (
         np.linspace(0, size - 1, math.ceil((size - 1) / CELL_PX) + 1)
         for size in (optics.columns, optics.rows)
@@ -123,7 +120,7 @@ def _grid(
 
 
 def _hats(size: int, nodes: NDArray[np.float64]) -> Values:
-    """Weights (size, len(nodes)) that interpolate between ``nodes`` linearly."""
+    """Weights (size, len(nodes)) for linear interpolation between ``nodes``."""
     step = nodes[1] - nodes[0]
     weights = np.maximum(1 - np.abs(np.arange(size)[:, None] - nodes) / step, 0)
     return np.asarray(weights, np.float32)
@@ -131,10 +128,10 @@ def _hats(size: int, nodes: NDArray[np.float64]) -> Values:
 
 @lru_cache(maxsize=2)
 def _field(optics: Optics) -> tuple[Values, Values]:
-    """Each pixel's direction (rows * columns, 3), and electrons a second (rows, columns) there.
+    """Each pixel's direction (rows * columns, 3), and electrons per second (rows, columns).
 
-    The electrons are those of a brightness of one V = 0 star a steradian: what a pixel sees of the
-    sky gets smaller towards the corners.
+    The electrons are for a brightness of one V = 0 star per steradian; the solid angle of a pixel
+    decreases towards the corners.
     """
     y, x = np.mgrid[: optics.rows, : optics.columns].astype(np.float64)
     directions = optics.unproject(np.stack([x.ravel(), y.ravel()], axis=1))

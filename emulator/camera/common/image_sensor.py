@@ -1,4 +1,4 @@
-"""What all image sensors have: a scene before them, a condition, a supply, and a pixel clock."""
+"""Base class of the image sensors: scene, condition, supply and pixel clock."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -14,72 +14,72 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 
 KEPT = 2
-"""Pictures that are kept: one that was joined in the middle, and the whole one after it."""
+"""Cached images: one whose storing began in the middle, and the whole one after it."""
 
 
 class ImageSensor(ABC, Generic[S, C]):
-    """One sensor behind its lens, powered from time 0 on.
+    """One sensor with its lens, powered from time 0 on.
 
     Attributes:
-        scene_types: classes of scenes that it takes.
-        sees: what it is and what it takes, for messages.
-        on_change: called after the output from now on has become another than announced.
+        scene_types: accepted classes of scenes.
+        sees: text of the error for other scenes.
+        on_change: called after the output differs from now on from what ``segment_at`` announced.
     """
 
     scene_types: ClassVar[tuple[type, ...]]
     sees: ClassVar[str]
 
     def __init__(
-        self, seen: S | View[S, C], condition: C, table: CameraRegisterMap, hz: int
+        self, scene: S | View[S, C], condition: C, table: CameraRegisterMap, hz: int
     ) -> None:
         """Power up.
 
         Args:
-            seen: what it looks at; with a condition, that counts.
-            condition: what lens and sensor are like, unless ``seen`` says.
+            scene: the scene, or a view whose condition replaces ``condition``.
+            condition: state of lens and sensor.
             table: registers.
             hz: frequency of the pixel clock.
         """
         self.on_change: Callable[[], None] = lambda: None
         self._table = table
         self._condition = condition
-        self.scene = seen
+        self.scene = scene
         self._hz = hz
         self._registers = RegisterFile(table)
         self._clock: PixelClock | None = PixelClock(hz)
         self._powered = True
         self._in_reset = False
-        self._made: deque[tuple[Any, Grey]] = deque(maxlen=KEPT)
+        self._images: deque[tuple[Any, Grey]] = deque(maxlen=KEPT)
 
     @property
     def scene(self) -> S:
-        """What it looks at; a new one is seen by the next frame that is rendered.
+        """What it looks at; a new scene takes effect with the next rendered frame.
 
-        A ``View`` changes the condition too. Raises TypeError for another kind of scene, ValueError
-        for one that does not fit the sensor.
+        A ``View`` changes the condition too. Raises TypeError for another class of scene, and
+        ValueError for one that does not fit the sensor.
         """
         return self._scene
 
     @scene.setter
-    def scene(self, seen: object) -> None:
-        scene: Any = seen
+    def scene(self, view: object) -> None:
+        scene: Any = view
         condition = self._condition
-        if isinstance(seen, View):
-            scene, condition = seen.scene, seen.condition
+        if isinstance(view, View):
+            scene, condition = view.scene, view.condition
         if not any(isinstance(scene, kind) for kind in self.scene_types):
             raise TypeError(f"{self.sees}, not {scene!r}")
-        self._look(scene, condition)
+        self._use(scene, condition)
 
     @property
     def condition(self) -> C:
-        """What lens and sensor are like."""
+        """State of lens and sensor."""
         return self._condition
 
     @condition.setter
     def condition(self, condition: C) -> None:
-        self._look(self._scene, condition)
+        self._use(self._scene, condition)
 
-    def _look(self, scene: S, condition: C) -> None:
+    def _use(self, scene: S, condition: C) -> None:
         self._check(scene, condition)
         self._scene, self._condition = scene, condition
 
@@ -88,12 +88,11 @@ class ImageSensor(ABC, Generic[S, C]):
 
     @property
     def period(self) -> Fraction:
-        """Time of one pixel clock in ps."""
         return Fraction(PS_PER_S, self._hz)
 
     @property
     def registers(self) -> RegisterFile:
-        """Its registers, for who looks past its control bus."""
+        """Its registers, for access without the control bus."""
         return self._registers
 
     @property
@@ -102,7 +101,7 @@ class ImageSensor(ABC, Generic[S, C]):
         return self._clock is not None
 
     def power(self, on: bool, now_ps: int) -> None:
-        """Turn the supply on or off; registers then have their reset values."""
+        """Switch the supply; the registers then have their reset values."""
         self._powered = on
         self._start_or_stop(now_ps)
 
@@ -117,20 +116,20 @@ class ImageSensor(ABC, Generic[S, C]):
 
     @property
     def rendered(self) -> Grey | None:
-        """The picture (rows, columns) that was rendered last, of the latest frame looked at."""
-        return self._made[-1][1] if self._made else None
+        """The image (rows, columns) rendered last."""
+        return self._images[-1][1] if self._images else None
 
     @abstractmethod
     def _restarted(self, now_ps: int) -> None:
-        """Forget all that was under way when the part started or stopped."""
+        """Reset the state of the output when the part starts or stops."""
 
-    def _once(self, frame: object, make: Callable[[], Grey]) -> Grey:
-        """The picture of ``frame``, made anew only when frame, scene or condition is another."""
+    def _cached(self, frame: object, render: Callable[[], Grey]) -> Grey:
+        """The image of ``frame``; rendered again only after a change of scene or condition."""
         key = (frame, self._scene, self._condition)
-        made = next((each for each in self._made if each[0] == key), None)
-        if made is None:
-            made = key, make()
+        image = next((each for each in self._images if each[0] == key), None)
+        if image is None:
+            image = key, render()
         else:
-            self._made = deque((each for each in self._made if each is not made), KEPT)
-        self._made.append(made)
-        return made[1]
+            self._images = deque((each for each in self._images if each is not image), KEPT)
+        self._images.append(image)
+        return image[1]

@@ -1,4 +1,4 @@
-"""Frames of a scene in grey values: light through the lens, then the sensor's own pixels."""
+"""Renders frames of a scene as grey values: light through the lens, then the sensor's pixels."""
 
 from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
@@ -19,28 +19,28 @@ Settings = TypeVar("Settings", contravariant=True)
 
 
 class Imager(ABC, Generic[Settings]):
-    """Renders frames; the same arguments give the same picture, whatever else was rendered."""
+    """Renders frames; an image depends only on the arguments."""
 
-    def picture(
+    def render(
         self, scene: Scene, condition: SkyCondition, shutter: RollingShutter, settings: Settings
     ) -> Grey:
         """Grey values (rows, columns), C-contiguous.
 
         Args:
-            scene: what there is to see.
-            condition: what lens and sensor are like.
-            shutter: when its rows are exposed; row 0 is the sensor's first.
-            settings: what the sensor's registers ask for.
+            scene: the scene.
+            condition: state of lens and sensor.
+            shutter: exposure of the rows; row 0 is the sensor's first.
+            settings: settings from the sensor's registers.
         """
         optics = condition.lens
         shape = optics.rows, optics.columns
         exposure = self.exposure(shape, shutter.exposure_s, condition, settings)
-        # By frame time, so that a frame nobody looked at does not change the next one's noise.
+        # By frame time, so that the noise of a frame does not depend on which ones were rendered.
         seed = [condition.seed, max(0, shutter.readout_ps)]
         if isinstance(scene, PictureScene):
             pixels = _photograph(scene, scene.part(optics.columns, optics.rows), shutter)
-            return effects.on_picture(pixels, condition.hazards, exposure, seed)
-        light = effects.on_light(
+            return effects.disturb_photograph(pixels, condition.hazards, exposure, seed)
+        light = effects.disturb_light(
             star_light(scene, optics, shutter), condition.hazards, exposure, seed
         )
         generator = None
@@ -51,7 +51,7 @@ class Imager(ABC, Generic[Settings]):
     def exposure(
         self, shape: tuple[int, int], seconds: float, condition: SkyCondition, settings: Settings
     ) -> Exposure:
-        """What hazards may know of a frame of ``shape`` (rows, columns)."""
+        """Data of a frame of ``shape`` (rows, columns) for hazards."""
         return Exposure(
             shape,
             condition.optics.pixel_pitch_um,
@@ -62,7 +62,7 @@ class Imager(ABC, Generic[Settings]):
 
     @abstractmethod
     def electrons_per_count(self, settings: Settings) -> float:
-        """Charge of one grey value of 8 bits at the gain that ``settings`` ask for."""
+        """Charge of one grey value of 8 bits at the gain in ``settings``."""
 
     @abstractmethod
     def counts(
@@ -73,19 +73,19 @@ class Imager(ABC, Generic[Settings]):
         settings: Settings,
         generator: np.random.Generator | None,
     ) -> Grey:
-        """Grey values, shape as ``light``.
+        """Grey values (rows, columns).
 
         Args:
-            light: mean number of electrons that it frees in each pixel, shape (rows, columns).
+            light: mean number of electrons in each pixel, shape (rows, columns).
             exposure_s: exposure of each pixel.
             condition: temperature, hot pixels and their seed, hazards.
-            settings: as of ``picture``.
+            settings: as for ``render``.
             generator: source of this frame's noise; None for a sensor without noise and defects.
         """
 
 
 def _photograph(scene: PictureScene, pixels: Grey, shutter: RollingShutter) -> Grey:
-    """A picture's ``pixels``, scaled where its own exposure is known."""
+    """A photograph's ``pixels``, scaled by the exposure if its own is known."""
     scale = shutter.relative_exposure
     if scene.exposure_ms is not None:
         scale = 1000 * shutter.exposure_s / scene.exposure_ms

@@ -1,7 +1,7 @@
-"""A camera's registers behind its control bus: address pointer, values, and the wait for a sync.
+"""A camera's registers: address pointer, values, and synchronised activation.
 
-An address holds a byte, or a wider word where the camera's table says so. What is declared as not
-modelled, or not declared at all, is stored and logged when accessed.
+An address holds a byte, or a wider word if the camera's table declares it. Accesses to registers
+and fields that are declared as not modelled, or not declared, are logged.
 """
 
 import logging
@@ -15,29 +15,27 @@ logger = logging.getLogger(__name__)
 class RegisterFile:
     """The registers of one camera.
 
-    Reading gives what was written. What is *active* is the same for registers that act at once,
-    and the state at the last sync for the others.
+    Reading returns the written value. The *active* value is the same for registers that act at
+    once, and the value at the last sync for the others.
     """
 
     def __init__(self, table: registers.CameraRegisterMap) -> None:
-        """Make a file with the reset values of ``table``."""
         self._table = table
         self._written: dict[int, int] = {}
         self._active: dict[int, int] = {}
         self.reset()
 
     def reset(self) -> None:
-        """Go back to the reset values."""
         self._pointer = 0
         for register in self._table:
             self.store(register.name, register.reset)
 
     def select(self, address: int) -> None:
-        """Set the address of the next byte read or written."""
+        """Set the address of the next byte to read or write."""
         self._pointer = address
 
     def write(self, byte: int) -> registers.CameraRegister | None:
-        """Write the next byte; returns the register that it belongs to, None if there is none."""
+        """Write the next byte; returns its register, or None if there is none."""
         address, register = self._step()
         if register is None:
             self._log(WARNING, "wrote %#04x to %#06x, where no register is known", byte, address)
@@ -51,7 +49,7 @@ class RegisterFile:
         return register
 
     def read(self) -> int:
-        """Read the next byte; 0 where no register is known."""
+        """Read the next byte; 0 where no register is declared."""
         address, register = self._step()
         if register is None:
             self._log(WARNING, "read %#06x, where no register is known", address)
@@ -61,11 +59,11 @@ class RegisterFile:
         return self._written[address]
 
     def peek(self, address: int) -> int:
-        """What was written to an address, without any effect; 0 where no register is known."""
+        """The value at an address, without side effects; 0 where no register is declared."""
         return self._written.get(address, 0)
 
     def written(self) -> dict[str, int]:
-        """What was written last, by the registers' names."""
+        """The values written last, by the registers' names."""
         return {register.name: self._value(register, self._written) for register in self._table}
 
     def sync(self) -> None:
@@ -73,7 +71,7 @@ class RegisterFile:
         self._active = dict(self._written)
 
     def active(self, name: str) -> int:
-        """Value of register ``name`` that is in effect."""
+        """The active value of register ``name``."""
         return self._value(self._table[name], self._active)
 
     def store(self, name: str, value: int) -> None:
@@ -89,7 +87,7 @@ class RegisterFile:
         return value
 
     def _step(self) -> tuple[int, registers.CameraRegister | None]:
-        """The pointer's address and register; the pointer moves on."""
+        """Address and register at the pointer; increments the pointer."""
         address = self._pointer
         self._pointer = (address + 1) % (1 << (8 * self._table.address_bytes))
         return address, self._table.at(address)

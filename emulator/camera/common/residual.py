@@ -1,4 +1,4 @@
-"""What no calibration knows of a lens: a smooth displacement of its picture."""
+"""Errors of a lens that its calibration does not contain: a smooth displacement of the image."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,8 @@ class Residual:
     """Polynomials across the sensor.
 
     Attributes:
-        shape: rows and columns that the coordinates -1..1 span.
-        across, down: their coefficients, px: for each power of x, those of the powers of y.
+        shape: rows and columns of the area with coordinates -1..1.
+        across, down: coefficients in px: for each power of x, those of the powers of y.
     """
 
     shape: tuple[int, int]
@@ -26,14 +26,14 @@ class Residual:
     down: Coefficients
 
     def at(self, pixels: Pixels) -> Pixels:
-        """Displacement (n, 2) of what is seen at ``pixels`` (n, 2); outside, as at the edge."""
+        """Displacement (n, 2) at the image points ``pixels`` (n, 2); outside, as at the edge."""
         rows, columns = self.shape
         x, y = np.clip(2 * pixels / (columns - 1, rows - 1) - 1, -1, 1).T
         return np.stack([_horner(x, y, self.across), _horner(x, y, self.down)], axis=1)
 
 
 def displaced(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
-    """Where points are seen that belong at ``pixels`` (n, 2), to 1e-11 px if that changes slowly.
+    """Image points (n, 2) of the ideal points ``pixels``, to 1e-11 px for smooth residuals.
 
     NaN stays NaN.
     """
@@ -48,14 +48,14 @@ def displaced(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
 
 
 def restored(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
-    """Inverse of `displaced`; the quick one of the two, for all pixels of a picture."""
+    """Inverse of `displaced`, and the faster of the two: for all pixels of an image."""
     for residual in reversed(residuals):
         pixels = pixels - residual.at(pixels)
     return pixels
 
 
 def _horner(x: Pixels, y: Pixels, coefficients: Coefficients) -> Pixels:
-    """The polynomial's values (n,); coefficients that are 0 at the end of a row cost nothing."""
+    """The polynomial's values (n,); skips zero coefficients at the end of a row."""
     total = np.zeros_like(x)
     for row in reversed(coefficients):
         total *= x

@@ -1,7 +1,7 @@
-"""When a rolling shutter exposes which row.
+"""Timing of a rolling shutter.
 
-CubeStar thesis, appendix C (figure C.1): rows are read out one line time after the other, and each
-is exposed for the same number of line times up to its own readout.
+CubeStar thesis, appendix C (figure C.1): rows are read out one line time apart, and each is exposed
+for the same number of line times before its readout.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ class RollingShutter:
         readout_ps: time at which row 0 is read out; row r follows r line times later.
         line_ps: one line time in ps, exact.
         exposure_lines: exposure in line times.
-        programmed_lines: exposure that the registers ask for; it differs only in the undefined
-            frame after the sensor was enabled.
+        programmed_lines: exposure set in the registers; it differs only in the undefined frame
+            after the sensor was enabled.
     """
 
     readout_ps: int
@@ -29,12 +29,10 @@ class RollingShutter:
 
     @property
     def exposure_s(self) -> float:
-        """Exposure of each row in s."""
         return float(self.exposure_lines * self.line_ps / PS_PER_S)
 
     @property
     def line_s(self) -> float:
-        """One line time in s."""
         return float(self.line_ps / PS_PER_S)
 
     @property
@@ -43,6 +41,6 @@ class RollingShutter:
         return self.exposure_lines / self.programmed_lines
 
     def mid_exposure_ps(self, row: float) -> int:
-        """Middle of the exposure of ``row``, counted from 0; fractions are between two rows."""
+        """Middle of the exposure of ``row``, counted from 0; may be fractional."""
         lines = Fraction(row) - Fraction(self.exposure_lines, 2)
         return self.readout_ps + round(lines * self.line_ps)

@@ -1,4 +1,4 @@
-"""What the sensors behind star trackers' lenses share: reset pin, two-wire bus, pictures."""
+"""Base class of star trackers' image sensors: reset pin, two-wire bus, scenes."""
 
 from abc import abstractmethod
 from typing import ClassVar
@@ -9,15 +9,14 @@ from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 
 
 class StarSensor(ImageSensor[Scene, SkyCondition]):
-    """A sensor that looks at the sky or at a picture.
+    """A sensor for the sky or a photograph.
 
     Attributes:
-        columns, rows: its pixels.
-        word_bytes: what one address of its registers holds.
+        word_bytes: bytes per address of its registers.
     """
 
     scene_types = (SkyScene, PictureScene)
-    sees = "a star tracker sees the sky or a picture"
+    sees = "a star tracker's scene is a sky or a picture"
     columns: ClassVar[int]
     rows: ClassVar[int]
     word_bytes: ClassVar[int]
@@ -26,27 +25,26 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
         lens = condition.optics
         if (lens.columns, lens.rows) != (self.columns, self.rows):
             raise ValueError(
-                f"the {self._table.camera} has {self.columns} x {self.rows} pixels, the lens is "
-                f"for {lens.columns} x {lens.rows}"
+                f"the {self._table.camera} has {self.columns} x {self.rows} pixels, but the lens "
+                f"is for {lens.columns} x {lens.rows}"
             )
         if isinstance(scene, PictureScene):
             scene.part(self.columns, self.rows)
 
     @property
     def temperature_c(self) -> float:
-        """Temperature of the sensor, in degrees Celsius."""
         return self.condition.temperature_c
 
     def set_reset_pin(self, level: int, now_ps: int) -> None:
-        """Drive the reset pin, low active."""
+        """Drive the reset pin, active low."""
         self._in_reset = not level
         self._start_or_stop(now_ps)
 
     def i2c_write(self, address: int, data: bytes, now_ps: int) -> bool:
-        """A write message to the 7-bit ``address`` ended; returns whether it was acknowledged.
+        """Handle a write message to the 7-bit ``address``; returns whether to acknowledge it.
 
-        A register's address, then words for that register and those that follow, upper byte
-        first; half a word is dropped.
+        ``data`` is a register's address, then words for that register and the following ones, upper
+        byte first; an incomplete word is dropped.
         """
         if not self.running or address != self._table.i2c_address:
             return False
@@ -69,4 +67,4 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
 
     @abstractmethod
     def _write(self, words: list[int], now_ps: int) -> None:
-        """Write to the selected register and those that follow."""
+        """Write to the selected register and the following ones."""

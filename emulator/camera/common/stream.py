@@ -1,6 +1,6 @@
-"""What a camera's parallel output is made of: segments of an unbroken pixel clock, and its grid.
+"""A camera's parallel output: segments with a continuous pixel clock, and the clock's edges.
 
-Pixel data, HSync and VSync change with the falling edge of the pixel clock and are good at its
+Pixel data, HSync and VSync change with the falling edge of the pixel clock and are valid at its
 rising edge (CubeStar thesis, appendix C).
 """
 
@@ -16,16 +16,9 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 @dataclass(frozen=True)
 class StreamSegment:
-    """A stretch of the output: blanking, or whole lines.
+    """A ``rtl.pixel_clock.PixelSegment``: blanking, or whole lines.
 
-    Attributes:
-        start_ps: first rising edge of the pixel clock.
-        clocks: number of pixel clocks; ``rows`` times the clocks of a line unless it is blanking.
-        vsync: level of VSync throughout.
-        rows: number of lines, each beginning with its active columns under a high HSync; 0 is
-            blanking, with HSync low throughout.
-        pixels: renders the lines, shape (rows, active columns), uint8, C-contiguous; None in
-            blanking.
+    Each line begins with its active columns, while HSync is high.
     """
 
     start_ps: int
@@ -37,32 +30,24 @@ class StreamSegment:
 
 @dataclass(frozen=True)
 class PixelClock:
-    """A free-running clock: rising edge k is at floor(origin + k * period).
-
-    Attributes:
-        hz: frequency.
-        origin_ps: time of edge 0.
-    """
+    """A free-running clock: rising edge k is at floor(origin + k * period)."""
 
     hz: int
     origin_ps: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse a frequency that is not positive."""
         if self.hz <= 0:
             raise ValueError(f"a pixel clock needs a positive frequency, not {self.hz} Hz")
 
     @property
     def period(self) -> Fraction:
-        """Time of one clock in ps, exact."""
         return Fraction(PS_PER_S, self.hz)
 
     def edge_ps(self, k: int) -> int:
-        """Time of rising edge ``k``."""
         return self.origin_ps + k * PS_PER_S // self.hz
 
     def end_ps(self, first: int, clocks: int) -> int:
-        """Where a consumer that counts ``clocks`` from edge ``first`` sees their end."""
+        """End of ``clocks`` clocks for a consumer that counts from edge ``first``."""
         return self.edge_ps(first) + clocks * PS_PER_S // self.hz
 
     def first_edge(self, time_ps: int) -> int:

@@ -1,1 +1,1 @@
-"""The MLX75412 image sensor of CubeStar."""
+"""CubeStar's image sensor MLX75412."""

@@ -1,13 +1,13 @@
-"""The sensor's pixels: electrons become 8-bit counts, with all that disturbs them.
+"""Renders frames of the MLX75412: electrons to 8-bit counts, with noise and defects.
 
 CubeStar thesis, section 3.4.4 (dark current and its subtraction), appendix C (upper 8 of 12 bits)
-and appendix E: 2.28 electrons per count of 12 bits, dark signal of 1008 counts a second at 65 C.
-Nothing is published about read noise, fixed pattern, defects, and how the dark signal depends on
-temperature; those constants are assumed, at what automotive sensors of that time had.
+and appendix E: 2.28 electrons per count of 12 bits, dark signal of 1008 counts per second at 65 C.
+Read noise, fixed pattern, defects and the dark signal's dependence on temperature are not
+published; these constants are assumed, typical of automotive sensors of that time.
 
 Shot, dark and read noise are drawn at once, as one normal distribution with the mean and the
-variance of the Poisson and normal parts together. What is lost is the skewness of the Poisson
-part: beside this read noise never more than 0.034. A frame costs one normal field that way.
+variance of the sum, so that a frame needs one normal field. This neglects the skewness of the
+Poisson part, which is at most 0.034 with this read noise.
 """
 
 from dataclasses import dataclass
@@ -37,10 +37,10 @@ HOT_DN12_PER_S_AT_20_C = 1500.0  # assumed: mean of an exponential distribution
 
 @dataclass(frozen=True)
 class Corrections:
-    """Which of the sensor's corrections are on.
+    """The sensor's corrections that are on.
 
     Attributes:
-        defects: known defective pixels take the mean of their neighbours in the row.
+        defects: known defective pixels get the mean of their neighbours in the row.
         fixed_pattern: most of the fixed pattern is subtracted.
         dark: the mean of the dark rows is subtracted.
     """
@@ -56,15 +56,14 @@ def dark_dn12_per_second(temperature_c: float) -> float:
 
 
 def ideal_counts(electrons: Light) -> Grey:
-    """What a sensor without noise and defects makes of ``electrons``: upper 8 of 12 bits."""
+    """Upper 8 of 12 bits for ``electrons`` without noise and defects."""
     return _upper_bits(electrons * np.float32(1 / ELECTRONS_PER_DN12))
 
 
 class Mlx75412Imager(Imager[Corrections]):
-    """Renders frames of one sensor, with its own fixed pattern and its own defects."""
+    """Renders frames of the sensor with fixed pattern and defects number ``seed``."""
 
     def __init__(self, seed: int = 0) -> None:
-        """Make the sensor that ``seed`` stands for."""
         generator = np.random.default_rng([seed, 0xD1E])
         shape = (ROWS, COLUMNS)
 
@@ -74,7 +73,7 @@ class Mlx75412Imager(Imager[Corrections]):
         self._gain = 1 + field(GAIN_NON_UNIFORMITY)
         self._dark_share = np.maximum(1 + field(DARK_NON_UNIFORMITY), 0)
         self._pattern = field(COLUMN_PATTERN_DN12, (1, COLUMNS)) + field(PIXEL_PATTERN_DN12)
-        # Away from the outer columns, whose pixels lack a neighbour to correct from.
+        # Not in the outer columns, whose pixels have only one neighbour for the correction.
         places = generator.choice(ROWS * (COLUMNS - 2), FACTORY_DEAD + FACTORY_HOT, replace=False)
         rows, columns = np.divmod(places, COLUMNS - 2)
         self._defects = rows, columns + 1
@@ -83,7 +82,6 @@ class Mlx75412Imager(Imager[Corrections]):
         self._hot_share = generator.exponential(size=FACTORY_HOT).astype(np.float32)
 
     def electrons_per_count(self, settings: Corrections) -> float:
-        """The gain is always the same; see ``Imager``."""
         del settings
         return ELECTRONS_PER_DN12 * DN12_PER_DN8
 
@@ -95,7 +93,6 @@ class Mlx75412Imager(Imager[Corrections]):
         settings: Corrections,
         generator: np.random.Generator | None,
     ) -> Grey:
-        """Grey values (512, 1024); see ``Imager``."""
         if generator is None:
             return ideal_counts(light)
         per_second = dark_dn12_per_second(condition.temperature_c)
@@ -107,7 +104,7 @@ class Mlx75412Imager(Imager[Corrections]):
         mean += light * self._gain
         mean[self._hot] += self._hot_share * hot_electrons
         if condition.hot_count:
-            # The sensor does not know of these.
+            # The sensor does not correct these.
             places, share = hot_pixels(condition.seed, condition.hot_count, light.size)
             mean.ravel()[places] += share * hot_electrons
         exposure = self.exposure((ROWS, COLUMNS), exposure_s, condition, settings)
@@ -126,7 +123,7 @@ class Mlx75412Imager(Imager[Corrections]):
 
 
 def _upper_bits(dn12: Light) -> Grey:
-    """Converts to whole counts of 12 bits, saturated, and takes the upper 8 bits."""
+    """Round to whole counts of 12 bits, saturate, and take the upper 8 bits."""
     counts: Light = np.clip(dn12 + np.float32(0.5), 0, FULL_SCALE_DN12)
     counts *= np.float32(1 / DN12_PER_DN8)  # a power of two: exact, so truncation drops 4 bits
     return counts.astype(np.uint8, order="C")

@@ -1,12 +1,13 @@
-"""The lens of CubeStar in front of its MLX75412: 6 mm focal length at f/1.2.
+"""The lens of CubeStar's MLX75412: 6 mm focal length at f/1.2.
 
 CubeStar thesis, section 5.4 (calibration, figure 5.12; focal length by star pairs) and 3.4.4.
 
 The calibration toolbox fits coefficients that map undistorted points to distorted ones. The
 firmware uses them with inverted signs in equations that map distorted points to undistorted ones,
-which is only nearly the inverse. This lens is by default the exact inverse of what the firmware
-computes, so that its calibration is right; ``Distortion.TOOLBOX`` is the other reading. Then the
-firmware's undistortion is off by 1.7 px in the mean over the picture, and by 15 px in one corner.
+which is only approximately the inverse. By default, this lens is the exact inverse of the
+firmware's computation, so its calibration is correct. With the other interpretation,
+``Distortion.TOOLBOX``, the firmware's undistortion has a mean error of 1.7 px over the image, and
+15 px in one corner.
 """
 
 from cubestack.emulator.camera.common.optics import Optics
@@ -16,8 +17,8 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_P
 EFFECTIVE_WIDTH_A = 4780.0
 """Bandwidth in Angstrom times transmission times quantum efficiency: fitted.
 
-A star of V = 3.8 so gives 300 counts of 8 bits, summed over its spot, in the 385.6 ms of the
-default frame rate, near the published detection limit. The thesis' own factors without a quantum
+A star of V = 3.8 then has 300 counts of 8 bits, summed over its spot, in the 385.6 ms of the
+default frame rate, near the published detection limit. The thesis' factors without a quantum
 efficiency range from 0.6 x 3000 to 0.8 x 6000 Angstrom, so this is a bright lens.
 """
 
@@ -50,12 +51,11 @@ UNCERTAIN = {
     "p1": 0.00163 / 3,
     "p2": 0.00085 / 3,
 }
-"""How well the calibration knows the lens: standard deviations, by the names of ``Optics``.
+"""Standard deviations of the calibration, by the names of ``Optics``.
 
-Published (figure 5.12), where the toolbox prints three standard deviations; of the focal length,
-which other tests gave, the rounding of the printed 6.28 mm. The toolbox fits them together, but
-prints no correlations: drawn one by one they are larger than they would be together.
+Published (figure 5.12), where the toolbox prints three standard deviations; for the focal length,
+which is from other tests, the rounding of the printed 6.28 mm. The toolbox fits them together, but
+prints no correlations: drawn independently, the errors are larger than with them.
 """
 
 CONDITION = SkyCondition(LENS)
-"""What a camera is like when nothing else is said."""

@@ -1,14 +1,14 @@
 """The MLX75412 image sensor: registers on its control bus, frames on its pixel lines.
 
-CubeStar thesis, appendices C and D. What it leaves open, we take:
+CubeStar thesis, appendices C and D. Assumptions where it is silent:
 
-- PIXCLK runs whenever the part has power and its reset pin is high, on a fixed grid from then on.
+- PIXCLK runs while the part has power and its reset pin is high, on a fixed grid from that time.
   While the part is disabled, HSync, VSync and data are low.
-- Enabling starts the read-out of a frame with an undefined exposure at once. No VSync low separates
-  it from the first good frame, which explains the published split pictures; all later frames are
-  preceded by VSync low during the whole vertical blanking.
-- Disabling ends the output in the middle of whatever it was.
-- Frame length and the next frame's exposure are taken over when a frame's read-out starts.
+- Enabling immediately starts the read-out of a frame with an undefined exposure. VSync stays high
+  between it and the first valid frame, which explains the published split images; before all later
+  frames, VSync is low during the whole vertical blanking.
+- Disabling ends the output immediately.
+- Frame length and the next frame's exposure are latched when a frame's read-out starts.
 - Synchronised values become active with the write of the sync register.
 """
 
@@ -29,21 +29,21 @@ from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mlx75412 as chip
 
 IDLE_CLOCKS = 4096 * chip.LINE_CLOCKS
-"""Length in which the endless blanking of the disabled sensor is handed out."""
+"""Length of the segments of blanking while the sensor is disabled."""
 
 REMEMBERED = 8
-"""Spans and frames kept: more than anybody looks ahead or back."""
+"""Number of stored spans and frames, more than any caller needs."""
 
 MOST_FRAME_LINES = 4095
 FEWEST_FRAME_LINES = chip.ROWS + 8
-"""Shortest vertical blanking: assumed, far below what 30 frames a second leave."""
+"""Shortest vertical blanking: assumed, far below that at 30 frames per second."""
 
 _ENABLE = chip.REGISTERS["MODE_SELECT"].field("ENABLE")
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """What was settled when a frame's read-out started."""
+    """Values that were latched when a frame's read-out started."""
 
     number: int  # since the sensor was enabled; 0 is the undefined one
     shutter: RollingShutter
@@ -54,14 +54,14 @@ class _Frame:
 
 @dataclass(frozen=True)
 class _Span:
-    """A stretch of output, in numbers of clock edges."""
+    """A part of the output, in numbers of clock edges."""
 
     first: int
     clocks: int
     vsync: int
-    frame: _Frame | None = None  # that is read out, or that the blanking follows
+    frame: _Frame | None = None  # the frame in read-out, or before the blanking
     rows: int = 0
-    cut: bool = False  # ended early by a change; never handed out again
+    cut: bool = False  # ended early by a change; not returned again
 
     @property
     def end(self) -> int:
@@ -69,12 +69,7 @@ class _Span:
 
 
 class Mlx75412(StarSensor):
-    """One sensor, powered from time 0 on.
-
-    Attributes:
-        line_clocks: pixel clocks of a line.
-        active_columns: those of them with HSync high.
-    """
+    """One sensor, powered from time 0 on."""
 
     columns, rows, word_bytes = chip.COLUMNS, chip.ROWS, 1
     line_clocks = chip.LINE_CLOCKS
@@ -92,11 +87,11 @@ class Mlx75412(StarSensor):
         """Power up with the reset pin high; see ``ImageSensor``.
 
         Args:
-            scene, condition: as of there.
-            seed: of the part's defects and of the undefined exposures.
+            scene, condition: as for ``ImageSensor``.
+            seed: seed of the part's defects and of the undefined exposures.
             crystal_hz: input clock; PIXCLK has the same frequency.
             vsync_before_first_frame: whether VSync goes low between the undefined and the first
-                good frame.
+                valid frame.
         """
         super().__init__(scene, condition, chip.REGISTERS, crystal_hz)
         self._seed = seed
@@ -108,7 +103,7 @@ class Mlx75412(StarSensor):
 
     @property
     def enabled(self) -> bool:
-        """Whether it gathers images."""
+        """Whether it sends frames."""
         return self.running and bool(_ENABLE.of(self._registers.active("MODE_SELECT")))
 
     def _restarted(self, now_ps: int) -> None:
@@ -130,7 +125,7 @@ class Mlx75412(StarSensor):
     # --- pixel lines ----------------------------------------------------------------------------
 
     def segment_at(self, time_ps: int) -> StreamSegment | None:
-        """The stretch of output at ``time_ps``, not before the last change; None without clock."""
+        """The segment at ``time_ps``, from the last change on; None without a clock."""
         clock = self._clock
         if clock is None:
             return None
@@ -141,13 +136,13 @@ class Mlx75412(StarSensor):
         span = next(
             s for s in self._spans if not s.cut and clock.end_ps(s.first, s.clocks) > time_ps
         )
-        pixels = partial(self._picture, span.frame) if span.rows and span.frame else None
+        pixels = partial(self._image, span.frame) if span.rows and span.frame else None
         return StreamSegment(clock.edge_ps(span.first), span.clocks, span.vsync, span.rows, pixels)
 
     def frame_from(self, time_ps: int) -> RollingShutter | None:
         """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
 
-        None when its output was not announced yet; of long ago, only the last frames are known.
+        None if it is not planned yet; only the latest ``REMEMBERED`` frames are stored.
         """
         if self._clock is not None:
             self.segment_at(time_ps)
@@ -160,7 +155,7 @@ class Mlx75412(StarSensor):
             self._frames.append(span.frame)
 
     def _after(self, clock: PixelClock, last: _Span) -> _Span:
-        """What follows ``last`` when nothing changes."""
+        """The span after ``last`` if nothing changes."""
         if not self.enabled:
             return _Span(last.end, IDLE_CLOCKS, vsync=0)
         if last.frame is None or last.cut:
@@ -198,7 +193,7 @@ class Mlx75412(StarSensor):
         return Corrections(on("DEFECT_CORRECTION"), on("FPN_CORRECTION"), on("DARK_SUBTRACTION"))
 
     def _replan(self, now_ps: int, *, cut: bool) -> None:
-        """Forget what was planned from ``now_ps`` on; with ``cut``, the present span too."""
+        """Drop the spans from ``now_ps`` on; with ``cut``, end the present one too."""
         clock = self._clock
         assert clock is not None
         self.segment_at(now_ps)
@@ -209,7 +204,7 @@ class Mlx75412(StarSensor):
         last = self._spans[-1]
         if last.first > edge:
             raise ValueError(
-                f"the sensor can not change at {now_ps} ps after its output was looked up to "
+                f"the sensor can not change at {now_ps} ps: its output is already planned up to "
                 f"{clock.edge_ps(last.first)} ps"
             )
         if cut:
@@ -221,19 +216,19 @@ class Mlx75412(StarSensor):
         while self._frames and self._frames[-1].shutter.readout_ps >= now_ps:
             self._frames.pop()
 
-    def _picture(self, frame: _Frame) -> Grey:
-        look = self._imager.picture
-        return self._once(
-            frame, lambda: look(self.scene, self.condition, frame.shutter, frame.corrections)
+    def _image(self, frame: _Frame) -> Grey:
+        render = self._imager.render
+        return self._cached(
+            frame, lambda: render(self.scene, self.condition, frame.shutter, frame.corrections)
         )
 
 
 def frame_lines(clocks_per_second: int, frames_per_second: int) -> int:
-    """Line times from one frame to the next, the nearest whole number (assumed) in range.
+    """Line times from one frame to the next, rounded to the nearest (assumed), within the limits.
 
     A line is 1322 input clocks, and the lowest frame rate, one frame in 5 413 590 of them, is 4095
-    lines: so a frame is a whole number of lines (appendix C: eq. C.0.1, figure C.1; table D.2).
-    ``clocks_per_second`` is what the registers assume, whatever crystal there is.
+    lines, so a frame is a whole number of lines (appendix C: eq. C.0.1, figure C.1; table D.2).
+    ``clocks_per_second`` is the value in the registers, which may differ from the crystal.
     """
     if frames_per_second == 0:
         return MOST_FRAME_LINES
@@ -243,7 +238,7 @@ def frame_lines(clocks_per_second: int, frames_per_second: int) -> int:
 
 
 def exposure_lines(rule: int, exposure: int, lines: int) -> int:
-    """Line times of exposure within a frame of ``lines``, by EXPOSURE_RULE and EXPOSURE."""
+    """Exposure in line times for a frame of ``lines``, from EXPOSURE_RULE and EXPOSURE."""
     if rule == chip.LONGEST_EXPOSURE:
         return lines - 1
     return min(max(exposure, 1), lines - 1)

@@ -1,1 +1,1 @@
-"""The MT9M001 image sensor of AraMiS."""
+"""AraMiS' image sensor MT9M001."""

@@ -1,7 +1,7 @@
-"""One frame of a scene on the MT9M001: its lens' light, its noise, its window.
+"""Renders frames of the MT9M001: light, noise, window.
 
 Shot, dark, background and read-out noise are drawn at once, as one normal distribution with the
-mean and the variance of all of them together.
+mean and the variance of their sum.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from cubestack.emulator.camera.mt9m001.registers import SensorSettings
 from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 
-COUNTS = 256  # of the eight wired bits
+COUNTS = 256  # eight bits are wired
 
 
 class Mt9m001Imager(Imager[SensorSettings]):
@@ -30,18 +30,18 @@ class Mt9m001Imager(Imager[SensorSettings]):
         noise: physics.NoiseTerms | None = None,
         background_electrons_per_s: float = physics.BACKGROUND_ELECTRONS_PER_S,
     ) -> None:
-        """Make the imager with the sensor that ``seed`` stands for.
+        """Create the imager.
 
         Args:
-            seed: of the part's hot pixels.
-            noise: which terms of noise there are under a condition with noise, all unless given.
-            background_electrons_per_s: light from elsewhere in each pixel.
+            seed: seed of the part's hot pixels.
+            noise: terms of the noise under a condition with noise; default all.
+            background_electrons_per_s: background light in each pixel.
         """
         self._seed = seed
         self._noise = noise or physics.NoiseTerms()
         self._background = background_electrons_per_s
 
-    def picture(
+    def render(
         self,
         scene: Scene,
         condition: SkyCondition,
@@ -49,13 +49,13 @@ class Mt9m001Imager(Imager[SensorSettings]):
         settings: SensorSettings,
     ) -> Grey:
         """Grey values of the window; row 0 of ``shutter`` is the window's first."""
-        # The array's row 0 has the time that it would have if it were read.
+        # Time at which the array's row 0 would be read out.
         readout_ps = shutter.readout_ps - round(settings.row * shutter.line_ps)
         whole = replace(shutter, readout_ps=readout_ps)
-        return _window(super().picture(scene, condition, whole, settings), settings)
+        return _window(super().render(scene, condition, whole, settings), settings)
 
     def electrons_per_count(self, settings: SensorSettings) -> float:
-        """By the mean of the four gains; see ``Imager``."""
+        """For the mean of the four gains; see ``Imager``."""
         return physics.FULL_WELL_ELECTRONS / (COUNTS * float(np.mean(settings.gains)))
 
     def counts(
@@ -66,7 +66,6 @@ class Mt9m001Imager(Imager[SensorSettings]):
         settings: SensorSettings,
         generator: np.random.Generator | None,
     ) -> Grey:
-        """Grey values, same shape as ``light``; see ``Imager``."""
         terms = physics.NoiseTerms.none() if generator is None else self._noise
         surplus = self._background * exposure_s if terms.background else 0.0
         own_dark = physics.dark_electrons_per_s(condition.temperature_c) * exposure_s
@@ -87,7 +86,7 @@ class Mt9m001Imager(Imager[SensorSettings]):
             noise = generator.standard_normal(light.shape, np.float32)
             noise *= np.sqrt(variance)
             signal += noise
-        # The dark rows' mean, which holds the mean dark current, is subtracted on the chip.
+        # The chip subtracts the mean of the dark rows, which contains the mean dark current.
         if terms.dark:
             signal -= np.float32(dark)
         scale = (physics.FULL_SCALE + 1) / physics.FULL_WELL_ELECTRONS
@@ -102,11 +101,11 @@ class Mt9m001Imager(Imager[SensorSettings]):
 
 
 def _gain(settings: SensorSettings) -> float | Light:
-    """One gain for all pixels, or one for each (1024, 1280)."""
+    """One gain for all pixels, or one per pixel (1024, 1280)."""
     even, odd_row, odd_column, odd = settings.gains
     if even == odd_row == odd_column == odd:
         return even
-    # Even and odd are counted in the window (assumed), whose start is even in the array.
+    # Even and odd refer to the window (assumed), whose start is even in the array.
     gains = np.array([[even, odd_column], [odd_row, odd]], np.float32)
     return np.roll(np.tile(gains, (ROWS // 2, COLUMNS // 2)), settings.row, axis=0)
 

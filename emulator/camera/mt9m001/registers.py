@@ -1,7 +1,7 @@
-"""What the MT9M001's registers ask for, and what writing some of them does beside storing.
+"""Settings from the MT9M001's registers, and side effects of writing them.
 
-MT9M001 data sheet, register list. A write to GLOBAL_GAIN goes to all four gains, CHIP_ENABLE and
-OUTPUT_CONTROL show the same two bits, RESET brings all reset values back, RESTART reads as 0.
+MT9M001 data sheet, register list. A write to GLOBAL_GAIN sets all four gains, CHIP_ENABLE and
+OUTPUT_CONTROL share two bits, RESET restores all reset values, RESTART reads as 0.
 """
 
 from dataclasses import dataclass, replace
@@ -14,16 +14,16 @@ GAINS = ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """What holds for a frame.
+    """Settings of a frame.
 
     Attributes:
         enabled: whether frames are sent.
         row, column: first pixel of the window, counted from the first active one; may be negative.
         rows, columns: size of the window.
         row_clocks: pixel clocks from line to line.
-        blank_rows: row times from the last line's time to the next frame, at least.
+        blank_rows: minimum of row times between the last line and the next frame.
         exposure_rows: exposure in row times.
-        gains: of even rows and columns; odd rows, even columns; even rows, odd columns; both odd.
+        gains: for even rows and columns; odd rows, even columns; even rows, odd columns; both odd.
     """
 
     enabled: bool
@@ -38,7 +38,7 @@ class SensorSettings:
 
     @property
     def timing(self) -> tuple[int, ...]:
-        """What makes frames of mixed exposure when it changes."""
+        """Settings whose change would cause frames of mixed exposure."""
         return (
             *(self.row, self.column, self.rows, self.columns),
             *(self.row_clocks, self.blank_rows, self.exposure_rows),
@@ -51,7 +51,7 @@ class SensorSettings:
 
 
 def read_settings(registers: RegisterFile, before: SensorSettings | None = None) -> SensorSettings:
-    """Settings that the registers ask for; while they are held, those of ``before``."""
+    """Settings from the registers; those of ``before`` while HOLD is set."""
     output = chip.REGISTERS["OUTPUT_CONTROL"]
     control = registers.active("OUTPUT_CONTROL")
     resetting = registers.active("RESET") & 1

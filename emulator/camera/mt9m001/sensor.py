@@ -1,15 +1,15 @@
 """The MT9M001 image sensor of AraMiS: registers on its two-wire bus, frames on its pixel lines.
 
 MT9M001 data sheet, revisions C and K: frame timing (tables 3 and 4), electronic rolling shutter.
-What it leaves open, we take:
+Assumptions where it is silent:
 
-- PIXCLK runs whenever the part has power and is out of reset, on a fixed grid from then on.
-- The read-out starts one exposure and a row after it is enabled, so that the first frame is good.
-- A frame keeps the settings that hold when FRAME_VALID rises. After a change of window, blanking
+- PIXCLK runs while the part has power and is out of reset, on a fixed grid from that time.
+- The read-out starts one exposure and a row after it is enabled, so the first frame is valid.
+- A frame uses the settings at the time when FRAME_VALID rises. After a change of window, blanking
   or exposure the next frame starts one whole exposure after both the change and the last frame:
   frames of mixed exposure are not sent.
-- Stopping, restarting and resetting end the output in the middle of whatever it was.
-- Pixels of a window beyond the active array are black.
+- Stopping, restarting and resetting end the output immediately.
+- Pixels of a window outside the active array are black.
 """
 
 from collections import deque
@@ -29,10 +29,10 @@ from cubestack.emulator.scene.sky import Scene
 from cubestack.firmware_model.interface.cameras import mt9m001 as chip
 
 IDLE_CLOCKS = 4_800_000
-"""Length in which the endless blanking of the stopped sensor is handed out."""
+"""Length of the segments of blanking while the sensor is stopped."""
 
 REMEMBERED = 8
-"""Frames kept: more than anybody looks back."""
+"""Number of stored frames, more than any caller needs."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,6 @@ class _Frame:
 
     Attributes:
         first: number of the clock edge at which FRAME_VALID rises.
-        settings: what holds for it.
         shutter: exposure of its rows; row 0 is the window's first.
     """
 
@@ -59,8 +58,8 @@ class Mt9m001(StarSensor):
     """One sensor, powered from time 0 on.
 
     Attributes:
-        active_columns: pixel clocks with LINE_VALID high, in the segment handed out last.
-        line_clocks: pixel clocks of a line, in the segment handed out last.
+        active_columns: pixel clocks per line with LINE_VALID high, in the latest segment.
+        line_clocks: pixel clocks per line, in the latest segment.
     """
 
     columns, rows, word_bytes = chip.COLUMNS, chip.ROWS, 2
@@ -77,22 +76,21 @@ class Mt9m001(StarSensor):
         """Power up with the reset pin high; see ``ImageSensor``.
 
         Args:
-            scene, condition: as of there.
-            seed: of the part's hot pixels.
+            scene, condition: as for ``ImageSensor``.
+            seed: seed of the part's hot pixels.
             clock_hz: master clock; PIXCLK has the same frequency.
-            noise: which terms of noise there are in a condition that has noise, all unless given.
+            noise: terms of the noise in a condition with noise; default all.
         """
         super().__init__(scene, condition, chip.REGISTERS, clock_hz)
         self._imager = Mt9m001Imager(seed, noise)
         self._settings = read_settings(self._registers)
-        self._since = 0  # edge of the last start or change: exposing anew begins there
+        self._since = 0  # edge of the last start or change, where the exposure begins
         self._frames: deque[_Frame] = deque(maxlen=REMEMBERED)
         self.active_columns = chip.COLUMNS
         self.line_clocks = self._settings.row_clocks
 
     @property
     def enabled(self) -> bool:
-        """Whether it sends frames."""
         return self.running and self._settings.enabled
 
     def _restarted(self, now_ps: int) -> None:
@@ -123,10 +121,10 @@ class Mt9m001(StarSensor):
     # --- pixel lines ----------------------------------------------------------------------------
 
     def segment_at(self, time_ps: int) -> StreamSegment | None:
-        """The stretch of output at ``time_ps``, not before the last change; None without clock.
+        """The segment at ``time_ps``, from the last change on; None without a clock.
 
         ``vsync`` is FRAME_VALID, and LINE_VALID is high in a line's active columns. The last line
-        of a frame is a segment of its own, because FRAME_VALID falls before a whole line is over.
+        of a frame is a separate segment, because FRAME_VALID falls before the end of its blanking.
         """
         clock = self._clock
         if clock is None:
@@ -159,7 +157,7 @@ class Mt9m001(StarSensor):
     def frame_from(self, time_ps: int) -> RollingShutter | None:
         """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
 
-        None when no frame is to be expected; of long ago, only the last frames are known.
+        None while no frames are sent; only the latest ``REMEMBERED`` frames are stored.
         """
         clock = self._clock
         if clock is None or not self._settings.enabled:
@@ -173,18 +171,18 @@ class Mt9m001(StarSensor):
         return StreamSegment(clock.edge_ps(first), end - first, 0, 0, None)
 
     def _plan(self, clock: PixelClock, time_ps: int) -> None:
-        """Make all frames that have begun by ``time_ps``."""
+        """Create all frames that have begun by ``time_ps``."""
         if not self._settings.enabled:
             return
         while True:
             frame = self._next(clock)
-            # A consumer that counts from an earlier edge may ask up to 1 ps before this one.
+            # A consumer that counts from an earlier edge may be up to 1 ps early.
             if clock.edge_ps(frame.first) > time_ps + 1:
                 return
             self._frames.append(frame)
 
     def _next(self, clock: PixelClock) -> _Frame:
-        """The frame after the last one that was made."""
+        """The frame after the last created one."""
         settings = self._settings
         rows = max(settings.blank_rows, settings.exposure_rows + 1)
         first = self._since + rows * settings.row_clocks
@@ -200,9 +198,9 @@ class Mt9m001(StarSensor):
         return _Frame(first, settings, shutter)
 
     def _pixels(self, frame: _Frame, *, last: bool) -> Grey:
-        """The last row of ``frame``, or all others."""
-        look = self._imager.picture
-        picture = self._once(
-            frame, lambda: look(self.scene, self.condition, frame.shutter, frame.settings)
+        """The last row of ``frame``, or all other rows."""
+        render = self._imager.render
+        image = self._cached(
+            frame, lambda: render(self.scene, self.condition, frame.shutter, frame.settings)
         )
-        return picture[-1:] if last else picture[:-1]
+        return image[-1:] if last else image[:-1]

@@ -1,1 +1,1 @@
-"""The OV7620 image sensor of CubeSense, with its fisheye."""
+"""CubeSense's image sensor OV7620 with its fisheye lens."""

@@ -1,4 +1,4 @@
-"""A picture out of focus: each point becomes a Gaussian spot."""
+"""Defocus: each point of the image becomes a Gaussian spot."""
 
 import math
 
@@ -9,7 +9,7 @@ REACH_SIGMAS = 4.0
 
 
 def blurred(light: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
-    """``light`` (rows, columns) with spots of this standard deviation; it is dark all around."""
+    """``light`` (rows, columns) with spots of this standard deviation; dark beyond the edges."""
     half = math.ceil(REACH_SIGMAS * sigma_px)
     edges = (np.arange(2 * half + 2) - half - 0.5) / (sigma_px * math.sqrt(2))
     shares = np.diff([math.erf(edge) for edge in edges])

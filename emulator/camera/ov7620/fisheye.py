@@ -1,12 +1,12 @@
 """CubeSense's fisheye lens: directions to pixels and back, and the directions of all pixels.
 
-CubeSense thesis, section 5.1.1 (boresight, table 5.1), section 5.2.1 (2.9 px for a degree of field
+CubeSense thesis, section 5.1.1 (boresight, table 5.1), section 5.2.1 (2.9 px per degree of field
 angle, equation 5.2.1, and the measured distortion polynomial, equation 5.2.3) and appendix A.3
-(field of 190 deg). By the polynomial the field ends 226.6 px from the boresight; table 5.1 gives
-the rim as 226 px. A unit's own lens may differ: `lens_error`.
+(field of 190 deg). By the polynomial, the field ends 226.6 px from the boresight; in table 5.1 the
+rim is at 226 px. The lens of a unit may differ: `lens_error`.
 
-Equation 5.2.3 gives 0.10 px at no field angle at all. What it puts within that radius is taken to
-be the boresight.
+Equation 5.2.3 results in 0.10 px at field angle 0; points within that radius count as the
+boresight.
 """
 
 from dataclasses import dataclass
@@ -26,13 +26,13 @@ DISTORTION = (-2.5572e-6, 7.6076e-5, 0.9953, 0.1036)
 """Coefficients of equation 5.2.3, highest power first; radii in px."""
 
 PIXELS_PER_DEGREE = 2.9
-"""Undistorted pixels for one degree of field angle."""
+"""Undistorted pixels per degree of field angle."""
 
 _NEWTON_STEPS = 8
 
 
 def check_field(alpha_deg: float, beta_deg: float) -> None:
-    """Raise SceneError for angles of a reflection that no lens images."""
+    """Raise SceneError for angles of a reflection outside the field."""
     if not np.hypot(alpha_deg, beta_deg) <= FIELD_DEG:
         raise SceneError(
             f"at_deg must be within {FIELD_DEG} deg of the boresight, not {alpha_deg}, {beta_deg}"
@@ -40,9 +40,9 @@ def check_field(alpha_deg: float, beta_deg: float) -> None:
 
 
 def distorted(radius_px: ArrayLike) -> NDArray[np.float64]:
-    """Distance from the boresight in the picture of what belongs at ``radius_px`` (equation 5.2.3).
+    """Distance from the boresight in the image for the ideal ``radius_px`` (equation 5.2.3).
 
-    Rises with ``radius_px`` up to 370 px, far beyond the field's 275.5 px.
+    Monotonic up to 370 px, far beyond the field's 275.5 px.
     """
     return np.asarray(np.polyval(DISTORTION, np.asarray(radius_px, np.float64)))
 
@@ -63,7 +63,7 @@ class Fisheye:
 
     Attributes:
         cx, cy: boresight and centre of distortion, px.
-        error: what the polynomial does not say of it; its centre is in ``cx`` and ``cy`` already.
+        error: deviation from the polynomial; ``cx`` and ``cy`` already contain that of the centre.
     """
 
     cx: float
@@ -92,9 +92,9 @@ class Fisheye:
 
     @cached_property
     def field(self) -> "FieldOfView":
-        """Directions of all pixels that see anything.
+        """Directions of all pixels within the field.
 
-        What a pixel covers is as the polynomial says: an error changes it by a few percent.
+        The size of a pixel is that of the polynomial; an error changes it by a few percent.
         """
         rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
         radius = np.hypot(columns - self.cx, rows - self.cy) / self.error.scale
@@ -102,7 +102,7 @@ class Fisheye:
         lit = np.clip(rim - radius + 0.5, 0, 1)
         index = np.flatnonzero(lit)
         wide = undistorted(np.minimum(radius[index], rim))
-        # Across the radius a pixel is 1 / radius of a turn, along it as long as the slope says.
+        # Across the radius a pixel spans 1 / radius of a turn; along it, the inverse of the slope.
         along = 1 / np.polyval(np.polyder(DISTORTION), wide)
         across = np.sin(np.radians(wide / PIXELS_PER_DEGREE)) / np.maximum(radius[index], 1)
         along_rad = np.radians(along / PIXELS_PER_DEGREE)
@@ -117,12 +117,12 @@ class Fisheye:
 
 @dataclass(frozen=True, eq=False)
 class FieldOfView:
-    """The pixels within a lens' field, in the order of the picture.
+    """The pixels within a lens' field, in the order of the image.
 
     Attributes:
-        index: flat indices (n,) in the picture of 480 rows of 640.
+        index: flat indices (n,) in the image of 480 rows of 640.
         vectors: unit vectors (n, 3) in camera axes, float32.
-        pixel_rad: angle (n,) that a pixel covers, the mean of both directions, float32.
+        pixel_rad: angle (n,) that a pixel spans, the mean of both directions, float32.
         lit: share (n,) of each pixel within the field; below 1 only along the rim, float32.
     """
 
@@ -133,12 +133,12 @@ class FieldOfView:
 
 
 LENSES = {Target.SUN: Fisheye(369, 250), Target.NADIR: Fisheye(371, 236)}
-"""Each camera's own boresight (table 5.1)."""
+"""Boresight of each camera (table 5.1)."""
 
 
 @lru_cache(maxsize=8)
 def lens_of(camera: Target, error: LensError = NOMINAL) -> Fisheye:
-    """The lens of ``camera`` with an error of its own; kept, as its field takes a while."""
+    """The lens of ``camera`` with ``error``; cached, as computing its field takes time."""
     if error == NOMINAL:
         return LENSES[camera]
     (x, y), nominal = error.centre_px, LENSES[camera]

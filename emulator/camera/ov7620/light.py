@@ -1,19 +1,19 @@
-"""Light of a scene through CubeSense's fisheyes: Earth, Sun and all hazards on the pixels.
+"""Light of a scene through CubeSense's fisheye lenses: Earth, Sun and all hazards on the pixels.
 
-CubeSense thesis, section 3.1.2.2 (the ND 4 filter on the sun side), section 5.1.3.2 (the Sun's
+CubeSense thesis, section 3.1.2.2 (the ND 4 filter of the Sun camera), section 5.1.3.2 (the Sun's
 image is 8 px in radius on the boresight and 6 px near the rim, for its 0.27 deg), section 5.1.4
-(sun exposure) and section 5.7 (levels). Unit: grey values above black for one line time of
-exposure at gain 1.
+(Sun exposure) and section 5.7 (levels). Unit: grey values above black per line time of exposure at
+gain 1.
 
-The thesis explains the Sun's size by charge that flows over from full pixels into their neighbours.
-Here its image is a round Gaussian spot of light, wider than the Sun and saturated in its middle, of
-the published size. The nadir camera, without a filter, makes a far brighter spot of it.
+The thesis explains the Sun's size by charge that overflows from full pixels into their neighbours.
+Here its image is a round Gaussian spot of the published size, wider than the Sun and saturated in
+the middle. In the nadir camera, without a filter, the spot is far brighter.
 
-Hazards shine as bright as they are by the Earth, whose radiance 1 is 4.75e9 stars of V = 0 a
-steradian. The Sun's spot, made as large as published, has a hundred times the light that it would
-have by that. Hazards that do not say where the Sun is have the scene's.
+The brightness of hazards is relative to the Earth, whose radiance 1 is 4.75e9 stars of V = 0 per
+steradian. On this scale the Sun's spot, with the published size, has a hundred times its true
+light. Hazards without a direction of the Sun use the scene's.
 
-A picture is taken as of one instant: what is neglected is the satellite's turn during a read-out.
+An image is computed for one instant: this neglects the satellite's rotation during a read-out.
 """
 
 import math
@@ -37,36 +37,35 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 
 USUAL_EXPOSURE = {Target.SUN: 1, Target.NADIR: 4}
-"""Counts of the exposure register that the published levels belong to.
+"""Counts of the exposure register for the published levels.
 
-Sun: 127 us (published). Nadir: "set once", to what is not published; assumed.
+Sun: 127 us (published). Nadir: "set once", to an unpublished value; assumed.
 """
 
 EARTH_LEVEL = 120.4
 """Grey values above black of radiance 1 in the nadir camera: fitted.
 
-The whole Earth, seen from 750 km with the Sun behind the satellite, then has the published mean of
-153, 119 above black.
+The whole Earth, from 750 km with the Sun behind the satellite, then has the published mean of 153,
+119 above black.
 """
 
 FILTER = {Target.SUN: 1e-4, Target.NADIR: 1.0}
 """Transmission (published)."""
 
 SUN_EDGE = 65.0
-"""Grey values above black that bound the Sun's image: 30 % of its level, 99 with black (5.7)."""
+"""Grey value above black at the edge of the Sun's image: 30 % of its level, 99 with black (5.7)."""
 
 SUN_SPOT = 0.367
-"""Standard deviation of the Sun's spot by its radius on the boresight: fitted.
+"""Standard deviation of the Sun's spot relative to its radius on the boresight: fitted.
 
-The spot is then bright enough to shrink from 8 px to the measured 6 px where the filter takes as
-much as :func:`_slant_transmission` says at the rim.
+With :func:`_slant_transmission`, the spot then shrinks from 8 px to the measured 6 px at the rim.
 """
 
 PIXEL_MM, BACK_FOCAL_MM = 7.6e-3, 2.77
 """Appendix A.1 and A.3."""
 
 FAINTEST = 1e-3
-"""Light that is left out, grey values a line time."""
+"""Light below this is neglected, grey values per line time."""
 
 Light = NDArray[np.float32]
 
@@ -74,24 +73,24 @@ Light = NDArray[np.float32]
 def scene_light(
     scene: EarthSunScene, camera: Target, bloom_px: float, time_ps: int, error: LensError = NOMINAL
 ) -> Light:
-    """Grey values (480, 640) above black that ``camera`` gains in each line time of exposure.
+    """Grey values (480, 640) above black per line time of exposure of ``camera``.
 
-    ``bloom_px`` is the radius of the Sun's image on the boresight of the sun camera, ``error``
-    what is particular to the lens.
+    ``bloom_px`` is the radius of the Sun's image on the boresight of the Sun camera, ``error`` the
+    deviation of the lens.
     """
     lens = lens_of(camera, error)
     light = np.zeros((ROWS, COLUMNS), np.float32)
     sun = scene.seen(scene.sun, camera, time_ps)
     earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(Target.NADIR)
-    seen, radiance = scene.earth.radiance(
+    lit, radiance = scene.earth.radiance(
         lens.field.vectors,
         lens.field.pixel_rad,
         scene.seen(scene.nadir, camera, time_ps),
         sun,
         scene.axes(camera, time_ps),
     )
-    radiance *= lens.field.lit[seen] * np.float32(earth_level)
-    light.ravel()[lens.field.index[seen]] = radiance
+    radiance *= lens.field.lit[lit] * np.float32(earth_level)
+    light.ravel()[lens.field.index[lit]] = radiance
     if not scene.hidden(scene.sun):
         _add_sun(light, lens, bloom_px, camera, sun)
     _add_hazards(light, lens, scene, camera, time_ps)
@@ -104,7 +103,7 @@ def scene_light(
 
 
 def looking_with(scene: EarthSunScene, camera: Target, time_ps: int) -> Looking:
-    """What hazards may know of ``camera``, whatever is particular to its lens."""
+    """The state of ``camera`` for hazards, with the nominal lens."""
     return Looking(
         scene.axes(camera, time_ps),
         2 * FIELD_DEG,
@@ -132,10 +131,10 @@ def _add_sun(
 
 
 def _slant_transmission(straight: float, radius_px: ArrayLike) -> NDArray[np.float64]:
-    """Transmission (...) of a filter behind the lens for light that reaches ``radius_px`` (...).
+    """Transmission (...) of a filter behind the lens for light at ``radius_px`` (...).
 
-    Assumed: the path through the filter is as oblique as the line from the centre of the last lens
-    element, and not refracted. At the rim a fifth of the filtered light is left.
+    Assumed: the path through the filter is straight from the centre of the last lens element,
+    without refraction. At the rim, a fifth of the filtered light remains.
     """
     slant = np.hypot(1, np.asarray(radius_px) * PIXEL_MM / BACK_FOCAL_MM)
     return np.asarray(straight**slant)
@@ -143,7 +142,7 @@ def _slant_transmission(straight: float, radius_px: ArrayLike) -> NDArray[np.flo
 
 @dataclass(frozen=True, kw_only=True)
 class _Disc(SkyHazard):
-    """The scene's Earth, as far as it hides hazards."""
+    """The scene's Earth, which hides hazards."""
 
     nadir: tuple[float, ...]
     radius_rad: float
@@ -152,13 +151,12 @@ class _Disc(SkyHazard):
     depth: ClassVar[Depth] = Depth.EARTH
 
     def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
-        """What is behind it."""
         del looking
         return np.asarray(vectors @ np.array(self.nadir) > math.cos(self.radius_rad))
 
 
 def _hazards(scene: EarthSunScene) -> list[SkyHazard]:
-    """Those of the scene, with its Sun; its Moon is one too."""
+    """The scene's hazards with its Sun, and its Moon as a hazard."""
     found = list(scene.hazards)
     if scene.moon is not None:
         found.append(Moon(direction=tuple(np.asarray(scene.moon).tolist()), scatter=0.0))
@@ -212,7 +210,6 @@ def _add_hazards(
 
 
 def _add_spot(light: Light, centre: NDArray[np.float64], sigma_px: float, peak: float) -> None:
-    """Add a round Gaussian of light."""
     if peak > FAINTEST:
         reach = sigma_px * math.sqrt(2 * math.log(peak / FAINTEST))
         patch, distance2 = _patch(light, centre, reach)
@@ -220,13 +217,13 @@ def _add_spot(light: Light, centre: NDArray[np.float64], sigma_px: float, peak: 
 
 
 def _add_disc(light: Light, centre: NDArray[np.float64], radius_px: float, level: float) -> None:
-    """Add an even disc, its edge a pixel wide."""
+    """Add an even disc with an edge one pixel wide."""
     patch, distance2 = _patch(light, centre, radius_px + 1)
     patch += np.float32(level) * np.clip(radius_px + 0.5 - np.sqrt(distance2), 0, 1)
 
 
 def _patch(light: Light, centre: NDArray[np.float64], reach: float) -> tuple[Light, Light]:
-    """The part of the picture around ``centre``, and its squared distances from there."""
+    """The part of the image around ``centre``, and its squared distances from there."""
     x, y = centre
     left, top = max(0, math.ceil(x - reach)), max(0, math.ceil(y - reach))
     patch = light[top : max(0, math.floor(y + reach) + 1), left : max(0, math.floor(x + reach) + 1)]

@@ -1,15 +1,15 @@
-"""A camera's end of OmniVision's serial camera control bus: decodes edges, takes register writes.
+"""A camera's end of OmniVision's serial camera control bus (SCCB): register writes only.
 
 CubeSense thesis, section 6.4.1, figure 6.4 and appendix C.1 (start, bytes of eight bits each
 followed by one bit that the microcontroller reads as an acknowledge, stop), and OV7620 product
-specifications, section 1.13: device address, register address, value. What we take:
+specifications, section 1.13: device address, register address, value. Assumptions:
 
-- SCCB calls the ninth bit "don't care". This camera pulls SDA low in it, from the falling clock
-  edge after the eighth bit to the next, when it is addressed, as an I2C device would.
-- A register takes its value with the ninth clock of the third byte. Further bytes of the same
-  transmission are ignored, as SCCB knows none.
-- Reading is not modelled: the microcontroller never reads. A read address is not answered.
-- Clock phases shorter than the bus allows are logged and decoded all the same.
+- SCCB defines the ninth bit as "don't care". When addressed, this camera pulls SDA low in it, from
+  the falling clock edge after the eighth bit to the next, like an I2C device.
+- A register is written at the ninth clock of the third byte. Further bytes of the same
+  transmission, which SCCB does not define, are ignored.
+- Reading is not modelled, as the microcontroller never reads. A read address is not acknowledged.
+- Clock phases that are too short for the bus are logged, and decoded nevertheless.
 """
 
 import logging
@@ -33,12 +33,7 @@ class SccbSlave:
     """
 
     def __init__(self, address: int, write: Callable[[int, int, int], None]) -> None:
-        """Make a device.
-
-        Args:
-            address: 7-bit address.
-            write: told register address, value, and the time in ps.
-        """
+        """``write`` is called with register address, value and time in ps."""
         self._address_byte = address << 1
         self._write = write
         self._levels = {"SCL": 1, "SDA": 1}
@@ -48,7 +43,7 @@ class SccbSlave:
         self.sda = 1
 
     def on_pin(self, name: str, level: int, now_ps: int) -> None:
-        """The master set ``name``, SCL or SDA, to ``level``; 1 is released."""
+        """The master set ``name``, SCL or SDA, to ``level``; 1 means released."""
         if name not in self._levels:
             raise ValueError(f"an SCCB device has the pins SCL and SDA, not {name!r}")
         if self._levels[name] == level:
@@ -71,7 +66,7 @@ class SccbSlave:
         self._shift, self._count = 0, 0
 
     def _condition(self, *, start: bool) -> None:
-        """SDA changed while SCL was high."""
+        """SDA changed while SCL was high: start or stop."""
         self._idle()
         self.sda = 1
         self._scl_since = None
@@ -80,7 +75,7 @@ class SccbSlave:
             self._bytes = []
 
     def _bit(self, now_ps: int) -> None:
-        """SCL rose: a bit counts, or the ninth clock has come."""
+        """SCL rose: a bit, or the ninth clock."""
         assert self._bytes is not None
         self._count += 1
         if self._count <= BITS:
@@ -89,7 +84,7 @@ class SccbSlave:
             self._write(self._bytes[1], self._bytes[2], now_ps)
 
     def _after_bit(self) -> None:
-        """SCL fell: the byte is complete after eight bits, and over after nine."""
+        """SCL fell: the byte is complete after eight bits, and ends after nine."""
         assert self._bytes is not None
         if self._count == BITS:
             self._bytes.append(self._shift)
@@ -109,7 +104,7 @@ class SccbSlave:
         if since is not None and now_ps - since < shortest and not self._too_fast:
             self._too_fast = True
             logger.warning(
-                "SCCB: SCL was %s for %.2f us only, right would be %.1f us or more",
+                "SCCB: SCL was %s for only %.2f us; at least %.1f us are needed",
                 "low" if level else "high",
                 (now_ps - since) / PS_PER_US,
                 shortest / PS_PER_US,

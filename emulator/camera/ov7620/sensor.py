@@ -1,16 +1,16 @@
 """The OV7620 image sensor: registers on its two control lines, frames on its pixel lines.
 
 CubeSense thesis, sections 3.2 and 6.4.1 and appendix A; OV7620 product specifications, section
-1.13. A frame has 525 lines of 858 clocks at 13.5 MHz. What the sources leave open, we take:
+1.13. A frame has 525 lines of 858 clocks at 13.5 MHz. Assumptions where the sources are silent:
 
-- PCLK runs whenever the part has power, on a fixed grid, and frames follow each other from then on.
+- PCLK runs while the part has power, on a fixed grid, and frames follow each other from that time.
   A frame begins with blanking; VSYN is high in all blanking between frames.
 - HREF rises with a line's first clock, wherever the window begins. The window's rows keep their
-  places in the frame. It is cut to 640 x 480 pixels, at least 4 x 2: the rest of the 664 x 492
-  pixels is never sent.
-- Values count from the next frame on; the exposure one frame later, as its rows are exposed while
-  the frame before is read out.
-- Automatic exposure and gain settle at once on a mean level of the picture.
+  places in the frame. The window is limited to 640 x 480 pixels, at least 4 x 2: the rest of the
+  664 x 492 pixels is never sent.
+- Register values take effect with the next frame; the exposure one frame later, as its rows are
+  exposed during the read-out of the frame before.
+- Automatic exposure and gain adjust at once to a mean level of the image.
 - Without black-and-white mode, Y is the mean of two rows.
 """
 
@@ -46,20 +46,20 @@ from cubestack.firmware_model.interface.cameras import ov7620 as chip
 
 FRAME_CLOCKS = chip.LINES_PER_FRAME * chip.CLOCKS_PER_LINE
 LINES_BEFORE = chip.LINES_PER_FRAME - chip.ROWS
-"""Blanking before the picture's first row: all of the frame's."""
+"""Lines of blanking before the first row: all of the frame's."""
 
 AUTO_LEVEL = 100.0
-"""Mean grey value that automatic exposure and gain aim at: assumed."""
+"""Target of automatic exposure and gain, a mean grey value: assumed."""
 
 LONGEST_EXPOSURE, HIGHEST_GAIN = 255, 7.75  # of EXPOSURE and GAIN
 SHAPE = chip.ROWS, chip.COLUMNS
 REMEMBERED = 8
-"""Frames kept: more than anybody looks ahead or back."""
+"""Number of stored frames, more than any caller needs."""
 
 
 @dataclass(frozen=True)
 class _Settings:
-    """What the registers ask for when a frame begins."""
+    """Settings from the registers when a frame begins."""
 
     columns: range
     rows: range
@@ -83,12 +83,11 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     Attributes:
         camera: which of the two it is.
-        line_clocks: pixel clocks of a line.
-        active_columns: those of them with HREF high, in the segment handed out last.
+        active_columns: pixel clocks per line with HREF high, in the latest segment.
     """
 
     scene_types = (EarthSunScene,)
-    sees = "a Sun and nadir sensor sees Earth and Sun"
+    sees = "the scene of a Sun and nadir sensor is Earth and Sun"
     line_clocks = chip.CLOCKS_PER_LINE
 
     def __init__(
@@ -98,10 +97,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         condition: FisheyeCondition | None = None,
         lens: LensError = NOMINAL,
     ) -> None:
-        """Power up; ``condition`` is what lens and sensor are like, unless ``scene`` says.
-
-        ``lens`` is the unit's own, where neither says another.
-        """
+        """Power up; a view's condition replaces ``condition``, and both may replace ``lens``."""
         super().__init__(
             scene, condition or FisheyeCondition(), chip.REGISTERS, chip.PIXEL_CLOCK_HZ
         )
@@ -114,7 +110,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     @property
     def lens(self) -> LensError:
-        """What is particular to the lens: that of the condition, else the unit's own; hazards."""
+        """Deviation of the lens: that of the condition, else the unit's, with hazards."""
         condition = self.condition
         given = condition.sun_lens if self.camera is Target.SUN else condition.nadir_lens
         own = self._own_lens if given is None else given
@@ -125,7 +121,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     @property
     def _hazards(self) -> effects.Hazards:
-        """Those of the condition, drawn for this camera."""
+        """The condition's hazards with seeds for this camera."""
         return tuple(replace(h, seed=h.seed ^ self.camera) for h in self.condition.hazards)
 
     @property
@@ -146,18 +142,17 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     @property
     def sda(self) -> int:
-        """0 while the camera pulls SDA low, else 1."""
         return self._sccb.sda
 
     def on_pin(self, name: str, level: int, now_ps: int) -> None:
-        """The microcontroller set SCL or SDA; nothing happens without power."""
+        """The microcontroller set SCL or SDA; ignored without power."""
         if self.running:
             self._sccb.on_pin(name, level, now_ps)
 
     def _write(self, address: int, value: int, now_ps: int) -> None:
         clock = self._clock
         assert clock is not None
-        # What has begun keeps its settings, and the frame after it their exposure.
+        # The frame that has begun keeps its settings, and the next one its exposure.
         begun = self._frame(clock, max(0, clock.first_edge(now_ps + 1) - 1) // FRAME_CLOCKS)
         self._registers.select(address)
         self._registers.write(value)
@@ -173,7 +168,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     # --- pixel lines ----------------------------------------------------------------------------
 
     def segment_at(self, time_ps: int) -> StreamSegment | None:
-        """The stretch of output at ``time_ps``, not before the last change; None without clock."""
+        """The segment at ``time_ps``, from the last change on; None without a clock."""
         clock = self._clock
         if clock is None:
             return None
@@ -193,7 +188,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def frame_from(self, time_ps: int) -> RollingShutter:
         """Exposure of the first frame whose read-out starts at ``time_ps`` or later.
 
-        Only a part with power has frames, and only the last few are remembered as they were.
+        The part must have power; only the latest ``REMEMBERED`` frames are stored.
         """
         clock = self._clock
         assert clock is not None
@@ -215,7 +210,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def _frame(self, clock: PixelClock, number: int) -> _Frame:
         if number in self._frames:
             return self._frames[number]
-        # A frame row's time is that of its line, so row 0 counts even if it is not sent.
+        # The time of a row is that of its line, so row 0 counts even if it is not sent.
         readout_ps = clock.edge_ps(number * FRAME_CLOCKS + LINES_BEFORE * chip.CLOCKS_PER_LINE)
         settings = self._settings(readout_ps)
         before = self._frames.get(number - 1)
@@ -235,10 +230,10 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         exposure, gain = max(active("EXPOSURE"), 1), _gain(active("GAIN"))
         automatic = bit("COMMON_B", "AUTO_ADJUST")
         if automatic and not bit("COMMON_I", "MANUAL_EXPOSURE"):
-            counts = self._wanted(time_ps) / (chip.EXPOSURE_LINES * gain)
+            counts = self._target_lines(time_ps) / (chip.EXPOSURE_LINES * gain)
             exposure = round(min(max(counts, 1), LONGEST_EXPOSURE))
         if automatic and bit("COMMON_A", "AUTO_GAIN"):
-            gain = self._wanted(time_ps) / (chip.EXPOSURE_LINES * exposure)
+            gain = self._target_lines(time_ps) / (chip.EXPOSURE_LINES * exposure)
             gain = min(max(gain, 1.0), HIGHEST_GAIN)
         return _Settings(
             _window(
@@ -251,23 +246,23 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             bit("COMMON_H", "BLACK_AND_WHITE"),
         )
 
-    # --- the picture ----------------------------------------------------------------------------
+    # --- rendering ------------------------------------------------------------------------------
 
     def _pixels(self, frame: _Frame) -> Grey:
-        return self._once(frame, lambda: self._picture(frame))
+        return self._cached(frame, lambda: self._render(frame))
 
-    def _picture(self, frame: _Frame) -> Grey:
+    def _render(self, frame: _Frame) -> Grey:
         condition, settings, shutter = self.condition, frame.settings, frame.shutter
         hazards = self._hazards
         light = self._light_at(shutter.mid_exposure_ps((chip.ROWS - 1) / 2))
         light = light * np.float32(shutter.exposure_lines)
         if not settings.monochrome:
             light[:-1] = (light[:-1] + light[1:]) / 2
-        # By frame time, so that a frame nobody looked at does not change the next one's noise.
+        # By frame time, so that the noise of a frame does not depend on which ones were rendered.
         seed = [condition.seed, self.camera, shutter.readout_ps]
         per_count = ELECTRONS_PER_GREY / settings.gain
         exposure = Exposure(SHAPE, PITCH_UM, shutter.exposure_s, condition.temperature_c, per_count)
-        light = effects.on_light(light, hazards, exposure, seed, ELECTRONS_PER_GREY)
+        light = effects.disturb_light(light, hazards, exposure, seed, ELECTRONS_PER_GREY)
         variance = effects.variance(hazards, exposure) / ELECTRONS_PER_GREY**2
         generator = None
         if condition.noise:
@@ -281,7 +276,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def _light_at(self, time_ps: int) -> Light:
         if not np.any(self.scene.rate_deg_s):
             time_ps = 0  # the same at all times
-        # The square of what a lens in focus makes is in the light already.
+        # The light already contains the spot of a lens in focus.
         further = math.sqrt(max(self._basics.spot_px**2 - SPOT_PX**2, 0))
         key = self.scene, self.condition.bloom_px, time_ps, self.lens, further
         if self._light is None or self._light[:-1] != key:
@@ -292,21 +287,21 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             self._light = *key, light
         return self._light[-1]
 
-    def _wanted(self, time_ps: int) -> float:
-        """Line times of exposure at gain 1 that bring the mean light to the level aimed at."""
+    def _target_lines(self, time_ps: int) -> float:
+        """Line times of exposure at gain 1 that result in the target level."""
         mean = float(self._light_at(time_ps).mean())
         return (AUTO_LEVEL - BLACK) / max(mean, 1e-6)
 
 
 def _gain(value: int) -> float:
-    """Amplification by register GAIN (OV7620 product specifications, section 1.13)."""
+    """Amplification for register GAIN (OV7620 product specifications, section 1.13)."""
     register = chip.REGISTERS["GAIN"]
     fine, double, again = (register.field(f).of(value) for f in ("FINE", "DOUBLE", "DOUBLE_AGAIN"))
     return (1 + fine / 16) * (1 + double) * (1 + again)
 
 
 def _window(start: int, stop: int, step: int) -> range:
-    """Columns or rows sent, by the window registers less their offset."""
+    """Columns or rows sent, from the window registers minus their offset."""
     limit = chip.COLUMNS if step == 4 else chip.ROWS
     first = min(max(start * step, 0), limit - step)
     return range(first, min(max(stop * step, first + step), limit))

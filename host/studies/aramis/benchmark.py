@@ -37,8 +37,8 @@ def _figures(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
         settings = replace(read_settings(RegisterFile(REGISTERS)), gains=(HIGHEST_GAIN,) * 4)
         shutter, scene = emulated.board.ppi.stored, emulated.scene
         assert shutter is not None
-        frame_ms = best_ms(lambda: imager.picture(scene, CONDITION, shutter, settings))
-        picture = imager.picture(scene, CONDITION, shutter, settings)
+        frame_ms = best_ms(lambda: imager.render(scene, CONDITION, shutter, settings))
+        picture = imager.render(scene, CONDITION, shutter, settings)
     meter = Meter(BLACKFIN_BF533)
     return {
         "aramis_ratio": ratio,

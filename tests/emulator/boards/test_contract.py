@@ -106,9 +106,9 @@ def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
     for name, other in (("cubestar", SKY.turned((1, 0, 0))), ("aramis", SKY)):
         boards[name].scene = other
         assert boards[name].scene is other
-        with pytest.raises(TypeError, match="sees the sky or a picture, not EarthSunScene"):
+        with pytest.raises(TypeError, match="is a sky or a picture, not EarthSunScene"):
             boards[name].scene = EARTH
-    with pytest.raises(TypeError, match="sees Earth and Sun, not SkyScene"):
+    with pytest.raises(TypeError, match="nadir sensor is Earth and Sun, not SkyScene"):
         boards["cubesense"].scene = SKY
 
 

@@ -1,4 +1,4 @@
-"""What makes pictures hard in sensor and lens, for all cameras."""
+"""Hazards of sensor and lens, for all cameras."""
 
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.hazards.dose import Dose
@@ -21,4 +21,4 @@ HAZARDS: dict[str, type[SensorHazard]] = {
         Background,
     )
 }
-"""All of them by name: what scene files, the command line and documents know."""
+"""All hazards, by the names in scene files, on the command line and in documents."""

@@ -1,6 +1,6 @@
-"""What a hazard of sensor or lens may do to a picture, and what it may know for that.
+"""Interface of a hazard of sensor or lens: its effects on an image, and their inputs.
 
-None of the effects is anything unless a hazard says so. Signals are electrons, whatever the sensor.
+By default, a hazard has no effect. Signals are in electrons, for any sensor.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class Exposure:
 
     Attributes:
         shape: rows and columns.
-        pitch_um: of its pixels.
-        seconds: for which each pixel gathers charge.
-        temperature_c: of the sensor.
+        pitch_um: pixel pitch.
+        seconds: exposure of each pixel.
+        temperature_c: temperature of the sensor.
         electrons_per_count: charge of one grey value of 8 bits, at this frame's gain.
     """
 
@@ -34,21 +34,21 @@ class Exposure:
 
     @property
     def area_cm2(self) -> float:
-        """Of all pixels."""
+        """Area of all pixels."""
         return self.shape[0] * self.shape[1] * (self.pitch_um * 1e-4) ** 2
 
 
 @dataclass(frozen=True)
 class Lens:
-    """What hazards may change of any lens.
+    """The properties of a lens that hazards may change.
 
     Attributes:
-        f_number: focal length by aperture.
-        pitch_um: of the sensor's pixels.
+        f_number: focal length divided by aperture.
+        pitch_um: pixel pitch of the sensor.
         shape: rows and columns of the sensor.
         spot_px: standard deviation of a point's image.
-        scale: focal length by what it should be.
-        residuals: displacements of the picture.
+        scale: focal length relative to its nominal value.
+        residuals: displacements of the image.
     """
 
     f_number: float
@@ -64,16 +64,16 @@ class SensorHazard(Hazard):
     """A hazard of sensor or lens."""
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
-        """The lens as this hazard makes it."""
+        """The lens as changed by this hazard."""
         del temperature_c
         return lens
 
     def hot(self) -> int:
-        """How many more pixels radiation has made hot, hot as this sensor's usually are."""
+        """Number of additional hot pixels, as hot as usual for the sensor."""
         return 0
 
     def dark_rise(self) -> float:
-        """By what factor the mean dark current has grown."""
+        """Factor on the mean dark current."""
         return 1.0
 
     def response(self, shape: tuple[int, int]) -> Field | None:
@@ -82,14 +82,14 @@ class SensorHazard(Hazard):
         return None
 
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
-        """Electrons (rows, columns) that it adds to one frame; None for none.
+        """Electrons (rows, columns) that it adds to one frame, or None.
 
-        ``generator`` is the frame's own: another frame, another draw.
+        ``generator`` belongs to the frame.
         """
         del exposure, generator
         return None
 
     def noise(self, exposure: Exposure) -> float:
-        """Standard deviation of noise that it adds in each pixel, electrons."""
+        """Standard deviation of the noise that it adds in each pixel, electrons."""
         del exposure
         return 0.0

@@ -1,7 +1,7 @@
-"""What several hazards of sensor and lens do together; without any, nothing is touched.
+"""Combined effect of several hazards of sensor and lens; without any, images are unchanged.
 
-Stray and starlight and all charge that hazards add pass the same uneven response, as its cause, the
-pixels' own gain, is behind them. Shot noise of what is added is the imager's.
+The uneven response, whose cause is the pixels' gain, applies to stray light, starlight and all
+charge that hazards add. The imager adds the shot noise of this charge.
 """
 
 import math
@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, Lens, SensorHazard
 from cubestack.emulator.scene.file import SceneError
 
-WIDEST_PX = 20.0  # standard deviation of a spot, assumed: few stars would still show
+WIDEST_PX = 20.0  # largest standard deviation of a spot, assumed: few stars remain visible
 SHORTEST, LONGEST = 0.85, 1.15
-"""Focal length by the usual one: no lens in use differs more."""
+"""Range of the focal length relative to the nominal one; lenses in use differ less."""
 
 Hazards = tuple[SensorHazard, ...]
 Grey = NDArray[np.uint8]
 
 
 def lens(own: Lens, hazards: Hazards, temperature_c: float) -> Lens:
-    """The lens ``own`` as they make it; SceneError where they go too far together."""
+    """The lens ``own`` as changed by the hazards; SceneError if they exceed the limits."""
     for hazard in hazards:
         own = hazard.lens(own, temperature_c)
     if own.spot_px > WIDEST_PX:
@@ -34,23 +34,21 @@ def lens(own: Lens, hazards: Hazards, temperature_c: float) -> Lens:
     if not SHORTEST <= own.scale <= LONGEST:
         raise SceneError(
             f"the hazards' focal length at {temperature_c:g} C must be {SHORTEST:g} to "
-            f"{LONGEST:g} of the usual one, not {own.scale:.3g}"
+            f"{LONGEST:g} of the nominal one, not {own.scale:.3g}"
         )
     return own
 
 
 def hot(hazards: Hazards) -> int:
-    """Number of pixels that they make hot."""
     return sum(hazard.hot() for hazard in hazards)
 
 
 def dark_rise(hazards: Hazards) -> float:
-    """Factor on the mean dark current."""
     return math.prod(hazard.dark_rise() for hazard in hazards)
 
 
 def variance(hazards: Hazards, exposure: Exposure) -> float:
-    """Of the noise that they add in each pixel, electrons squared."""
+    """Variance of the noise that they add in each pixel, electrons squared."""
     return sum(hazard.noise(exposure) ** 2 for hazard in hazards)
 
 
@@ -62,7 +60,7 @@ def response(hazards: Hazards, shape: tuple[int, int]) -> Field | None:
 
 
 def charge(hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Field | None:
-    """Electrons (rows, columns) that they add to the frame of ``seed``; None for none."""
+    """Electrons (rows, columns) that they add to the frame with ``seed``, or None."""
     total: Field | None = None
     for number, hazard in enumerate(hazards):
         drawn = np.random.SFC64([*seed, 0x4A2, number, hazard.seed])
@@ -72,21 +70,20 @@ def charge(hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Field |
     return total
 
 
-def on_light(
+def disturb_light(
     light: Field, hazards: Hazards, exposure: Exposure, seed: Sequence[int], electrons: float = 1.0
 ) -> Field:
-    """Signal (rows, columns) of the pixels, where ``light`` alone gives that much.
-
-    ``electrons`` is what one of its units has.
-    """
+    """Signal (rows, columns) from ``light``, in whose unit there are ``electrons`` electrons."""
     added, uneven = charge(hazards, exposure, seed), response(hazards, exposure.shape)
     if added is not None:
         light = light + added / np.float32(electrons)
     return light if uneven is None else light * uneven
 
 
-def on_picture(pixels: Grey, hazards: Hazards, exposure: Exposure, seed: Sequence[int]) -> Grey:
-    """Grey values of a photograph with what they do to the pixels; its lens was another one."""
+def disturb_photograph(
+    pixels: Grey, hazards: Hazards, exposure: Exposure, seed: Sequence[int]
+) -> Grey:
+    """Grey values of a photograph with the hazards' effects on the pixels, not the lens."""
     added, uneven = charge(hazards, exposure, seed), response(hazards, exposure.shape)
     sigma = math.sqrt(variance(hazards, exposure))
     if added is None and uneven is None and not sigma:

@@ -33,7 +33,7 @@ class Sensor(ImageSensor[Any, Any]):
             self.made.append(frame)
             return np.array([len(self.made)])
 
-        return int(self._once(frame, make)[0])
+        return int(self._cached(frame, make)[0])
 
 
 def test_pictures_are_made_once_and_two_are_kept() -> None:

@@ -141,7 +141,7 @@ def picture(
     shutter: RollingShutter = LONG,
     condition: SkyCondition = CONDITION,
 ) -> np.ndarray:
-    return chip.Mlx75412Imager(seed=2).picture(scene, condition, shutter, chip.Corrections())
+    return chip.Mlx75412Imager(seed=2).render(scene, condition, shutter, chip.Corrections())
 
 
 def test_noise_repeats_for_the_same_scene_and_frame_only() -> None:
@@ -149,8 +149,8 @@ def test_noise_repeats_for_the_same_scene_and_frame_only() -> None:
     assert np.any(first != picture(ORION, condition=replace(CONDITION, seed=1)))
     assert np.any(first != picture(ORION, replace(LONG, readout_ps=2 * 10**12)))
     imager = chip.Mlx75412Imager(seed=2)  # whatever else was rendered
-    imager.picture(ORION, CONDITION, replace(LONG, readout_ps=5), chip.Corrections())
-    np.testing.assert_array_equal(imager.picture(ORION, CONDITION, LONG, chip.Corrections()), first)
+    imager.render(ORION, CONDITION, replace(LONG, readout_ps=5), chip.Corrections())
+    np.testing.assert_array_equal(imager.render(ORION, CONDITION, LONG, chip.Corrections()), first)
 
 
 def test_without_noise_only_light_is_left() -> None:

@@ -190,9 +190,9 @@ def test_writing_the_same_mode_changes_nothing(camera: Mlx75412) -> None:
     enable(camera, 20 * MS)
     assert [s.start_ps for s in segments(camera, 20 * MS, 3)] == [s.start_ps for s in before]
     assert len(changes) == 1
-    # Nor can it change after the output was looked up too far.
+    # Nor can it change after the output was planned too far.
     segments(camera, 20 * MS, 40)
-    with pytest.raises(ValueError, match="after its output was looked up to"):
+    with pytest.raises(ValueError, match="its output is already planned up to"):
         enable(camera, 1 * MS, on=False)
 
 

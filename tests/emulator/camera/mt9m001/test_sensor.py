@@ -246,12 +246,12 @@ def test_frames_repeat_with_the_same_seed_and_differ_in_time() -> None:
 
 
 def test_another_sensor_s_lens_and_what_is_no_sky_are_refused() -> None:
-    with pytest.raises(ValueError, match="1280 x 1024 pixels, the lens is for 1024 x 512"):
+    with pytest.raises(ValueError, match="1280 x 1024 pixels, but the lens is for 1024 x 512"):
         Mt9m001(scene(), condition=other_lens.CONDITION)
     camera = Mt9m001(scene())
     with pytest.raises(ValueError, match="the lens is for 1024 x 512"):
         camera.condition = other_lens.CONDITION
-    with pytest.raises(TypeError, match="sees the sky or a picture, not 3"):
+    with pytest.raises(TypeError, match="a star tracker's scene is a sky or a picture, not 3"):
         camera.scene = 3
     assert camera.condition is CONDITION
 
@@ -289,7 +289,7 @@ def test_a_window_s_rows_have_their_own_times() -> None:
 
     def picture(readout_ps: int, settings: SensorSettings) -> np.ndarray:
         shutter = RollingShutter(readout_ps, line_ps, 1000, 1000)
-        return Mt9m001Imager().picture(turning, QUIET, shutter, settings)
+        return Mt9m001Imager().render(turning, QUIET, shutter, settings)
 
     part = picture(first_ps, whole)[600:900]
     window = replace(whole, row=600, rows=300)

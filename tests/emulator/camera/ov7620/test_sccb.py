@@ -99,7 +99,7 @@ def test_too_fast_a_clock_is_logged_once_and_decoded(
         assert not caplog.records  # 0.7 us high, 1.4 us low
         device.send(bytes([0x42, 0x10, 0x5B]), now_ps=10**9, step_ps=500_000)
     assert device.registers == [(0x10, 0x5A), (0x10, 0x5B)]
-    message = "SCCB: SCL was low for 1.00 us only, right would be 1.3 us or more"
+    message = "SCCB: SCL was low for only 1.00 us; at least 1.3 us are needed"
     assert caplog.messages == [message]
 
 

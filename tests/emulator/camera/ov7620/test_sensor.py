@@ -280,7 +280,7 @@ def test_a_reflection_beyond_the_field_is_refused(scene: EarthSunScene) -> None:
     far = Reflection(Target.SUN, 90, 90, radius_px=1, level=1)
     with pytest.raises(ValueError, match="at_deg must be within 95"):
         make(replace(scene, reflections=(far,)))
-    with pytest.raises(TypeError, match="sees Earth and Sun, not 3"):
+    with pytest.raises(TypeError, match="nadir sensor is Earth and Sun, not 3"):
         make(scene).scene = 3
 
 

@@ -103,7 +103,7 @@ def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
     settings = read_settings(RegisterFile(REGISTERS))
     settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
     shutter = RollingShutter(10**12, Fraction(31_750_000), 6299, 6299)
-    sky = Mt9m001Imager().picture(scene, CONDITION, shutter, settings)
+    sky = Mt9m001Imager().render(scene, CONDITION, shutter, settings)
     Image.fromarray(np.pad(sky, ((0, 20), (7, 0)))).save(tmp_path / "sky.png")
     (frame,) = measure(image=tmp_path / "sky.png", crop=(7, 0))
     assert (frame.solved, frame.right, frame.truth) == (True, None, None)

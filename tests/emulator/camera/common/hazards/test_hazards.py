@@ -37,9 +37,9 @@ def picture(
     shutter = replace(SHUTTER, readout_ps=readout_ps)
     if camera == "cubestar":
         like = replace(cubestar.CONDITION, hazards=hazards, **condition)  # type: ignore[arg-type]
-        return Mlx75412Imager(1).picture(scene, like, shutter, Corrections())
+        return Mlx75412Imager(1).render(scene, like, shutter, Corrections())
     like = replace(aramis.CONDITION, hazards=hazards, **condition)  # type: ignore[arg-type]
-    return Mt9m001Imager(1).picture(scene, like, shutter, read_settings(RegisterFile(REGISTERS)))
+    return Mt9m001Imager(1).render(scene, like, shutter, read_settings(RegisterFile(REGISTERS)))
 
 
 @pytest.mark.parametrize("hazard", HAZARDS.values(), ids=list(HAZARDS))
@@ -148,7 +148,7 @@ def test_the_mean_dark_rise_is_the_dark_rows_too() -> None:
     like = replace(cubestar.CONDITION, hazards=(Dose(krad=10.0),), temperature_c=65.0)
     imager = Mlx75412Imager(1)
     raw, corrected = (
-        imager.picture(DARK, like, SHUTTER, Corrections(dark=dark)) for dark in (False, True)
+        imager.render(DARK, like, SHUTTER, Corrections(dark=dark)) for dark in (False, True)
     )
     assert np.median(raw) == pytest.approx(4 * 1008 * 0.3856 / 16, abs=4)
     assert np.median(corrected) < 5

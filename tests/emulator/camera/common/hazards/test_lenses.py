@@ -81,9 +81,9 @@ def test_hazards_that_go_too_far_together_are_refused() -> None:
     with pytest.raises(SceneError, match=r"spot at 60 C must be at most 20 px, not 71"):
         replace(CONDITION, hazards=(Defocus(um_per_k=50.0),), temperature_c=60.0)
     twice = (FocalLength(percent=10.0), FocalLength(percent=5.0))
-    with pytest.raises(SceneError, match=r"must be 0.85 to 1.15 of the usual one, not 1.1[56]"):
+    with pytest.raises(SceneError, match=r"must be 0.85 to 1.15 of the nominal one, not 1.1[56]"):
         replace(CONDITION, hazards=twice)
-    with pytest.raises(SceneError, match=r"must be 0.85 to 1.15 of the usual one, not 1.1[56]"):
+    with pytest.raises(SceneError, match=r"must be 0.85 to 1.15 of the nominal one, not 1.1[56]"):
         FisheyeCondition(hazards=twice)
 
 
