@@ -53,7 +53,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--cubestack-engine",
         choices=get_args(Engine),
         default="auto",
-        help="how the FPGA is run (default: compiled where there is a compiler)",
+        help="how to run the FPGA (default: compiled, if a compiler is installed)",
     )
     group.addoption(
         "--cubestack-wall-time",

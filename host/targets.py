@@ -111,7 +111,7 @@ def open_target(
         device: name of the device; not needed for emulated devices, recordings and default I2C
             addresses.
         service_port: another serial line, with the one-letter protocol.
-        backup: the serial line has the register protocol in place of the node protocol.
+        backup: the serial line speaks the register protocol in place of the node protocol.
         baud: of the serial line; None for the published one.
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.

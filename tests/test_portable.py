@@ -71,4 +71,4 @@ def test_what_needs_linux_says_so(words: tuple[str, ...]) -> None:
     done = on_macos(*words)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert line.endswith("an I2C bus for unmodified programs is there on Linux alone")
+    assert line.endswith("an I2C bus for unmodified programs needs Linux")

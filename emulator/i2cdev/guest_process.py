@@ -36,7 +36,7 @@ SEPARATORS = frozenset(": \t\n")
 """Separators between libraries in LD_PRELOAD."""
 
 SIGNALLED = 128
-"""Exit code of a program that a signal ended, minus the signal's number, as in shells."""
+"""Exit status of a program that a signal ended, minus the signal's number, as in shells."""
 
 
 class RouteError(RuntimeError):
@@ -67,7 +67,7 @@ class GuestProcess(Endpoint):
 
     @property
     def exit_code(self) -> int:
-        """Exit code as in a shell; waits for the end."""
+        """Exit status as in a shell; waits for the end."""
         code = self._process.wait()
         return code if code >= 0 else SIGNALLED - code
 

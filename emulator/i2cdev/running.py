@@ -68,7 +68,7 @@ def run_program(
     route: guest_process.Route | None = None,
     say: Callable[[str], None] = lambda _text: None,
 ) -> int:
-    """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit code.
+    """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit status.
 
     Without a ``route``, seccomp is tried, then preload; ``say`` receives the route and the reason.
     Processes that the program leaves behind are also served until they end.

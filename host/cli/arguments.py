@@ -34,7 +34,7 @@ class Parser(argparse.ArgumentParser):
         return f"{text}\ndocs/: {_documents()}\n" if "docs/" in text else text
 
     def error(self, message: str) -> NoReturn:
-        """End with exit code 2."""
+        """End with exit status 2."""
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

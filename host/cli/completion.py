@@ -1,4 +1,4 @@
-"""Print what has a shell complete commands, options and names after a tab.
+"""Print the script that completes commands, options and names in a shell.
 
 examples:
   cubestack completion bash > ~/.local/share/bash-completion/completions/cubestack
@@ -12,7 +12,7 @@ import shtab
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="whose completion")
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="shell to complete for")
 
 
 def run(args: argparse.Namespace) -> int:

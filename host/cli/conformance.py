@@ -1,9 +1,8 @@
 """Check a device's protocol against the interface tables, emulated or real.
 
 Walks every telemetry frame, telecommand, register and bench letter, and every
-error path. Without --allow-write only what changes nothing is done: no
-telecommand is sent at all. Exit code 0 when all passed, 1 when something failed
-or differs.
+error path. Without --allow-write it changes nothing and sends no telecommand.
+Exit status: 0 all checks passed, 1 a check failed or differs.
 
 examples:
   cubestack conformance emulated:{first} --allow-write
@@ -31,10 +30,14 @@ DETAIL_COLUMNS = 100
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
     parser.add_argument(
-        "--allow-write", action="store_true", help="send telecommands, write registers"
+        "--allow-write", action="store_true", help="also send telecommands and write registers"
     )
-    parser.add_argument("--compare", metavar="TARGET", help="show the first difference to another")
-    parser.add_argument("--json", action="store_true", help="one object for each check")
+    parser.add_argument(
+        "--compare",
+        metavar="TARGET",
+        help="compare with another target and show the first difference",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object per check")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""Tell what was said in a recording of the node protocol, message by message.
+"""List the messages of a recording of the node protocol.
 
 Every request with its answer, on the serial line and on I2C: when, its name, and its
 fields by the device's table. A file has a row for each field.
@@ -7,7 +7,7 @@ examples:
   cubestack emulate {second} --record run.rec
   cubestack decode run.rec
   cubestack decode run.rec --out run.csv        or run.parquet (cubestack[parquet])
-  cubestack decode run.rec --json               an object a line
+  cubestack decode run.rec --json               one object per line
 """
 
 import argparse
@@ -24,7 +24,7 @@ from cubestack.host.terminal import say
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="or FILE.parquet")
-    parser.add_argument("--json", action="store_true", help="one object for each message, a line")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per message")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -30,10 +30,7 @@ def add_start_arguments(
     """Declare the options for the seed, whose default is ``seed``, for faults and the engine."""
     parser.add_argument("--seed", type=whole(0), default=seed, help=seed_help)
     parser.add_argument(
-        "--faults",
-        type=Path,
-        metavar="FILE",
-        help="TOML plan of faults, with their seed (see docs/faults.md)",
+        "--faults", type=Path, metavar="FILE", help="TOML fault plan (docs/faults.md)"
     )
     add_engine_arguments(parser)
 
@@ -44,7 +41,7 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
         "--engine",
         choices=get_args(Engine),
         default="auto",
-        help="how the FPGA is run (default: compiled where there is a compiler)",
+        help="how to run the FPGA (default: compiled, if a compiler is installed)",
     )
 
 
@@ -118,13 +115,16 @@ def inject_plan(
 
 def add_record_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--record", type=Path, metavar="FILE", help="every byte of all ports (docs/recording.md)"
+        "--record",
+        type=Path,
+        metavar="FILE",
+        help="record every byte of all ports to FILE (docs/recording.md)",
     )
     parser.add_argument(
         "--trace",
         type=Path,
         metavar="FILE.vcd",
-        help="lines, buses, FPGA pins and firmware for a waveform viewer",
+        help="write serial lines, buses, FPGA pins and firmware variables as a waveform",
     )
 
 
@@ -137,7 +137,9 @@ def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
         help="serve gdb on this port of this machine, for --firmware (docs/own-firmware.md)",
     )
     parser.add_argument(
-        "--gdb-wait", action="store_true", help="run nothing until gdb lets it: with --gdb"
+        "--gdb-wait",
+        action="store_true",
+        help="with --gdb: wait for gdb before the first instruction",
     )
     parser.add_argument(
         "--profile-out",
@@ -149,7 +151,7 @@ def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
         "--coverage-out",
         type=Path,
         metavar="FILE",
-        help="executed lines of --firmware, as lcov has them",
+        help="executed lines of --firmware, as an lcov file",
     )
 
 

@@ -89,13 +89,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pace",
         choices=("real", "fast"),
         default="real",
-        help="real: virtual time is wall time; fast: ahead while there is work",
+        help="real: virtual time follows wall time; fast: as fast as possible",
     )
     parser.add_argument(
         "--control",
         type=whole(0, LAST_PORT),
         metavar="PORT",
-        help=f"HTTP port that steers it, with the token in ${TOKEN} or a new one (docs/control.md)",
+        help=f"HTTP port for control (docs/control.md); token in ${TOKEN}, or a new one",
     )
     parser.add_argument("--lifeline", type=whole(0), help=argparse.SUPPRESS)
     device_options.add_record_arguments(parser)

@@ -1,13 +1,13 @@
 """Write a device's interface for other programs, from the tables that firmware and
-host share. To read it: cubestack registers.
+host share. `cubestack registers` lists them for people.
 
   c            C99 header: IDs, offsets, scales, accessors
-  python       module with a dataclass for each message; needs nothing else
+  python       module with a dataclass per message; no dependencies
   xtce         XTCE 1.2, for mission control systems
-  cosmos       OpenC3 COSMOS commands and telemetry (a file of cmd_tlm)
-  wireshark    dissector in Lua, for what a TCP port carries
-  processor-c  C header of the processor's registers, and what its pins lead to
-  svd          CMSIS-SVD of these, for debuggers
+  cosmos       OpenC3 COSMOS commands and telemetry (cmd_tlm file)
+  wireshark    Lua dissector for the protocol on a TCP port
+  processor-c  C header of the processor's registers and pin connections
+  svd          CMSIS-SVD of the processor, for debuggers
 
 examples:
   cubestack export {first} --format c --out {first}.h

@@ -1,6 +1,6 @@
-"""Look at a device in the browser, and command it: emulated here, or on a real port.
+"""Open a page in the browser that shows and commands a device, emulated or real.
 
-The page is served on this machine alone, at an address with a token in it.
+The page is served on this machine only; its address contains a token.
 
 examples:
   cubestack ground emulated:{first}
@@ -40,22 +40,30 @@ LOOK_S = 0.5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("targets", nargs="+", metavar="TARGET", help=FORMS)
-    parser.add_argument("--device", choices=device_names(), help="where a target does not tell")
-    parser.add_argument("--baud", type=whole(1), help="of a serial line")
+    parser.add_argument(
+        "--device", choices=device_names(), help="needed if TARGET does not name it"
+    )
+    parser.add_argument("--baud", type=whole(1), help="baud rate of the serial line")
     parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
     parser.add_argument(
-        "--control", metavar="URL", help=f"control port of its emulation; its token in ${TOKEN}"
+        "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
     )
     parser.add_argument(
-        "--record", type=Path, metavar="FILE", help="what is said to a device not emulated here"
+        "--record",
+        type=Path,
+        metavar="FILE",
+        help="record the session with a device that is not emulated here",
     )
-    parser.add_argument("--scene", metavar="FILE", help="of an emulated device")
-    parser.add_argument("--seed", type=whole(0), help="of an emulated device")
+    parser.add_argument("--scene", metavar="FILE", help="for an emulated device")
+    parser.add_argument("--seed", type=whole(0), help="for an emulated device")
     add_board_arguments(parser)
     parser.add_argument(
-        "--port", type=whole(0, LAST_PORT), default=0, help="of the page (default: any free one)"
+        "--port",
+        type=whole(0, LAST_PORT),
+        default=0,
+        help="port of the page (default: any free one)",
     )
-    parser.add_argument("--json", action="store_true", help="tell the address as a JSON object")
+    parser.add_argument("--json", action="store_true", help="print the address as a JSON object")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,5 +1,5 @@
-"""Look at the FPGA designs: how much of the part they take, Verilog of them for
-other tools, proofs of what they promise, waveforms of tests that failed.
+"""FPGA designs: area, Verilog for other tools, formal proofs, waveforms of failed
+tests.
 
 examples:
   cubestack hdl area
@@ -47,24 +47,23 @@ examples:
   cubestack hdl verilog TOP --out top.v     a wrong name of TOP lists all
   cubestack hdl verilog TOP | yosys -f verilog -p 'synth_ice40' -"""
 
-PROVE = """Prove, by induction, what the designs promise: for every length of time,
-every picture and every order of the clocks' edges. Each proof is then tried
-again on a design with a bug planted in it, which it has to find. Needs the
-extra hdl; all of them take one to two minutes.
+PROVE = """Prove properties of the designs by induction: for any run time, any image and
+any order of clock edges. Each proof then runs on a design with a planted bug,
+which it must find. Needs the extra hdl; all proofs take one to two minutes.
 
-Exit code 1 when something is not proved or a planted bug is not found.
+Exit status 1 if a property is not proved or a planted bug is not found.
 
 examples:
   cubestack hdl prove
   cubestack hdl prove sun-scan pair-drivers
   cubestack hdl prove --json"""
 
-WAVE = """The waveform of a gateware test that failed (`make test-hdl` and `make test` keep it):
-in gtkwave or surfer when there is a screen and one is installed, else as text, the pins' last
-changes before the failure.
+WAVE = """Show the waveform of a failed gateware test, which `make test-hdl` and
+`make test` keep: in gtkwave or surfer if installed and a screen is available,
+else as text with the last changes of the pins.
 
 examples:
-  cubestack hdl wave whole_frame    part of a test's name; a wrong one lists all
+  cubestack hdl wave whole_frame    part of a test's name; a wrong name lists all
   cubestack hdl wave whole_frame --text --internal --last 50"""
 
 
@@ -86,7 +85,9 @@ def add_arguments(
     actions = parser.add_subparsers(
         dest="action", required=True, metavar="ACTION", parser_class=Parser
     )
-    area = actions.add_parser("area", help="tiles of every design", description=AREA)
+    area = actions.add_parser(
+        "area", help="list the tiles that every design uses", description=AREA
+    )
     area.add_argument("names", metavar="NAME", nargs="*", help="designs; default: all")
     area.add_argument("--json", action="store_true", help="as JSON")
     area.add_argument(
@@ -96,24 +97,30 @@ def add_arguments(
         "--fmax", action="store_true", help="place on an iCE40 HX8K; needs the extra place"
     )
     area.set_defaults(act=_area)
-    verilog = actions.add_parser("verilog", help="a top as one Verilog file", description=VERILOG)
+    verilog = actions.add_parser(
+        "verilog", help="write a top as one Verilog file", description=VERILOG
+    )
     verilog.add_argument("top", metavar="TOP", help="a top; a wrong name lists them")
     verilog.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
     verilog.set_defaults(act=_verilog)
-    prove = actions.add_parser(
-        "prove", help="proofs of what the designs promise", description=PROVE
-    )
+    prove = actions.add_parser("prove", help="prove properties of the designs", description=PROVE)
     prove.add_argument("names", metavar="NAME", nargs="*", help="proofs; default: all")
-    prove.add_argument("--json", action="store_true", help="as JSON, when all are done")
+    prove.add_argument("--json", action="store_true", help="print JSON when all are done")
     prove.set_defaults(act=_prove)
-    wave = actions.add_parser("wave", help="waveform of a test that failed", description=WAVE)
+    wave = actions.add_parser("wave", help="show the waveform of a failed test", description=WAVE)
     wave.add_argument("test", metavar="TEST", help="part of its name, or a VCD file")
     wave.add_argument(
         "--folder", type=Path, default=Path("out/hdl/waves"), help="default: %(default)s"
     )
-    wave.add_argument("--text", action="store_true", help="text even if there is a viewer")
-    wave.add_argument("--last", type=_count, default=20, metavar="N", help="changes in the text")
-    wave.add_argument("--internal", action="store_true", help="not only pins in the text")
+    wave.add_argument(
+        "--text", action="store_true", help="print text even if a viewer is installed"
+    )
+    wave.add_argument(
+        "--last", type=_count, default=20, metavar="N", help="number of changes in the text"
+    )
+    wave.add_argument(
+        "--internal", action="store_true", help="include internal signals in the text"
+    )
     wave.set_defaults(act=_wave)
 
 

@@ -1,6 +1,6 @@
 """Entry point of the ``cubestack`` command.
 
-Exit codes: 0 done, 1 the run failed, 2 the call was wrong, 128 and the signal's number when it was
+Exit statuss: 0 done, 1 the run failed, 2 the call was wrong, 128 and the signal's number when it was
 ended by one. An error is one line: what, where, and what would be right.
 """
 
@@ -104,7 +104,7 @@ def _loudness(verbose: int, *, quiet: bool) -> Iterator[None]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line ``arguments`` (default: the process's own); returns the exit code."""
+    """Run the command line ``arguments`` (default: the process's own); returns the exit status."""
     if arguments is None:
         _end_in_order()
         _write_anywhere()

@@ -6,7 +6,7 @@ what comes back over the serial line. The truth is known to this command alone.
 
 examples:
   cubestack measure {first} --frames 20
-  cubestack measure {second} --frames 20 --min-right 90    exit code 1 below 90 % right;
+  cubestack measure {second} --frames 20 --min-right 90    exit status 1 below 90 % right;
       without --min-right, when nothing at all was measured
   cubestack measure DEVICE --help
 """
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--min-right",
             type=typed(PERCENT),
             metavar="PCT",
-            help="exit code 1 when fewer percent of the results are right",
+            help="exit status 1 if fewer percent of the results are right",
         )
 
 
@@ -66,7 +66,7 @@ def add_devices(
             device.name, help=device.summary, description=experiment.description
         )
         command.add_argument(
-            "--json", action="store_true", help="one JSON object a result, nothing else"
+            "--json", action="store_true", help="print one JSON object per result and nothing else"
         )
         add_options(command, experiment.options)
         add_board(command, (device, experiment))

@@ -27,7 +27,7 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         "--pty",
         type=Path,
         metavar="PATH",
-        help="link to a pseudo-terminal, of several devices what comes before their names; "
+        help="link to a pseudo-terminal; for several devices, the prefix of their links; "
         "default: " + ", ".join(f"./tty{name.upper()}" for name in device_names()),
     )
     where.add_argument(
@@ -37,31 +37,31 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         "--rfc2217",
         type=whole(0, LAST_PORT),
         metavar="PORT",
-        help="the same with RFC 2217: clients set the baud rate, a wrong one gives garbage",
+        help="the same with RFC 2217: clients set the baud rate; a wrong one garbles",
     )
     parser.add_argument(
         "--strict-line",
         action="store_true",
         help="pseudo-terminals have the baud rate, parity and stop bits that clients set, as "
-        "with --rfc2217; else they tell of wrong ones",
+        "with --rfc2217; without it a mismatch is only reported",
     )
     parser.add_argument(
         "--listen",
         default=LOOPBACK,
         metavar="ADDRESS",
-        help=f"of the TCP port (default {LOOPBACK}); others need --allow-remote",
+        help=f"of the TCP port (default {LOOPBACK}); any other needs --allow-remote",
     )
     parser.add_argument(
         "--allow-remote",
         action="store_true",
-        help="let other machines connect; there is no protection",
+        help="accept connections from other machines; nothing protects the port",
     )
 
 
 def check_linux() -> None:
     """ValueError where there are no I2C buses for unmodified programs."""
     if not sys.platform.startswith("linux"):
-        raise ValueError("an I2C bus for unmodified programs is there on Linux alone")
+        raise ValueError("an I2C bus for unmodified programs needs Linux")
 
 
 def open_ports(
@@ -90,7 +90,7 @@ def open_ports(
             path = path.with_name(path.name + line.suffix)
             endpoint = PtyEndpoint(path, line.uart, strict=args.strict_line, report=say)
         elif first and first + len(lines) - 1 > LAST_PORT:
-            raise ValueError(f"{opened.device.title} needs {len(lines)} ports from {first} on")
+            raise ValueError(f"{opened.device.title} needs {len(lines)} ports, {first} and up")
         else:
             port = first and first + index  # 0 lets the system choose each one
             endpoint = kind(args.listen, port, line.uart, allow_remote=args.allow_remote)

@@ -1,5 +1,5 @@
 """List a device's telecommands, telemetry and registers, from the tables that
-firmware and host share; or the switches of its firmware. For programs: cubestack export.
+firmware and host share, or its switches. `cubestack export` is for programs.
 
 examples:
   cubestack registers {first}
@@ -22,12 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--processor",
         action="store_true",
-        help="registers of its processor and what its pins lead to, for firmware of your own",
+        help="registers and pin connections of the processor, for your own firmware",
     )
     parser.add_argument(
         "--switches",
         action="store_true",
-        help="where the firmware can do what its documents print, or better",
+        help="switches between the published and better algorithms",
     )
 
 

@@ -1,10 +1,10 @@
-"""Play a recording's host to an emulated device and compare what the device says.
+"""Replay the host's side of a recording to an emulated device and compare its answers.
 
 The device is powered up like the recorded one, as the recording says: its scene,
 seed and faults, and what was done to it meanwhile. --scene, --seed and --faults
-take their place, and what is not as it was is told. Exit code 0 when every byte
-came at the same time, 1 when one differs: the first one of each port is named
-with its field. With --trace-from or --trace-to it plays to the end of that span
+replace the recorded ones; differences in the set-up are reported. Exit status 0 if
+every byte came at the same time, else 1 with the first different byte of each port
+and its field. With --trace-from or --trace-to it replays to the end of that span
 and compares nothing.
 
 examples:
@@ -35,13 +35,15 @@ LATEST_S = 1e8
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
-    parser.add_argument("--scene", type=Path, metavar="SCENE", help="another one than recorded")
-    add_start_arguments(parser, seed=None, seed_help="another one than recorded")
+    parser.add_argument("--scene", type=Path, metavar="SCENE", help="replaces the recorded one")
+    add_start_arguments(parser, seed=None, seed_help="replaces the recorded one")
     add_record_arguments(parser)
     time = typed(between(0.0, LATEST_S, "a time in s"))
     parser.add_argument("--trace-from", type=time, metavar="S", help="where --trace begins")
     parser.add_argument("--trace-to", type=time, metavar="S", help="where --trace ends")
-    parser.add_argument("--json", action="store_true", help="one object with all differences")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object with all differences"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ class ReportCommand:
         parser.add_argument(
             "device", nargs="?", choices=tuple(self.found), default=first, help=f"default {first}"
         )
-        parser.add_argument("--json", action="store_true", help="one JSON object a result")
+        parser.add_argument("--json", action="store_true", help="print one JSON object per result")
         add_options(parser, *(experiment.options for _, experiment in self.found.values()))
         add_board(parser, *self.found.values())
 

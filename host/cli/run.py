@@ -1,8 +1,8 @@
 """Run an unmodified program that sees an emulated I2C bus as /dev/i2c-N.
 
-No privileges and no kernel module: the program's calls on that one file are
-taken by seccomp user notification, or by a library that is loaded into it.
-The program's exit code is passed on.
+It needs no privileges and no kernel module: seccomp user notification, or a
+preloaded library, intercepts the program's calls on that file. The exit status is
+the program's.
 
 examples:
   cubestack run -- i2cdetect -y 7
@@ -49,13 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const="",
         metavar="SOCKET",
-        help="the bus of a running emulation (default: the one that serves bus N)",
+        help="use the bus of a running emulation (default: the one that serves bus N)",
     )
     parser.add_argument(
         "--device",
         action="append",
         choices=device_names(),
-        help=f"a device on the bus; may be given again (default {device_names()[0]})",
+        help=f"device on the bus; repeatable (default {device_names()[0]})",
     )
     parser.add_argument(
         "--i2c-addr",
@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_move,
         default=[],
         metavar="NAME=0xNN",
-        help=f"other address: {', '.join(_addresses())}, or the old one",
+        help=f"change an address; NAME is {', '.join(_addresses())} or the old address",
     )
     parser.add_argument(
         "--scene", type=Path, metavar="FILE", help="TOML scene of the one device (default: its own)"
@@ -71,31 +71,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     device_options.add_start_arguments(parser)
     device_options.add_board_arguments(parser)
     parser.add_argument(
-        "--hz", type=whole(1), default=STANDARD_HZ, help="bits a second (default 100000)"
+        "--hz",
+        type=whole(1),
+        default=STANDARD_HZ,
+        help="bus clock in bits per second (default 100000)",
     )
     parser.add_argument(
         "--pace",
         choices=("real", "fast"),
         default="real",
-        help="real: a transfer takes its time on the wire; fast: as little as it can",
+        help="real: transfers take as long as on the wire; fast: as fast as possible",
     )
     parser.add_argument(
         "--nack-errno",
         choices=NACK_ERRORS,
         default="ENXIO",
-        help="error when nobody acknowledges an address (default ENXIO)",
+        help="error when no device acknowledges an address (default ENXIO)",
     )
     parser.add_argument(
         "--route",
         choices=("seccomp", "preload"),
-        help="how calls are taken (default: seccomp where the kernel allows it)",
+        help="how calls are intercepted (default: seccomp if the kernel allows it)",
     )
-    parser.add_argument("--quiet", action="store_true", help="say nothing about bus and route")
+    parser.add_argument("--quiet", action="store_true", help="don't print bus and route")
     parser.add_argument("program", nargs="+", metavar="PROGRAM", help="after --, with arguments")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the program; returns its exit code."""
+    """Run the program; returns its exit status."""
     check_linux()
     if shutil.which(args.program[0]) is None:
         raise ValueError(f"{args.program[0]}: no such program; give a path, or a name on the PATH")

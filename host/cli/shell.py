@@ -3,7 +3,7 @@
 TARGET is a serial port (/dev/ttyUSB0), tcp://HOST:PORT, rfc2217://HOST:PORT,
 i2c:BUS:ADDR, emulated:DEVICE or recorded:FILE. Words complete with Tab; `help`
 lists the commands. With -c or a script file, the first command that fails ends
-the run: exit code 1 when the device failed, 2 when the command makes no sense.
+the run: exit status 1 if the device failed, 2 if the command was invalid.
 
 examples:
   cubestack shell emulated:{second}
@@ -39,10 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="commands",
         action="append",
         metavar="COMMANDS",
-        help="separated by semicolons; may be given again",
+        help="commands separated by semicolons; repeatable",
     )
-    source.add_argument("--script", type=Path, metavar="FILE", help="one command a line")
-    parser.add_argument("--json", action="store_true", help="one object for each command")
+    source.add_argument(
+        "--script", type=Path, metavar="FILE", help="file with one command per line"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object per command")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -14,19 +14,21 @@ from cubestack.host.terminal import busy, say
 def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the target and its options."""
     parser.add_argument("target", metavar="TARGET", help=FORMS)
-    parser.add_argument("--device", choices=device_names(), help="where the target does not tell")
+    parser.add_argument(
+        "--device", choices=device_names(), help="needed if TARGET does not name it"
+    )
     parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
     parser.add_argument(
-        "--backup", action="store_true", help="the serial line has the register protocol"
+        "--backup", action="store_true", help="the serial line speaks the register protocol"
     )
-    parser.add_argument("--baud", type=whole(1), help="of the serial line")
-    parser.add_argument("--scene", type=Path, metavar="FILE", help="of an emulated device")
-    parser.add_argument("--seed", type=whole(0), default=0, help="of an emulated device")
+    parser.add_argument("--baud", type=whole(1), help="baud rate of the serial line")
+    parser.add_argument("--scene", type=Path, metavar="FILE", help="for an emulated device")
+    parser.add_argument("--seed", type=whole(0), default=0, help="for an emulated device")
     parser.add_argument(
-        "--control", metavar="URL", help=f"control port of its emulation; its token in ${TOKEN}"
+        "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
     )
     add_board_arguments(parser)
-    parser.add_argument("--record", type=Path, metavar="FILE", help="what is said, to a recording")
+    parser.add_argument("--record", type=Path, metavar="FILE", help="record the session to FILE")
 
 
 def open_any_target(text: str, args: argparse.Namespace) -> Target:

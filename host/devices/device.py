@@ -79,13 +79,13 @@ class BoardOption:
 PROFILE_OPTIONS = (
     BoardOption(
         "profile",
-        f"what the documents print, or the best that is known (default {DEFAULT_PROFILE})",
+        f"algorithms as the sources print them, or the best known (default {DEFAULT_PROFILE})",
         PROFILES,
         DEFAULT_PROFILE,
     ),
     BoardOption(
         "set",
-        "switches that differ from the profile: see `cubestack registers DEVICE --switches`",
+        "switches that override the profile; `cubestack registers DEVICE --switches` lists them",
         default="",
         metavar="SWITCH=VALUE,...",
         unset="as the profile",

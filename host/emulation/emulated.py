@@ -111,7 +111,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     def run(
         self, *command: str | Path, timeout_s: float = 60.0, pace: Literal["real", "fast"] = "fast"
     ) -> subprocess.CompletedProcess[str]:
-        """Run a program against the serial line; its exit code and output.
+        """Run a program against the serial line; its exit status and output.
 
         Every "{port}" in ``command`` becomes the path of a pseudo-terminal; a warning tells of a
         program that sets another baud rate, parity or stop bits than the device has. Raises
@@ -140,7 +140,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
                 endpoint.close()
 
     def run_on_i2c(self, *command: str | Path, bus: int = 7) -> int:
-        """Run a program that finds the device on /dev/i2c-``bus``; its exit code."""
+        """Run a program that finds the device on /dev/i2c-``bus``; its exit status."""
         from cubestack.emulator.i2cdev.adapter import I2cAdapter
         from cubestack.emulator.i2cdev.running import emulated_bus, run_program
 

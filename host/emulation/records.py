@@ -31,7 +31,7 @@ def start_recorder(
 
 
 def start_trace(emulated: AnyEmulated, stream: IO[str]) -> "VcdTrace":
-    """Trace lines, buses, FPGA pins and firmware for a waveform viewer; as ``start_recorder``."""
+    """Trace lines, buses, FPGA pins and firmware variables into a VCD file."""
     from cubestack.emulator.recording.trace import VcdTrace
 
     board = emulated.board

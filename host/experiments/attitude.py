@@ -46,20 +46,20 @@ class SkyOptions(MeasureOptions):
         None, "TOML scene; default: random sky", SCENE, metavar="FILE", group="light"
     )
     image: Path | None = option(
-        None, "picture file as the light", PATH, metavar="FILE", group="light"
+        None, "use an image file in place of the sky", PATH, metavar="FILE", group="light"
     )
     mode: str = "lis"
     hint_error: float = option(0.0, "largest error of the hint", ANGLE, metavar="DEG")
     mag_limit: float | None = option(
         None,
-        "cut the sky at this magnitude; default: all that the camera can see",
+        "leave out stars fainter than this; default: none that the camera can see",
         NUMBER,
         metavar="V",
     )
     false_stars: int = option(
-        0, "stars that are in no catalogue, at random places", whole(0), metavar="N"
+        0, "number of stars that are in no catalogue, at random places", whole(0), metavar="N"
     )
-    no_noise: bool = option(False, "a sensor without any noise")
+    no_noise: bool = option(False, "turn the sensor's noise off")
     hazard: tuple[hazards.Asked, ...] = hazards.hazard_option()
     crop: tuple[int, int] = option(
         (0, 0), "with --image: left upper corner of the part that is seen", CORNER, metavar="X,Y"

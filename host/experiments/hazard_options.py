@@ -52,7 +52,7 @@ def hazard_option() -> Any:
     """The field of an experiment's options that takes hazards; ``check`` knows their names."""
     return option(
         (),
-        "make every random frame harder, as moon or gradient=60; may be given again "
+        "add a hazard to every random frame, e.g. moon or gradient=60; repeatable "
         "(see docs/hazards.md)",
         Kind("NAME or NAME=STRENGTH, as in moon or gradient=60", _asked),
         metavar="NAME[=STRENGTH]",

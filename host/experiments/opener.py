@@ -20,7 +20,7 @@ class MeasureOptions(Options):
     frames: int = option(1, "number of frames (default 1)", whole(1))
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
     faults: Path | Plan | None = option(
-        None, "TOML plan of faults, with their seed (see docs/faults.md)", PLAN, metavar="FILE"
+        None, "TOML fault plan (docs/faults.md)", PLAN, metavar="FILE"
     )
 
 

@@ -71,7 +71,7 @@ DEVICE: "Device[AramisBoard, Aramis]" = Device(
     reports=(
         Report(
             "catalogue",
-            "compile the onboard star catalogue and say what is in it",
+            "compile the onboard star catalogue and summarise it",
             get(f"{STUDIES}.catalogue:EXPERIMENT"),
         ),
     ),

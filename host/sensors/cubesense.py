@@ -52,7 +52,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
         ),
         Report(
             "ball",
-            "turn the nadir sensor before the ball of its bench",
+            "turn the nadir sensor in front of the test ball",
             get(f"{STUDIES}.ball:EXPERIMENT"),
         ),
         Report(
@@ -64,7 +64,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
     overlay=call("cubestack.host.experiments.cubesense.pictures:overlay"),
     options=(
         BoardOption(
-            "mcu_addressing", "FPGAs that let the processor choose addresses (telecommand 100)"
+            "mcu_addressing", "FPGA variant whose addresses the processor can set (telecommand 100)"
         ),
         BoardOption(
             "uart",

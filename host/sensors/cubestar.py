@@ -151,7 +151,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         ),
         Report(
             "catalogue",
-            "compile the onboard star catalogue and say what is in it",
+            "compile the onboard star catalogue and summarise it",
             get(f"{STUDIES}.catalogue:EXPERIMENT"),
         ),
         Report(
@@ -161,7 +161,7 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         ),
         Report(
             "upsets",
-            "turn over bits of FPGA and memories, and see what comes of it",
+            "flip bits of FPGA and memories, and report the effects",
             get(f"{STUDIES}.upsets:EXPERIMENT"),
         ),
     ),
@@ -184,7 +184,8 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
             unset="this project's model",
         ),
         BoardOption(
-            "semihosting", "own firmware prints, and ends, by BKPT 0xAB, which is a fault otherwise"
+            "semihosting",
+            "handle semihosting calls (BKPT 0xAB) of --firmware; without it they are faults",
         ),
     ),
     processor=get("cubestack.firmware_model.interface.cubestar.processor_header:PROCESSOR"),

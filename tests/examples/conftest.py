@@ -32,7 +32,7 @@ class Installed:
         return {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, self.paths))}
 
     def run(self, *command: str | Path) -> "subprocess.CompletedProcess[str]":
-        """Run a program of a user's; its exit code and output."""
+        """Run a program of a user's; its exit status and output."""
         return subprocess.run(
             [str(word) for word in command],
             env=self.environment,

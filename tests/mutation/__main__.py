@@ -9,7 +9,7 @@ examples, from the project's folder:
 
 A mutant is killed when a test fails, or when the tests do not end in time. It faces the tests that
 run its line, and without a recorded run those of the nearest files. Survivors are printed; some
-change nothing that can be seen. Exit code 1 when fewer than 90 % are killed.
+change nothing that can be seen. Exit status 1 when fewer than 90 % are killed.
 """
 
 import argparse

@@ -52,7 +52,7 @@ DOCUMENTS = (
 
 
 def record(root: Path, *, new: bool = False) -> int:
-    """Run all tests of the project in ``root`` under coverage.py; pytest's exit code.
+    """Run all tests of the project in ``root`` under coverage.py; pytest's exit status.
 
     Or only those that are ``new``, and add them to what is on record.
     """

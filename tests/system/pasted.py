@@ -5,7 +5,7 @@ README.md and then of each page, line by line in one shell a document: what one 
 installs or writes, the next one has. What serves until Ctrl-C serves until its document ends, or
 the next one takes its place; scripts of README.md run beside it. The tutorial has an empty folder.
 
-It tells of each command how it ended, how long it took, or why it was left out; the exit code is 1
+It tells of each command how it ended, how long it took, or why it was left out; the exit status is 1
 when one of them failed. ``--long`` has those too that take minutes to hours.
 """
 
@@ -40,7 +40,7 @@ from .document_code import (
     words_of,
 )
 
-MARK = "-- pasted, exit code"
+MARK = "-- pasted, exit status"
 READY = "Ctrl-C ends it"
 LONG_TARGETS = {"test", "test-all", "test-hdl", "mutants", "bench-engines", "libraries"}
 EMPTY_FOLDER = {"tutorial.md"}
@@ -104,7 +104,7 @@ class Shell:
         self._said.put(None)
 
     def run(self, line: str, limit_s: float) -> tuple[int, list[str]]:
-        """Its exit code, and what it said; it is interrupted after ``limit_s``."""
+        """Its exit status, and what it said; it is interrupted after ``limit_s``."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{{ {line}\n}} </dev/null\nprintf '\\n{MARK} %s\\n' $?\n")
         self._process.stdin.flush()

@@ -2,8 +2,8 @@
 serial line, host.
 
 The star tracker captures and processes every picture; the host sees only what
-comes back over the serial line. The truth is known to this command alone and is
-printed beside the result. The sky shows all stars that the camera can see. The
+comes back over the serial line. Only this command has the truth; it prints it
+beside the result. The sky shows all stars that the camera can see. The
 first measurement with a lens compiles its catalogue, which takes seconds.
 
 examples:
@@ -91,11 +91,11 @@ class AramisOptions(attitudes.SkyOptions):
         metavar="V,V",
     )
     without: tuple[str, ...] = option(
-        (), "leave out a term of the noise; may be given again", choices=NOISE_TERMS, many=True
+        (), "leave out a term of the noise; repeatable", choices=NOISE_TERMS, many=True
     )
     bit_flips: float = option(
         0.0,
-        "turn over each bit of the catalogue's flash with this probability before each frame",
+        "flip each bit of the catalogue's flash with this probability before each frame",
         between(0, 1, "a probability in 0..1"),
         metavar="RATE",
     )

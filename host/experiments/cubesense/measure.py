@@ -59,12 +59,12 @@ class CubeSenseOptions(MeasureOptions):
     sensor: str = option("both", "default: both", choices=("both", "sun", "nadir"))
     memory: str = option(
         "own",
-        "SRAM that takes the pictures: the camera's own (default), or the other half's",
+        "SRAM that stores the images: the camera's own (default), or the other half's",
         choices=("own", "other"),
     )
     search: str = option(
         "lines",
-        "how edges are looked for: along lines (published); around samples, by halves or "
+        "how edges are searched: along lines (published); around samples, by halves or "
         "stepping from pixel to pixel, with FPGAs that let the processor choose addresses",
         choices=tuple(SEARCHES),
     )

@@ -1,8 +1,8 @@
 """Measure attitudes of CubeStar end to end: scene, camera, FPGA, firmware, host.
 
 Every frame is captured and processed by the emulated device; the host sees only
-what comes back over the serial line. The truth is known to this command alone
-and is printed beside the result.
+what comes back over the serial line. Only this command has the truth; it prints
+it beside the result.
 
 The camera sees more stars than the onboard list has, so the published detection
 threshold of 6 fills pictures with stars that have no name. Where all stars are in
@@ -13,7 +13,7 @@ times, and profile extended, which takes a threshold from each picture.
 
 examples:
   cubestack measure cubestar --frames 20                      lost in space
-  cubestack measure cubestar --threshold 13 --min-right 90    exit code 1 below 90 % right
+  cubestack measure cubestar --threshold 13 --min-right 90    exit status 1 below 90 % right
   cubestack measure cubestar --frames 200 --mag-limit 3.8 --json > frames.jsonl
   cubestack measure cubestar --mode assisted --hint-error 5   rough boresight
   cubestack measure cubestar --image sky.jpg --crop 0,256 --camera camera.json

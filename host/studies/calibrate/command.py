@@ -1,7 +1,7 @@
-"""Calibrate a device's camera from pictures, real ones or an emulated unit's.
+"""Calibrate a device's camera from images of a real or an emulated unit.
 
-The result is what the device, or `cubestack measure`, can be told; docs/calibration.md
-says how pictures are taken.
+The result can be loaded into the device or `cubestack measure`; docs/calibration.md
+describes how to take the images.
 
 examples:
   cubestack calibrate {first} --emulated 20 --out camera.json

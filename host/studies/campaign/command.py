@@ -1,17 +1,17 @@
-"""Measure thousands of skies: every combination of the values that a plan gives, on
-all cores or on a cluster; with 95 % limits of what is right, refused and wrong.
+"""Measure thousands of skies: every combination of the values in a plan, on all cores
+or a cluster, with 95 % limits of the rates of right, refused and wrong results.
 
-A plan is a TOML file (docs/campaigns.md). Results are added to FOLDER/rows.jsonl block
-by block, so that little is lost whatever happens; --resume goes on.
+A plan is a TOML file (docs/campaigns.md). Results are appended to FOLDER/rows.jsonl block
+by block, so an interruption loses little; --resume continues.
 
 examples:
-  cubestack campaign --list                               plans that come with the devices
+  cubestack campaign --list                               plans shipped with the devices
   cubestack campaign NAME --workers 2                     one of them
   cubestack campaign false-stars.toml
   cubestack campaign false-stars.toml --resume --workers 2
   cubestack campaign false-stars.toml --scheduler tcp://10.0.0.1:8786
   cubestack campaign report false-stars.campaign          report.html there
-  cubestack campaign report NEW --compare OLD             exit code 1 when NEW is worse
+  cubestack campaign report NEW --compare OLD             exit status 1 if NEW is worse
   cubestack campaign replay false-stars.campaign 17       measure row 17 again
   cubestack campaign parquet false-stars.campaign         rows.parquet there
 """
@@ -46,29 +46,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "       cubestack campaign parquet FOLDER"
     )
     parser.add_argument(
-        "words", nargs="*", metavar="PLAN", help="file, or name of one that comes with a device"
+        "words", nargs="*", metavar="PLAN", help="file, or name of a plan shipped with a device"
     )
-    parser.add_argument("--list", action="store_true", help="list the plans that there are by name")
+    parser.add_argument(
+        "--list", action="store_true", help="list the plans shipped with the devices"
+    )
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER", help="default: the plan's name, with .campaign"
     )
-    parser.add_argument("--resume", action="store_true", help="go on with what is in the folder")
+    parser.add_argument(
+        "--resume", action="store_true", help="continue with the rows in the folder"
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
     )
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
     parser.add_argument(
-        "--compare", type=Path, metavar="FOLDER", help="of a report: what was before, same skies"
+        "--compare",
+        type=Path,
+        metavar="FOLDER",
+        help="for report: an earlier campaign of the same skies",
     )
     parser.add_argument(
         "--worst",
         type=whole(0),
         default=WORST,
         metavar="N",
-        help=f"of a report: worst cases that are measured again and shown (default {WORST})",
+        help=f"for report: number of worst cases measured again and shown (default {WORST})",
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a point")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per point")
 
 
 def run(args: argparse.Namespace) -> int:

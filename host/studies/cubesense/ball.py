@@ -42,7 +42,7 @@ class BallOptions(Options):
     samples: int = option(10, "pictures at each angle (default 10)", whole(2), metavar="N")
     off_axis: float = option(
         0.0,
-        "optic point so far before the stage's axis (default 0)",
+        "distance of the optic point in front of the stage's axis (default 0)",
         between(-30, 30, "a length in -30..30 mm"),
         metavar="MM",
     )

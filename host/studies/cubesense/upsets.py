@@ -1,4 +1,4 @@
-"""Turn over bits of CubeSense's two FPGAs and memories, and see what comes of it.
+"""Flip bits of CubeSense's two FPGAs and memories, and report the effects.
 
 A loop is a picture of the Sun and one of the Earth in the memory of one of the two, which one by
 chance: one of them comes over the link. Each bit of each register is hit at random times while both

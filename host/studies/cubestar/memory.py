@@ -1,4 +1,4 @@
-"""Tell how much flash, static RAM, heap and stack firmware of one's own has used in
+"""Report how much flash, static RAM, heap and stack your own firmware used in
 CubeStar's processor: 1 MB of flash, 128 kB of RAM.
 
 examples:
@@ -23,7 +23,7 @@ class MemoryOptions(Options):
 
     seconds: float = option(2.0, "virtual time to run for (default 2)", POSITIVE)
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    capture: bool = option(False, "let it capture and process a picture, by telecommand")
+    capture: bool = option(False, "send a telecommand that captures and processes an image")
 
 
 class _Memory(Telling[MemoryOptions]):

@@ -1,4 +1,4 @@
-"""Turn over bits of CubeStar's FPGA and memories, and see what comes of it.
+"""Flip bits of CubeStar's FPGA and memories, and report the effects.
 
 Each bit of each register is hit at random times while the FPGA is idle, stores, waits
 between pictures, and is read back; each upset in a copy of the running device. What the

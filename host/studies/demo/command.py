@@ -18,9 +18,7 @@ from cubestack.host.devices.registry import devices
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = [one.name for one in devices() if "demo" in one.studies]
-    parser.add_argument(
-        "device", nargs="?", choices=names, help="show this one only; default: all of them"
-    )
+    parser.add_argument("device", nargs="?", choices=names, help="run this one only; default: all")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the pictures")
     parser.add_argument(
         "--photographs",

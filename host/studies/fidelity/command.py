@@ -1,12 +1,12 @@
-"""Measure every published figure of the devices: what their documents have, ours in
-both profiles, and how ours comes about.
+"""Measure every published figure of the devices: the documents' values, ours in both
+profiles, and how ours arise.
 
   predicted   follows from the model; nothing was set to make it so
   fitted      a constant was set so that it comes out, or nearly
   chosen      a choice that the document leaves open makes it
   definition  the document's own formula or setting
 
-All takes less than half an hour on two idle cores.
+All rows take less than half an hour on two idle cores.
 
 examples:
   cubestack fidelity --quick
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PATTERN",
-        help="keys of rows, as in 'sun-*'; can be given again",
+        help="keys of rows, e.g. 'sun-*'; repeatable",
     )
     parser.add_argument("--profile", choices=PROFILES, help="default: both")
     parser.add_argument("--quick", action="store_true", help="a few pictures of each kind")
@@ -43,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a row")
-    parser.add_argument("--markdown", action="store_true", help="tables as the pages have them")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per row")
+    parser.add_argument("--markdown", action="store_true", help="print the tables of the pages")
     parser.add_argument(
         "--write",
         nargs="?",

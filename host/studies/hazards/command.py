@@ -1,5 +1,5 @@
-"""Make skies hard, and see how often a sensor is right, refuses, or is wrong: for each
-hazard a sample picture, and a curve against its strength.
+"""Count right, refused and wrong results in hard skies: for each hazard a sample image
+and a curve over its strength.
 
 Every picture goes through the whole device; the bands are 95 % limits of the rates.
 Results do not depend on the number of workers.
@@ -8,7 +8,7 @@ examples:
   cubestack hazards {first} --hazard moon --frames 20
   cubestack hazards --frames 40 --out docs                all, and the page that shows them
   cubestack hazards {first} --json > points.jsonl
-  cubestack hazards --list                                what there is
+  cubestack hazards --list                                list hazards and their strengths
 """
 
 import argparse
@@ -27,7 +27,7 @@ from cubestack.host.terminal import progress, say, show
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("device", nargs="?", help="default: all that take hazards")
+    parser.add_argument("device", nargs="?", help="default: all devices with hazards")
     parser.add_argument(
         "--hazard", action="append", default=[], metavar="NAME", help="default: all; may be given "
         "again",
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="write hazards.md there, or a part of it, with pictures, curves and points",
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a point")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per point")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -50,19 +50,25 @@ class UpsetOptions(Options):
     frames: int = option(1, "upsets of each bit in each phase (default 1)", whole(1))
     seed: int = option(0, "seed of everything random (default 0)", whole(0))
     registers: str = option(
-        "*", "only those with such a path, as 'writer.*'", TEXT, metavar="PATTERN"
+        "*", "only registers whose path matches, e.g. 'writer.*'", TEXT, metavar="PATTERN"
     )
     memories: str = option(
-        "", "memories to hit, as 'ram,flash' (default: those with pictures)", TEXT, metavar="NAMES"
+        "",
+        "memories to hit, e.g. 'ram,flash' (default: those that hold images)",
+        TEXT,
+        metavar="NAMES",
     )
     memory_bits: int = option(
-        8, "bits of each memory, drawn anew, beside those of the registers (default 8)", whole(0)
+        8, "random bits of each memory, besides all bits of the registers (default 8)", whole(0)
     )
     flux: float = option(
-        1.0, "particles for each cm2 and second (default 1), for rates a day", POSITIVE
+        1.0, "particles per cm2 and second (default 1), for rates per day", POSITIVE
     )
     cross_section: float = option(
-        1e-13, "of a bit in cm2 (default 1e-13), for rates a day", POSITIVE, metavar="CM2"
+        1e-13,
+        "cross-section of a bit in cm2 (default 1e-13), for rates per day",
+        POSITIVE,
+        metavar="CM2",
     )
 
 

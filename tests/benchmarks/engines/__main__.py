@@ -4,7 +4,7 @@ examples, from the project's folder:
   make bench-engines
   python -m tests.benchmarks.engines --json
 
-Exit code 2 when an engine fails or stores something else than the cameras sent.
+Exit status 2 when an engine fails or stores something else than the cameras sent.
 """
 
 import argparse

@@ -6,7 +6,7 @@ examples, from the project's folder:
   python -m tests.hdl.mutants cubesense-pair --all           hours; the same command goes on
   python -m tests.hdl.mutants --json
 
-Exit code 1 when fewer than 95 % of the mutants that are not equivalent are killed.
+Exit status 1 when fewer than 95 % of the mutants that are not equivalent are killed.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""`cubestack conformance` on emulated devices: all pass; reports and exit codes."""
+"""`cubestack conformance` on emulated devices: all pass; reports and exit statuss."""
 
 import json
 

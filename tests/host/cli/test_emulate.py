@@ -46,7 +46,7 @@ class Serving:
             self._serves.set()
 
     def __call__(self, *words: object, last: str, beside: Callable[[], None]) -> int:
-        """The exit code; ``last`` names the device that is told of last."""
+        """The exit status; ``last`` names the device that is told of last."""
         self._last = last
         reading, writing = os.pipe()
 

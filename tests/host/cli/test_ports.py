@@ -65,7 +65,7 @@ def test_free_tcp_ports(ports, kind):
 
 @pytest.mark.parametrize("devices", [1, 2])
 def test_not_enough_ports(ports, opened, devices):
-    with pytest.raises(ValueError, match=f"CubeSense needs {2 * devices} ports from 65535 on"):
+    with pytest.raises(ValueError, match=f"CubeSense needs {2 * devices} ports, 65535 and up"):
         ports("--rfc2217", "65535", devices=[opened] * devices)
 
 

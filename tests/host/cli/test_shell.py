@@ -1,4 +1,4 @@
-"""`cubestack shell` on emulated devices and recordings: outputs and exit codes."""
+"""`cubestack shell` on emulated devices and recordings: outputs and exit statuss."""
 
 import json
 import os

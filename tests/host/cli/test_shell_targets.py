@@ -64,7 +64,7 @@ def serving(kind, folder):
 
 @pytest.fixture
 def shell_on(tmp_path, monkeypatch, run):
-    """Runs commands on a kind of target; exit code, output, errors."""
+    """Runs commands on a kind of target; exit status, output, errors."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
 
     def call(kind, commands, *options):

@@ -1,4 +1,4 @@
-"""What commands tell and return: exit codes, tables, lines for a reader, what stops them."""
+"""What commands tell and return: exit statuss, tables, lines for a reader, what stops them."""
 
 import argparse
 import json
@@ -30,7 +30,7 @@ from tests.conftest import Run
 
 @pytest.fixture
 def ending(monkeypatch: pytest.MonkeyPatch) -> list[BaseException | int | None]:
-    """What `bench` ends with: an exception, or its exit code."""
+    """What `bench` ends with: an exception, or its exit status."""
     ends = list[BaseException | int | None]()
 
     def run(_args: argparse.Namespace) -> int | None:

@@ -1,4 +1,4 @@
-/* A program that knows Linux's i2c-dev and nothing else. Its exit code is 17 when all is well. */
+/* A program that knows Linux's i2c-dev and nothing else. Its exit status is 17 when all is well. */
 
 #include <errno.h>
 #include <fcntl.h>

@@ -18,7 +18,7 @@ from .conftest import LATCH, Run, needs_tools
 pytestmark = needs_tools
 
 Session = tuple[tuple[str, int, str], ...]
-"""Command, its exit code, and what it prints."""
+"""Command, its exit status, and what it prints."""
 
 
 def text(data: bytes) -> str:
