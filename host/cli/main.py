@@ -1,7 +1,7 @@
 """Entry point of the ``cubestack`` command.
 
-Exit statuss: 0 done, 1 the run failed, 2 the call was wrong, 128 and the signal's number when it was
-ended by one. An error is one line: what, where, and what would be right.
+Exit status: 0 done, 1 the run failed, 2 the call was wrong, 128 plus the signal's number when a
+signal ended it. An error is one line: what, where, and what would be right.
 """
 
 import logging

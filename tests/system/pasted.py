@@ -5,8 +5,8 @@ README.md and then of each page, line by line in one shell a document: what one 
 installs or writes, the next one has. What serves until Ctrl-C serves until its document ends, or
 the next one takes its place; scripts of README.md run beside it. The tutorial has an empty folder.
 
-It tells of each command how it ended, how long it took, or why it was left out; the exit status is 1
-when one of them failed. ``--long`` has those too that take minutes to hours.
+It reports for each command how it ended, how long it took, or why it was left out; the exit status
+is 1 when one of them failed. ``--long`` includes those that take minutes to hours.
 """
 
 import argparse

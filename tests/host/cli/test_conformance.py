@@ -1,4 +1,4 @@
-"""`cubestack conformance` on emulated devices: all pass; reports and exit statuss."""
+"""`cubestack conformance` on emulated devices: all pass; reports and exit status."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The command: what it takes, exit statuss, one-line errors, and output for scripts."""
+"""The command: what it takes, exit status, one-line errors, and output for scripts."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""`cubestack shell` on emulated devices and recordings: outputs and exit statuss."""
+"""`cubestack shell` on emulated devices and recordings: outputs and exit status."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What commands tell and return: exit statuss, tables, lines for a reader, what stops them."""
+"""What commands tell and return: exit status, tables, lines for a reader, what stops them."""
 
 import argparse
 import json
