@@ -1,1 +1,1 @@
-"""What there is to look at: stars, Earth, Sun, pictures, and the pose; no sensor."""
+"""Scenes: stars, Earth, Sun, photographs, and the pose; independent of sensors."""

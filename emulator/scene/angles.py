@@ -1,7 +1,7 @@
-"""Directions as a pair of angles, as sun and nadir sensors give them.
+"""Directions as a pair of angles, as sun and nadir sensors report them.
 
-Alpha and beta are undistorted picture coordinates in degrees: their root sum of squares is the
-angle from the boresight, and they divide it into x (right) and y (down).
+Alpha and beta are undistorted image coordinates in degrees, x (right) and y (down): their root sum
+of squares is the angle from the boresight.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def vector_from_angles(alpha_deg: ArrayLike, beta_deg: ArrayLike) -> NDArray[np.float64]:
-    """Unit vectors (..., 3) in camera axes of alpha and beta."""
+    """Unit vectors (..., 3) in camera axes."""
     theta, phi = np.radians(np.hypot(alpha_deg, beta_deg)), np.arctan2(beta_deg, alpha_deg)
     return np.stack(
         [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1

@@ -1,9 +1,9 @@
 """Attitudes: quaternions, rotation matrices, pointing angles, motion and errors.
 
 Conventions: camera axes are x right, y down, z out of the lens. A quaternion (x, y, z, w), scalar
-last, turns inertial (ICRS) vectors into camera vectors, v_camera = q v_inertial q*, so that
-v_camera = A(q) v_inertial with A = (w^2 - |v|^2) I + 2 v v^T + 2 w [v]x. That is the rotation of
-scipy's Rotation.from_quat; CubeStar thesis, equation 5.3.1 reads its quaternion as the conjugate.
+last, transforms inertial (ICRS) vectors to camera vectors, v_camera = q v_inertial q*, so that
+v_camera = A(q) v_inertial with A = (w^2 - |v|^2) I + 2 v v^T + 2 w [v]x. This is the rotation of
+scipy's Rotation.from_quat; in the CubeStar thesis, equation 5.3.1, the quaternion is the conjugate.
 All arrays are float64.
 """
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def unit_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
-    """``quaternion`` scaled to length 1, shape (4,); ValueError when that is not possible."""
+    """``quaternion`` scaled to length 1, shape (4,); ValueError if that is not possible."""
     q = np.asarray(quaternion, np.float64)
     if q.shape != (4,):
         raise ValueError(f"a quaternion has 4 numbers (x, y, z, w), not shape {q.shape}")
@@ -23,7 +23,6 @@ def unit_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
-    """Rotation matrix A (3, 3), inertial to camera."""
     x, y, z, w = unit_quaternion(quaternion)
     v = np.array([x, y, z])
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -34,8 +33,8 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
 def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     """Unit quaternion (4,) of a rotation matrix, scalar part not negative."""
     a = np.asarray(matrix, np.float64)
-    # 4 q q^T, all of it sums of elements of A. The row of the largest component is the quaternion,
-    # scaled, without cancellation.
+    # 4 q q^T, from sums of elements of A. The row of the largest component is the scaled
+    # quaternion, without cancellation.
     xy, xz, yz = a[0, 1] + a[1, 0], a[0, 2] + a[2, 0], a[1, 2] + a[2, 1]
     xw, yw, zw = a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]
     products = np.array(
@@ -51,9 +50,9 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
 
 
 def matrix_from_pointing(ra_deg: float, dec_deg: float, roll_deg: float) -> NDArray[np.float64]:
-    """Rotation matrix of a boresight and the angle of the picture's up direction, east of north.
+    """Rotation matrix of a boresight and a roll: the angle of image up, east of north.
 
-    East is to the left of north, as the sky shows it to someone inside.
+    East is to the left of north, as in the sky.
     """
     ra, dec, roll = np.radians([ra_deg, dec_deg, roll_deg])
     boresight = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
@@ -65,15 +64,14 @@ def matrix_from_pointing(ra_deg: float, dec_deg: float, roll_deg: float) -> NDAr
 
 
 def quaternion_from_pointing(ra_deg: float, dec_deg: float, roll_deg: float) -> NDArray[np.float64]:
-    """Quaternion of a boresight and a roll angle; see `matrix_from_pointing`."""
     return quaternion_from_matrix(matrix_from_pointing(ra_deg, dec_deg, roll_deg))
 
 
 def pointing_from_matrix(matrix: ArrayLike) -> tuple[float, float, float]:
     """Right ascension (0..360), declination and roll (-180..180) in degrees.
 
-    At a pole of the sky, right ascension and roll are not told apart; right ascension is then
-    whatever rounding makes of it, and roll fits to it.
+    At a pole of the sky, only their combination is defined; right ascension is then arbitrary, and
+    roll is consistent with it.
     """
     a = np.asarray(matrix, np.float64)
     ra = np.arctan2(a[2, 1], a[2, 0])
@@ -86,26 +84,25 @@ def pointing_from_matrix(matrix: ArrayLike) -> tuple[float, float, float]:
 
 
 def propagate(quaternion: ArrayLike, rate_deg_s: ArrayLike, seconds: float) -> NDArray[np.float64]:
-    """The attitude after ``seconds`` of a constant body rate, (3,) in deg/s in camera axes.
+    """The attitude after ``seconds`` of a constant body rate (3,) in deg/s, camera axes.
 
-    The camera turns by the right-hand rule about the rate vector, so the stars turn the other way.
+    The camera turns by the right-hand rule about the rate vector.
     """
     angle = np.radians(np.asarray(rate_deg_s, np.float64)) * seconds
     size = float(np.linalg.norm(angle))
-    # Minus: the stars turn the other way. np.sinc(t) is sin(pi t) / (pi t): finite at rest.
+    # Minus: the stars turn the opposite way. np.sinc(t) is sin(pi t) / (pi t): finite at rest.
     turn = matrix_from_quaternion([*(-0.5 * np.sinc(size / 2 / np.pi) * angle), np.cos(size / 2)])
     return quaternion_from_matrix(turn @ matrix_from_quaternion(quaternion))
 
 
 def attitude_error_deg(q_measured: ArrayLike, q_truth: ArrayLike) -> tuple[float, float]:
-    """Errors across and about the boresight in degrees: cross is not negative, roll is signed.
+    """Cross error (the angle between the boresights) and signed roll error in degrees.
 
-    With D = A_measured A_truth^T: cross is the angle between the boresights, roll is
-    atan2(D01 - D10, D00 + D11).
+    With D = A_measured A_truth^T, roll is atan2(D01 - D10, D00 + D11).
     """
     measured, truth = matrix_from_quaternion(q_measured), matrix_from_quaternion(q_truth)
     d = measured @ truth.T
-    # The cross product keeps its digits where the cosine of a small angle loses them.
+    # For small angles, the cross product is more accurate than the cosine.
     cross = np.arctan2(np.linalg.norm(np.cross(measured[2], truth[2])), d[2, 2])
     roll = np.arctan2(d[0, 1] - d[1, 0], d[0, 0] + d[1, 1])
     return float(np.degrees(cross)), float(np.degrees(roll))

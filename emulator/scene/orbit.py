@@ -1,11 +1,11 @@
-"""A satellite on its orbit: where Earth, Sun and Moon stand, how it points, what its cameras see.
+"""A satellite on its orbit: directions of Earth, Sun and Moon, its attitude, and its scenes.
 
 - Orbit: SGP4 (Vallado and others 2006, AIAA 2006-6753, the package `sgp4`), in the axes of date
-  (TEME), turned to ICRS by the precession of Lieske 1977 (A&A 58, 1). Nutation is left out: 20
-  arcsec at most, which moves the Earth's centre by less than any sensor here sees.
+  (TEME), transformed to ICRS by the precession of Lieske 1977 (A&A 58, 1). Nutation is neglected:
+  at most 20 arcsec, below what any sensor here can measure at the Earth's centre.
 - Sun: `hazards.ephemeris`. Moon: the Astronomical Almanac's low-precision formulae (page D22),
-  0.3 deg; as the satellite sees it, not the Earth's centre.
-- Body axes: what a mounting makes of them is a camera's. Rates are those of the attitude profile.
+  0.3 deg; as seen from the satellite, not from the Earth's centre.
+- A mounting is the rotation from body axes to camera axes. Rates are those of the attitude profile.
 """
 
 from collections.abc import Sequence
@@ -33,33 +33,32 @@ from cubestack.emulator.scene.sky import Pose, SkyScene
 
 SUN_RADIUS_KM = 696_000.0
 GM_KM3_S2 = 398_600.8
-"""Of the Earth, as in WGS 72, which two-line elements are made for."""
+"""Gravitational parameter of the Earth in WGS 72, the system of two-line elements."""
 
 DAY_S = 86_400.0
-EPOCH_1950 = 2433281.5  # of the days that SGP4's elements count from
+EPOCH_1950 = 2433281.5  # Julian date from which SGP4 counts days
 
 STEP_S = 1e-3
-"""Over which a body rate is the difference of two attitudes."""
+"""Time between two attitudes whose difference is a body rate."""
 
 Vector = NDArray[np.float64]
 
 
 class Attitude(Protocol):
-    """How the satellite points: inertial to body."""
+    """An attitude profile: inertial to body axes."""
 
     def matrix(self, surroundings: "Surroundings") -> Vector:
         """Rotation (3, 3) from ICRS to body axes."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What is around the satellite at a time; directions are ICRS.
+    """Position and surroundings of the satellite at a time; directions are ICRS.
 
     Attributes:
-        time_s: since the orbit's start.
-        position_km, velocity_km_s: (3,) from the Earth's centre.
-        sun, moon: unit vectors (3,) as the satellite sees them.
+        time_s: time since the orbit's start.
+        position_km, velocity_km_s: (3,) relative to the Earth's centre.
+        sun, moon: unit vectors (3,) from the satellite.
         sun_km: distance of the Sun.
     """
 
@@ -72,17 +71,16 @@ class Surroundings:
 
     @property
     def altitude_km(self) -> float:
-        """Above a sphere of the equator's radius."""
+        """Altitude above a sphere with the equator's radius."""
         return float(np.linalg.norm(self.position_km)) - EARTH_RADIUS_KM
 
     @property
     def nadir(self) -> Vector:
-        """Unit vector (3,) to the Earth's centre."""
         return -self.position_km / np.linalg.norm(self.position_km)
 
     @property
     def shadow(self) -> float:
-        """Share of the Sun's disc that the Earth hides, 0 to 1; both are discs."""
+        """Share of the Sun's disc that the Earth's disc hides, 0 to 1."""
         earth = np.radians(angular_radius_deg(self.altitude_km))
         sun = np.arcsin(SUN_RADIUS_KM / self.sun_km)
         apart = np.arccos(np.clip(self.sun @ self.nadir, -1, 1))
@@ -90,7 +88,7 @@ class Surroundings:
 
 
 def hidden_share(radius: float, other: float, apart: float) -> float:
-    """Share of a disc that another, not smaller one hides; all three angles in one unit."""
+    """Share of a disc that another, not smaller one hides; all angles in the same unit."""
     if apart >= radius + other:
         return 0.0
     if apart <= other - radius:
@@ -105,7 +103,7 @@ def hidden_share(radius: float, other: float, apart: float) -> float:
 
 @dataclass(frozen=True)
 class Inertial:
-    """Points at one place of the sky, or turns about one body axis from there.
+    """A fixed attitude, or a constant body rate.
 
     Attributes:
         quaternion: (4,) at the start, scalar last, ICRS to body.
@@ -116,23 +114,21 @@ class Inertial:
     rate_deg_s: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def matrix(self, surroundings: Surroundings) -> Vector:
-        """See `Attitude`."""
         turned = propagate(self.quaternion, self.rate_deg_s, surroundings.time_s)
         return matrix_from_quaternion(turned)
 
 
 @dataclass(frozen=True)
 class NadirPointing:
-    """Body z to the Earth's centre, body y against the orbit's normal, then turned.
+    """Body z to the Earth's centre, body y opposite to the orbit's normal, then an offset.
 
     Attributes:
-        offset_deg: rotation vector (3,) in body axes by which it is off.
+        offset_deg: rotation vector (3,) in body axes.
     """
 
     offset_deg: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def matrix(self, surroundings: Surroundings) -> Vector:
-        """See `Attitude`."""
         z = surroundings.nadir
         y = -np.cross(surroundings.position_km, surroundings.velocity_km_s)
         y /= np.linalg.norm(y)
@@ -145,19 +141,18 @@ class Waypoints:
     """Quaternions at times; between two of them the satellite turns at a constant rate.
 
     Attributes:
-        points: (time in s, quaternion (4,) ICRS to body), in the order of time.
+        points: (time in s, quaternion (4,) ICRS to body), ordered by time, else SceneError.
     """
 
     points: tuple[tuple[float, tuple[float, ...]], ...]
 
     def __post_init__(self) -> None:
-        """Refuse what has no order."""
         times = [time_s for time_s, _ in self.points]
         if not times or sorted(set(times)) != times:
-            raise SceneError(f"points must be one after the other, not at {times} s")
+            raise SceneError(f"points must be ordered by time, not {times} s")
 
     def matrix(self, surroundings: Surroundings) -> Vector:
-        """See `Attitude`; before the first and after the last point it stands still."""
+        """Before the first and after the last point, the attitude is constant."""
         now = surroundings.time_s
         begun = [number for number, (time_s, _) in enumerate(self.points) if time_s <= now]
         if not begun or begun[-1] == len(self.points) - 1:
@@ -169,7 +164,7 @@ class Waypoints:
 
 
 def rate_between(first: Vector, second: Vector, seconds: float) -> Vector:
-    """Body rate (3,) in deg/s that turns one attitude (3, 3) into another in this time."""
+    """Body rate (3,) in deg/s that turns one attitude (3, 3) into another in ``seconds``."""
     x, y, z, w = quaternion_from_matrix(second @ first.T)
     axis = np.array([x, y, z])
     size = float(np.linalg.norm(axis))
@@ -183,11 +178,11 @@ class Orbit:
     """A satellite, its attitude, and how its cameras are mounted.
 
     Attributes:
-        satellite: elements, as SGP4 has them.
+        satellite: SGP4's elements.
         start: date and time of virtual time 0, UTC.
-        attitude: how it points.
-        mountings: of cameras that look at the sky, by device; body z where there is none.
-        hazards: whether Earth, Sun and Moon disturb cameras that look at the sky.
+        attitude: attitude profile.
+        mountings: mountings of star trackers by device; default along body z.
+        hazards: whether Earth, Sun and Moon disturb star trackers.
     """
 
     satellite: Satrec
@@ -204,11 +199,11 @@ class Orbit:
 
     @property
     def period_s(self) -> float:
-        """Of a revolution, from node to node without the Earth's flattening."""
+        """Orbital period from node to node, without the Earth's flattening."""
         return float(2 * np.pi / self.satellite.no_kozai * 60)
 
     def around(self, time_s: float) -> Surroundings:
-        """What is around the satellite; SceneError where its elements do not hold any more."""
+        """The surroundings at a time; SceneError if SGP4 reports an error."""
         days, part = self._start_days
         part += time_s / DAY_S
         error, position, velocity = self.satellite.sgp4(days, part)
@@ -235,7 +230,7 @@ class Orbit:
         return now, rate_between(now, soon, STEP_S)
 
     def sky(self, time_s: float, scene: SkyScene, name: str) -> SkyScene:
-        """What the camera of the device ``name`` sees from then on; else as ``scene``."""
+        """``scene`` with attitude and hazards for the star tracker ``name`` from then on."""
         around = self.around(time_s)
         body, rate = self.body(time_s)
         mounting = self.mountings.get(name, BODY_Z).matrix
@@ -252,14 +247,14 @@ class Orbit:
         )
 
     def below(self, time_s: float, scene: EarthSunScene, lasts_s: float = 0.0) -> EarthSunScene:
-        """What a satellite's sun and nadir cameras see from then on; else as ``scene``.
+        """``scene`` with the directions for a satellite's sun and nadir cameras from then on.
 
-        A scene's Earth stands still while the satellite turns, so it stands where it is in the
-        middle of the time ``lasts_s`` for which the scene is looked at.
+        The Earth does not move within a scene, so its direction is that in the middle of
+        ``lasts_s``, the time for which the scene is used.
         """
         around = self.around(time_s + lasts_s / 2)
         body, rate = self.body(time_s)
-        # Scene axes are those of the body at virtual time 0, had it always turned like that.
+        # Scene axes are the body axes at virtual time 0, extrapolated with the present rate.
         back = matrix_from_quaternion(propagate((0, 0, 0, 1), rate, time_s)).T @ body
         return replace(
             scene,
@@ -274,7 +269,7 @@ class Orbit:
 BODY_Z = Mounting((0.0, 0.0, 1.0))
 
 DISTURBING = {"earth-limb": 60.0, "moon": 60.0, "sun-glare": 100.0}
-"""Hazards for cameras that look at the sky, and the angle beyond which they are left out, deg."""
+"""Hazards for star trackers, and the angle in deg beyond which they are neglected."""
 
 
 def _near(around: Surroundings, boresight: Vector) -> tuple[SkyHazard, ...]:
@@ -313,7 +308,7 @@ def _about_z(angle: float) -> Vector:
 
 
 def moon(julian_date: float) -> Vector:
-    """Position (3,) of the Moon from the Earth's centre, axes of date, km."""
+    """Position (3,) of the Moon relative to the Earth's centre, axes of date, km."""
     t = (julian_date - J2000) / 36525
 
     def terms(function: Any, rows: Sequence[tuple[float, float, float]]) -> float:
@@ -334,7 +329,7 @@ def moon(julian_date: float) -> Vector:
     )
 
 
-# Size, and argument at J2000 with its change in a century; all in degrees.
+# Amplitude, and argument at J2000 with its change per century; all in degrees.
 _LONGITUDE = (
     (6.29, 135.0, 477198.87), (-1.27, 259.3, -413335.36), (0.66, 235.7, 890534.22),
     (0.21, 269.9, 954397.74), (-0.19, 357.5, 35999.05), (-0.11, 186.5, 966404.03),
@@ -352,7 +347,7 @@ _PARALLAX = (
 def circular(
     start: datetime, altitude_km: float, inclination_deg: float, node_deg: float, along_deg: float
 ) -> Satrec:
-    """Elements of a circular orbit, without drag; ``along_deg`` from the ascending node."""
+    """Elements of a circular orbit without drag; ``along_deg`` is from the ascending node."""
     axis = EARTH_RADIUS_KM + altitude_km
     at = start.astimezone(UTC)
     days, part = jday(at.year, at.month, at.day, at.hour, at.minute, at.second)

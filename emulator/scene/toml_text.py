@@ -1,4 +1,4 @@
-"""Writes tables as TOML: what Python's own library only reads."""
+"""Writes tables as TOML, which Python's library only reads."""
 
 import json
 import math
@@ -13,10 +13,10 @@ _MOMENT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d(:\d\d(\.\d+)?)?(Z|[+-]\d\d:\d\d
 
 
 def toml_text(table: Mapping[str, Any]) -> str:
-    """``table`` as a TOML document that reads as the same table.
+    """``table`` as a TOML document.
 
-    Values are numbers, texts, true and false, lists, tables, and lists of tables. A text that is a
-    moment, as 2013-06-01T20:00:00Z, becomes one. SceneError for anything else.
+    Values are numbers, texts, true and false, lists, tables, and lists of tables, else SceneError.
+    A text such as 2013-06-01T20:00:00Z becomes a date and time.
     """
     return "".join(_lines(table, ()))
 
@@ -54,9 +54,9 @@ def _value(value: Any) -> str:
             return value if _MOMENT.fullmatch(value) else _text(value)
         case list():
             return f"[{', '.join(map(_value, value))}]"
-    raise SceneError(f"no value of a scene file: {value!r}")
+    raise SceneError(f"a scene file can not contain the value {value!r}")
 
 
 def _text(value: str) -> str:
-    # JSON's quoted text is TOML's basic one, but for the control character that JSON leaves.
+    # JSON's quoted text is TOML's basic string, except that JSON does not escape DEL.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,9 +1,9 @@
-"""Where the planets, the Earth and the Sun are: approximate positions of the years 1800 to 2050.
+"""Approximate positions of the planets, the Earth and the Sun in the years 1800 to 2050.
 
 E. M. Standish, Keplerian elements for approximate positions of the major planets (JPL), table 1:
-errors of the heliocentric longitudes are 15 to 50 arcsec to Mars, 400 and 600 for Jupiter and
-Saturn. Axes are ICRS, distances astronomical units, dates Julian; the seconds between the scales
-of time, and the distance between the Earth and its barycentre with the Moon, are left out.
+errors of the heliocentric longitudes are 15 to 50 arcsec up to Mars, 400 and 600 for Jupiter and
+Saturn. Axes are ICRS, distances astronomical units, dates Julian. Neglected: the seconds between
+the time scales, and the distance between the Earth and its barycentre with the Moon.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 J2000 = 2451545.0
 NEW_YEAR_2026 = 2461041.5
 FIRST_DATE, LAST_DATE = 2378496.5, 2469807.5
-"""Between which the elements hold: 1800 and 2050."""
+"""Validity of the elements: 1800 to 2050."""
 
 AU_KM = 149_597_870.7
 DAY_S = 86400.0
@@ -20,7 +20,7 @@ OBLIQUITY_RAD = np.radians(23.43928)
 LIGHT_DAYS_PER_AU = 499.004784 / DAY_S
 
 #: Axis (au), eccentricity, inclination, mean longitude, longitudes of perihelion and node (deg),
-#: each at J2000 and its change in a century.
+#: each at J2000 and its change per century.
 ELEMENTS = {
     "mercury": (
         (0.38709927, 0.20563593, 7.00497902, 252.25032350, 77.45779628, 48.33076593),
@@ -60,13 +60,13 @@ Vector = NDArray[np.float64]
 
 
 def heliocentric(planet: str, julian_date: float) -> Vector:
-    """Position (3,) of a planet as the Sun sees it, ICRS, au."""
+    """Position (3,) of a planet relative to the Sun, ICRS, au."""
     start, change = np.array(ELEMENTS[planet])
     axis, eccentricity, *angles = start + change * (julian_date - J2000) / 36525
     inclination, longitude, perihelion, node = np.radians(angles)
     mean = np.remainder(longitude - perihelion + np.pi, 2 * np.pi) - np.pi
     anomaly = mean
-    for _ in range(8):  # Newton's method; no eccentricity here needs more
+    for _ in range(8):  # Newton's method; enough for these eccentricities
         excess = anomaly - eccentricity * np.sin(anomaly) - mean
         anomaly -= excess / (1 - eccentricity * np.cos(anomaly))
     in_orbit = axis * np.array(
@@ -77,7 +77,7 @@ def heliocentric(planet: str, julian_date: float) -> Vector:
 
 
 def geocentric(planet: str, julian_date: float) -> Vector:
-    """Position (3,) of a planet as the Earth sees it, when its light left: ICRS, au."""
+    """Position (3,) of a planet relative to the Earth when its light left: ICRS, au."""
     earth = heliocentric("earth", julian_date)
     there = heliocentric(planet, julian_date) - earth
     sent = julian_date - LIGHT_DAYS_PER_AU * float(np.linalg.norm(there))
@@ -85,14 +85,14 @@ def geocentric(planet: str, julian_date: float) -> Vector:
 
 
 def sun_longitude_deg(julian_date: float) -> float:
-    """Ecliptic longitude of the Sun as the Earth sees it, 0 to 360, equinox J2000."""
+    """Ecliptic longitude of the Sun seen from the Earth, 0 to 360, equinox J2000."""
     x, y, _ = -heliocentric("earth", julian_date) @ FROM_ECLIPTIC
     return float(np.degrees(np.arctan2(y, x)) % 360)
 
 
 def earth_velocity_km_s(julian_date: float) -> Vector:
     """Velocity (3,) of the Earth around the Sun, ICRS, km/s."""
-    half = 0.05  # days; the orbit is straight enough to 1e-7
+    half = 0.05  # days; the curvature of the orbit is below 1e-7
     later, before = (heliocentric("earth", julian_date + dt) for dt in (half, -half))
     return (later - before) * (AU_KM / (2 * half * DAY_S))
 

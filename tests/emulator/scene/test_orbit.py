@@ -220,7 +220,7 @@ def test_waypoints_are_met_and_the_way_between_is_even() -> None:
     rates = [own.body(at)[1] for at in (101.0, 150.0, 199.0)]
     assert rates[1:] == [pytest.approx(rates[0], abs=1e-6)] * 2
     assert np.linalg.norm(rates[0]) * 100 == pytest.approx(40.0)  # about the pole
-    with pytest.raises(SceneError, match="points must be one after the other"):
+    with pytest.raises(SceneError, match="points must be ordered by time"):
         Waypoints(((2.0, first), (1.0, second)))
 
 

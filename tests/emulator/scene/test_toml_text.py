@@ -31,5 +31,5 @@ def test_a_moment_becomes_one() -> None:
 
 @pytest.mark.parametrize("value", [None, float("inf"), float("nan"), object(), [None], [{}, 1]])
 def test_what_toml_has_not_is_refused(value: Any) -> None:
-    with pytest.raises(SceneError, match="no value of a scene file"):
+    with pytest.raises(SceneError, match="a scene file can not contain the value"):
         toml_text({"key": value})

@@ -65,7 +65,7 @@ def test_another_scene_is_looked_at_and_not_shown(controlled: Controlled) -> Non
         ({}, 'scene: kind must be "sky" or "picture", not None'),
         ({"kind": "sky", "ra_deg": 400, "dec_deg": 0}, "scene: ra_deg must be -360 to 360"),
         ({"kind": "sky", "ra_deg": 1, "dec_deg": 0, "<b>": 1}, "scene: unknown key '<b>'"),
-        ({"kind": "sky", "ra_deg": None}, "no value of a scene file: None"),
+        ({"kind": "sky", "ra_deg": None}, "a scene file can not contain the value None"),
         ({"kind": "sky", "a\nb": {"c": 1}}, "scene: unknown key 'a\\nb'"),
         ({"kind": "sky", "ra_deg": "\ud800", "dec_deg": 1}, "surrogates not allowed"),
         ({"kind": "picture", "file": "/none.png"}, "scene: none.png can not be read"),
