@@ -24,13 +24,15 @@ class Box(NamedTuple):
 
 FLOORS: dict[str, Sequence[Box]] = {
     "host": (
-        Box("api", "import cubestack"),
-        Box("cli", "argparse only"),
-        Box("sensors", "declarations"),
+        Box("api", "public names"),
+        Box("studies", "campaigns"),
+        Box("cli", "commands"),
+        Box("sensors", "declared"),
+        Box("ground", "browser"),
         Box("experiments", "beside truth"),
-        Box("conformance"),
         Box("shell"),
-        Box("devices", "registry, targets"),
+        Box("emulation", "open device"),
+        Box("devices", "registry"),
         Box("clients", "node, I2C", "8"),
         Box("transport", "serial, TCP", "7"),
     ),
@@ -49,6 +51,7 @@ FLOORS: dict[str, Sequence[Box]] = {
         Box("native", "C++"),
     ),
     "firmware_model": (
+        Box("values", "limits"),
         Box("interface", "tables", "c"),
         Box("formats", "recordings"),
         Box("mcu", "requests, costs"),

@@ -204,6 +204,13 @@ def test_files_that_a_document_names_exist(document: Path) -> None:
     assert [path for path in named if not any(any(one.glob(path)) for one in folders)] == []
 
 
+@pytest.mark.parametrize("package", ["hdl", "firmware_model", "emulator", "host"])
+def test_the_table_of_packages_names_every_folder(package: str) -> None:
+    (row,) = re.findall(rf"^\| `{package}/` \|.*", text_of("docs/architecture.md"), re.MULTILINE)
+    folders = {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    assert folders <= set(re.findall(r"`(\w+)/`", row))
+
+
 def test_make_has_the_targets_that_are_promised() -> None:
     targets = set(re.findall(r"^(\w+):", text_of("Makefile"), re.MULTILINE))
     assert {"venv", "run", "test", "lint", "bench", "clean"} <= targets
