@@ -24,7 +24,7 @@ DOCUMENTS ?=
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test test-all test-hdl pasted firmware mutants lint libraries bench bench-engines clean
+.PHONY: help venv run docs test test-all test-hdl pasted firmware mutants lint bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -36,7 +36,6 @@ help:
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make docs      set up, then build the documents as a site in out/site"
 	@echo "make lint      ruff and mypy"
-	@echo "make libraries  build the compiled FPGAs that come along anew, for x86-64 and aarch64"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
 	@echo "make clean     remove .venv, out and caches"
@@ -83,10 +82,6 @@ lint: .venv/ready-dev
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench
-
-libraries: .venv/ready-dev
-	@$(BIN)/python -m pip install -q ziglang
-	@$(BIN)/python -m cubestack.host.emulation.libraries
 
 docs: .venv/ready-dev
 	@NO_MKDOCS_2_WARNING=1 COLUMNS=90 $(BIN)/mkdocs build --strict --quiet

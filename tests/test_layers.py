@@ -21,7 +21,7 @@ TABLES = ("firmware_model.values", "firmware_model.interface", "firmware_model.f
 #: What each package may import of the others.
 BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_model"), "host": TABLES}
 #: Parts of ``host`` that use the other packages; each is loaded only when it is needed.
-USING = ("cli", "emulation", "experiments", "ground", "studies")
+USING = ("cli", "emulation", "experiments", "ground", "native", "studies")
 #: Parts that may import the other packages inside of functions only: listing devices, opening a
 #: real device and asking for help load no emulator.
 LAZY = ("api", "devices", "pytest_plugin", "sensors", "targets")
@@ -53,7 +53,7 @@ ORDER = {
         "recording pictures",
         "devices",
         "emulation",
-        "targets",
+        "native targets",
         "shell",
         "conformance experiments ground",
         "cli",

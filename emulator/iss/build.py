@@ -19,13 +19,11 @@ def sources() -> list[Path]:
 
 @lru_cache(maxsize=4)
 def simulator_library(folder: Path | None = None) -> Path:
-    """The library, from the cache or built now.
-
-    ``folder`` and errors: see :func:`cubestack.emulator.native.cache.cached_library`.
-    """
+    """See :func:`cubestack.emulator.native.cache.library_of`."""
     header = cxx_header(LAYOUTS)
     build = partial(_compile, header, sources())
-    return cache.cached_library(f"simulator {header}", sources(), build, folder)
+    recipe = cache.recipe("the Cortex-M3 simulator", header, sources(), build)
+    return cache.library_of(recipe, folder)
 
 
 def _compile(

@@ -1,9 +1,10 @@
-"""Keeps shared libraries in the user's cache folder.
+"""Shared libraries of C++ code: shipped in a wheel, or compiled once and kept in the cache folder.
 
-The key covers everything that a library depends on: what its builder says, the compiler and its
-flags; not the compiler where the library came along ready-made. A library's file name carries the
-hash of its own bytes, so that a damaged one is noticed. Of processes that want the same one at
-once, one builds it and the others wait; it appears by renaming, as not every file system has locks.
+A file's name is the hash of what the library is made of and the hash of its own bytes, so that a
+stale library is not found and a damaged one is not loaded. A shipped library depends on sources
+and flags only; a compiled one also on the versions of the tools and of the compiler. Of processes
+that need the same library, one compiles it and the others wait. It appears by renaming, as not
+every file system has locks.
 """
 
 import fcntl
@@ -15,49 +16,80 @@ import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from cubestack.emulator.native import compiler as compilers
 from cubestack.emulator.native.compiler import Compiler, CompilerError, NoCompilerError
-from cubestack.emulator.native.ready_made import hash_of, ready_made
+
+SHIPPED = Path(__file__).parent / "libraries"
+"""Libraries of the shipped devices, in wheels only; `cubestack.host.native.wheels` builds them."""
 
 UNUSED_S = 90 * 86_400
-"""Wall time after which a library that nobody used makes room for others."""
+"""Wall time after which an unused library is removed."""
 
 _log = logging.getLogger(__name__)
 
 Build = Callable[[Compiler, Path, Path], Path]
-"""Gets the compiler, a scratch folder and where its log goes, and returns the library."""
+"""Takes the compiler, a scratch folder and the path of its log, and returns the library."""
+
+Report = Callable[[str], AbstractContextManager[object]]
+"""Shows a line of text as long as its block lasts."""
 
 
-class Wanted(NamedTuple):
-    """A library that somebody asked for: all that it is made of, and how."""
+class Recipe(NamedTuple):
+    """A library: its name for readers, what it is made of, and how it is built.
 
+    ``inputs`` is a hash of design, sources and flags; ``tools`` one of what turns them into C++.
+    """
+
+    title: str
     inputs: bytes
+    tools: bytes
     build: Build
 
+    def key(self, compiler: Compiler) -> str:
+        """Name of the library that ``compiler`` builds on this machine."""
+        machine = f"{platform.machine()} {compiler.identity}".encode()
+        return hash_of(self.inputs + self.tools + machine)
 
-_asked: list[list[Wanted]] = []
+
+_lists: list[list[Recipe]] = []
+_reports: list[Report] = []
 
 
 @contextmanager
-def noted() -> Iterator[list[Wanted]]:
-    """Note every library that is asked for meanwhile."""
-    wanted: list[Wanted] = []
-    _asked.append(wanted)
+def collected() -> Iterator[list[Recipe]]:
+    """Collect the recipes of requested libraries; each request raises NoCompilerError."""
+    recipes: list[Recipe] = []
+    _lists.append(recipes)
     try:
-        yield wanted
+        yield recipes
     finally:
-        _asked.remove(wanted)
+        _lists.remove(recipes)
+
+
+@contextmanager
+def reported(report: Report) -> Iterator[None]:
+    """Have ``report`` show what is compiled within the block."""
+    _reports.append(report)
+    try:
+        yield
+    finally:
+        _reports.remove(report)
+
+
+def hash_of(content: bytes) -> str:
+    """Short hash for file names."""
+    return hashlib.sha256(content).hexdigest()[:24]
 
 
 def cache_folder() -> Path:
     """Folder of the libraries: ``$XDG_CACHE_HOME/cubestack``, by default below ``~/.cache``.
 
-    Where that can not be written to, one among the temporary files that is this user's alone.
+    Where that is not writable, one among the temporary files that belongs to this user alone.
     """
     base = os.environ.get("XDG_CACHE_HOME")
     folder = (Path(base) if base else Path.home() / ".cache") / "cubestack"
@@ -81,76 +113,93 @@ def _private_folder(wanted: Path) -> Path:
     return folder
 
 
-def cached_library(
-    content: str, sources: Iterable[Path], build: Build, folder: Path | None = None
-) -> Path:
-    """Shared library of what ``content`` and the files ``sources`` say.
+def recipe(
+    title: str, content: str, sources: Iterable[Path], build: Build, tools: Iterable[bytes] = ()
+) -> Recipe:
+    """Recipe of a library made of ``content`` and the files ``sources`` with ``tools``."""
+    inputs, versions = hashlib.sha256(), hashlib.sha256()
+    for text in (content, *compilers.FLAGS):
+        inputs.update(text.encode() + b"\0")
+    for source in sources:
+        inputs.update(source.read_bytes())
+    for tool in tools:
+        versions.update(tool)
+    return Recipe(title, inputs.digest(), versions.digest(), build)
 
-    From the cache, of those that come along, or built. ``folder`` replaces :func:`cache_folder`.
+
+def library_of(wanted: Recipe, folder: Path | None = None) -> Path:
+    """Path of a library: shipped, from the cache, or compiled now.
+
+    ``$CXX`` chooses a compiler, so nothing shipped is used. ``folder`` replaces
+    :func:`cache_folder`.
 
     Raises:
         NoCompilerError: there is no C++ compiler.
         CompilerError: it failed; the message names the log.
     """
-    inputs = _inputs(content, sources)
-    for wanted in _asked:
-        wanted.append(Wanted(inputs, build))
+    if _lists:
+        _lists[-1].append(wanted)
+        raise NoCompilerError("libraries are only listed")
     folder = folder or cache_folder()
-    ready = ready_made(inputs)
+    library = ready_library(wanted, folder)
+    if library is not None:
+        _log.info("loading %s from %s", wanted.title, library)
+        return library
+    compiler = compilers.find_compiler()
+    if compiler is None:
+        raise NoCompilerError(
+            "no C++ compiler found (install g++ or clang++, or run: pip install ziglang)"
+        )
     try:
-        if ready is not None:
-            digest, library = ready
-            path = folder / f"{hash_of(inputs)}-{digest}.so"
-            _log.info("ready-made library %s", path.name)
-            return _found(folder, hash_of(inputs)) or _kept(path, library)
-        compiler = compilers.find_compiler()
-        if compiler is None:
-            raise NoCompilerError(
-                "no C++ compiler (c++, g++, clang++ or that of pip install 'cubestack[compiler]') "
-                "found"
-            )
-        key = hash_of(inputs + f"{platform.machine()} {compiler.identity}".encode())
-        return _found(folder, key) or _built(folder, key, compiler, build)
+        return _built(folder, compiler, wanted)
     except OSError as error:
         text = f"can not use the cache folder {folder} ({error.strerror})"
         raise CompilerError(f"{text}; XDG_CACHE_HOME names another one") from error
 
 
+def ready_library(wanted: Recipe, folder: Path | None = None) -> Path | None:
+    """Path of a library that is shipped or in the cache, None where it must be compiled."""
+    if not os.environ.get("CXX") and (library := _intact(SHIPPED, hash_of(wanted.inputs))):
+        return library
+    compiler = compilers.find_compiler()
+    return compiler and _found(folder or cache_folder(), wanted.key(compiler))
+
+
+def _intact(folder: Path, key: str) -> Path | None:
+    files = folder.glob(f"{key}-*.so")
+    return next((one for one in files if one.stem == f"{key}-{hash_of(one.read_bytes())}"), None)
+
+
 def _found(folder: Path, key: str) -> Path | None:
-    for candidate in folder.glob(f"{key}-*.so"):
-        if candidate.stem == f"{key}-{hash_of(candidate.read_bytes())}":
-            with suppress(OSError):
-                os.utime(candidate)  # it is in use
-            return candidate
-        candidate.unlink(missing_ok=True)
-    return None
+    library = _intact(folder, key)
+    if library is not None:
+        with suppress(OSError):
+            os.utime(library)  # it is in use
+    return library
 
 
-def _built(folder: Path, key: str, compiler: Compiler, build: Build) -> Path:
+def _built(folder: Path, compiler: Compiler, wanted: Recipe) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
+    key = wanted.key(compiler)
     log = folder / f"{key}.log"
-    with log.open("a") as turn:
+    with _shown(wanted, compiler), log.open("a") as turn:
         with suppress(OSError):
             fcntl.flock(turn, fcntl.LOCK_EX)
         if (library := _found(folder, key)) is not None:  # while waiting
             return library
-        _log.info("compiling into %s with %s", folder, " ".join(compiler.command))
+        for damaged in folder.glob(f"{key}-*.so"):
+            damaged.unlink(missing_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            built = build(compiler, Path(scratch), log)
+            built = wanted.build(compiler, Path(scratch), log)
             library = folder / f"{key}-{hash_of(built.read_bytes())}.so"
             built.replace(library)
     _prune(folder)
     return library
 
 
-def _kept(path: Path, library: bytes) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent) as scratch:
-        written = Path(scratch) / path.name
-        written.write_bytes(library)
-        written.replace(path)
-    _prune(path.parent)
-    return path
+def _shown(wanted: Recipe, compiler: Compiler) -> AbstractContextManager[object]:
+    _log.info("compiling %s with %s", wanted.title, " ".join(compiler.command))
+    return _reports[-1](f"compiling {wanted.title}, once") if _reports else nullcontext()
 
 
 def _prune(folder: Path) -> None:
@@ -161,13 +210,3 @@ def _prune(folder: Path) -> None:
             with suppress(OSError):
                 if path.stat().st_mtime < oldest:
                     path.unlink()
-
-
-def _inputs(content: str, sources: Iterable[Path]) -> bytes:
-    """All that a library is made of, on any machine and by any compiler."""
-    digest = hashlib.sha256()
-    for text in (content, *compilers.FLAGS):
-        digest.update(text.encode() + b"\0")
-    for source in sources:
-        digest.update(source.read_bytes())
-    return digest.digest()

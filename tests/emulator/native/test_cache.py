@@ -66,13 +66,13 @@ def test_what_nobody_uses_makes_room(tmp_path: Path) -> None:
         return built
 
     def library(name: str) -> Path:
-        return cache.cached_library(name, [], build, tmp_path)
+        return cache.library_of(cache.recipe(name, name, [], build), tmp_path)
 
     used, unused = library("used"), library("unused")
     long_ago = time.time() - cache.UNUSED_S - 60
     for path in (used, unused):
         os.utime(path, (long_ago, long_ago))
-    assert library("used") == used  # which is noted
+    assert library("used") == used  # and now recently
     new = library("new")
     assert set(tmp_path.glob("*.so")) == {used, new}
 
@@ -100,7 +100,7 @@ def test_who_comes_second_waits_for_what_is_being_built(
         return library
 
     def ask() -> Path:
-        return cache.cached_library("wanted", [], build, tmp_path)
+        return cache.library_of(cache.recipe("wanted", "wanted", [], build), tmp_path)
 
     second = threading.Thread(target=ask)
     monkeypatch.setattr(cache, "_found", found)

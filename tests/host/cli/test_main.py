@@ -196,7 +196,6 @@ def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, image
 
 def test_no_compiler(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cubestack.emulator.native.compiler.find_compiler", lambda: None)
-    monkeypatch.setattr("cubestack.emulator.native.cache.ready_made", lambda _: None)
     outcome = run("measure", "cubestar", "--engine", "compiled")
     assert outcome.code == FAILED
     assert "no C++ compiler" in outcome.line

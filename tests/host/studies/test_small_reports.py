@@ -201,49 +201,6 @@ def test_what_fails_again_is_told_and_what_did_not_fail_raises(
         list(worst(folder, len(rows)))
 
 
-# --- what is shipped ------------------------------------------------------------------------------
-
-
-def test_libraries_are_made_for_all_machines_and_others_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from cubestack.emulator.native import ready_made
-
-    folder = tmp_path / "native"
-    folder.mkdir()
-    (folder / "old").write_bytes(b"x")
-
-    def build(compiler: Any, scratch: Path, log: Path) -> Path:
-        assert scratch.is_dir()
-        assert log.parent == scratch
-        made = scratch / "library"
-        made.write_bytes(" ".join(compiler.command[-3:]).encode())
-        return made
-
-    wanted: Any = [SimpleNamespace(inputs=bytes([number]), build=build) for number in range(2)]
-    monkeypatch.setattr(libraries, "needed", lambda: wanted)
-    monkeypatch.setattr(libraries, "FOLDER", folder)
-    told = list[str]()
-    monkeypatch.setattr(libraries, "print", told.append, raising=False)
-    libraries.main()
-    names = {path.name for path in folder.iterdir()}
-    assert len(names) == len(told) == 2 * len(ready_made.TARGETS)
-    assert "old" not in names
-    for path in folder.iterdir():
-        assert f"{path.name}: {path.stat().st_size} bytes" in told
-        assert any(path.name.startswith(machine) for machine in ready_made.TARGETS)
-
-
-def test_every_choice_of_every_device_is_tried_once() -> None:
-    found = [(name, *options.items()) for name, options in libraries.choices()]
-    assert len(set(found)) == len(found)
-    assert ("cubestar",) in found
-    assert ("cubestar", ("layout", "2")) in found
-    assert ("cubestar", ("firmware", "reference")) in found
-    assert ("cubesense", ("mcu_addressing", True)) in found
-    assert all(value is not None for _, *options in found for _, value in options)
-
-
 # --- the ball -------------------------------------------------------------------------------------
 
 

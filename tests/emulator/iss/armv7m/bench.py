@@ -78,7 +78,8 @@ def _library() -> ctypes.CDLL:
             compiler, scratch / "bench.so", log, [f"-I{FOLDER}", f"-I{FOLDER / 'armv7m'}", unity]
         )
 
-    library = ctypes.CDLL(str(cache.cached_library("bench", files, partial(build, [*core, here]))))
+    recipe = cache.recipe("the core's bench", "bench", files, partial(build, [*core, here]))
+    library = ctypes.CDLL(str(cache.library_of(recipe)))
     library.bench_new.restype = ctypes.c_void_p
     library.bench_code.restype = library.bench_ram.restype = ctypes.c_void_p
     library.bench_get.restype = library.bench_peek.restype = ctypes.c_uint32

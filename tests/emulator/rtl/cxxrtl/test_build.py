@@ -62,14 +62,16 @@ def test_damaged_library_is_built_again(quick_compiler, cache, damage):
 
 
 @pytest.mark.slow
-def test_whatever_is_other_makes_another_library(quick_compiler, cache, monkeypatch):
+def test_library_depends_on_all_that_it_is_made_of(quick_compiler, cache, monkeypatch):
     libraries = [build.library_for(wiring()), build.library_for(cubestar_wiring(CubeStarTop(2, 3)))]
     monkeypatch.setattr(compiler, "FLAGS", (*compiler.FLAGS, "-g"))
     libraries.append(build.library_for(wiring()))
     monkeypatch.setattr(build, "SOURCES", ("driver.cpp",))
     libraries.append(build.library_for(wiring()))
     libraries.append(build.library_for(replace(wiring(), data="SRAM_A")))
-    assert len(set(libraries)) == 5
+    monkeypatch.setattr(build, "yosys_version", lambda: "999")
+    libraries.append(build.library_for(wiring()))
+    assert len(set(libraries)) == 6
 
 
 @pytest.mark.slow
@@ -113,10 +115,10 @@ def test_compiler_that_fails_is_one_line_with_its_log(cache, tmp_path, monkeypat
 
 
 def test_simulator_with_a_warning_where_there_is_no_compiler(without_compiler, cache):
-    with pytest.warns(UserWarning, match=r"^no C\+\+ compiler .* found; using the Amaranth"):
+    with pytest.warns(UserWarning, match=r"^no C\+\+ compiler .*\); using the Amaranth"):
         engine = make_engine(wiring())
     assert isinstance(engine, SimulatedEngine)
-    with pytest.raises(compiler.NoCompilerError, match=r"cubestack\[compiler\]"):
+    with pytest.raises(compiler.NoCompilerError, match="run: pip install ziglang"):
         make_engine(wiring(), "compiled")
     assert not cache.exists()
 

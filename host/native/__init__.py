@@ -1,0 +1,1 @@
+"""Libraries of the shipped devices: listed, compiled ahead, and packed into wheels."""
