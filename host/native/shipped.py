@@ -12,9 +12,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from cubestack.host.emulation.emulated import open_device
 from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.devices.registry import device as registered
+from cubestack.host.emulation.emulated import open_device
 from cubestack.host.terminal import progress, say
 
 if TYPE_CHECKING:

@@ -11,7 +11,6 @@ import pytest
 from cubestack.emulator.iss.insight.memory_report import MemoryUse
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.experiment import Section
-from cubestack.host.emulation import libraries
 from cubestack.host.experiments.aramis import measure as aramis
 from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign.folder import Folder
