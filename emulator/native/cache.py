@@ -198,8 +198,9 @@ def _built(folder: Path, compiler: Compiler, wanted: Recipe) -> Path:
 
 
 def _shown(wanted: Recipe, compiler: Compiler) -> AbstractContextManager[object]:
-    _log.info("compiling %s with %s", wanted.title, " ".join(compiler.command))
-    return _reports[-1](f"compiling {wanted.title}, once") if _reports else nullcontext()
+    text = f"compiling {wanted.title} (once, about {compiler.build_s(1):.0f} s)"
+    _log.log(logging.INFO if _reports else logging.WARNING, "%s with %s", text, compiler.name)
+    return _reports[-1](text) if _reports else nullcontext()
 
 
 def _prune(folder: Path) -> None:

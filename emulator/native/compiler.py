@@ -31,6 +31,16 @@ class Compiler:
     command: tuple[str, ...]
     identity: str
 
+    @property
+    def name(self) -> str:
+        """For readers: name and version on one line."""
+        return self.identity.splitlines()[:2][-1]
+
+    def build_s(self, count: int) -> float:
+        """Rough time to build ``count`` libraries on one core."""
+        first = 50.0 if self.identity.startswith("ziglang") else 0.0  # builds its C++ library
+        return first + 10.0 * count
+
 
 @lru_cache(maxsize=8)
 def _version_of(command: tuple[str, ...], _changed_ns: int) -> str | None:

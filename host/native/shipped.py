@@ -1,15 +1,17 @@
 """Libraries that the shipped devices need, with every choice that they have.
 
-``python -m cubestack.host.native.shipped`` compiles those that the cache folder lacks.
+``python -m cubestack.host.native.shipped`` compiles those of each device with its defaults that the
+cache folder lacks; with ``all``, those of every choice.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import nullcontext, suppress
 from typing import TYPE_CHECKING, Any
 
 from cubestack.host.devices.registry import BUILT_IN
@@ -58,7 +60,7 @@ def compile_missing(wanted: Iterable[Recipe]) -> None:
 
     Nothing happens without a compiler. Errors as ``library_of``.
     """
-    from cubestack.emulator.native.cache import cache_folder, library_of, ready_library
+    from cubestack.emulator.native.cache import cache_folder, library_of, ready_library, reported
     from cubestack.emulator.native.compiler import find_compiler
 
     compiler = find_compiler()
@@ -66,14 +68,16 @@ def compile_missing(wanted: Iterable[Recipe]) -> None:
     if compiler is None or not missing:
         return
     threads = min(len(missing), os.cpu_count() or 1)
+    about_s = compiler.build_s(len(missing)) / threads
     say(
-        f"compiling {len(missing)} libraries with {compiler.identity.splitlines()[-1]}, "
-        f"once; they are kept in {cache_folder()}"
+        f"compiling {len(missing)} FPGA designs and simulators with {compiler.name}, once, into "
+        f"{cache_folder()}: about {about_s:.0f} s"
     )
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in progress(pool.map(library_of, missing), len(missing), "compiling"):
-            pass
+    with reported(lambda _: nullcontext()), ThreadPoolExecutor(threads) as pool:
+        jobs = [pool.submit(library_of, one) for one in missing]
+        for job in progress(as_completed(jobs), len(jobs), "compiled"):
+            job.result()
 
 
 if __name__ == "__main__":
-    compile_missing(recipes(choices()))
+    compile_missing(recipes(choices() if "all" in sys.argv else ((n, {}) for n in BUILT_IN)))
