@@ -199,7 +199,7 @@ def _built(folder: Path, compiler: Compiler, wanted: Recipe) -> Path:
 
 def _shown(wanted: Recipe, compiler: Compiler) -> AbstractContextManager[object]:
     text = f"compiling {wanted.title} (once, about {compiler.build_s(1):.0f} s)"
-    _log.log(logging.INFO if _reports else logging.WARNING, "%s with %s", text, compiler.name)
+    _log.info("%s with %s", text, compiler.name)
     return _reports[-1](text) if _reports else nullcontext()
 
 

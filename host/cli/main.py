@@ -17,7 +17,7 @@ from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.commands import BUILT_IN, Listed, commands, with_headings
 from cubestack.host.cli.reports import reports
 from cubestack.host.devices.registry import device_names
-from cubestack.host.terminal import busy, hush, say
+from cubestack.host.terminal import hush, say
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
 SIGNALLED = 128
@@ -111,12 +111,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
     args = make_parser(asked or "").parse_args(given)
-    # Not for --help.
-    from cubestack.emulator.native.cache import reported
-    from cubestack.emulator.native.compiler import CompilerError
-
     try:
-        with _loudness(args.verbose, quiet=args.quiet), warnings.catch_warnings(), reported(busy):
+        with _loudness(args.verbose, quiet=args.quiet), warnings.catch_warnings():
             warnings.showwarning = lambda text, *_, **__: say(f"cubestack {args.command}: {text}")
             return int(args.run(args) or DONE)
     except KeyboardInterrupt:
@@ -130,7 +126,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         named = f"{error.filename}: {error.strerror}" if error.filename else error
         print(f"cubestack {args.command}: {named}", file=sys.stderr)
         return FAILED
-    except CompilerError as error:
+    except RuntimeError as error:
+        from cubestack.emulator.native.compiler import CompilerError
+
+        if not isinstance(error, CompilerError):
+            raise
         print(f"cubestack {args.command}: {error}", file=sys.stderr)
         return FAILED
 

@@ -29,6 +29,7 @@ from cubestack.host.devices.device import AnyDevice, BoardT_co, ClientT_co, Devi
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.devices.registry import devices
 from cubestack.host.emulation.virtual_serial import PS_PER_S, VirtualSerial
+from cubestack.host.terminal import busy
 from cubestack.host.transport.smbus import CubeSMBus
 
 if TYPE_CHECKING:
@@ -237,6 +238,8 @@ def power_up(
 
     Profile and switches that are not given are those of the scene file.
     """
+    from cubestack.emulator.native.cache import reported
+
     chosen = {}
     if beside is not None:
         options |= {"kernel": beside.board.kernel, "i2c_bus": beside.board.i2c_bus}
@@ -247,7 +250,8 @@ def power_up(
         chosen = {"profile": profile, **({"set": changes} if changes else {})}
     else:
         scene_options(device, scene)  # there are none
-    board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
+    with reported(busy):  # the first start compiles
+        board = device.open_board(device.scene(scene), seed=seed, engine=engine, **options)
     if board.firmware:
         chosen["firmware"] = board.firmware
     return EmulatedDevice(device, board, seed, chosen)

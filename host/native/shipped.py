@@ -4,23 +4,26 @@
 cache folder lacks; with ``all``, those of every choice.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import nullcontext, suppress
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
+from typing import Any
 
+from cubestack.emulator.native.cache import (
+    Recipe,
+    cache_folder,
+    collected,
+    library_of,
+    ready_library,
+)
+from cubestack.emulator.native.compiler import NoCompilerError, find_compiler
 from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.terminal import progress, say
-
-if TYPE_CHECKING:
-    from cubestack.emulator.native.cache import Recipe
 
 Choice = tuple[str, dict[str, Any]]
 """Name of a device, and options of ``open_device``."""
@@ -42,9 +45,6 @@ def recipes(opened: Iterable[Choice]) -> list[Recipe]:
 
     Those that this process has loaded already may be missing.
     """
-    from cubestack.emulator.native.cache import collected
-    from cubestack.emulator.native.compiler import NoCompilerError
-
     found: dict[bytes, Recipe] = {}
     for name, options in opened:
         with collected() as wanted, suppress(NoCompilerError), warnings.catch_warnings():
@@ -60,9 +60,6 @@ def compile_missing(wanted: Iterable[Recipe]) -> None:
 
     Nothing happens without a compiler. Errors as ``library_of``.
     """
-    from cubestack.emulator.native.cache import cache_folder, library_of, ready_library, reported
-    from cubestack.emulator.native.compiler import find_compiler
-
     compiler = find_compiler()
     missing = [one for one in wanted if ready_library(one) is None]
     if compiler is None or not missing:
@@ -73,7 +70,7 @@ def compile_missing(wanted: Iterable[Recipe]) -> None:
         f"compiling {len(missing)} FPGA designs and simulators with {compiler.name}, once, into "
         f"{cache_folder()}: about {about_s:.0f} s"
     )
-    with reported(lambda _: nullcontext()), ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         jobs = [pool.submit(library_of, one) for one in missing]
         for job in progress(as_completed(jobs), len(jobs), "compiled"):
             job.result()

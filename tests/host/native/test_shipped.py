@@ -30,10 +30,11 @@ def test_devices_with_the_same_design_share_a_library() -> None:
 @pytest.fixture
 def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A compiler, and a cache folder of the test's own."""
-    monkeypatch.setattr(
-        cache.compilers, "find_compiler", lambda: Compiler(("c++",), "c++\nc++ of a test")
-    )
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    found = Compiler(("c++",), "c++\nc++ of a test")
+    for module in (cache.compilers, shipped):
+        monkeypatch.setattr(module, "find_compiler", lambda: found)
+    for module in (cache, shipped):
+        monkeypatch.setattr(module, "cache_folder", lambda: tmp_path)
 
 
 @pytest.mark.usefixtures("compiler")
@@ -61,6 +62,6 @@ def test_missing_libraries_are_compiled_once_each_and_the_reader_is_informed(cap
 
 
 def test_nothing_is_compiled_where_there_is_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache.compilers, "find_compiler", lambda: None)
-    monkeypatch.setattr(cache, "library_of", lambda _: pytest.fail("compiled"))
+    monkeypatch.setattr(shipped, "find_compiler", lambda: None)
+    monkeypatch.setattr(shipped, "library_of", lambda _: pytest.fail("compiled"))
     shipped.compile_missing([cache.recipe("a", "a", [], lambda *_: Path())])
