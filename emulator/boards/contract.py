@@ -71,7 +71,6 @@ class SerialLine:
 
     @property
     def has_node(self) -> bool:
-        """Whether it carries the node protocol."""
         return self.title == NODE_PROTOCOL
 
     @property
@@ -150,7 +149,6 @@ class Board(ABC):
 
     @property
     def uart(self) -> Uart:
-        """The device's end of the satellite's serial line."""
         return self.lines[0].uart
 
     @cached_property
@@ -225,5 +223,4 @@ class Board(ABC):
         return uart
 
     def _scramble(self, memory: NDArray[np.uint8]) -> None:
-        """Fill a static RAM with its random content after power-up."""
         memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)

@@ -69,7 +69,6 @@ class DebuggedBoard(FirmwareBoard, Protocol):
 
 
 def windows(board: DebuggedBoard) -> Mapping[MemoryRegion, Window]:
-    """Memories besides the processor's own."""
     found: dict[MemoryRegion, Window] = {}
     if board.engine is not None:
         for index, memory in enumerate(board.engine.memories.values()):

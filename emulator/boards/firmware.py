@@ -198,7 +198,6 @@ class CameraWire:
         return byte
 
     def _finish(self, now_ps: int) -> None:
-        """Write the collected bytes to the camera."""
         if self._written is not None:
             self.camera.i2c_write(self._address, bytes(self._written), now_ps)
             self._written = None

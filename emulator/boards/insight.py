@@ -38,6 +38,5 @@ class Insight:
         return History(self.observer, interrupts)
 
     def close(self) -> None:
-        """Stop observing; the results remain."""
         if self._observed:
             self.observer.close()

@@ -149,7 +149,6 @@ class Monitor:
 
 
 def _value(text: str) -> Any:
-    """A number, a truth value, or the text itself."""
     for convert in (lambda word: int(word, 0), float):
         try:
             return convert(text)

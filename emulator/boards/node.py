@@ -84,7 +84,6 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
         """The program after a reset, which charges its cycles to ``meter``."""
 
     def _wiring(self) -> Wiring | None:
-        """Wiring of its FPGA; None without one."""
         return None
 
     @property

@@ -19,7 +19,6 @@ class RegisterValue(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The value, and the fields that are not 0."""
         if self.value is None:
             return "can not be read"
         shown = (f"{name}={value:#x}" for name, value in self.fields.items() if value)

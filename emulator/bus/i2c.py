@@ -49,7 +49,6 @@ class I2cMessage:
 
     @property
     def reading(self) -> bool:
-        """Whether the address is sent for reading."""
         return self.read > 0 or self.probe_read
 
 
@@ -86,11 +85,9 @@ class OpenTarget(I2cTarget, Protocol):
 class I2cFaultHook(Protocol):
     """A fault between a host and the targets; each method may wait, or raise I2cError."""
 
-    def before_start(self) -> Generator[simpy.Event, Any, None]:
-        """Called before a transfer begins."""
+    def before_start(self) -> Generator[simpy.Event, Any, None]: ...
 
-    def after_address(self, address: int) -> Generator[simpy.Event, Any, None]:
-        """Called after the address of a message was sent."""
+    def after_address(self, address: int) -> Generator[simpy.Event, Any, None]: ...
 
     def after_byte(self, address: int, read: bool) -> Generator[simpy.Event, Any, None]:
         """Called after a byte was sent by either side, before its acknowledge."""
@@ -181,7 +178,6 @@ class I2cBus:
         return self._targets
 
     def move(self, address: int, new_address: int) -> None:
-        """Change a target's address; raises ValueError as ``attach``."""
         if address not in self._targets:
             raise ValueError(f"no I2C device is at address {address:#04x}")
         if address != new_address:
@@ -227,7 +223,6 @@ class I2cBus:
             raise
 
     def _hand_on(self) -> None:
-        """Pass the bus to the next transfer in the queue, or free it."""
         if self._turns:
             self._turns.popleft().succeed()
         else:
@@ -310,7 +305,6 @@ class I2cBus:
     def _stretched(
         self, call: Callable[[], T | None], address: int
     ) -> Generator[simpy.Event, Any, T]:
-        """The result of ``call``; waits while the target stretches the clock."""
         give_up_ps = self.kernel.now + LONGEST_STRETCH_PS
         while (answer := call()) is None:
             if self.kernel.now >= give_up_ps:

@@ -165,7 +165,6 @@ class LineSampler:
         return found
 
     def _forget(self, before_ps: int) -> None:
-        """Drop everything before ``before_ps``."""
         self._from_ps = before_ps
         while self._edges and self._edges[0][0] < before_ps:
             self._level = self._edges.popleft()[1]

@@ -23,8 +23,7 @@ class UartTap:
     def device_heard(self, byte: int, start_ps: int) -> None:
         """The device received a byte that began at ``start_ps``."""
 
-    def framing_error(self, time_ps: int) -> None:
-        """The device dropped a character."""
+    def framing_error(self, time_ps: int) -> None: ...
 
 
 class FaultHook(Protocol):
@@ -90,7 +89,6 @@ class Uart:
         env.process(self._receiver())
 
     def send(self, data: bytes) -> None:
-        """Queue ``data`` behind the bytes still being sent."""
         if not data:
             return
         start = max(self._env.now, self._sending_until)
@@ -124,12 +122,10 @@ class Uart:
 
     @property
     def host_backlog(self) -> int:
-        """Bytes that the host still has to send, including the one on the line."""
         return len(self._incoming)
 
     @property
     def busy(self) -> bool:
-        """Whether either side is sending."""
         return self.host_backlog > 0 or self.backlog > 0
 
     def _receiver(self) -> Generator[simpy.Event, Any, None]:

@@ -60,8 +60,7 @@ class DeviceFile:
         except OSError as error:
             done(_failed(error))
 
-    def close(self) -> None:
-        """Nothing to release."""
+    def close(self) -> None: ...
 
     def _ioctl(self, number: int, argument: int) -> bytes:
         match number:

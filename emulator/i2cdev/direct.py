@@ -50,8 +50,7 @@ class DirectI2c:
             self._env.step()
         return split_reply(replies[0])
 
-    def close(self) -> None:
-        """Nothing to release."""
+    def close(self) -> None: ...
 
     def wait(self, seconds: float) -> None:
         self._env.advance_to(self._env.now + int(seconds * PS_PER_S))

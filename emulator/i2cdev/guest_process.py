@@ -54,7 +54,6 @@ class GuestProcess(Endpoint):
     def __init__(
         self, process: "subprocess.Popen[bytes]", name: str, *, adopts: bool = False
     ) -> None:
-        """Watch ``process``; with ``adopts``, this process is the reaper of its orphans."""
         self.name = name
         self._adopts = adopts
         self._process = process
@@ -62,7 +61,6 @@ class GuestProcess(Endpoint):
 
     @property
     def ended(self) -> bool:
-        """Whether it has ended, as of the latest ``exchange``."""
         return self._process.returncode is not None
 
     @property
@@ -72,14 +70,12 @@ class GuestProcess(Endpoint):
         return code if code >= 0 else SIGNALLED - code
 
     def send(self, number: int) -> None:
-        """Send it a signal, if it still runs."""
         self._process.send_signal(number)
 
     def watched(self) -> list[tuple[int, int]]:
         return [] if self.ended else [(self._pidfd, select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Notice its end, and reap its orphans."""
         if not self.ended:
             if poll_now(self._pidfd, select.POLLIN):
                 self._process.poll()

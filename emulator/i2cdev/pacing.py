@@ -88,7 +88,6 @@ class Watch:
             time.sleep((duration_ns - NAP_NS) / NS_PER_S)
 
     def close(self) -> None:
-        """Stop watching; the ports stay open."""
         self._poller.close()
 
 

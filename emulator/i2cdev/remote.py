@@ -60,7 +60,6 @@ class RemoteBus(Endpoint):
                 self._files[fileno].exchange()
 
     def close(self) -> None:
-        """Close all files; their calls fail."""
         for file in list(self._files.values()):
             file.close()
         self._poller.close()

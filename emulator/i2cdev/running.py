@@ -177,7 +177,6 @@ class _Run(Endpoint):
             self.on_end()
 
     def close(self) -> None:
-        """Close the ports of program and supervisor; the bus stays open."""
         for port in self.ports:
             port.close()
 

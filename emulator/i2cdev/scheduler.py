@@ -92,7 +92,6 @@ class I2cScheduler(Endpoint):
         return None if due_ps is None else due_ps - self._ahead_ps()
 
     def close(self) -> None:
-        """Stop watching; the ports stay open."""
         self._watch.close()
 
     def exchange(self, now_ps: int) -> None:
@@ -107,7 +106,6 @@ class I2cScheduler(Endpoint):
             pass
 
     def _serve(self, ports: Iterable[Endpoint], *, came: bool) -> None:
-        """Exchange ``ports``; ``came``: whether any of them is ready."""
         if came:
             self._came_ns = self._pace.now_ns()
             self._quickest_ns = min(self._quickest_ns, self._came_ns - self._answered_ns)
@@ -118,7 +116,6 @@ class I2cScheduler(Endpoint):
             self._answered_ns = self._pace.now_ns()
 
     def _pending(self) -> bool:
-        """Whether an answer is due."""
         return self._adapter.busy or self._adapter.release_ps() is not None
 
     def _turn(self) -> bool:
@@ -165,7 +162,6 @@ class I2cScheduler(Endpoint):
         return self._came_ns - way_ns - min(self._late_ns, MAX_DEBT_NS)
 
     def _release(self, due_ps: int) -> bool:
-        """Return the next answer, unless it is due too late."""
         clock_ns, due_ns = self._pace.now_ns, self._pace.ns_at(due_ps - self._ahead_ps())
         left_ns = 0 if self._pace.fast else due_ns - clock_ns()
         if left_ns > SPIN_NS:

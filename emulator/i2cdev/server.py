@@ -56,14 +56,12 @@ class I2cServer(Endpoint):
 
     @property
     def clients(self) -> int:
-        """Number of open connections."""
         return len(self._clients)
 
     def watched(self) -> list[tuple[int, int]]:
         return [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Receive calls; answers are sent at the end of their transfers."""
         for fileno, events in self._poller.poll(0):
             client = self._clients.get(fileno)
             if client is None:
@@ -93,7 +91,6 @@ class I2cServer(Endpoint):
         self._clients.pop(fileno).close()
 
     def close(self) -> None:
-        """Disconnect all clients, and remove the socket."""
         for client in self._clients.values():
             client.close()
         self._clients.clear()
@@ -153,7 +150,6 @@ class _Client:
             self._watch(events)
 
     def _receive(self) -> bool:
-        """Read what is available; returns whether anything came."""
         try:
             data = self._socket.recv(CHUNK_BYTES)
         except BlockingIOError:

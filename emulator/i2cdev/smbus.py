@@ -21,7 +21,6 @@ _WITHOUT_CHECKSUM = (SmbusSize.QUICK, SmbusSize.I2C_BLOCK_DATA)
 
 
 def checksum(data: Iterable[int]) -> int:
-    """Packet error code over ``data``."""
     value = 0
     for byte in data:
         value ^= byte
@@ -90,7 +89,6 @@ class Transaction:
         return [write, read]
 
     def _payload(self) -> bytearray:
-        """The part of the caller's data that is sent."""
         match self._size:
             case SmbusSize.BYTE_DATA:
                 return self._data[:1]
@@ -121,7 +119,6 @@ class Transaction:
         return bytes(self._data)
 
     def _wire_bytes(self, received: bytearray) -> Iterable[int]:
-        """All bytes of the transaction on the wire."""
         for message in self.messages[:-1]:
             yield message.address << 1
             yield from message.data

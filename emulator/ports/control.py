@@ -75,16 +75,13 @@ class ControlPort(Endpoint):
 
     @property
     def held(self) -> bool:
-        """Whether virtual time is held, here or by a debugger."""
         return self.kernel.paused
 
     def pause(self) -> None:
-        """Hold virtual time."""
         self._cancel_run("held")
         self.kernel.hold(HOLDER)
 
     def resume(self) -> None:
-        """Release virtual time."""
         self._cancel_run("resumed")
         self._release()
 
@@ -187,7 +184,6 @@ class ControlPort(Endpoint):
             raise ValueError(f"held by the {', '.join(sorted(others))}; continue from there")
 
     def _cancel_run(self, why: str) -> None:
-        """End a ``run_to`` that is under way."""
         if self._until_ps is not None:
             self._until_ps = None
             self._arrived.set_exception(RuntimeError(f"the run was {why} before its end"))

@@ -22,7 +22,6 @@ class DirectSerial:
         return self._env.now
 
     def write(self, data: bytes) -> None:
-        """Start sending ``data`` now."""
         self._line.uart.host_writes(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:

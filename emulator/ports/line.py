@@ -76,7 +76,6 @@ class HostLine:
         self._sampler = None if form == uart.form else LineSampler(form)
 
     def unplug(self) -> None:
-        """Disconnect; what the device sends from now on is lost."""
         self._blocks.clear()
         if self.uart.line == self._deliver:
             self.uart.line = lambda _data, _first_ps, _byte_ps: None

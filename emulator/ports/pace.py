@@ -37,7 +37,6 @@ class Pace:
         return self.mode == "fast"
 
     def change(self, mode: Mode, speed: float = 1.0) -> None:
-        """Set mode and speed from now on."""
         self.mode, self.speed = mode, speed
         self.align()
 
@@ -51,7 +50,6 @@ class Pace:
         return self.clock_ns() - self.kernel.held_ns
 
     def now_ps(self) -> int:
-        """Wall time on the scale of virtual time."""
         return self.ps_at(self.now_ns())
 
     def ps_at(self, ns: int) -> int:

@@ -118,7 +118,6 @@ class PtyEndpoint(SerialPort):
             self._reported = True
 
     def _renew(self) -> None:
-        """Reset the terminal after its last client."""
         self._reported = False
         try:
             slave = os.open(self._terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -132,7 +131,6 @@ class PtyEndpoint(SerialPort):
         os.close(slave)
 
     def _replace(self) -> None:
-        """Create a new terminal under the same link."""
         master, self._terminal = _open_terminal(self._baud)
         os.dup2(master, self._master, inheritable=False)
         os.close(master)

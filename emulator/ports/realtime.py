@@ -137,7 +137,6 @@ class RealtimeScheduler:
             self.report(f"can not keep real time: {lag_s:.1f} s behind")
 
     def _until_next_s(self) -> float:
-        """Wall time until the next event, at most ``IDLE_S``."""
         if self.env.paused:
             return IDLE_S
         times = [ps for ps in (self._release_ps(1), self.env.horizon()) if ps is not None]

@@ -75,7 +75,6 @@ class SerialPort(Endpoint):
         return MAX_UNSENT - self._line.uart.host_backlog
 
     def _events(self, *, reading: bool) -> int:
-        """Events to wait for on the client's descriptor."""
         events = select.POLLIN if reading and self._room() > 0 else 0
         return events | (select.POLLOUT if self._unread else 0)
 

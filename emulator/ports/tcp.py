@@ -79,8 +79,7 @@ class TcpEndpoint(SerialPort):
         self._welcome()
         return self._client
 
-    def _welcome(self) -> None:
-        """Called for a new client."""
+    def _welcome(self) -> None: ...
 
     def _read(self, max_bytes: int) -> bytes:
         if self._client is None or self._input_ended:

@@ -38,7 +38,6 @@ class Recorder:
         self._writer.write(rec.Control(time_ps, words, text))
 
     def flush(self) -> None:
-        """Write pending bytes, so that the file is complete."""
         for tap in self._taps:
             tap.flush()
         self._writer.flush()

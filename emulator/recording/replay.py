@@ -73,7 +73,6 @@ class Replay:
         self._stopped = True
 
     def _until(self, time_ps: int) -> Generator[simpy.Event, Any, bool]:
-        """Wait until ``time_ps``; returns whether to continue."""
         yield self._kernel.timeout(max(0, time_ps - self._kernel.now))
         return not self._stopped
 

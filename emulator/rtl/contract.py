@@ -89,24 +89,20 @@ class RtlEngine(ABC):
         self.flip_changed = False
 
     @abstractmethod
-    def _set(self, name: str, value: int) -> None:
-        """Drive input ``name`` at ``now_ps`` and settle the design."""
+    def _set(self, name: str, value: int) -> None: ...
 
     @abstractmethod
-    def _get(self, name: str) -> int:
-        """Settled level of any pin."""
+    def _get(self, name: str) -> int: ...
 
     @abstractmethod
-    def _power(self, memory: int, on: bool) -> None:
-        """Switch a memory's supply at ``now_ps``."""
+    def _power(self, memory: int, on: bool) -> None: ...
 
     @abstractmethod
     def _load(self, camera: int, loaded: LoadedSegment | None, edge: int) -> None:
         """Continue with ``edge`` of a segment, and put its sample on the lines."""
 
     @abstractmethod
-    def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
-        """Use the rendered lines of the loaded segment."""
+    def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None: ...
 
     @abstractmethod
     def _burst(self, until_ps: int, cameras: Sequence[int]) -> tuple[int, BurstEnd, int]:
@@ -143,7 +139,6 @@ class RtlEngine(ABC):
         return b""
 
     def _flip(self, register: str, bit: int) -> None:
-        """Invert a bit of a register at ``now_ps`` and settle the design."""
         raise AssertionError("this engine has no access to registers")
 
     @property
@@ -169,7 +164,6 @@ class RtlEngine(ABC):
 
     @property
     def violation_counts(self) -> Counter[ViolationKind]:
-        """Number of violations of each rule."""
         return self._log.counts
 
     def attach(self, source: PixelSource | None, camera: str | None = None) -> None:
@@ -223,7 +217,6 @@ class RtlEngine(ABC):
         self.flip_changed = (self.state(), dict(self.violation_counts)) != before
 
     def set_pin(self, name: str, value: int) -> None:
-        """Drive one of the microcontroller's pins; see ``FpgaPort``."""
         if name not in self.wiring.mcu_pins:
             names = ", ".join(self.wiring.mcu_pins)
             raise ValueError(f"the microcontroller does not drive {name}, only {names}")
@@ -236,7 +229,6 @@ class RtlEngine(ABC):
         self._set(name, value)
 
     def get_pin(self, name: str) -> int:
-        """Settled level of any pin, including the cameras'."""
         if name in self._camera_of:
             self._catch_up(self._camera_of[name])
         elif name not in self.wiring.widths:
@@ -255,7 +247,6 @@ class RtlEngine(ABC):
         return self._run(until_ps, stop_on)
 
     def _run(self, until_ps: int, stop_on: tuple[str, int] | None) -> int:
-        """``run`` without upsets."""
         if self._idle and stop_on is None and until_ps >= self.now_ps:
             self.now_ps = until_ps
             return until_ps

@@ -48,8 +48,7 @@ class PixelSource(Protocol):
     """The camera's parallel output; data and syncs change with the falling edge of the clock."""
 
     @property
-    def period(self) -> Fraction:
-        """Time of one pixel clock in ps."""
+    def period(self) -> Fraction: ...
 
     @property
     def line_clocks(self) -> int:

@@ -42,7 +42,6 @@ class RepeatedFrame:
 
     @property
     def clocks(self) -> int:
-        """Pixel clocks per frame."""
         return self.blank_clocks + len(self.image) * self.line_clocks
 
     def segment_at(self, time_ps: int) -> _Segment:

@@ -26,7 +26,6 @@ class _Stream:
 
     @property
     def time_ps(self) -> int:
-        """Time of the next edge."""
         assert self.loaded is not None
         return self.loaded.time_of(self.edge)
 
@@ -57,8 +56,7 @@ class SimulatedEngine(RtlEngine):
         self._context = contexts[0]
         self._settle(0)
 
-    def close(self) -> None:
-        """Nothing to release."""
+    def close(self) -> None: ...
 
     def _get(self, name: str) -> int:
         return int(self._context.get(getattr(self.wiring.component, name)))
@@ -77,7 +75,6 @@ class SimulatedEngine(RtlEngine):
         self._settle(time_ps)
 
     def _settle(self, time_ps: int) -> None:
-        """Update the memories after a change of the pins."""
         memories = list(zip(self._srams, self.wiring.memories, strict=True))
         for sram, memory in memories:
             sram.drive(time_ps, self._memory_pins(memory))

@@ -78,7 +78,6 @@ class Violation(NamedTuple):
 
     @property
     def detail(self) -> str:
-        """Description with the measured times."""
         return RULES[self.kind].format(self.found, self.needed)
 
 

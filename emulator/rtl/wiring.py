@@ -149,12 +149,10 @@ class Wiring:
 
     @cached_property
     def widths(self) -> dict[str, int]:
-        """Width of every pin."""
         return {name: len(getattr(self.component, name)) for name in self._members(None)}
 
     @cached_property
     def initial(self) -> dict[str, int]:
-        """Initial levels of the inputs."""
         members = self.component.signature.members
         return {name: int(members[name].init or 0) for name in self._members(In)}
 

@@ -139,7 +139,6 @@ class Debugger:
         return stop
 
     def _halt_on(self, stop: Stop) -> None:
-        """Halt if the run ended for a reason that concerns the debugger."""
         if stop.reason is not StopReason.LOCKED_UP:
             self._reported_lock_up = False
         match stop.reason:

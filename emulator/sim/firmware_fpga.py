@@ -67,7 +67,6 @@ class FpgaCoupling:
         self._couple()
 
     def _couple(self) -> None:
-        """Connect the machine's pins to the FPGA's driver, or to callbacks."""
         self._driver = driver = self.fpga.driver if self._by_driver else None
         self._reported = -1  # the running cameras that the machine was last given
         addresses = (0, 0, 0, 0) if driver is None else driver[:4]

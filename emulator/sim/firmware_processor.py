@@ -114,7 +114,6 @@ class FirmwareProcessor:
 
     @property
     def dozing(self) -> bool:
-        """Whether the core sleeps."""
         return not self._awake
 
     @property
@@ -241,7 +240,6 @@ class FirmwareProcessor:
         return min(horizon, now_ps + self.look_ahead_ps)
 
     def _sleeps(self, stop: Stop) -> bool:
-        """Whether the kernel can continue without the machine."""
         machine = self.machine
         return machine.asleep and machine.next_event_ps > max(stop.now_ps, self.env.now)
 
@@ -250,7 +248,6 @@ class FirmwareProcessor:
         yield from self._await_input(None if due_ps == NEVER else max(due_ps, self.env.now))
 
     def _await_input(self, until_ps: int | None) -> Steps:
-        """Wait for an input, which may be there already, or a time."""
         alternatives: list[simpy.Event] = [self._input]
         if until_ps is not None and not self._input.triggered:
             alternatives.append(self.env.timeout(until_ps - self.env.now))

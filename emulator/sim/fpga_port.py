@@ -59,7 +59,6 @@ class Transactions:
         return len(self.addresses)
 
     def first(self, count: int) -> "Transactions":
-        """The first ``count``; they share the data."""
         return replace(self, addresses=self.addresses[:count], data=self.data[:count])
 
     @property

@@ -49,7 +49,6 @@ class PowerModel:
     """
 
     def __init__(self, env: Kernel, table: PowerTable) -> None:
-        """Start with every part in its first state and all switches on."""
         self._env = env
         self.table = table
         self._states = {name: next(iter(part.ma)) for name, part in table.parts.items()}

@@ -26,7 +26,6 @@ class Kernel(simpy.Environment):
 
     @property
     def paused(self) -> bool:
-        """Whether it is held, for example by a debugger that has halted a processor."""
         return bool(self._holders)
 
     @property
@@ -34,7 +33,6 @@ class Kernel(simpy.Environment):
         return frozenset(self._holders)
 
     def hold(self, holder: str) -> None:
-        """Stop all events until ``holder`` calls ``release``."""
         if not self._holders:
             self._since_ns = monotonic_ns()
         self._holders.add(holder)
@@ -47,7 +45,6 @@ class Kernel(simpy.Environment):
 
     @property
     def now(self) -> int:
-        """Virtual time in ps."""
         return self._now  # type: ignore[return-value]  # all delays are whole numbers
 
     def restart(self) -> None:

@@ -63,7 +63,6 @@ class CatalogueParameters(DeclaredValues):
 
     @property
     def side_deg(self) -> float:
-        """Longest side of a triangle in degrees."""
         return self.fov_deg if self.longest_side_deg is None else self.longest_side_deg
 
 

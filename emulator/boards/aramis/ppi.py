@@ -43,7 +43,6 @@ class Ppi:
 
     @property
     def busy(self) -> bool:
-        """Whether it waits for a frame or reads one."""
         return self._run % 2 == 1
 
     def start(self, target: NDArray[np.uint8]) -> None:

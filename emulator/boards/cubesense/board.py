@@ -267,6 +267,5 @@ class CubeSenseBoard(Board):
 
 
 def _stores(commanded: dict[Camera, Action], camera: Camera) -> bool:
-    """Whether ``camera``'s image is being stored, in either memory."""
     other = Camera(1 - camera)
     return commanded[camera] is Action.STORE or commanded[other] is Action.STORE_OTHER

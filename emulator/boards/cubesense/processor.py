@@ -24,7 +24,6 @@ class Pic18f45k20(NodePeripherals):
         self.mcu_addressing = mcu_addressing
 
     def reset(self) -> None:
-        """Reset the part: its timer restarts from 0."""
         self._reset_ps = self._board.kernel.now
 
     def uart_send(self, data: bytes, port: Port = Port.NODE) -> None:
@@ -34,7 +33,6 @@ class Pic18f45k20(NodePeripherals):
         return self._uarts[port].backlog
 
     def adc_counts(self, monitor: Monitor) -> int:
-        """Result of a conversion, 0 to 1023."""
         current_ma = self._board.power.current_ma
         match monitor:
             case Monitor.SUPPLY_5V:

@@ -128,7 +128,6 @@ class CubeStarFirmwareBoard(CubeStarStack):
         return any(line.uart.busy for line in self.lines) or not self.processor.waiting
 
     def probes(self) -> dict[str, int | str]:
-        """The energy mode (0: awake) in addition to the base class's probes."""
         return super().probes() | {"energy_mode": self.processor.energy_mode}
 
     def connect_console(self, report: Callable[[str], None]) -> None:
@@ -167,7 +166,6 @@ class CubeStarFirmwareBoard(CubeStarStack):
     # --- pins -----------------------------------------------------------------------------------
 
     def _couple(self, fpga: FpgaPort, *, compiled: bool) -> FpgaCoupling:
-        """Connect the machine's pins to the FPGA, or to a fault in front of it."""
         found = [
             FpgaPin(
                 name,

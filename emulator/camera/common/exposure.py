@@ -188,7 +188,6 @@ def _phases(
 
 
 def _time_ps(optics: Optics, shutter: RollingShutter, phase: float) -> int:
-    """The instant ``phase`` of the middle row's exposure."""
     exposure_ps = shutter.exposure_lines * shutter.line_ps
     middle_row = (optics.rows - 1) / 2
     return shutter.mid_exposure_ps(middle_row) + round((phase - 0.5) * exposure_ps)

@@ -54,7 +54,6 @@ def brightness(
 
 
 def _brightness_map(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) -> Values | None:
-    """Surface brightness (rows, columns)."""
     (x, y), nodes = _grid(optics)
     directions = nodes @ now.axes
     coarse = brightness(hazards, now, directions)
@@ -89,7 +88,6 @@ def _not_smooth(
 
 
 def _blur(image: Values, places: NDArray[np.int64], sigma_px: float) -> None:
-    """Blur the part of ``image`` with the flat ``places`` by the lens' spot."""
     half = math.ceil(4 * sigma_px)
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / sigma_px) ** 2)
     kernel = (kernel / kernel.sum()).astype(np.float32)

@@ -120,8 +120,7 @@ class ImageSensor(ABC, Generic[S, C]):
         return self._images[-1][1] if self._images else None
 
     @abstractmethod
-    def _restarted(self, now_ps: int) -> None:
-        """Reset the state of the output when the part starts or stops."""
+    def _restarted(self, now_ps: int) -> None: ...
 
     def _cached(self, frame: object, render: Callable[[], Grey]) -> Grey:
         """The image of ``frame``; rendered again only after a change of scene or condition."""

@@ -87,7 +87,6 @@ class RegisterFile:
         return value
 
     def _step(self) -> tuple[int, registers.CameraRegister | None]:
-        """Address and register at the pointer; increments the pointer."""
         address = self._pointer
         self._pointer = (address + 1) % (1 << (8 * self._table.address_bytes))
         return address, self._table.at(address)

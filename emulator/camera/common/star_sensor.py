@@ -66,5 +66,4 @@ class StarSensor(ImageSensor[Scene, SkyCondition]):
         return b"".join(words)[:count]
 
     @abstractmethod
-    def _write(self, words: list[int], now_ps: int) -> None:
-        """Write to the selected register and the following ones."""
+    def _write(self, words: list[int], now_ps: int) -> None: ...

@@ -155,7 +155,6 @@ class Mlx75412(StarSensor):
             self._frames.append(span.frame)
 
     def _after(self, clock: PixelClock, last: _Span) -> _Span:
-        """The span after ``last`` if nothing changes."""
         if not self.enabled:
             return _Span(last.end, IDLE_CLOCKS, vsync=0)
         if last.frame is None or last.cut:

@@ -101,7 +101,6 @@ class Mt9m001Imager(Imager[SensorSettings]):
 
 
 def _gain(settings: SensorSettings) -> float | Light:
-    """One gain for all pixels, or one per pixel (1024, 1280)."""
     even, odd_row, odd_column, odd = settings.gains
     if even == odd_row == odd_column == odd:
         return even

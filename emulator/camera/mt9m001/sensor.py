@@ -182,7 +182,6 @@ class Mt9m001(StarSensor):
             self._frames.append(frame)
 
     def _next(self, clock: PixelClock) -> _Frame:
-        """The frame after the last created one."""
         settings = self._settings
         rows = max(settings.blank_rows, settings.exposure_rows + 1)
         first = self._since + rows * settings.row_clocks

@@ -175,7 +175,6 @@ def _hazards(scene: EarthSunScene) -> list[SkyHazard]:
 def _add_hazards(
     light: Light, lens: Fisheye, scene: EarthSunScene, camera: Target, time_ps: int
 ) -> None:
-    """Add glow and points of light, in place."""
     hazards = _hazards(scene)
     if not hazards:
         return
@@ -217,7 +216,6 @@ def _add_spot(light: Light, centre: NDArray[np.float64], sigma_px: float, peak: 
 
 
 def _add_disc(light: Light, centre: NDArray[np.float64], radius_px: float, level: float) -> None:
-    """Add an even disc with an edge one pixel wide."""
     patch, distance2 = _patch(light, centre, radius_px + 1)
     patch += np.float32(level) * np.clip(radius_px + 0.5 - np.sqrt(distance2), 0, 1)
 

@@ -121,7 +121,6 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
 
     @property
     def _hazards(self) -> effects.Hazards:
-        """The condition's hazards with seeds for this camera."""
         return tuple(replace(h, seed=h.seed ^ self.camera) for h in self.condition.hazards)
 
     @property

@@ -72,7 +72,6 @@ def shim_library(folder: Path | None = None) -> Path:
 
 
 def _definitions() -> list[str]:
-    """Constants of the protocol, for the C source."""
     listing = DeviceNode(0).listing.replace("i2c-0", "i2c-%d", 1)
     text = listing.replace("\t", "\\t").replace("\n", "\\n")
     return [

@@ -37,7 +37,6 @@ def install(libc: ctypes.CDLL, number: int, steps: bytes) -> int:
 
 
 def main(link_fd: str, number: str, *command: str) -> None:
-    """Install the filter, send the listener, execute the program."""
     link = socket.socket(fileno=int(link_fd))
     link.set_inheritable(False)
     libc = ctypes.CDLL(None, use_errno=True)

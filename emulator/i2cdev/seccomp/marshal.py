@@ -34,7 +34,6 @@ class Marshalled(NamedTuple):
 
 
 def ioctl(call: Notification) -> Marshalled:
-    """An ioctl; raises OSError."""
     number, argument = call.arguments[1] & 0xFFFF_FFFF, call.arguments[2]
     match number:
         case linux.Ioctl.RDWR:

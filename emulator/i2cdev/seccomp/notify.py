@@ -61,7 +61,6 @@ class Listener:
     """
 
     def __init__(self, fd: int) -> None:
-        """Own ``fd``."""
         self.fd = fd
         self._one_step = True
         self.hands_over = not has_priority() and self._hand_over()

@@ -71,7 +71,6 @@ class Supervisor(Endpoint):
     def __init__(
         self, listener: Listener, abi: Abi, node: DeviceNode, descriptors: range, files: Files
     ) -> None:
-        """Serve the device file ``node`` to the processes behind ``listener``."""
         self.name = node.path
         self.ended = False
         self.hands_over = listener.hands_over
@@ -93,7 +92,6 @@ class Supervisor(Endpoint):
         return [] if self.ended else [(self._poller.fileno(), select.POLLIN)]
 
     def exchange(self, now_ps: int) -> None:
-        """Receive calls; answers are sent at the end of their transfers."""
         while not self.ended and (ready := self._poller.poll(0)):
             for fd, events in ready:
                 if fd != self._listener.fd:
@@ -114,7 +112,6 @@ class Supervisor(Endpoint):
         os.close(self._listener.fd)
 
     def _forget(self, fd: int) -> None:
-        """Close the file whose last copy was closed."""
         self._poller.unregister(fd)
         for inode, (file, end) in list(self._opened.items()):
             if end.fileno() == fd:
@@ -228,7 +225,6 @@ class Supervisor(Endpoint):
     def _stat_at(
         self, call: Notification, flags: int, handle: Callable[[Notification, Found], None]
     ) -> None:
-        """A stat of a path, or of a descriptor if the path is empty."""
         if call.arguments[flags] & AT_EMPTY_PATH:
             with contextlib.suppress(OSError):
                 if not read_text(call.pid, call.arguments[1], 1):
@@ -322,5 +318,4 @@ def _take_descriptor(thread: int, fd: int) -> int:
 
 
 def _signed(argument: int) -> int:
-    """An argument of type int."""
     return (argument & 0xFFFF_FFFF ^ 1 << 31) - (1 << 31)

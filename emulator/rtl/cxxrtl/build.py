@@ -24,7 +24,6 @@ SOURCES = ("*.cpp", "*.h", "pins_header.py", "clock_steps.py", "variants.py", "s
 
 
 def library_for(wiring: Wiring, folder: Path | None = None) -> Path:
-    """Shared library of the driver with ``wiring``; see :func:`driver_library`."""
     design = f"{_design_hash(wiring.component)}{pins_header(wiring, '')}{wiring.burst_levels}"
     name = type(wiring.component).__name__
     return driver_library(name, design, partial(_compile, wiring), folder)

@@ -111,7 +111,6 @@ def _evaluation(variant: str, members: dict[str, str]) -> _Evaluation | None:
 
 
 def _block(lines: Iterable[str]) -> list[str]:
-    """The lines up to the closing brace."""
     block = []
     for line in lines:
         block.append(line)

@@ -48,7 +48,6 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 def _longs(*values: int) -> ctypes.Array[ctypes.c_int64]:
-    """Pack one of the driver's structures."""
     return (_LONG * len(values))(*values)
 
 

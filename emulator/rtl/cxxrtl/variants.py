@@ -101,7 +101,6 @@ def _yosys(rtlil: str, script: str) -> str:
 
 
 def _hold(design: str) -> str:
-    """Turn registers that nothing can change into inputs."""
     number = 1000  # port number, above those of all other ports
     for cell in list(_CELL.finditer(design)):
         kind, body = cell.groups()

@@ -33,7 +33,6 @@ _SEED = 2013
 
 
 def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
-    """Cycles of each operation, by name."""
     rng = np.random.default_rng(_SEED)
     kind = np.float64 if double else np.float32
     operands = {
@@ -67,14 +66,12 @@ def _around_one(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _iteration(calls: Calls, name: str, *arguments: int) -> float:
-    """Cycles of one iteration of a function's loop."""
     for _ in range(2):  # in the second run the cache is warm
         few, many = (calls.call(name, turns, *arguments) for turns in (FEW, MANY))
     return (many - few) / (MANY - FEW)
 
 
 def _interrupt(calls: Calls) -> float:
-    """Entry, a byte through a queue, and return."""
     machine = calls.machine
     masked = _iteration(calls, "byte_interrupt_taken")
     machine.write(_INTERRUPT_UNPEND, 1)

@@ -67,7 +67,6 @@ def default_settings() -> str:
 
 
 def run(calls: Calls, picture: NDArray[np.uint8]) -> Solution:
-    """Process an image (rows, columns)."""
     calls.machine.external[: picture.size] = picture.reshape(-1)
     cycles: dict[str, int] = {}
     stack: list[str] = []
