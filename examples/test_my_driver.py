@@ -49,7 +49,7 @@ def test_it_gives_up_in_time(cubestar: Any) -> None:
     assert cubestar.time_s < 1.0
 
 
-@pytest.mark.cubestack(seed=5, faults="[[fault]]\nkind = 'latch-up'\nat = 0.3\n")
+@pytest.mark.cubestack(seed=5, faults="[[fault]]\nkind = 'latch-up'\nat_s = 0.3\n")
 def test_a_latch_up_costs_one_picture(cubestar: Any) -> None:
     """The plan strikes while the first picture is taken."""
     assert cubestar.client.capture_and_process().name == "CAPTURE_FAILED"

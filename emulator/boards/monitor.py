@@ -1,7 +1,7 @@
 """A debugger's ``monitor`` commands that concern the board."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
 from cubestack.emulator.boards.processor_registers import peek, peripherals
 from cubestack.emulator.camera.common.register_file import RegisterFile
@@ -118,19 +118,9 @@ class Monitor:
             case ["clear"]:
                 faults.clear()
                 return ""
-            case ["inject", kind, *rest]:
-                given = dict(word.split("=", 1) for word in rest if "=" in word)
-                targets = [word for word in rest if "=" not in word]
-                if len(targets) > 1:
-                    raise ValueError(f"a fault has one target, not {' '.join(targets)}")
-                for_s = given.pop("for_s", None)
-                faults.inject(
-                    kind,
-                    target=targets[0] if targets else None,
-                    for_s=None if for_s is None else float(for_s),
-                    **{name: _value(text) for name, text in given.items()},
-                )
-                return f"injected: {' '.join(words[1:])}"
+            case ["inject", *what] if what:
+                faults.inject_words(what)
+                return f"injected: {' '.join(what)}"
         raise ValueError("usage: faults [log|clear|inject KIND [TARGET] [PARAMETER=VALUE ...]]")
 
     def _lookup(self, words: list[str]) -> str:
@@ -146,12 +136,3 @@ class Monitor:
     def _report(self, _words: list[str]) -> str:
         machine = self._board.machine
         return fault_report(machine, self._symbols, machine.now_ps)
-
-
-def _value(text: str) -> Any:
-    for convert in (lambda word: int(word, 0), float):
-        try:
-            return convert(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False}.get(text, text)

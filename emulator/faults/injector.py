@@ -1,11 +1,12 @@
 """Injects faults into a board: at once or at a virtual time, for a while or for ever."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
 from cubestack.emulator.faults import parts, table
-from cubestack.emulator.faults.declaration import Fault, FaultError, Site
+from cubestack.emulator.faults.declaration import TIMES, Fault, FaultError, Site
 from cubestack.emulator.faults.injection import FaultEvent, Injection, Mechanism
 from cubestack.emulator.faults.pins import PinFaults
 from cubestack.emulator.faults.plan import Plan
@@ -15,9 +16,6 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 LOG_LIMIT = 100_000
 """Events kept in the log; all are counted."""
-
-LONGEST_S = 1e9
-"""Latest time and longest duration."""
 
 
 class Faults:
@@ -99,6 +97,30 @@ class Faults:
             self._env.process(self._follow(injection, mechanism))
         return injection
 
+    def inject_words(self, words: Sequence[str]) -> Injection:
+        """Inject what words say: ``KIND [TARGET] [PARAMETER=VALUE ...] [at_s=S] [for_s=S]``.
+
+        FaultError as for ``inject``.
+        """
+        kind, *rest = words
+        given = dict(word.split("=", 1) for word in rest if "=" in word)
+        targets = [word for word in rest if "=" not in word]
+        if "target" in given:
+            targets.append(given.pop("target"))
+        if len(targets) > 1:
+            raise FaultError(f"fault {kind}: one target, not {' '.join(targets)}")
+        declared = {**(table.FAULTS[kind].declared() if kind in table.FAULTS else {}), **TIMES}
+        values: dict[str, Any] = dict(given)
+        for name in given.keys() & declared.keys():
+            try:
+                values[name] = declared[name].parse(given[name])
+            except ValueError as error:
+                raise FaultError(f"{kind}: {name} {error}") from None
+        times = {name: values.pop(name) for name in TIMES if name in values}
+        return self.inject(
+            table.make_fault(kind, **values), target=next(iter(targets), None), **times
+        )
+
     def load(self, plan: Plan) -> list[Injection]:
         """Take over a plan's seed and inject its faults; the same errors as ``inject``."""
         self.seed = plan.seed
@@ -144,19 +166,17 @@ class Faults:
         self, fault: Fault, at_s: float | None, for_s: float | None
     ) -> tuple[int, int | None]:
         now_ps = self._env.now
-        start_ps = now_ps
-        if at_s is not None:
-            if not now_ps / PS_PER_S <= at_s <= LONGEST_S:
-                raise FaultError(
-                    f"{fault.kind}: it can not begin at {at_s:g} s, it is {now_ps / PS_PER_S:g} s"
-                )
-            start_ps = max(now_ps, round(at_s * PS_PER_S))
+        declared = {"at_s": replace(TIMES["at_s"], low=now_ps / PS_PER_S), "for_s": TIMES["for_s"]}
+        for name, value in (("at_s", at_s), ("for_s", for_s)):
+            try:
+                declared[name].check(value)
+            except ValueError as error:
+                raise FaultError(f"{fault.kind}: {name} {error}") from None
+        start_ps = now_ps if at_s is None else max(now_ps, round(at_s * PS_PER_S))
         if for_s is None:
             return start_ps, None
         if fault.momentary:
             raise FaultError(f"{fault.kind} happens at one instant: it has no duration")
-        if not 0 < for_s <= LONGEST_S:
-            raise FaultError(f"{fault.kind}: a duration must be over 0 s, not {for_s:g} s")
         return start_ps, start_ps + max(1, round(for_s * PS_PER_S))
 
     def _follow(self, injection: Injection, mechanism: Mechanism) -> Any:

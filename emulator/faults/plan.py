@@ -6,8 +6,8 @@
 
     [[fault]]
     kind = "uart-corrupt"
-    at = 2.0               # s of virtual time; from the start unless given
-    for = 0.5              # s; for ever unless given
+    at_s = 2.0             # virtual time; from the start unless given
+    for_s = 0.5            # for ever unless given
     rate = 0.01            # parameters of the kind
 
     [[fault]]
@@ -20,10 +20,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cubestack.emulator.faults.declaration import Fault, FaultError
+from cubestack.emulator.faults.declaration import TIMES, Fault, FaultError
 from cubestack.emulator.faults.table import make_fault
+from cubestack.firmware_model.values import REQUIRED, named, read_table, text, whole
 
-_OWN = ("kind", "target", "at", "for")
+_SEED = whole(0, "of everything random", 0)
+_OWN = named({"kind": text(REQUIRED, "of fault"), "target": text(None, "what it hits"), **TIMES})
 
 
 @dataclass(frozen=True)
@@ -70,29 +72,23 @@ def parse_plan(text: str, name: str = "plan") -> Plan:
     seed, entries = table.pop("seed", 0), table.pop("fault", [])
     if table:
         raise FaultError(f"{name}: no key {next(iter(table))!r}; a plan has seed and [[fault]]")
-    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise FaultError(f"{name}: seed must be a whole number from 0, not {seed!r}")
+    try:
+        _SEED.check(seed)
+    except ValueError as error:
+        raise FaultError(f"{name}: seed {error}") from None
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FaultError(f"{name}: faults are written as [[fault]]")
     faults = []
     for number, entry in enumerate(entries, start=1):
         try:
             faults.append(_planned(entry))
-        except FaultError as error:
+        except ValueError as error:
             raise FaultError(f"{name}: fault {number}: {error}") from None
     return Plan(seed, tuple(faults), name)
 
 
 def _planned(entry: dict[str, Any]) -> PlannedFault:
-    for key in ("at", "for"):
-        value = entry.get(key)
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise FaultError(f"{key} must be a number of s, not {value!r}")
-    for key in ("kind", "target"):
-        if not isinstance(entry.get(key, ""), str):
-            raise FaultError(f"{key} must be a text, not {entry[key]!r}")
-    if "kind" not in entry:
-        raise FaultError("it needs a kind")
-    parameters = {key: value for key, value in entry.items() if key not in _OWN}
-    fault = make_fault(entry["kind"], **parameters)
-    return PlannedFault(fault, entry.get("target"), entry.get("at"), entry.get("for"))
+    words = {*_OWN, *(one.formerly for one in _OWN.values())}
+    own = read_table({key: value for key, value in entry.items() if key in words}, _OWN)
+    parameters = {key: value for key, value in entry.items() if key not in words}
+    return PlannedFault(make_fault(own.pop("kind"), **parameters), **own)

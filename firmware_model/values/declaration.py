@@ -68,6 +68,13 @@ def _whole(given: Any) -> int:
     return operator.index(given)
 
 
+def _integer(given: str) -> int:
+    try:
+        return int(given)
+    except ValueError:
+        return int(given, 0)  # 0x10
+
+
 def _exactly(kind: type[Any]) -> Callable[[Any], Any]:
     def read(given: Any) -> Any:
         if not isinstance(given, kind):
@@ -78,7 +85,7 @@ def _exactly(kind: type[Any]) -> Callable[[Any], Any]:
 
 
 NUMBER = ValueKind("number", "a number", _number, float)
-WHOLE = ValueKind("whole", "a whole number", _whole, int)
+WHOLE = ValueKind("whole", "a whole number", _whole, _integer)
 FLAG = ValueKind(
     "flag",
     "true or false",
@@ -106,6 +113,7 @@ class Declaration:
         default: `REQUIRED` where there is none; with None, None is allowed.
         kind: its type.
         exclusive: whether ``low`` itself is not allowed.
+        formerly: a name that is deprecated, empty for none.
         instead: names of values that are given instead of this one, or this one instead of them.
         role: "ra", "dec" or "roll" of a camera, or the "direction" of something; else empty.
         metavar: stands for the value in the help of a command.
@@ -121,6 +129,7 @@ class Declaration:
     default: Any = REQUIRED
     kind: ValueKind = TEXT
     exclusive: bool = False
+    formerly: str = ""
     instead: tuple[str, ...] = ()
     role: str = ""
     metavar: str = ""
@@ -155,6 +164,11 @@ class Declaration:
     def wanted(self) -> str:
         """What it must be apart from its limits, in words."""
         return f"one of {', '.join(self.choice_values)}" if self.choices else self.kind.what
+
+    @property
+    def allowed(self) -> str:
+        """What is allowed, in words, as documents list it."""
+        return self.limits or " or ".join(self.choice_values) or self.kind.what
 
     def fits(self, value: Any) -> bool:
         """Whether a number is within the limits; anything is where there are none."""

@@ -1,5 +1,6 @@
 """Tables of declared values, as TOML files have them: keys, tables in tables, tables by kind."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -33,10 +34,17 @@ def described(keys: Keys) -> dict[str, dict[str, Any]]:
 
 def read_table(given: Mapping[str, Any], keys: Keys) -> dict[str, Any]:
     """The checked values of a table; ValueError for an unknown, wrong or missing key."""
-    values = {}
-    for name, value in given.items():
+    values: dict[str, Any] = {}
+    now = {one.formerly: name for name, one in keys.items()}
+    for word, value in given.items():
+        name = now.get(word, word)
         if name not in keys:
-            raise ValueError(f"unknown key {name!r}; allowed are {', '.join(keys)}")
+            raise ValueError(f"unknown key {word!r}; allowed are {', '.join(keys)}")
+        if name in values:
+            raise ValueError(f"{name} is given twice, once as {keys[name].formerly}")
+        if name != word:
+            text = f"the key {word} is deprecated and goes with the next version: write {name}"
+            warnings.warn(text, FutureWarning, stacklevel=2)
         try:
             values[name] = keys[name].read(value)
         except ValueError as error:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from cubestack.firmware_model.formats.recording import Control
 from cubestack.firmware_model.formats.setup import Document
@@ -12,9 +12,6 @@ from cubestack.host.recording.setups import read_document, written
 
 CLEAR = "clear"
 """Ends all faults."""
-
-TIMES = ("at_s", "for_s")
-"""When a fault begins, and how long it lasts."""
 
 
 class Controls(Protocol):
@@ -70,6 +67,7 @@ class EmulatedControls:
     """
 
     def __init__(self, emulated: AnyEmulated) -> None:
+        from cubestack.emulator.faults.declaration import TIMES
         from cubestack.emulator.faults.table import FAULTS
 
         self.on_act: Callable[[tuple[str, ...], str], None] = lambda _words, _text: None
@@ -79,7 +77,7 @@ class EmulatedControls:
         kinds = board.faults.kinds()
         self.faults = spoken(kinds)
         self.fault_parameters: Mapping[str, tuple[str, ...]] = {
-            kind: (*FAULTS[kind].parameters(), *TIMES[: 1 if FAULTS[kind].momentary else 2])
+            kind: (*FAULTS[kind].declared(), *([*TIMES][:1] if FAULTS[kind].momentary else TIMES))
             for kind in kinds
         }
 
@@ -105,28 +103,12 @@ class EmulatedControls:
         if words == [CLEAR]:
             self._board.faults.clear()
         else:
-            self._inject(words)
+            self._board.faults.inject_words(words)
         self.on_act(("fault", *words), "")
 
     def fault_log(self) -> list[str]:
         """A line for each thing that faults have done, with its virtual time."""
         return [str(event) for event in self._board.faults.log]
-
-    def _inject(self, words: list[str]) -> None:
-        kind, *rest = words
-        given = dict(word.split("=", 1) for word in rest if "=" in word)
-        targets = [word for word in rest if "=" not in word]
-        if len(targets) > 1:
-            raise TargetError(f"fault {kind}: one target, not {' '.join(targets)}")
-        times = {name: _seconds(given.pop(name)) for name in TIMES if name in given}
-        if "target" in given:
-            targets.append(given.pop("target"))
-        if "fault" in given:
-            raise TargetError(f"fault {kind}: no parameter 'fault'")
-        parameters = {name: _parameter(text) for name, text in given.items()}
-        self._board.faults.inject(
-            kind, target=targets[0] if targets else None, **times, **parameters
-        )
 
     def scene(self, path: Path) -> None:
         """Show the scene in a file; ValueError for one that is none."""
@@ -168,19 +150,3 @@ class EmulatedControls:
 
     def advance(self, seconds: float) -> None:
         self._emulated.wait(seconds)
-
-
-def _seconds(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise TargetError(f"{text!r} is not a number of seconds") from None
-
-
-def _parameter(text: str) -> Any:
-    for convert in (int, float):
-        try:
-            return convert(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False}.get(text.lower(), text)

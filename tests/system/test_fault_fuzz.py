@@ -210,7 +210,7 @@ class Fuzzer:
         self.events += 1
         faults, kind = self.board.faults, self._one_of(self.kinds)
         options: dict[str, Any] = {"target": self._one_of(faults.targets(FAULTS[kind].site))}
-        if "rate" in FAULTS[kind].parameters():
+        if "rate" in FAULTS[kind].declared():
             options["rate"] = UPSETS.get(kind, 0.2)
         if not FAULTS[kind].momentary:
             options["for_s"] = float(self.rng.exponential(0.05)) + 1e-6

@@ -121,12 +121,9 @@ def test_times_that_may_just_be(desk: Desk) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"at_s": 1.999}, "uart-drop: it can not begin at 1.999 s, it is 2 s"),
-        ({"at_s": 1.1e9}, r"uart-drop: it can not begin at 1.1e\+09 s, it is 2 s"),
-        ({"at_s": float("nan")}, "uart-drop: it can not begin at nan s"),
-        ({"for_s": 0.0}, "uart-drop: a duration must be over 0 s, not 0 s"),
-        ({"for_s": -1.0}, "uart-drop: a duration must be over 0 s, not -1 s"),
-        ({"for_s": 1.1e9}, "uart-drop: a duration must be over 0 s, not 1.1e"),
+        ({"at_s": 1.999}, "uart-drop: at_s must be 2 to 1000000000 s, not 1.999"),
+        ({"at_s": 1.1e9}, "uart-drop: at_s must be 2 to 1000000000 s, not 11"),
+        ({"for_s": 0.0}, "uart-drop: for_s must be above 0 and at most 1000000000 s, not 0.0"),
         ({"target": "other"}, "uart-drop: no serial line 'other'; there are uart"),
     ],
 )

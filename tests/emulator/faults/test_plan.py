@@ -14,8 +14,8 @@ PLAN = """
 seed = 7
 [[fault]]
 kind = "uart-drop"
-at = 2
-for = 0.5
+at_s = 2
+for_s = 0.5
 rate = 0.25
 [[fault]]
 kind = "latch-up"
@@ -39,18 +39,29 @@ def test_a_plan(tmp_path: Path) -> None:
     assert parse_plan("").faults == ()
 
 
+@pytest.mark.filterwarnings("default::FutureWarning")
+def test_old_names_of_times_still_work_with_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    old = PLAN.replace("at_s", "at").replace("for_s", "for")
+    assert parse_plan(old) == parse_plan(PLAN)
+    assert [str(one.message) for one in recwarn] == [
+        f"the key {old} is deprecated and goes with the next version: write {old}_s"
+        for old in ("at", "for")
+    ]
+    with pytest.raises(FaultError, match="fault 1: at_s is given twice, once as at"):
+        parse_plan('[[fault]]\nkind = "ack-lost"\nat_s = 1\nat = 1')
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("seed = -1", "seed must be a whole number from 0, not -1"),
-        ("seed = true", "seed must be"),
+        ("seed = -1", "seed must be at least 0, not -1"),
         ("speed = 1", "no key 'speed'; a plan has seed and"),
         ("fault = 3", r"faults are written as \[\[fault\]\]"),
         ("seed = ", "plan: "),
-        ("[[fault]]", "fault 1: it needs a kind"),
-        ('[[fault]]\nkind = "ack-lost"\n[[fault]]\nkind = 3', "fault 2: kind must be a text"),
+        ("[[fault]]", "fault 1: needs the key kind"),
+        ('[[fault]]\nkind = "ack-lost"\n[[fault]]\nkind = 3', "fault 2: kind must be text"),
         ('[[fault]]\nkind = "smoke"', "fault 1: no fault 'smoke'; there are uart-drop"),
-        ('[[fault]]\nkind = "uart-drop"\nat = "noon"', "fault 1: at must be a number of s"),
+        ('[[fault]]\nkind = "uart-drop"\nat_s = "noon"', "fault 1: at_s must be a number, not 'noon'"),
         ('[[fault]]\nkind = "uart-drop"\nrate = 7', "uart-drop: rate must be 0 to 1, not 7"),
         ('[[fault]]\nkind = "ack-lost"\nrate = 1', "no parameter 'rate'; it has no parameters"),
     ],

@@ -8,11 +8,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cubestack.emulator.faults import table
-from cubestack.emulator.faults.declaration import FaultError, Parameter
+from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.table import FAULTS, make_fault, markdown_table
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "fault-kinds.md"
-PARAMETERS = [(kind, name) for kind, fault in FAULTS.items() for name in fault.parameters()]
 
 
 @pytest.mark.parametrize("kind", FAULTS)
@@ -25,26 +24,11 @@ def test_a_fault_is_declared_in_full(kind: str) -> None:
     assert fault.__doc__ != "Base of all faults."
 
 
-def value_outside(parameter: Parameter) -> object:
-    return "sideways" if parameter.choices is not None else parameter.high * 2 + 1
-
-
-@pytest.mark.parametrize(("kind", "name"), PARAMETERS)
-def test_a_wrong_value_is_refused_by_name(kind: str, name: str) -> None:
-    parameter = FAULTS[kind].parameters()[name]
-    assert parameter.text
-    if parameter.range == "any":
-        return
-    for value in (value_outside(parameter), [], b"1"):
-        with pytest.raises(FaultError, match=f"{kind}: {name} must be"):
-            make_fault(kind, **{name: value})
-
-
 @example("kind", 1)
 @given(st.text(max_size=8), st.one_of(st.none(), st.text(), st.integers(), st.floats()))
 def test_no_value_does_worse_than_a_fault_error(name: str, value: object) -> None:
     for kind, fault in FAULTS.items():
-        for known in (name, *fault.parameters()):
+        for known in (name, *fault.declared()):
             with suppress(FaultError):
                 make_fault(kind, **{known: value})
 

@@ -133,7 +133,7 @@ def test_several_devices_share_a_bus_and_have_ports_of_their_own(serving: Servin
 
 def test_what_faults_do_is_told(serving: Serving, tmp_path: Path) -> None:
     plan, port = tmp_path / "plan.toml", tmp_path / "tty"
-    plan.write_text("[[fault]]\nkind = 'latch-up'\ntarget = 'imager'\nat = 1e-4\n", "utf-8")
+    plan.write_text("[[fault]]\nkind = 'latch-up'\ntarget = 'imager'\nat_s = 1e-4\n", "utf-8")
 
     def beside() -> None:
         asked(str(port), "cubestar")

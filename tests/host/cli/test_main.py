@@ -292,7 +292,7 @@ def test_measure_as_a_check(run: Run) -> None:
     check_one_line(run(*call, "--min-right", "101"), "'101'", "0..100")
 
 
-LATCH_UP = "[[fault]]\nkind = 'latch-up'\nat = 0.3\n"
+LATCH_UP = "[[fault]]\nkind = 'latch-up'\nat_s = 0.3\n"
 
 
 @NEEDS_COMPILER

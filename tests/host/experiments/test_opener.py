@@ -10,7 +10,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.experiments import opener
 from cubestack.host.experiments.opener import Opener
 
-PLAN = "[[fault]]\nkind = 'uart-drop'\nat = 1.0\n"
+PLAN = "[[fault]]\nkind = 'uart-drop'\nat_s = 1.0\n"
 
 
 class Emulated:

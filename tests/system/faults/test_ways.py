@@ -25,7 +25,7 @@ from .bench import BENCHES, Bench, Star, Tracker, powered
 def given(kind: str, board: Board) -> dict[str, Any]:
     """A value for each parameter of a fault; the rates are those that no run takes notice of."""
     fault = FAULTS[kind]
-    values = {name: getattr(fault(), name) for name in fault.parameters()}
+    values = {name: getattr(fault(), name) for name in fault.declared()}
     for name in (name for name, default in values.items() if default is None):
         values[name] = next(iter(board.engine.registers)) if name == "register" else 0
     return values | ({"rate": 1e-9} if "upsets" in kind else {})
@@ -182,7 +182,7 @@ def test_refusals_name_what_would_be_right(star: Star) -> None:
         ({"fault": "uart-drop", "rate": 2.0}, "rate must be 0 to 1, not 2.0"),
         ({"fault": "uart-drop", "chance": 1}, "no parameter 'chance'; it has rate, direction"),
         ({"fault": "latch-up", "for_s": 1.0}, "it has no duration"),
-        ({"fault": "uart-drop", "at_s": -1.0}, "can not begin at -1 s"),
+        ({"fault": "uart-drop", "at_s": -1.0}, "at_s must be 0.*s, not -1.0"),
         ({"fault": "register-flip", "register": "writer.ack", "bit": 3}, r"writer\.ack\[3\]"),
     ]
     for arguments, message in cases:
