@@ -18,13 +18,13 @@ of the stars; the sidereal time's equinox has moved by 0.4 deg from theirs, whic
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
 from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.values import REQUIRED, DeclaredValues, flag, number
 
 SIDEREAL_DEG_S = 360 / 86164.0905
 """Rate at which the Earth turns below the stars."""
@@ -39,43 +39,28 @@ Vectors = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Atmosphere:
-    """An observer on the Earth, and the air above.
+class Atmosphere(DeclaredValues):
+    """An observer on the Earth, and the air above; SceneError for values out of their limits."""
 
-    Attributes:
-        latitude_deg: of the observer, -90 to 90.
-        sidereal_deg: local sidereal time at time 0, the right ascension of the zenith, 0 to 360.
-        height_m: above the sea, -500 to 9000.
-        seeing_arcsec: width at half maximum of a star's image in a large telescope, at the zenith
-            and 500 nm, 0 to 20; 0 for images that stand still.
-        scintillation: whether stars twinkle.
-        extinction_mag: loss of light by one air mass, 0 to 5 magnitudes.
-        sky_mag: brightness of the sky, V magnitudes for a square arcsecond, 10 to 30; None is dark.
-    """
+    error = SceneError
 
-    latitude_deg: float
-    sidereal_deg: float
-    height_m: float = 0.0
-    seeing_arcsec: float = 2.0
-    scintillation: bool = True
-    extinction_mag: float = 0.25
-    sky_mag: float | None = None
-
-    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
-        "latitude_deg": (-90, 90),
-        "sidereal_deg": (0, 360),
-        "height_m": (-500, 9000),
-        "seeing_arcsec": (0, 20),
-        "extinction_mag": (0, 5),
-        "sky_mag": (10, 30),
-    }
-
-    def __post_init__(self) -> None:
-        """Refuse a place or an air that can not be: SceneError."""
-        for name, (low, high) in self.LIMITS.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                raise SceneError(f"{name} must be in {low:g}..{high:g}, not {value}")
+    latitude_deg: float = number(REQUIRED, "of the observer, north positive", -90, 90)
+    sidereal_deg: float = number(
+        REQUIRED,
+        "right ascension of the zenith at time 0",
+        0,
+        360,
+        instead=("utc", "longitude_deg"),
+    )
+    height_m: float = number(0.0, "above the sea", -500, 9000)
+    seeing_arcsec: float = number(
+        2.0, "width at half maximum in a large telescope, at the zenith and 500 nm", 0, 20
+    )
+    scintillation: bool = flag(True, "stars twinkle")
+    extinction_mag: float = number(0.25, "loss of light by one air mass", 0, 5)
+    sky_mag: float | None = number(
+        None, "brightness of the sky, V of a square arcsecond; dark unless given", 10, 30
+    )
 
     def zenith(self, time_s: float) -> Vectors:
         """Unit vector (3,) to the zenith."""

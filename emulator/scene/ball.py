@@ -17,10 +17,23 @@ from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.values import named, number, positive, vector, whole
 
 RADIUS_MM = 300.0
 DISTANCE_MM = 35.2
 """Of the camera from the ball's surface."""
+
+BALL = named(
+    {
+        "angle_deg": vector(2, (0.0, 0.0), "alpha and beta that the stage is turned to"),
+        "radius_mm": positive(RADIUS_MM, "of the ball"),
+        "distance_mm": positive(DISTANCE_MM, "of its surface from the axis"),
+        "offset_mm": vector(3, (0.0, 0.0, 0.0), "of the optic point from the axis"),
+        "unevenness": number(0.0, "of the ball's brightness, relative", 0, 10),
+        "seed": whole(0, "of the ball's surface", 0),
+    }
+)
+"""Arguments of `ball_scene` that scene files have."""
 
 
 def ball_scene(
@@ -32,20 +45,17 @@ def ball_scene(
 ) -> EarthSunScene:
     """What the nadir camera sees with the stage turned to ``angle_deg``, (alpha, beta).
 
-    Args:
-        angle_deg: where the ball's centre would be with the optic point in the stage's axis.
-        radius_mm: of the ball.
-        distance_mm: of its surface from the stage's axis, along the way to its centre.
-        offset_mm: of the optic point from the stage's axis, (3,) in camera axes.
-        others: attributes of ``EarthSunScene``, such as ``unevenness`` (here 0 by default).
+    The ball's centre would be at ``angle_deg`` with the optic point in the stage's axis, and
+    ``distance_mm`` is along the way to that centre. ``others`` are attributes of ``EarthSunScene``.
 
     Raises:
         SceneError: for a size that is not above 0, or an optic point in the ball.
     """
-    if not (0 < radius_mm < np.inf and 0 < distance_mm < np.inf):
-        raise SceneError(
-            f"radius_mm and distance_mm must be above 0, not {radius_mm} and {distance_mm}"
-        )
+    for name, size in (("radius_mm", radius_mm), ("distance_mm", distance_mm)):
+        try:
+            BALL[name].check(size)
+        except ValueError as error:
+            raise SceneError(f"{name} {error}") from None
     centre = (radius_mm + distance_mm) * vector_from_angles(*angle_deg) - np.asarray(offset_mm)
     away = float(np.linalg.norm(centre))
     if not radius_mm < away:

@@ -7,7 +7,7 @@ of its picture's right side in body axes. Alpha and beta are as in ``emulator.sc
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,10 +15,19 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
-from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_outside, refuse_zero
+from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import Clouds, EarthHazard
 from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.values import (
+    REQUIRED,
+    DeclaredValues,
+    choice,
+    number,
+    positive,
+    vector,
+    whole,
+)
 
 FASTEST_DEG_S = 1000.0
 """Body rate about one axis, at most (assumed)."""
@@ -44,19 +53,19 @@ def _unit(name: str, vector: ArrayLike) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class Mounting:
-    """How a camera sits on the satellite.
+class Mounting(DeclaredValues):
+    """How a camera sits on the satellite; what of ``right`` is along the boresight is left out."""
 
-    Attributes:
-        boresight: (3,) in body axes.
-        right: (3,) in body axes; what of it is along the boresight is left out.
-    """
+    error = SceneError
 
-    boresight: ArrayLike
-    right: ArrayLike = (1.0, 0.0, 0.0)
+    boresight: ArrayLike = vector(3, REQUIRED, "direction, body axes")
+    right: ArrayLike = vector(
+        3, (1.0, 0.0, 0.0), "direction that the picture's rows follow, body axes"
+    )
 
     def __post_init__(self) -> None:
-        """Refuse directions that make no axes."""
+        """Refuse directions that make no axes: SceneError."""
+        super().__post_init__()
         if np.linalg.norm(np.cross(_unit("boresight", self.boresight), self._right)) < 1e-6:
             raise SceneError(f"right must not be along the boresight {self.boresight!r}")
 
@@ -73,25 +82,21 @@ class Mounting:
 
 
 @dataclass(frozen=True)
-class Reflection:
+class Reflection(DeclaredValues):
     """A false light in one camera's picture: an even disc.
 
-    Attributes:
-        camera: that sees it, by what it is there for.
-        alpha_deg, beta_deg: its centre.
-        radius_px: its size.
-        level: grey values above black, at the exposure that the published levels belong to.
+    ``level`` is at the exposure that the published levels belong to.
     """
 
-    camera: Target
-    alpha_deg: float
-    beta_deg: float
-    radius_px: float
-    level: float
+    error = SceneError
 
-    def __post_init__(self) -> None:
-        """Refuse a disc that can not be."""
-        refuse_zero(self, "radius_px", "level")
+    camera: Target = choice(
+        REQUIRED, "that sees it", {camera.name.lower(): camera for camera in Target}
+    )
+    alpha_deg: float = number(REQUIRED, "of its centre")
+    beta_deg: float = number(REQUIRED, "of its centre")
+    radius_px: float = positive(REQUIRED, "its size")
+    level: float = positive(REQUIRED, "grey values above black")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,56 +116,47 @@ class SensorTruth:
 
 
 @dataclass(frozen=True, eq=False)
-class EarthSunScene:
-    """Surroundings of a satellite with a sun and a nadir camera.
+class EarthSunScene(DeclaredValues):
+    """Surroundings of a satellite with a sun and a nadir camera; directions are in scene axes.
 
     Attributes:
-        nadir: direction (3,) of the Earth's centre, scene axes.
-        sun: direction (3,) of the Sun, scene axes.
-        moon: direction (3,) of the Moon, scene axes; its phase follows from the Sun's. None: none.
-        altitude_km: of the satellite.
-        rate_deg_s: body rate (3,) in body axes.
+        moon: its phase follows from the Sun's direction.
         nadir_camera, sun_camera: how they are mounted.
-        unevenness: standard deviation of the Earth's brightness, relative (assumed).
-        glow_km: scale height of the glow above the limb; 0 for none (assumed).
         reflections: false lights.
-        hazards: what else gives light, in scene axes; some say where Earth and Sun stand.
-        seed: of the Earth's surface.
+        hazards: what else gives light; some say where Earth and Sun stand.
     """
 
-    nadir: ArrayLike = (0.0, 0.0, 1.0)
-    sun: ArrayLike = (0.0, 0.0, -1.0)
-    moon: ArrayLike | None = None
-    altitude_km: float = 750.0
-    rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
+    error = SceneError
+
+    nadir: ArrayLike = vector(
+        3, (0.0, 0.0, 1.0), "direction of the Earth's centre", role="direction"
+    )
+    sun: ArrayLike = vector(3, (0.0, 0.0, -1.0), "direction of the Sun", role="direction")
+    moon: ArrayLike | None = vector(
+        3, None, "direction of the Moon; without it there is none", role="direction"
+    )
+    altitude_km: float = positive(750.0, "of the satellite", high=HIGHEST_KM)
+    rate_deg_s: ArrayLike = vector(
+        3, (0.0, 0.0, 0.0), "body rate in body axes", -FASTEST_DEG_S, FASTEST_DEG_S
+    )
     nadir_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, 1.0)))
     sun_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, -1.0)))
-    unevenness: float = 0.1
-    glow_km: float = 10.0
+    unevenness: float = number(
+        0.1, "standard deviation of the Earth's brightness, relative (assumed)", 0, 10
+    )
+    glow_km: float = number(
+        10.0, "scale height of the glow above the limb; 0 for none (assumed)", 0, 1000
+    )
     reflections: tuple[Reflection, ...] = ()
     hazards: tuple[SkyHazard, ...] = ()
-    seed: int = 0
-
-    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
-        "altitude_km": (0, HIGHEST_KM),
-        "unevenness": (0, 10),
-        "glow_km": (0, 1000),
-    }
+    seed: int = whole(0, "of the Earth's surface", 0)
 
     def __post_init__(self) -> None:
         """Refuse surroundings that can not be; directions become unit vectors."""
+        super().__post_init__()
         for name in ("nadir", "sun", "moon"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _unit(name, getattr(self, name)))
-        rate = np.asarray(self.rate_deg_s, np.float64)
-        if rate.shape != (3,) or not np.all(np.abs(rate) <= FASTEST_DEG_S):
-            raise SceneError(
-                f"rate_deg_s must be 3 numbers in deg/s, at most {FASTEST_DEG_S:g} each, not "
-                f"{self.rate_deg_s!r}"
-            )
-        refuse_zero(self, "altitude_km")
-        refuse_negative(self, "seed")
-        refuse_outside(self, **self.LIMITS)
         refuse_strangers(self.hazards)
         radius = np.radians(angular_radius_deg(self.altitude_km))
         for hazard in self.hazards:

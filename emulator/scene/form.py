@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hazards import Hazard
 from cubestack.emulator.scene.hazards.contract import Body, SkyHazard
-from cubestack.emulator.scene.keys import Told, plain
+from cubestack.firmware_model.values import plain
 
 Matrix = NDArray[np.float64]
 Table = dict[str, Any]
@@ -86,13 +86,13 @@ class SceneForm(Generic[V]):
     """Scenes of one kind of device.
 
     Attributes:
-        keys: of scene files, by kind, as ``keys.declared`` tells them.
+        keys: of scene files, by kind, as ``values.described`` has them.
         view: what the cameras of a board see, and are like, as the reader of scene files gives it.
         table: of a scene file that gives such a view again.
         sight: such a view on the map, and where it is at a time in ps.
     """
 
-    keys: Mapping[str, Mapping[str, Told]]
+    keys: Mapping[str, Mapping[str, Any]]
     view: Callable[[Any], V]
     table: Callable[[V], Table]
     sight: Callable[[V, int], Sight]

@@ -16,16 +16,16 @@ boresight = [0.0, -1.0, 0.0]
 right = [1.0, 0.0, 0.0]
 """
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from sgp4.api import Satrec
 
-from cubestack.emulator.scene import file
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.earth_sun import Mounting
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, read_file
 from cubestack.emulator.scene.orbit import (
     Attitude,
     Inertial,
@@ -34,49 +34,39 @@ from cubestack.emulator.scene.orbit import (
     Waypoints,
     circular,
 )
-
-_CIRCULAR: file.Readers = {
-    "altitude_km": file.within(160, 40_000),
-    "inclination_deg": file.within(0, 180),
-    "node_deg": file.angle,
-    "along_deg": file.angle,
-}
-_RATE = file.several(3, file.within(-100, 100))
-_TURN = file.several(3, file.angle)
-_QUATERNION = file.several(4, file.number)
+from cubestack.firmware_model.values import (
+    REQUIRED,
+    TABLE,
+    TEXT,
+    Declaration,
+    ListDeclaration,
+    TableDeclaration,
+    flag,
+    moment,
+    named,
+    number,
+    read_table,
+    table,
+    vector,
+)
 
 
 def load_orbit(path: Path) -> Orbit:
     """What the file says; SceneError names it, and the key that is wrong."""
-    return file.read_file(path, _orbit)
+    return read_file(path, _orbit)
 
 
-def _orbit(table: dict[str, Any]) -> Orbit:
-    values = file.read_table(
-        table,
-        {
-            "start": _start,
-            "tle": _lines,
-            "hazards": file.flag,
-            "circular": file.subtable(_CIRCULAR),
-            "attitude": _attitude,
-            "mountings": _mountings,
-        },
-    )
-    if "start" not in values:
-        raise SceneError("needs the key start")
+def _orbit(given: dict[str, Any]) -> Orbit:
+    values = read_table(given, _KEYS)
     lines, elements = values.pop("tle", None), values.pop("circular", None)
     if (lines is None) == (elements is None):
         raise SceneError("needs either tle, or the table circular")
     if lines is not None:
         return Orbit(lines, **values)
-    if missing := _CIRCULAR.keys() - elements.keys() - {"along_deg"}:
-        raise SceneError(f"circular: needs the keys {', '.join(sorted(missing))}")
     return Orbit(circular(values["start"], **{"along_deg": 0.0} | elements), **values)
 
 
-def _start(value: Any) -> datetime:
-    found = file.moment(value)
+def _start(found: datetime) -> datetime:
     if found.tzinfo is None:
         raise SceneError(f"must say its time zone, as {found.isoformat()}Z")
     if not 1958 <= found.year <= 2049:
@@ -84,16 +74,14 @@ def _start(value: Any) -> datetime:
     return found
 
 
-def _lines(value: Any) -> Satrec:
+def _lines(value: tuple[str, str]) -> Satrec:
     """Two-line elements whose check sums are right."""
-    if not isinstance(value, list) or len(value) != 2 or not all(type(v) is str for v in value):
-        raise SceneError(f"must be two lines of text, not {value!r}")
-    for number, line in enumerate(value, 1):
-        if len(line) != 69 or line[0] != str(number):
-            raise SceneError(f"line {number} must have 69 characters, the first a {number}")
+    for count, line in enumerate(value, 1):
+        if len(line) != 69 or line[0] != str(count):
+            raise SceneError(f"line {count} must have 69 characters, the first a {count}")
         total = sum(int(c) if c.isdigit() else c == "-" for c in line[:68]) % 10
         if line[68] != str(total):
-            raise SceneError(f"line {number} must end in its check sum {total}, not {line[68]}")
+            raise SceneError(f"line {count} must end in its check sum {total}, not {line[68]}")
     try:
         satellite = Satrec.twoline2rv(*value)
     except (ValueError, RuntimeError) as error:
@@ -103,66 +91,77 @@ def _lines(value: Any) -> Satrec:
     return satellite
 
 
-def _attitude(value: Any) -> Attitude:
-    if not isinstance(value, dict) or value.get("kind") not in _ATTITUDES:
-        raise SceneError(f"kind must be one of {', '.join(_ATTITUDES)}")
-    values = dict(value)
-    made: Attitude = _ATTITUDES[values.pop("kind")](values)
-    return made
+_QUATERNION = vector(4, REQUIRED, "ICRS to body, scalar last")
+_POINT = named({"at_s": number(REQUIRED, "after the start", 0, 1e9), "quaternion": _QUATERNION})
+_INERTIAL = named(
+    {
+        "ra_deg": number(None, "of the boresight", -360, 360),
+        "dec_deg": number(None, "of the boresight", -90, 90),
+        "roll_deg": number(0.0, "of the picture", -360, 360),
+        "quaternion": replace(_QUATERNION, default=None),
+        "rate_deg_s": vector(3, (0.0, 0.0, 0.0), "body rate", -100, 100),
+    }
+)
 
 
-def _inertial(values: dict[str, Any]) -> Attitude:
-    pose = file.read_table(
-        values,
-        {
-            "ra_deg": file.angle,
-            "dec_deg": file.declination,
-            "roll_deg": file.angle,
-            "quaternion": _QUATERNION,
-            "rate_deg_s": _RATE,
-        },
-    )
-    angles = [pose.pop(key, None) for key in ("ra_deg", "dec_deg", "roll_deg")]
-    if ("quaternion" in pose) == (angles[0] is not None) or (angles[0] is None) != (
-        angles[1] is None
-    ):
+def _inertial(pose: dict[str, Any]) -> Attitude:
+    ra, dec, roll = (pose.pop(key, None) for key in ("ra_deg", "dec_deg", "roll_deg"))
+    if ("quaternion" in pose) == (ra is not None) or (ra is None) != (dec is None):
         raise SceneError("attitude needs either quaternion, or ra_deg and dec_deg")
-    if angles[0] is not None:
-        turned = quaternion_from_pointing(angles[0], angles[1], angles[2] or 0.0)
-        pose["quaternion"] = tuple(turned.tolist())
+    if ra is not None:
+        pose["quaternion"] = tuple(quaternion_from_pointing(ra, dec, roll or 0.0).tolist())
     return Inertial(**pose)
 
 
-def _waypoints(values: dict[str, Any]) -> Attitude:
-    points = values.get("points")
-    if values.keys() != {"points"} or not isinstance(points, list):
-        raise SceneError("attitude needs points, each under [[attitude.points]]")
-    read = file.subtable({"at_s": file.within(0, 1e9), "quaternion": _QUATERNION})
-    rows = [read(point) for point in points]
-    if any(row.keys() != {"at_s", "quaternion"} for row in rows):
-        raise SceneError("each of points needs at_s and quaternion")
-    return Waypoints(tuple((row["at_s"], row["quaternion"]) for row in rows))
-
-
-_ATTITUDES: dict[str, Any] = {
-    "nadir": lambda values: NadirPointing(**file.read_table(values, {"offset_deg": _TURN})),
-    "inertial": _inertial,
-    "waypoints": _waypoints,
+_ATTITUDES: dict[str, TableDeclaration] = {
+    "nadir": table(
+        None,
+        "body z to the Earth's centre",
+        {"offset_deg": vector(3, (0.0, 0.0, 0.0), "rotation vector", -360, 360)},
+        lambda values: NadirPointing(**values),
+    ),
+    "inertial": table(None, "at one place of the sky, or turning from there", _INERTIAL, _inertial),
+    "waypoints": table(
+        None,
+        "quaternions at times",
+        {"points": table(REQUIRED, "in the order of time", _POINT, array=True)},
+        lambda values: Waypoints(tuple((p["at_s"], p["quaternion"]) for p in values["points"])),
+    ),
 }
 
 
-def _mountings(value: Any) -> dict[str, Mounting]:
-    if not isinstance(value, dict):
-        raise SceneError(f"must be tables by device, not {value!r}")
-    read = file.subtable(
-        {"boresight": file.several(3, file.number), "right": file.several(3, file.number)}
-    )
-    found = {}
-    for name, table in value.items():
-        values = read(table)
-        if "boresight" not in values:
-            raise SceneError(f"{name}: needs the key boresight")
-        found[name] = Mounting(**values)
-    for mounting in found.values():
-        mounting.matrix  # noqa: B018  refuses what makes no axes
-    return found
+def _attitude(given: dict[str, Any]) -> Attitude:
+    values = dict(given)
+    kind = values.pop("kind", None)
+    if kind not in _ATTITUDES:
+        raise SceneError(f"kind must be one of {', '.join(_ATTITUDES)}")
+    made: Attitude = _ATTITUDES[kind].read(values)
+    return made
+
+
+def _mountings(given: dict[str, Any]) -> dict[str, Mounting]:
+    mounting = table(None, "of the camera of a device", Mounting)
+    return read_table(given, dict.fromkeys(given, mounting))
+
+
+_KEYS = named(
+    {
+        "start": moment(REQUIRED, "virtual time 0", make=_start),
+        "tle": ListDeclaration(
+            part=Declaration(kind=TEXT), count=2, default=None, meaning="elements", make=_lines
+        ),
+        "circular": table(
+            None,
+            "a circular orbit instead of elements",
+            {
+                "altitude_km": number(REQUIRED, "above the Earth", 160, 40_000),
+                "inclination_deg": number(REQUIRED, "of the orbit", 0, 180),
+                "node_deg": number(REQUIRED, "right ascension of the ascending node", -360, 360),
+                "along_deg": number(0.0, "from there, at the start", -360, 360),
+            },
+        ),
+        "hazards": flag(True, "Earth, Sun and Moon disturb cameras that look at the sky"),
+        "attitude": Declaration(kind=TABLE, default=None, make=_attitude),
+        "mountings": Declaration(kind=TABLE, default=None, make=_mountings),
+    }
+)

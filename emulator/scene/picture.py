@@ -9,37 +9,38 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image, UnidentifiedImageError
 
 from cubestack.emulator.scene.attitude import unit_quaternion
-from cubestack.emulator.scene.file import SceneError, refuse_zero
+from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.values import DeclaredValues, positive, vector, whole
 
 FORMATS = ("PNG", "JPEG", "TIFF")
 
 
 @dataclass(frozen=True, eq=False)
-class PictureScene:
+class PictureScene(DeclaredValues):
     """A picture file as the light on a sensor: PNG, JPEG or TIFF, grey or colour.
 
     Attributes:
         file: the picture.
-        crop: column and row of its first pixel that the sensor sees.
-        exposure_ms: exposure that it was taken with; None: grey values do not scale.
-        quaternion: its attitude (4,) if known.
         pixels: grey values (rows, columns) of the whole picture, read-only.
     """
 
+    error = SceneError
+
     file: Path
-    crop: tuple[int, int] = (0, 0)
-    exposure_ms: float | None = None
-    quaternion: ArrayLike | None = None
+    crop: tuple[int, int] = vector(
+        2, (0, 0), "column and row of the first pixel that is seen", 0, kind=whole
+    )
+    exposure_ms: float | None = positive(
+        None, "that it was taken with: its light scales; else as it is"
+    )
+    quaternion: ArrayLike | None = vector(4, None, "attitude of the picture")
     pixels: NDArray[np.uint8] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Load the picture; SceneError when there is none, or a value is wrong."""
+        super().__post_init__()
         if self.quaternion is not None:
             check_quaternion(self.quaternion)
-        if self.exposure_ms is not None:
-            refuse_zero(self, "exposure_ms")
-        if min(self.crop) < 0:
-            raise SceneError(f"crop must not be negative, not {self.crop[0]},{self.crop[1]}")
         object.__setattr__(self, "pixels", load_picture(Path(self.file)))
 
     def part(self, columns: int, rows: int) -> NDArray[np.uint8]:

@@ -2,18 +2,18 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
-from cubestack.emulator.scene.file import SceneError, refuse_negative, refuse_outside
+from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
 from cubestack.emulator.scene.picture import PictureScene, check_quaternion
 from cubestack.emulator.sim.virtual_time import PS_PER_S
+from cubestack.firmware_model.values import DeclaredValues, flag, number, vector, whole
 
 __all__ = ["FASTEST_DEG_S", "PictureScene", "Pose", "Scene", "SceneError", "SkyScene"]
 
@@ -33,80 +33,68 @@ MOST_FALSE_STARS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class Pose(DeclaredValues):
     """An attitude and a constant body rate from some time on.
 
-    Attributes:
-        quaternion: (4,), scalar last, inertial to camera, at ``start_s``.
-        rate_deg_s: (3,), body rate in camera axes, each at most ``FASTEST_DEG_S`` in size.
-        start_s: virtual time from which on it holds.
+    ``quaternion`` (4,), scalar last, inertial to camera, is the attitude at ``at_s``.
     """
 
+    error = SceneError
+
     quaternion: ArrayLike
-    rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
-    start_s: float = 0.0
+    rate_deg_s: ArrayLike = vector(
+        3, (0.0, 0.0, 0.0), "body rate about the camera axes", -FASTEST_DEG_S, FASTEST_DEG_S
+    )
+    at_s: float = number(0.0, "virtual time from which the pose holds", formerly="start_s")
 
     def __post_init__(self) -> None:
-        """Refuse what is no attitude or no rate."""
+        """Refuse what is no attitude or no rate: SceneError."""
+        super().__post_init__()
         check_quaternion(self.quaternion)
-        rate = np.asarray(self.rate_deg_s)
-        if rate.shape != (3,) or not np.all(np.abs(rate) <= FASTEST_DEG_S):
-            raise SceneError(
-                f"rate_deg_s must be 3 numbers in deg/s, at most {FASTEST_DEG_S:g} each, "
-                f"not {self.rate_deg_s}"
-            )
 
     def at(self, time_s: float) -> NDArray[np.float64]:
         """Quaternion (4,) at ``time_s``."""
-        return propagate(self.quaternion, self.rate_deg_s, time_s - self.start_s)
+        return propagate(self.quaternion, self.rate_deg_s, time_s - self.at_s)
 
 
 @dataclass(frozen=True, eq=False)
-class SkyScene:
+class SkyScene(DeclaredValues):
     """The night sky.
 
     Attributes:
         quaternion: attitude (4,) at time 0, scalar last, inertial (ICRS at ``epoch``) to camera.
         rate_deg_s: body rate (3,) in camera axes.
         poses: later poses, each holding from its start on; in the order of their starts.
-        epoch: Julian year of the stars' positions, one of ``EPOCHS``.
-        mag_limit: stars with V strictly below it are seen; None for all that the camera resolves.
-        false_stars: number of lights at random places of the picture that no catalogue has, at most
-            ``MOST_FALSE_STARS``.
-        false_star_mag: range of their magnitudes, brightest first, uniform (assumed).
         atmosphere: the air that the stars, and only they, are seen through; None in space.
         hazards: what else gives light, or stands in the stars' way.
-        still: the stars stand still during each exposure, wherever they are at its middle, as in
-            screenshots of a planetarium.
-        seed: of the false stars and of the air.
     """
+
+    error = SceneError
 
     quaternion: ArrayLike
     rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
     poses: tuple[Pose, ...] = ()
-    epoch: float = DEFAULT_EPOCH
-    mag_limit: float | None = None
-    false_stars: int = 0
-    false_star_mag: tuple[float, float] = (2.0, 3.8)
+    epoch: float = number(
+        DEFAULT_EPOCH, "Julian year to which proper motion carries the stars", *EPOCHS
+    )
+    mag_limit: float | None = number(None, "only stars with V below it are seen", *MAGNITUDES)
+    false_stars: int = whole(
+        0, "lights at random places that no catalogue has", 0, MOST_FALSE_STARS
+    )
+    false_star_mag: tuple[float, float] = vector(
+        2, (2.0, 3.8), "range of their V, brightest first", *MAGNITUDES
+    )
     atmosphere: Atmosphere | None = None
     hazards: tuple[SkyHazard, ...] = ()
-    still: bool = False
-    seed: int = 0
-
-    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
-        "epoch": EPOCHS,
-        "mag_limit": MAGNITUDES,
-        "false_star_mag": MAGNITUDES,
-        "false_stars": (0, MOST_FALSE_STARS),
-    }
+    still: bool = flag(False, "stars stand still during each exposure, as at its middle")
+    seed: int = whole(0, "of false stars and air", 0)
 
     def __post_init__(self) -> None:
-        """Refuse a sky that can not be."""
-        starts = [pose.start_s for pose in self.all_poses]
+        """Refuse a sky that can not be: SceneError."""
+        super().__post_init__()
+        starts = [pose.at_s for pose in self.all_poses]
         if sorted(starts) != starts:
             raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
-        refuse_negative(self, "seed")
-        refuse_outside(self, **self.LIMITS)
         refuse_strangers(self.hazards)
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:
@@ -135,7 +123,7 @@ class SkyScene:
 
     def pose_at(self, time_ps: int) -> Pose:
         """The pose that holds at a time."""
-        begun = [pose for pose in self.poses if pose.start_s * PS_PER_S <= time_ps]
+        begun = [pose for pose in self.poses if pose.at_s * PS_PER_S <= time_ps]
         return begun[-1] if begun else self.all_poses[0]
 
     def truth(self, time_ps: int) -> NDArray[np.float64]:

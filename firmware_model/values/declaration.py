@@ -4,14 +4,14 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass
+from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
 from functools import partial
 from numbers import Real
 from typing import Any
 
-REQUIRED = MISSING
+REQUIRED: Any = object()
 """Default of a value that must be given."""
 
 UNITS = {
@@ -94,6 +94,7 @@ FLAG = ValueKind(
 )
 TEXT = ValueKind("text", "text", _exactly(str), str)
 CHOICE = ValueKind("choice", "a name", _exactly(str), str)
+TABLE = ValueKind("table", "a table", _exactly(dict), str)
 MOMENT = ValueKind(
     "moment", "a date and time, as 2013-06-01T20:00:00Z", _exactly(datetime), datetime.fromisoformat
 )
@@ -112,6 +113,7 @@ class Declaration:
             to a program. Empty for any value of the kind.
         default: `REQUIRED` where there is none; with None, None is allowed.
         kind: its type.
+        make: what becomes of a value that is read; ValueError for one that is not allowed.
         exclusive: whether ``low`` itself is not allowed.
         formerly: a name that is deprecated, empty for none.
         instead: names of values that are given instead of this one, or this one instead of them.
@@ -128,6 +130,7 @@ class Declaration:
     choices: Any = ()
     default: Any = REQUIRED
     kind: ValueKind = TEXT
+    make: Callable[[Any], Any] | None = None
     exclusive: bool = False
     formerly: str = ""
     instead: tuple[str, ...] = ()
@@ -188,7 +191,7 @@ class Declaration:
             raise self.error(given) from None
         if not self.fits(value):
             raise self.error(given, self.limits)
-        return value
+        return value if self.make is None else self.make(value)
 
     def parse(self, given: str) -> Any:
         """The value of a text, as on a command line; ValueError says what it must be."""
@@ -249,14 +252,15 @@ class ListDeclaration(Declaration):
     @property
     def wanted(self) -> str:
         """What it must be, in words."""
-        return "a list" if self.count is None else f"a list of {self.count} numbers"
+        what = "texts" if self.part.kind is TEXT else "numbers"
+        return "a list" if self.count is None else f"a list of {self.count} {what}"
 
-    def read(self, given: Any) -> tuple[Any, ...]:
-        """The values, as a tuple; ValueError for a wrong number of them, or a wrong one."""
+    def read(self, given: Any) -> Any:
         parts = given.tolist() if hasattr(given, "tolist") else given  # an array
         if not isinstance(parts, list | tuple) or self.count not in (None, len(parts)):
             raise self.error(given)
-        return tuple(self.part.read(one) for one in parts)
+        values = tuple(self.part.read(one) for one in parts)
+        return values if self.make is None else self.make(values)
 
     def take(self, given: Any) -> tuple[Any, ...]:
         """The values, each a text or what a program gave."""
@@ -309,9 +313,16 @@ def choice(default: Any, meaning: str, choices: Any, **more: Any) -> Any:
     return Declaration(default=default, meaning=meaning, choices=choices, kind=CHOICE, **more)
 
 
-def vector(count: int, default: Any, meaning: str, *limits: Any, **more: Any) -> Any:
+def vector(
+    count: int,
+    default: Any,
+    meaning: str,
+    *limits: Any,
+    kind: Callable[..., Any] = number,
+    **more: Any,
+) -> Any:
     """A list of so many numbers, each with ``limits`` as `number` takes them."""
-    part = number(REQUIRED, "", *limits)
+    part = kind(REQUIRED, "", *limits)
     return ListDeclaration(default=default, meaning=meaning, part=part, count=count, **more)
 
 

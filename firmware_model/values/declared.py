@@ -3,7 +3,7 @@
 from dataclasses import field, replace
 from typing import Any, ClassVar
 
-from cubestack.firmware_model.values.declaration import Declaration
+from cubestack.firmware_model.values.declaration import REQUIRED, Declaration
 from cubestack.firmware_model.values.tables import named
 
 
@@ -25,7 +25,7 @@ class DeclaredValues:
         own = {name: one for name, one in vars(cls).items() if isinstance(one, Declaration)}
         cls._declared = {**cls._declared, **named(own)}
         for name, one in own.items():
-            setattr(cls, name, field(default=one.default))
+            setattr(cls, name, field() if one.default is REQUIRED else field(default=one.default))
 
     def __post_init__(self) -> None:
         """Check every value."""

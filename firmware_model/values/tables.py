@@ -62,13 +62,11 @@ class TableDeclaration(Declaration):
     """A table, or an array of tables.
 
     Attributes:
-        keys: of each table.
-        make: what a table becomes, of its values.
+        keys: of each table; ``make`` is given their values.
         array: whether it is an array, written as ``[[NAME]]``.
     """
 
     keys: Keys
-    make: Callable[[dict[str, Any]], Any] = dict
     array: bool = False
 
     @property
@@ -81,7 +79,8 @@ class TableDeclaration(Declaration):
         tables = given if self.array else [given]
         if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
             raise self.error(given)
-        made = tuple(self.make(read_table(one, self.keys)) for one in tables)
+        values = (read_table(one, self.keys) for one in tables)
+        made = tuple(one if self.make is None else self.make(one) for one in values)
         return made if self.array else made[0]
 
     def described(self) -> dict[str, Any]:
@@ -101,9 +100,7 @@ def table(
     if isinstance(keys, type):
         owner: Any = keys
         keys, make = owner.declared(), make or (lambda values: owner(**values))
-    return TableDeclaration(
-        default=default, meaning=meaning, keys=named(keys), make=make or dict, **more
-    )
+    return TableDeclaration(default=default, meaning=meaning, keys=named(keys), make=make, **more)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -116,7 +116,7 @@ def test_a_sun_outside_of_the_field(sun_deg: float, tmp_path: Path) -> None:
     ("text", "message"),
     [
         ('kind = "sky"', "kind must be \"sun-slit\", not 'sky'"),
-        ('kind = "sun-slit"\nsun_deg = 91', "sun_deg must be -90 to 90, not 91"),
+        ('kind = "sun-slit"\nsun_deg = 91', "sun_deg must be -90 to 90 deg, not 91"),
         ('kind = "sun-slit"\nbrightness = "high"', "brightness must be a number, not 'high'"),
     ],
 )

@@ -1,9 +1,7 @@
 """What documents say, against what is there."""
 
-import math
 import re
 import tomllib
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -103,16 +101,15 @@ def test_defaults_are_those_of_the_code(heading: str, defaults: tuple[object, ..
 def hazard_rows(hazard: type[Hazard]) -> list[str]:
     """The rows of a table of all keys of a hazard but the seed."""
     rows = []
-    for entry in fields(hazard):
-        value, (low, high) = entry.default, entry.metadata["range"]
+    for name, one in hazard.declared().items():
+        value = one.default
         if isinstance(value, tuple):
             shown = str([float(f"{number:g}") for number in value]).replace(".0", "")
         else:
             shown = f"{value:.10g}" if isinstance(value, int | float) else str(value or "none")
-        span = f"{low:.10g} to {high:.10g}" if high < math.inf else ""
-        meaning = entry.metadata["meaning"]
-        if entry.name != "seed":
-            rows.append(f"| `{hazard.name}` | `{entry.name}` | {shown} | {span} | {meaning} |")
+        span = one.limits or " or ".join(one.choice_values) or one.unit
+        if name != "seed":
+            rows.append(f"| `{hazard.name}` | `{name}` | {shown} | {span} | {one.meaning} |")
     return rows
 
 

@@ -15,7 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.hazards.contract import Lens
 from cubestack.emulator.camera.common.residual import Residual, displaced, restored
-from cubestack.emulator.scene.file import refuse_zero
+from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.values import (
+    REQUIRED,
+    DeclaredValues,
+    choice,
+    number,
+    positive,
+    whole,
+)
 
 PHOTONS_V0 = 1000.0
 """Flux of a star of V = 0 in photons / (s cm^2 Angstrom) (published, eq. 3.4.2)."""
@@ -34,57 +42,52 @@ class Distortion(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Optics:
+class Optics(DeclaredValues):
     """A lens in front of the sensor. Pixel coordinates have (0, 0) at the first pixel's centre.
 
-    Attributes:
-        focal_length_mm: scale of directions, eq. 4.1.6.
-        pixel_pitch_um: of the sensor, both ways.
-        fx, fy: scale of the normalised coordinates of the distortion, px (eq. 4.1.5).
-        cx, cy: principal point, px.
-        k1, k2, p1, p2: distorted to undistorted, as in eqs. 4.1.3 and 4.1.4.
-        distortion: INVERSE makes those equations exact; TOOLBOX has the calibration toolbox's
-            model with the same coefficients in inverted sign.
-        psf_sigma_px: standard deviation of the Gaussian spot, px, at most 20; defocus included.
-        vignetting: light falls off with this power of the cosine of the field angle; 4 is natural
-            vignetting, 0 is none.
-        columns, rows: pixels of the sensor.
-        aperture_mm: diameter of the entrance pupil.
-        effective_width_a: bandwidth in Angstrom times transmission times quantum efficiency.
-        field_stop_deg: diameter of the round field that a light shade lets through; 360 is none.
-        residuals: what neither coefficients nor focal length say of where the picture is.
+    Coefficients are those of eqs. 4.1.3 and 4.1.4, which INVERSE makes exact; TOOLBOX has the
+    calibration toolbox's model with the same coefficients in inverted sign. ``psf_sigma_px`` has
+    defocus included; a vignetting of 4 is the natural one. ``residuals`` are what neither
+    coefficients nor focal length say of where the picture is.
     """
 
-    focal_length_mm: float
-    pixel_pitch_um: float
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    k1: float = 0.0
-    k2: float = 0.0
-    p1: float = 0.0
-    p2: float = 0.0
-    distortion: Distortion = Distortion.INVERSE
-    psf_sigma_px: float
-    vignetting: float = 0.0
-    columns: int
-    rows: int
-    aperture_mm: float
-    effective_width_a: float
-    field_stop_deg: float = 360.0
+    error = SceneError
+
+    focal_length_mm: float = positive(REQUIRED, "scale of directions")
+    pixel_pitch_um: float = positive(REQUIRED, "of the sensor")
+    fx: float = positive(
+        REQUIRED, "scale of the distortion's normalised coordinates across", unit="px"
+    )
+    fy: float = positive(REQUIRED, "the same along a column", unit="px")
+    cx: float = number(REQUIRED, "principal point, column", unit="px")
+    cy: float = number(REQUIRED, "principal point, row", unit="px")
+    k1: float = number(0.0, "radial coefficient, distorted to undistorted")
+    k2: float = number(0.0, "the next one")
+    p1: float = number(0.0, "tangential coefficient")
+    p2: float = number(0.0, "the other one")
+    distortion: Distortion = choice(
+        Distortion.INVERSE, "which way the coefficients map", {one.value: one for one in Distortion}
+    )
+    psf_sigma_px: float = positive(
+        REQUIRED, "standard deviation of a star's spot", high=WIDEST_PSF_PX
+    )
+    vignetting: float = number(
+        0.0, "power of the cosine of the field angle by which the light falls off"
+    )
+    columns: int = whole(REQUIRED, "pixels of a row", 1)
+    rows: int = whole(REQUIRED, "pixels of a column", 1)
+    aperture_mm: float = positive(REQUIRED, "diameter of the entrance pupil")
+    effective_width_a: float = positive(
+        REQUIRED, "bandwidth in Angstrom times transmission times quantum efficiency"
+    )
+    field_stop_deg: float = positive(
+        360.0, "diameter of the round field that a shade lets through; 360: none"
+    )
     residuals: tuple[Residual, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a lens that can not make pictures."""
-        refuse_zero(
-            self, "focal_length_mm", "pixel_pitch_um", "fx", "fy", "psf_sigma_px", "columns"
-        )
-        refuse_zero(self, "rows", "aperture_mm", "effective_width_a", "field_stop_deg")
-        if self.psf_sigma_px > WIDEST_PSF_PX:
-            raise ValueError(
-                f"psf_sigma_px must be at most {WIDEST_PSF_PX:g}, not {self.psf_sigma_px}"
-            )
+        """Refuse a lens that can not make pictures: ValueError."""
+        super().__post_init__()
         y, x = np.mgrid[-0.5 : self.rows - 0.5 : 5j, -0.5 : self.columns - 0.5 : 9j]
         sensor = np.stack([x.ravel(), y.ravel()], axis=1)
         with np.errstate(all="ignore"):

@@ -24,8 +24,8 @@ from cubestack.emulator.scene.form import (
     hazard_table,
     rounded,
 )
-from cubestack.emulator.scene.keys import plain
 from cubestack.emulator.scene.sky import Pose, Scene, SkyScene
+from cubestack.firmware_model.values import plain
 
 TITLE = "right ascension and declination, degrees"
 
@@ -69,7 +69,7 @@ def _sky(scene: SkyScene) -> Table:
         *(scene, usual), "quaternion", "rate_deg_s", "poses", "atmosphere", "hazards"
     )
     if later:
-        table["poses"] = [{"start_s": pose.start_s, **_pose(pose)} for pose in later]
+        table["poses"] = [{"at_s": pose.at_s, **_pose(pose)} for pose in later]
     air = scene.atmosphere
     if air is not None:
         needed = {"latitude_deg": air.latitude_deg, "sidereal_deg": air.sidereal_deg}

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.optics import Optics
-from cubestack.emulator.scene.file import SceneError, refuse_negative
+from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.sky import Scene
+from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 
 S = TypeVar("S")
 C = TypeVar("C")
@@ -29,42 +30,32 @@ TEMPERATURES_C = (-60.0, 125.0)
 """That sensors work at."""
 
 
-def check_temperature(temperature_c: float) -> None:
-    """Raise SceneError for a temperature that no sensor works at."""
-    low, high = TEMPERATURES_C
-    if not low <= temperature_c <= high:
-        raise SceneError(f"temperature_c must be in {low:g}..{high:g}, not {temperature_c}")
-
-
 @dataclass(frozen=True)
-class SkyCondition:
+class SkyCondition(DeclaredValues):
     """What a camera that looks at the sky is like.
 
     Attributes:
         optics: the lens.
-        noise: False makes the sensor ideal: no noise, no dark current, no defects.
-        seed: of noise and hot pixels.
-        temperature_c: of the sensor, -60 to 125.
-        hot_pixels: number of pixels that radiation has made hot since the sensor left the factory.
         hazards: what else is wrong with lens and sensor.
     """
 
+    error = SceneError
+
     optics: Optics
-    noise: bool = True
-    seed: int = 0
-    temperature_c: float = 20.0
-    hot_pixels: int = 20
+    noise: bool = flag(True, "false: no shot, dark and read noise, no defects")
+    seed: int = whole(0, "of noise and hot pixels", 0)
+    temperature_c: float = number(
+        20.0, "of the sensor; 8 degrees double the dark current", *TEMPERATURES_C
+    )
+    hot_pixels: int = whole(20, "pixels that radiation has made hot", 0)
     hazards: tuple[SensorHazard, ...] = ()
 
-    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {"temperature_c": TEMPERATURES_C}
-
     def __post_init__(self) -> None:
-        """Refuse what can not be."""
-        refuse_negative(self, "hot_pixels", "seed")
+        """Refuse what can not be: SceneError."""
+        super().__post_init__()
         pixels = self.optics.columns * self.optics.rows
         if self.hot_count > pixels:
             raise SceneError(f"hot_pixels must be at most {pixels}, not {self.hot_count}")
-        check_temperature(self.temperature_c)
         effects.lens(self.optics.basics, self.hazards, self.temperature_c)
 
     @property

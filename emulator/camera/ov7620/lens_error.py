@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.camera.common.residual import Residual
 from cubestack.emulator.scene.earth_sun import Target
 from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.values import REQUIRED, DeclaredValues, many, number, vector
 
 FIELD_DEG = 95.0
 """Largest angle from the boresight that the lens images, half of 190 deg (appendix A.3)."""
@@ -47,34 +48,32 @@ Angles = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class LensError:
+class LensError(DeclaredValues):
     """What the polynomial does not say of one lens; by default nothing.
 
     A direction is imaged where the polynomial images another one: its angles alpha and beta, plus
     this error.
 
-    Attributes:
-        centre_px: optical axis (x, y) less the boresight of table 5.1, px, each within 20.
-        radial_deg: pairs of field angle, rising within 0 and 95 deg, and error outwards there; a
-            smooth curve goes through them, 0 on the axis and at the rim, and exceeds none.
-        decentring_deg: coefficients (p1, p2) of Brown's tangential distortion, deg at the rim, but
-            falling off towards it.
-        scale: of the picture about the optical axis, 0.85 to 1.15.
-        residuals: displacements of the picture beside all this.
+    The boresight is that of table 5.1. Field angles rise within 0 and 95 deg; a smooth curve goes
+    through their errors, 0 on the axis and at the rim, and exceeds none. Decentring is in deg at
+    the rim, but falls off towards it. ``residuals`` displace the picture beside all this.
     """
 
-    centre_px: tuple[float, float] = (0.0, 0.0)
-    radial_deg: tuple[tuple[float, float], ...] = ()
-    decentring_deg: tuple[float, float] = (0.0, 0.0)
-    scale: float = 1.0
+    error = SceneError
+
+    centre_px: tuple[float, float] = vector(
+        2, (0.0, 0.0), "optical axis less the boresight", -MOST_PX, MOST_PX
+    )
+    radial_deg: tuple[tuple[float, float], ...] = many(
+        (), "pairs of field angle, and error outwards there", vector(2, REQUIRED, "")
+    )
+    decentring_deg: tuple[float, float] = vector(2, (0.0, 0.0), "Brown's p1 and p2")
+    scale: float = number(1.0, "of the picture about the optical axis", 0.85, 1.15)
     residuals: tuple[Residual, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a lens that can not be: SceneError."""
-        if not max(map(abs, self.centre_px)) <= MOST_PX:
-            raise SceneError(f"centre_px must be within {MOST_PX:g} px, not {self.centre_px}")
-        if not 0.85 <= self.scale <= 1.15:
-            raise SceneError(f"scale must be in 0.85..1.15, not {self.scale:g}")
+        super().__post_init__()
         nodes = [0.0, *(angle for angle, _ in self.radial_deg), FIELD_DEG]
         if not np.all(np.diff(nodes) > 0):
             raise SceneError(

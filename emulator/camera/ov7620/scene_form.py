@@ -25,7 +25,7 @@ from cubestack.emulator.scene.form import (
 )
 from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG, Body
 from cubestack.emulator.scene.hazards.moon import RADIUS_RAD as MOON_RADIUS_RAD
-from cubestack.emulator.scene.keys import plain
+from cubestack.firmware_model.values import plain
 
 TITLE = "the satellite's body axes at time 0; y is down"
 

@@ -12,7 +12,8 @@ import numpy as np
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import ephemeris
 from cubestack.emulator.scene.hazards.contract import Looking, SkyHazard, Vectors, direction
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.firmware_model.values import number, vector
 
 LIGHT_KM_S = 299_792.458
 FASTEST_KM_S = 3000.0
@@ -22,17 +23,15 @@ FASTEST_KM_S = 3000.0
 class Aberration(SkyHazard):
     """The observer's velocity."""
 
-    velocity_km_s: tuple[float, float, float] | None = key(
-        None, "of the observer, km/s; else that of the Earth at the date and that of the orbit"
+    velocity_km_s: tuple[float, float, float] | None = vector(
+        3, None, "of the observer; else that of the Earth at the date and that of the orbit"
     )
-    julian_date: float = key(
+    julian_date: float = number(
         ephemeris.NEW_YEAR_2026, "Julian date at time 0", ephemeris.FIRST_DATE, ephemeris.LAST_DATE
     )
-    orbit_km_s: float = key(7.6, "speed around the Earth, km/s", 0, 12)
-    orbit_towards: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0),
-        "where that goes: three numbers, or right ascension and declination in deg",
-        role="direction",
+    orbit_km_s: float = number(7.6, "speed around the Earth", 0, 12)
+    orbit_towards: tuple[float, ...] = heading(
+        (0.0, 0.0, 1.0), "where that goes: three numbers, or right ascension and declination in deg"
     )
 
     name: ClassVar[str] = "aberration"

@@ -20,7 +20,8 @@ from cubestack.emulator.scene.hazards.contract import (
     aside,
     direction,
 )
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.firmware_model.values import number
 
 SLOWEST_DEG_S, FASTEST_DEG_S = 0.1, 2.0
 
@@ -29,19 +30,15 @@ SLOWEST_DEG_S, FASTEST_DEG_S = 0.1, 2.0
 class Debris(SkyHazard):
     """One object that moves against the stars."""
 
-    direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0),
-        "where it is at `time_s`: three numbers, or ra and dec in deg",
-        role="direction",
+    direction: tuple[float, ...] = heading(
+        (0.0, 0.0, 1.0), "where it is at `at_s`: three numbers, or ra and dec in deg"
     )
-    towards: tuple[float, ...] = key(
-        (1.0, 0.0, 0.0),
-        "a direction on its way, less than half a turn on, likewise",
-        role="direction",
+    towards: tuple[float, ...] = heading(
+        (1.0, 0.0, 0.0), "a direction on its way, less than half a turn on, likewise"
     )
-    rate_deg_s: float = key(0.5, "how fast it moves, deg/s", 0, 20)
-    v_mag: float = key(2.0, "its magnitude", -10, 10)
-    time_s: float = key(0.0, "when it is there, s", -1e6, 1e6)
+    rate_deg_s: float = number(0.5, "how fast it moves", 0, 20)
+    v_mag: float = number(2.0, "its magnitude", -10, 10)
+    at_s: float = number(0.0, "when it is there", -1e6, 1e6, formerly="time_s")
 
     name: ClassVar[str] = "debris"
     meaning: ClassVar[str] = "an object that crosses the field"
@@ -67,7 +64,7 @@ class Debris(SkyHazard):
             towards=tuple(aside(here, 90.0, generator).tolist()),
             rate_deg_s=rate,
             v_mag=strength,
-            time_s=looking.time_s,
+            at_s=looking.time_s,
         )
 
     @property
@@ -85,6 +82,6 @@ class Debris(SkyHazard):
         here, there = direction("direction", self.direction), direction("towards", self.towards)
         ahead = there - (there @ here) * here
         ahead /= np.linalg.norm(ahead)
-        angle = math.radians(self.rate_deg_s * (looking.time_s - self.time_s))
+        angle = math.radians(self.rate_deg_s * (looking.time_s - self.at_s))
         place = math.cos(angle) * here + math.sin(angle) * ahead
         return Lights(place[None], np.array([self.v_mag]))

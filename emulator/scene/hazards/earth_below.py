@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
 from cubestack.emulator.scene.hazards.contract import Depth, Looking, SkyHazard, Vectors
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number
 
 CLOUD, CLEAR = 0.6 / 0.3, 0.12 / 0.3
 """Brightness by that of the mean Earth."""
@@ -45,8 +46,8 @@ class EarthHazard(SkyHazard):
 class Clouds(EarthHazard):
     """Clouds over a sea."""
 
-    contrast: float = key(1.0, "1: white clouds on a dark sea; 0: even", 0, 1)
-    cover: float = key(0.5, "share of the surface under clouds", 0.01, 0.99)
+    contrast: float = number(1.0, "1: white clouds on a dark sea; 0: even", 0, 1)
+    cover: float = number(0.5, "share of the surface under clouds", 0.01, 0.99)
 
     name: ClassVar[str] = "clouds"
     meaning: ClassVar[str] = "clouds on the Earth below"
@@ -81,8 +82,8 @@ class Clouds(EarthHazard):
 class Terminator(EarthHazard):
     """Where the Sun stands, by how much of the Earth below is lit."""
 
-    phase_deg: float = key(90.0, "angle at the Earth from satellite to Sun; 0: full", 0, 180)
-    towards_deg: float = key(0.0, "direction of the Sun around the nadir", -360, 360)
+    phase_deg: float = number(90.0, "angle at the Earth from satellite to Sun; 0: full", 0, 180)
+    towards_deg: float = number(0.0, "direction of the Sun around the nadir", -360, 360)
 
     name: ClassVar[str] = "terminator"
     meaning: ClassVar[str] = "night on a part of the Earth below"
@@ -107,8 +108,8 @@ class Terminator(EarthHazard):
 class EarthInSunCamera(EarthHazard):
     """The Earth in the Sun camera's field, close to the Sun, or in front of it."""
 
-    above_deg: float = key(5.0, "of the Sun above the limb; below 0 it has set", -90, 120)
-    towards_deg: float = key(0.0, "direction of the Earth around the Sun", -360, 360)
+    above_deg: float = number(5.0, "of the Sun above the limb; below 0 it has set", -90, 120)
+    towards_deg: float = number(0.0, "direction of the Earth around the Sun", -360, 360)
 
     cameras: ClassVar[tuple[str, ...]] = ("sun",)
     name: ClassVar[str] = "earth-in-sun-camera"

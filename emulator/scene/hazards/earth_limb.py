@@ -35,8 +35,9 @@ from cubestack.emulator.scene.hazards.contract import (
     direction,
 )
 from cubestack.emulator.scene.hazards.glare import OUTER_RAD, aureole
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.emulator.scene.hazards.sky_glow import S10
+from cubestack.firmware_model.values import number
 
 AIRGLOW_KM, AIRGLOW_SIGMA_KM, AIRGLOW_S10 = 95.0, 4.0, 145.0
 TOP_KM = AIRGLOW_KM + 5 * AIRGLOW_SIGMA_KM
@@ -59,21 +60,21 @@ SUN_AWAY_DEG = 60.0
 class EarthLimb(SkyHazard):
     """The Earth below a satellite, in some direction."""
 
-    nadir: tuple[float, ...] = key(
-        (0.0, 0.0, -1.0),
-        "of its centre: three numbers, or right ascension and declination in deg",
-        role="direction",
+    nadir: tuple[float, ...] = heading(
+        (0.0, 0.0, -1.0), "of its centre: three numbers, or right ascension and declination in deg"
     )
-    sun: tuple[float, ...] | None = key(
-        None,
-        "direction of the Sun, likewise; without it, in the satellite's zenith",
-        role="direction",
+    sun: tuple[float, ...] | None = heading(
+        None, "direction of the Sun, likewise; without it, in the satellite's zenith"
     )
-    altitude_km: float = key(600.0, "of the satellite", 150, 40_000)
-    unevenness: float = key(0.1, "standard deviation of the surface's brightness, relative", 0, 1)
-    glow_km: float = key(7.0, "height in which the lit air's glow falls to 1/e; 0 for none", 0, 50)
-    airglow: float = key(1.0, "airglow by what is published", 0, 100)
-    scatter: float = key(0.0, "share of its light that the lens scatters", 0, 0.2)
+    altitude_km: float = number(600.0, "of the satellite", 150, 40_000)
+    unevenness: float = number(
+        0.1, "standard deviation of the surface's brightness, relative", 0, 1
+    )
+    glow_km: float = number(
+        7.0, "height in which the lit air's glow falls to 1/e; 0 for none", 0, 50
+    )
+    airglow: float = number(1.0, "airglow by what is published", 0, 100)
+    scatter: float = number(0.0, "share of its light that the lens scatters", 0, 0.2)
 
     name: ClassVar[str] = "earth-limb"
     meaning: ClassVar[str] = "the Earth's limb near the boresight or across the picture"

@@ -26,7 +26,8 @@ from cubestack.emulator.scene.hazards.contract import (
     direction,
 )
 from cubestack.emulator.scene.hazards.glare import SHARE, aureole
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.firmware_model.values import number, whole
 
 PLACES = (-1.1, 0.5)
 """Where a ghost may lie, by the Sun's angle from the axis; below 0 beyond the axis."""
@@ -41,14 +42,12 @@ REACH_SIGMAS = 4.0
 class Ghosts(SkyHazard):
     """What the lens makes of the Sun beside its image."""
 
-    sun: tuple[float, ...] | None = key(
-        None,
-        "direction of the Sun; without it, the scene's, or none where a scene has none",
-        role="direction",
+    sun: tuple[float, ...] | None = heading(
+        None, "direction of the Sun; without it, the scene's, or none where a scene has none"
     )
-    share: float = key(1e-4, "of the Sun's light that the brightest ghost has", 0, 1)
-    count: int = key(5, "ghosts, each with half of the light of the one before", 0, 50)
-    scatter: float = key(SHARE, "share of the Sun's light that the lens scatters", 0, 0.2)
+    share: float = number(1e-4, "of the Sun's light that the brightest ghost has", 0, 1)
+    count: int = whole(5, "ghosts, each with half of the light of the one before", 0, 50)
+    scatter: float = number(SHARE, "share of the Sun's light that the lens scatters", 0, 0.2)
 
     name: ClassVar[str] = "ghosts"
     meaning: ClassVar[str] = "reflections of the Sun in the lens, and its glare"
@@ -87,10 +86,10 @@ class Ghosts(SkyHazard):
         light = 10 ** (-0.4 * SUN_V)
         if self.scatter:
             total += (light * aureole(angles_rad(vectors, sun), self.scatter)).astype(np.float32)
-        for number, (centre, sigma) in enumerate(self._places(looking, sun)):
+        for count, (centre, sigma) in enumerate(self._places(looking, sun)):
             angles = angles_rad(vectors, centre)
             near = np.flatnonzero(angles < REACH_SIGMAS * sigma)
-            peak = light * self.share / 2**number / (2 * np.pi * sigma**2)
+            peak = light * self.share / 2**count / (2 * np.pi * sigma**2)
             total[near] += peak * np.exp(-0.5 * (angles[near] / sigma) ** 2)
         return total
 

@@ -21,7 +21,8 @@ from cubestack.emulator.scene.hazards.contract import (
     SkyHazard,
     Vectors,
 )
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number, whole
 
 SUN_RADIUS_RAD = math.radians(0.2666)
 SUN_SURFACE = 10 ** (-0.4 * SUN_V) / (math.pi * SUN_RADIUS_RAD**2)
@@ -36,8 +37,8 @@ LENGTHS, WIDTHS = (0.01, 0.15), (0.004, 0.02)
 class Glint(SkyHazard):
     """Bright patches that stand still in the picture."""
 
-    surface: float = key(1e-4, "brightness by that of the Sun's surface", 0, 1)
-    count: int = key(2, "patches", 0, 50)
+    surface: float = number(1e-4, "brightness by that of the Sun's surface", 0, 1)
+    count: int = whole(2, "patches", 0, 50)
 
     name: ClassVar[str] = "glint"
     meaning: ClassVar[str] = "sunlit structure at the border of the field"

@@ -1,16 +1,16 @@
 """What all hazards have in common: a name, checked keys, and a scale of strength.
 
-A hazard is a frozen dataclass. Its fields are the keys of its table ``[hazards.NAME]`` in scene
-files, each declared by :func:`key` with its meaning and range, which documents and checks read.
+A hazard is a frozen dataclass of declared values, the keys of its table ``[hazards.NAME]`` in scene
+files.
 """
 
-import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from cubestack.emulator.scene.file import SceneError
+from cubestack.firmware_model.values import REQUIRED, WHOLE, DeclaredValues, many, number, whole
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,13 @@ class Strength:
         return self.values[-1] if self.default is None else self.default
 
 
-def key(
-    default: Any, meaning: str, low: float = -math.inf, high: float = math.inf, role: str = ""
-) -> Any:
-    """A field of a hazard: what it is, with its unit, and its least and greatest value.
-
-    ``role`` is "direction" for that of something, as ``emulator.scene.file.Reader`` tells it.
-    """
-    told = {"meaning": meaning, "range": (low, high)} | ({"role": role} if role else {})
-    return field(default=default, metadata=told)
+def heading(default: Any, meaning: str) -> Any:
+    """A direction: three numbers, or right ascension and declination in degrees."""
+    return many(default, meaning, number(REQUIRED, ""), role="direction")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hazard:
+class Hazard(DeclaredValues):
     """One thing that makes pictures hard; SceneError for a value that is out of its range.
 
     Attributes:
@@ -60,20 +54,12 @@ class Hazard:
     meaning: ClassVar[str]
     strength: ClassVar[Strength]
 
-    seed: int = key(0, "of all that is drawn for it", 0, 2**63 - 1)
+    error = SceneError
+    seed: int = whole(0, "of all that is drawn for it", 0, 2**63 - 1)
 
-    def __post_init__(self) -> None:
-        """Refuse what is out of range."""
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            low, high = entry.metadata.get("range", (-math.inf, math.inf))
-            if isinstance(value, int | float) and not (
-                low <= value <= high and math.isfinite(value)
-            ):
-                raise SceneError(
-                    f"{entry.name} of the hazard {self.name} must be in {low:g}..{high:g}, "
-                    f"not {value:g}"
-                )
+    @classmethod
+    def refusal(cls, name: str, text: str) -> SceneError:
+        return SceneError(f"{name} of the hazard {cls.name} {text}")
 
     @classmethod
     def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
@@ -82,6 +68,6 @@ class Hazard:
         ``looking`` says where the camera looks, for hazards that are somewhere.
         """
         del looking
-        whole = cls.__dataclass_fields__[cls.strength.key].type in (int, int | None)
-        values: dict[str, Any] = {cls.strength.key: int(strength) if whole else strength}
+        counted = cls.declared()[cls.strength.key].kind is WHOLE
+        values: dict[str, Any] = {cls.strength.key: int(strength) if counted else strength}
         return cls(seed=int(generator.integers(2**31)), **values)

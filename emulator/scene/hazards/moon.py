@@ -27,7 +27,8 @@ from cubestack.emulator.scene.hazards.contract import (
     direction,
 )
 from cubestack.emulator.scene.hazards.glare import SHARE, aureole
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.firmware_model.values import number
 
 RADIUS_RAD = math.radians(0.2591)
 """Of the disc at the mean distance."""
@@ -43,17 +44,13 @@ LEAST_LIT = 1e-9  # of the phase integral: a new Moon has no light to spread
 class Moon(SkyHazard):
     """The Moon in some direction."""
 
-    direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0),
-        "of its centre: three numbers, or right ascension and declination in deg",
-        role="direction",
+    direction: tuple[float, ...] = heading(
+        (0.0, 0.0, 1.0), "of its centre: three numbers, or right ascension and declination in deg"
     )
-    sun: tuple[float, ...] | None = key(
-        None,
-        "direction of the Sun, likewise, which gives the phase; without it, full",
-        role="direction",
+    sun: tuple[float, ...] | None = heading(
+        None, "direction of the Sun, likewise, which gives the phase; without it, full"
     )
-    scatter: float = key(SHARE, "share of its light that the lens scatters", 0, 0.2)
+    scatter: float = number(SHARE, "share of its light that the lens scatters", 0, 0.2)
 
     name: ClassVar[str] = "moon"
     meaning: ClassVar[str] = "the Moon in the field"

@@ -20,7 +20,8 @@ from cubestack.emulator.scene.hazards.contract import (
     Vectors,
     direction,
 )
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.firmware_model.values import number
 
 #: Magnitude at 1 au from Sun and Earth, and its polynomial in the phase angle (deg).
 MAGNITUDES = {
@@ -41,15 +42,13 @@ SATURN_POLE = direction("pole", (40.589, 83.537))
 class Planets(SkyHazard):
     """All planets at a date, or one bright light somewhere."""
 
-    julian_date: float = key(
+    julian_date: float = number(
         ephemeris.NEW_YEAR_2026, "Julian date at time 0", ephemeris.FIRST_DATE, ephemeris.LAST_DATE
     )
-    direction: tuple[float, ...] | None = key(
-        None,
-        "of one planet, instead of all of the date: three numbers, or ra and dec in deg",
-        role="direction",
+    direction: tuple[float, ...] | None = heading(
+        None, "of one planet, instead of all of the date: three numbers, or ra and dec in deg"
     )
-    v_mag: float = key(-2.5, "magnitude of that one", -5.0, 10.0)
+    v_mag: float = number(-2.5, "magnitude of that one", -5.0, 10.0)
 
     name: ClassVar[str] = "planets"
     meaning: ClassVar[str] = "planets among the stars"

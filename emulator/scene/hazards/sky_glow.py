@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hazards import ephemeris
 from cubestack.emulator.scene.hazards.contract import Brightness, Looking, SkyHazard, Vectors
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number
 
 S10 = 1e-4 * (180 / math.pi) ** 2
 """In V = 0 stars a steradian."""
@@ -72,14 +73,14 @@ TO_GALACTIC = np.array(
 class SkyGlow(SkyHazard):
     """The sky's own light, in ICRS axes."""
 
-    julian_date: float = key(
+    julian_date: float = number(
         ephemeris.NEW_YEAR_2026,
         "Julian date, which tells where the Sun is",
         ephemeris.FIRST_DATE,
         ephemeris.LAST_DATE,
     )
-    zodiacal: float = key(1.0, "zodiacal light by what is published", 0, 100)
-    milky_way: float = key(1.0, "Milky Way by what is published", 0, 100)
+    zodiacal: float = number(1.0, "zodiacal light by what is published", 0, 100)
+    milky_way: float = number(1.0, "Milky Way by what is published", 0, 100)
 
     name: ClassVar[str] = "sky-glow"
     meaning: ClassVar[str] = "zodiacal light and Milky Way"

@@ -27,7 +27,8 @@ from cubestack.emulator.scene.hazards.contract import (
     angles_rad,
     direction,
 )
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength, heading
+from cubestack.firmware_model.values import number
 
 REFERENCE_DEG = 45.0
 MOST = 1.0
@@ -38,17 +39,15 @@ MOST = 1.0
 class SunGlare(SkyHazard):
     """A source beside the field."""
 
-    direction: tuple[float, ...] = key(
-        (0.0, 0.0, 1.0),
-        "of the source: three numbers, or right ascension and declination in deg",
-        role="direction",
+    direction: tuple[float, ...] = heading(
+        (0.0, 0.0, 1.0), "of the source: three numbers, or right ascension and declination in deg"
     )
-    v_mag: float = key(
+    v_mag: float = number(
         SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73", -30, 30
     )
-    transmittance: float = key(1e-7, "brightness a steradian at 45 deg, by its light", 0, 1)
-    decade_deg: float = key(15.0, "angle in which that falls to a tenth, deg", 1, 180)
-    slope_deg: float = key(30.0, "angle across the picture in which it falls to 1/e, deg", 1, 1e6)
+    transmittance: float = number(1e-7, "brightness a steradian at 45 deg, by its light", 0, 1)
+    decade_deg: float = number(15.0, "angle in which that falls to a tenth", 1, 180)
+    slope_deg: float = number(30.0, "angle across the picture in which it falls to 1/e", 1, 1e6)
 
     name: ClassVar[str] = "sun-glare"
     meaning: ClassVar[str] = "stray light of the Sun beside the field"

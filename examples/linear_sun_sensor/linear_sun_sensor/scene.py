@@ -2,59 +2,46 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from cubestack.emulator.scene import file
-from cubestack.emulator.scene.file import SceneError
+from cubestack.emulator.scene.file import SceneError, read_scene_file
 from cubestack.emulator.scene.form import Field, SceneForm, Sight, differing
 from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG, Body
-from cubestack.emulator.scene.keys import declared
+from cubestack.firmware_model.values import (
+    DeclaredValues,
+    described,
+    flag,
+    number,
+    read_table,
+    whole,
+)
 
 
 @dataclass(frozen=True)
-class SlitScene:
-    """The Sun in the plane of boresight and array.
+class SlitScene(DeclaredValues):
+    """The Sun in the plane of boresight and array; SceneError for values out of their limits."""
 
-    Attributes:
-        sun_deg: from the boresight, -90 to 90, positive towards the last pixel.
-        brightness: of the Sun at 1 au, 0 to 100.
-        noise: whether pixels have any.
-        seed: of it.
-    """
+    error = SceneError
 
-    LIMITS: ClassVar = {"sun_deg": (-90, 90), "brightness": (0, 100), "seed": (0, 2**32)}
-
-    sun_deg: float = 12.0
-    brightness: float = 1.0
-    noise: bool = True
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Refuse what can not be; SceneError names it."""
-        for name, (low, high) in self.LIMITS.items():
-            if not low <= getattr(self, name) <= high:
-                raise SceneError(f"{name} must be {low} to {high}, not {getattr(self, name):g}")
-
-
-_KEYS = {
-    "sun_deg": file.number.told("from the boresight, in the plane of the array"),
-    "brightness": file.number.told("of the Sun at 1 au"),
-    "noise": file.flag.told("whether pixels have any"),
-    "seed": file.whole.told("of the noise"),
-}
+    sun_deg: float = number(
+        12.0, "from the boresight, in the plane of the array, positive to the last pixel", -90, 90
+    )
+    brightness: float = number(1.0, "of the Sun at 1 au", 0, 100)
+    noise: bool = flag(True, "whether pixels have any")
+    seed: int = whole(0, "of the noise", 0, 2**32)
 
 
 def load_scene(path: Path) -> SlitScene:
     """The scene that a TOML file describes; SceneError names the key that is wrong."""
-    kinds = {"sun-slit": lambda table: SlitScene(**file.read_table(table, _KEYS))}
-    return file.read_scene_file(path, kinds, '"sun-slit"')
+    kinds = {"sun-slit": lambda table: SlitScene(**read_table(table, SlitScene.declared()))}
+    return read_scene_file(path, kinds, '"sun-slit"')
 
 
 def scene_form() -> SceneForm[SlitScene]:
     """For tools: the keys, the table of a scene, and where it is on a map of the sky."""
-    keys = {"sun-slit": declared(_KEYS, SlitScene)}
+    keys = {"sun-slit": described(SlitScene.declared())}
     return SceneForm(keys, lambda board: board.scene, _table, _sight)
 
 

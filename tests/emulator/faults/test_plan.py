@@ -61,7 +61,7 @@ def test_old_names_of_times_still_work_with_a_warning(recwarn: pytest.WarningsRe
         ("[[fault]]", "fault 1: needs the key kind"),
         ('[[fault]]\nkind = "ack-lost"\n[[fault]]\nkind = 3', "fault 2: kind must be text"),
         ('[[fault]]\nkind = "smoke"', "fault 1: no fault 'smoke'; there are uart-drop"),
-        ('[[fault]]\nkind = "uart-drop"\nat_s = "noon"', "fault 1: at_s must be a number, not 'noon'"),
+        ('[[fault]]\nkind = "uart-drop"\nat_s = "noon"', "at_s must be a number, not 'noon'"),
         ('[[fault]]\nkind = "uart-drop"\nrate = 7', "uart-drop: rate must be 0 to 1, not 7"),
         ('[[fault]]\nkind = "ack-lost"\nrate = 1', "no parameter 'rate'; it has no parameters"),
     ],

@@ -14,7 +14,7 @@ from cubestack.emulator.scene.toml_text import toml_text
         {"kind": "sky", "ra_deg": 83.8, "count": -3, "noise": False, "list": [1, 2.5]},
         {"small": 1e-7, "large": 1e300, "pairs": [[40.0, 0.1], [70.0, 0.4]], "none": []},
         {"atmosphere": {"latitude_deg": -33.9}, "after": 1},
-        {"poses": [{"start_s": 1.0, "rate_deg_s": [0.0, 1.0, 0.0]}, {"start_s": 2.0}]},
+        {"poses": [{"at_s": 1.0, "rate_deg_s": [0.0, 1.0, 0.0]}, {"at_s": 2.0}]},
         {"hazards": {"sun-glare": [{"direction": [1.0, 2.0]}], "moon": {"scatter": 0.1}}},
         {"empty": {}, "key with blanks": {'"quoted"': 1}, "line\nend": 2},
         {"text": 'quotes " and \\ and \x00 \x7f \n é 😀 ]\n[hazards]'},

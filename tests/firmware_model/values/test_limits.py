@@ -2,12 +2,15 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cubestack.emulator.camera.mlx75412.lens import LENS
+from cubestack.emulator.scene.hazards import Hazard
 from cubestack.firmware_model.values import (
     FLAG,
     NUMBER,
@@ -20,14 +23,25 @@ from cubestack.firmware_model.values import (
 ROOT = Path(__file__).parents[3]
 PACKAGES = ("firmware_model", "emulator", "host")
 
+SKY, SUN = {"quaternion": (0.0, 0.0, 0.0, 1.0)}, {"boresight": (0.0, 0.0, 1.0)}
 #: What classes without a default for every value are made with here.
-NEEDED: dict[str, dict[str, Any]] = {}
+NEEDED: dict[str, dict[str, Any]] = {
+    "Atmosphere": {"latitude_deg": 0.0, "sidereal_deg": 0.0},
+    "Mounting": SUN,
+    "Optics": {one.name: getattr(LENS, one.name) for one in fields(LENS)},
+    "PictureScene": {"file": ROOT / "none.png"},
+    "Pose": SKY,
+    "Reflection": {"camera": 0, "alpha_deg": 0, "beta_deg": 0, "radius_px": 1, "level": 1},
+    "SkyCondition": {"optics": LENS},
+    "SkyScene": SKY,
+}
 
 
 def owners(kind: type[DeclaredValues] = DeclaredValues) -> Iterator[type[Any]]:
     for one in kind.__subclasses__():
         yield from owners(one)
-        if one.__module__.startswith("cubestack.") and one._declared:
+        is_base = issubclass(one, Hazard) and not hasattr(one, "name")
+        if one.__module__.startswith("cubestack.") and one._declared and not is_base:
             yield one
 
 

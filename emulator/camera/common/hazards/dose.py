@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.dark import doubled
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, SensorHazard
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number
 
 SOURCES_PER_UM3 = 1 / 33_000
 """In each um3 of depleted silicon, for 1 TeV/g of displacement damage (published, rounded)."""
@@ -48,7 +49,7 @@ class Dose(SensorHazard):
     meaning: ClassVar[str] = "hot pixels and dark current after a total dose, by temperature"
     strength: ClassVar[Strength] = Strength("krad", "krad", (0, 0.3, 1, 3, 5, 10), 5)
 
-    krad: float = key(5.0, "total ionising dose in silicon, krad", 0, 30)
+    krad: float = number(5.0, "total ionising dose in silicon", 0, 30, "krad")
 
     def dark_rise(self) -> float:
         """The mean rise, which the sensor's dark rows share."""

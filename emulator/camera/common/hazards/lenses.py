@@ -9,7 +9,8 @@ from numpy.polynomial.legendre import leg2poly
 
 from cubestack.emulator.camera.common.hazards.contract import Lens, SensorHazard
 from cubestack.emulator.camera.common.residual import Residual
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number
 
 CALIBRATED_C = 20.0
 """Temperature at which lenses are in focus and as long as the firmware takes them to be."""
@@ -31,8 +32,8 @@ class Defocus(SensorHazard):
     meaning: ClassVar[str] = "a lens out of focus, by temperature or by the spot's width"
     strength: ClassVar[Strength] = Strength("sigma_px", "px", (1, 1.5, 2, 3, 4, 6), 3)
 
-    sigma_px: float | None = key(None, "standard deviation of the whole spot, px", 0.3, 20)
-    um_per_k: float = key(0.5, "else: shift of the focus, um for each K away from 20 C", -50, 50)
+    sigma_px: float | None = number(None, "standard deviation of the whole spot", 0.3, 20)
+    um_per_k: float = number(0.5, "else: shift of the focus, um for each K away from 20 C", -50, 50)
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
         """The lens with another spot."""
@@ -50,8 +51,8 @@ class FocalLength(SensorHazard):
     meaning: ClassVar[str] = "another focal length than calibrated"
     strength: ClassVar[Strength] = Strength("percent", "%", (0, 0.1, 0.3, 0.5, 1, 3), 1)
 
-    percent: float = key(0.0, "longer at 20 C, per cent", -10, 10)
-    ppm_per_k: float = key(20.0, "longer for each K above 20 C, millionths", -500, 500)
+    percent: float = number(0.0, "longer at 20 C, per cent", -10, 10)
+    ppm_per_k: float = number(20.0, "longer for each K above 20 C, millionths", -500, 500)
 
     @classmethod
     def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
@@ -78,7 +79,7 @@ class LensResiduals(SensorHazard):
     meaning: ClassVar[str] = "a smooth distortion that no calibration knows"
     strength: ClassVar[Strength] = Strength("rms_px", "px", (0, 0.1, 0.2, 0.5, 1, 2), 0.5)
 
-    rms_px: float = key(0.3, "root of the mean squared displacement over the sensor, px", 0, 10)
+    rms_px: float = number(0.3, "root of the mean squared displacement over the sensor", 0, 10)
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
         """The lens that displaces."""

@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from cubestack.emulator.camera.common.hazards.contract import Field, SensorHazard
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number, whole
 
 DUST_PX = (3.0, 15.0)
 """Radii of the shadows of dust, a few pixels before the sensor (chosen)."""
@@ -24,7 +25,7 @@ class HotPixels(SensorHazard):
     meaning: ClassVar[str] = "pixels that radiation has made hot, by their number"
     strength: ClassVar[Strength] = Strength("count", "", (0, 300, 1000, 3000, 10_000, 20_000))
 
-    count: int = key(1000, "number of hot pixels beside those of the key `hot_pixels`", 0, 75_000)
+    count: int = whole(1000, "number of hot pixels beside those of the key `hot_pixels`", 0, 75_000)
 
     def hot(self) -> int:
         """All of them."""
@@ -42,9 +43,11 @@ class Response(SensorHazard):
     meaning: ClassVar[str] = "uneven response of pixels and columns, shadows of dust"
     strength: ClassVar[Strength] = Strength("percent", "%", (0, 0.5, 1, 2, 4, 8), 4)
 
-    percent: float = key(1.0, "standard deviation of the pixels' gain, per cent", 0, 30)
-    columns_percent: float | None = key(None, "of the columns' gain; else half of `percent`", 0, 30)
-    dust: int = key(10, "number of shadows, each up to five times `percent` deep", 0, 1000)
+    percent: float = number(1.0, "standard deviation of the pixels' gain, per cent", 0, 30)
+    columns_percent: float | None = number(
+        None, "of the columns' gain; else half of `percent`", 0, 30
+    )
+    dust: int = whole(10, "number of shadows, each up to five times `percent` deep", 0, 1000)
 
     def response(self, shape: tuple[int, int]) -> Field | None:
         """Gain (rows, columns), 1 in the mean, at least 0."""

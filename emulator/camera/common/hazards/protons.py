@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, SensorHazard
-from cubestack.emulator.scene.file import SceneError
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import choice, number, whole
 
 Numbers = NDArray[np.float64]
 
@@ -79,15 +79,11 @@ class Protons(SensorHazard):
     meaning: ClassVar[str] = "tracks of protons, others in each exposure"
     strength: ClassVar[Strength] = Strength("hits", "a frame", (0, 3, 10, 30, 100, 300), 100)
 
-    orbit: str = key("anomaly", 'where: "quiet", "anomaly" (South Atlantic) or "solar" (event)')
-    hits: int | None = key(None, "tracks a frame; else by orbit, area and exposure", 0, 20_000)
-    depth_um: float = key(8.0, "of the layer that gathers charge, um", 1, 50)
-
-    def __post_init__(self) -> None:
-        """Refuse an orbit that is not known."""
-        super().__post_init__()
-        if self.orbit not in ORBITS:
-            raise SceneError(f"orbit must be one of {list(ORBITS)}, not {self.orbit!r}")
+    orbit: str = choice(
+        "anomaly", "quiet, over the South Atlantic anomaly, or in a solar event", tuple(ORBITS)
+    )
+    hits: int | None = whole(None, "tracks a frame; else by orbit, area and exposure", 0, 20_000)
+    depth_um: float = number(8.0, "of the layer that gathers charge", 1, 50)
 
     def mean_hits(self, exposure: Exposure) -> float:
         """Expected number in one frame."""

@@ -11,7 +11,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, SensorHazard
-from cubestack.emulator.scene.hazards.hazard import Strength, key
+from cubestack.emulator.scene.hazards.hazard import Strength
+from cubestack.firmware_model.values import number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +23,7 @@ class Gradient(SensorHazard):
     meaning: ClassVar[str] = "a slope of stray light across the picture"
     strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 60), 60)
 
-    counts: float = key(30.0, "grey values at its bright end; 0 at the other one", 0, 255)
+    counts: float = number(30.0, "grey values at its bright end; 0 at the other one", 0, 255)
 
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
         """The slope's light."""
@@ -40,8 +41,8 @@ class Background(SensorHazard):
     meaning: ClassVar[str] = "an even level of stray light, and noise"
     strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 80), 20)
 
-    counts: float = key(20.0, "grey values that it adds", 0, 255)
-    sigma: float = key(4.0, "standard deviation of further noise, grey values", 0, 100)
+    counts: float = number(20.0, "grey values that it adds", 0, 255)
+    sigma: float = number(4.0, "standard deviation of further noise, grey values", 0, 100)
 
     @classmethod
     def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:

@@ -177,7 +177,7 @@ def test_static_scene_does_not_depend_on_time() -> None:
 
 
 def test_poses_follow_each_other() -> None:
-    poses = (Pose(ORION.quaternion, start_s=5.0),)
+    poses = (Pose(ORION.quaternion, at_s=5.0),)
     scene = replace(SkyScene.pointing(10.0, 20.0), poses=poses, mag_limit=3.8)
     late = replace(LONG, readout_ps=6 * 10**12)
     np.testing.assert_allclose(light(scene, late), light(ORION, late), atol=1e-2)

@@ -137,10 +137,6 @@ def test_vignetting() -> None:
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"psf_sigma_px": 0}, "psf_sigma_px must be above 0, not 0"),
-        *(({name: 0}, f"{name} must be above 0") for name in ("columns", "rows", "aperture_mm")),
-        ({"field_stop_deg": 0}, "field_stop_deg must be above 0"),
-        ({"psf_sigma_px": 21}, "psf_sigma_px must be at most 20, not 21"),
         ({"k1": -1.5}, "folds the picture within the sensor"),
         ({"k1": 1.5, "distortion": Distortion.TOOLBOX}, "folds the picture within the sensor"),
     ],

@@ -47,7 +47,7 @@ temperature_c = -10
 psf_sigma_px = 1.2
 distortion = "toolbox"
 [[poses]]
-start_s = 10
+at_s = 10
 quaternion = [0, 0, 0, 2]
 """
 
@@ -107,32 +107,26 @@ PICTURE = 'kind = "picture"\nfile = "x"\n'
         ('kind = "sky"\nra_deg = 1', "needs both ra_deg and dec_deg"),
         (f"{SKY}quaternion = [0, 0, 0, 1]", "either quaternion, or ra_deg"),
         (f"{SKY}magnitude = 3", "unknown key 'magnitude'; allowed are ra_deg, dec"),
-        (f"{SKY}start_s = 3", "unknown key 'start_s'"),
+        (f"{SKY}at_s = 3", "unknown key 'at_s'"),
         (f"{SKY}noise = 1", "noise must be true or false, not 1"),
         (f"{SKY}seed = 1.5", "seed must be a whole number, not 1.5"),
-        (f"{SKY}seed = -1", "seed must not be negative, not -1"),
         (f'{SKY}epoch = "now"', "epoch must be a number, not 'now'"),
         (f"{SKY}epoch = true", "epoch must be a number, not True"),
         (f"{SKY}rate_deg_s = [1, 2]", "rate_deg_s must be a list of 3 numbers"),
         (f"{SKY}rate_deg_s = [1, 2, nan]", "rate_deg_s must be a number, not nan"),
-        (f"{SKY}rate_deg_s = [1, 2, -101]", "in deg/s, at most 100 each, not (1.0,"),
         (f"{SKY}mag_limit = inf", "mag_limit must be a number, not inf"),
         (f"{SKY}epoch = 1{'0' * 400}", "epoch must be a number, not 1000"),
         (f"{SKY}false_star_mag = [4, 2]", "must not fall, not from 4 to 2"),
         (f"{SKY}hot_pixels = 524289", "hot_pixels must be at most 524288, not 524289"),
-        (f"{SKY}hot_pixels = -1", "hot_pixels must not be negative"),
-        (f"{SKY}temperature_c = 300", "temperature_c must be in -60..125, not 300"),
         (f"{SKY}optics = 1", "optics must be a table, not 1"),
         (f"{SKY}[optics]\nf = 1", "optics: unknown key 'f'; allowed are focal_leng"),
-        (f"{SKY}[optics]\nfx = 0", "optics: fx must be above 0, not 0.0"),
-        (f'{SKY}[optics]\ndistortion = "no"', "one of ['inverse', 'toolbox']"),
+        (f'{SKY}[optics]\ndistortion = "no"', "one of inverse, toolbox, not 'no'"),
         (f"{SKY}poses = 3", "poses must be tables, each under [[poses]]"),
         (f"{SKY}[[poses]]\nra_deg = 1", "needs both ra_deg and dec_deg"),
-        (f"{SKY}[[poses]]\n{POSE}start_s = -1", "poses must start one after the oth"),
+        (f"{SKY}[[poses]]\n{POSE}at_s = -1", "poses must start one after the oth"),
         ('kind = "sky"\nquaternion = [0, 0, 0, 0]', "a quaternion needs a finite length above 0"),
-        ('kind = "picture"', "a picture needs the key file"),
+        ('kind = "picture"', "needs the key file"),
         (f"{PICTURE}quaternion = [0, 0, 0, 0]", "a quaternion needs a finite length above 0"),
-        (f"{PICTURE}temperature_c = 126", "temperature_c must be in -60..125, not 126"),
         ('kind = "picture"\nfile = 1', "file must be text, not 1"),
         ('kind = "picture"\nfile = "none.png"', "none.png can not be read: No such file"),
         (f"{PICTURE}ra_deg = 1", "unknown key 'ra_deg'; allowed are file, crop"),
@@ -188,9 +182,8 @@ def test_a_night_on_the_ground(tmp_path: Path) -> None:
         ),
         ("sidereal_deg", "longitude_deg", "atmosphere: needs either sidereal_deg, or utc"),
         ("latitude_deg = -33.9", "", "atmosphere: needs the key latitude_deg"),
-        ("seeing_arcsec = 3", "seeing_arcsec = 30", "atmosphere: seeing_arcsec must be in 0..20"),
         ('"earth"', '"earth"\nrate_deg_s = [0, 1, 0]', 'mount = "earth" needs one pose'),
-        ('"earth"', '"moon"', "mount must be one of ['sky', 'earth'], not 'moon'"),
+        ('"earth"', '"moon"', "mount must be one of sky, earth, not 'moon'"),
         ("sidereal_deg = 200", 'utc = "now"\nlongitude_deg = 0', "utc must be a date and time"),
     ],
 )
@@ -200,7 +193,7 @@ def test_nights_that_can_not_be(tmp_path: Path, old: str, new: str, wrong: str) 
 
 def test_a_pose_without_attitude_goes_on(tmp_path: Path) -> None:
     turns = "".join(
-        f"[[poses]]\nstart_s = {start}\nrate_deg_s = {rate}\n"
+        f"[[poses]]\nat_s = {start}\nrate_deg_s = {rate}\n"
         for start, rate in ((2, [0, 5, 0]), (4, [0, 0, 0]), (6, [0, 0, 1]))
     )
     scene = load(save(tmp_path, f'kind = "sky"\nra_deg = 10\ndec_deg = 0\n{turns}')).scene
@@ -261,10 +254,7 @@ def test_hazards_go_to_scene_and_condition(tmp_path: Path) -> None:
     [
         ("[hazards.moo]", "hazards: unknown key 'moo'; allowed are moon, "),
         ("[hazards.moon]\nphase = 1", "hazards: moon: unknown key 'phase'; allowed are "),
-        (
-            "[hazards.moon]\nscatter = 2",
-            "hazards: moon: scatter of the hazard moon must be in 0..0",
-        ),
+        ("[hazards.moon]\nscatter = 2", "hazards: moon: scatter must be 0 to 0.2, not 2"),
         ("[hazards.moon]\nsun = 2", "hazards: moon: sun must be a list, not 2"),
         ("[hazards]\nmoon = 2", "hazards: moon must be a table, not 2"),
     ],

@@ -67,7 +67,7 @@ def test_a_lens_from_a_file(tmp_path: Path) -> None:
     assert condition.sun_lens == LensError((1.0, -2.0), ((40.0, 0.5), (60.0, 1.0)))
     assert condition.nadir_lens is None
     for wrong, complaint in [
-        ("radial_deg = 3", "sun_lens: radial_deg must be pairs"),
+        ("radial_deg = 3", "sun_lens: radial_deg must be a list, not 3"),
         ("radial_deg = [[1]]", "sun_lens: radial_deg must be a list of 2 numbers"),
         ("radial_deg = [[99, 1]]", "sun_lens: radial_deg must have rising field angles"),
         ("colour = 1", "unknown key 'colour'; allowed are centre_px"),
@@ -92,15 +92,11 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
         ("", 'kind must be "earth-sun" or "ball" for a sun and nadir sensor, not None'),
         ('kind = "sky"', "not 'sky'"),
         ("kind", "is no TOML file"),
-        (f"{KIND}height = 3", "unknown key 'height'; allowed are nadir, nadir_deg"),
+        (f"{KIND}height = 3", "unknown key 'height'; allowed are nadir, sun, moon"),
         (f"{KIND}sun = [1, 0, 0]\nsun_deg = [1, 0]", "give either sun or sun_deg, not both"),
         (f"{KIND}nadir = [0, 0, 0]", "nadir must be 3 numbers, not all 0, not (0.0, 0.0, 0.0)"),
         (f"{KIND}moon = [0, 0, nan]", "moon must be a number, not nan"),
         (f"{KIND}nadir_deg = [1]", "nadir_deg must be a list of 2 numbers, not [1]"),
-        (f"{KIND}altitude_km = 0", "altitude_km must be above 0, not 0.0"),
-        (f"{KIND}bloom_px = -1", "bloom_px must be above 0, not -1.0"),
-        (f"{KIND}unevenness = -0.1", "unevenness must be 0 to 10, not -0.1"),
-        (f"{KIND}hot_pairs = -3", "hot_pairs must not be negative, not -3"),
         (f"{KIND}seed = 0.5", "seed must be a whole number, not 0.5"),
         (f"{KIND}noise = 0", "noise must be true or false, not 0"),
         (f"{KIND}rate_deg_s = [inf, 0, 0]", "rate_deg_s must be a number, not inf"),
@@ -109,10 +105,9 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
         (f"{KIND}[sun_camera]\nboresight = [1, 0, 0]", "sun_camera: right must not be along the"),
         (f"{KIND}[sun_camera]\nup = 1", "sun_camera: unknown key 'up'; allowed are boresight"),
         (f"{KIND}reflections = 1", "reflections must be tables, each under [[reflections]]"),
-        (f'{KIND}[[reflections]]\ncamera = "star"', "camera must be one of ['sun', 'nadir']"),
-        (f'{KIND}[[reflections]]\ncamera = "sun"', "needs the keys at_deg, level, radius_px"),
+        (f'{KIND}[[reflections]]\ncamera = "star"', "camera must be one of sun, nadir, not"),
+        (f'{KIND}[[reflections]]\ncamera = "sun"', "needs the keys radius_px, level, at_"),
         (f"{DISC}at_deg = [90, 90]\nlevel = 1", "within 95.0 deg of the boresight, not 90.0, 90.0"),
-        (f"{DISC}at_deg = [9, 9]\nlevel = 0", "level must be above 0, not 0.0"),
     ],
 )
 def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
@@ -128,7 +123,7 @@ def test_the_ball_of_the_bench(tmp_path: Path) -> None:
     assert view.condition.nadir_lens == LensError(centre_px=(1.0, 0.0))
     assert (view.condition.noise, view.condition.seed, view.scene.seed) == (False, 4, 4)
     for wrong, complaint in (
-        ("radius_mm = 0", "radius_mm and distance_mm must be above 0"),
+        ("radius_mm = 0", "radius_mm must be above 0 mm, not 0"),
         ("offset_mm = [0, 0, 40]", "offset_mm must leave the camera outside of the ball"),
         ("nadir = [0, 0, 1]", "unknown key 'nadir'; allowed are angle_deg"),
     ):

@@ -20,7 +20,7 @@ def streak(rate_deg_s: float) -> tuple[np.ndarray, Debris]:
         towards=tuple(NOW.axes[0].tolist()),
         rate_deg_s=rate_deg_s,
         v_mag=0.0,
-        time_s=MIDDLE.time_s,
+        at_s=MIDDLE.time_s,
     )
     scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(hazard,))
     return star_light(scene, LENS, SHUTTER), hazard

@@ -5,9 +5,10 @@ import pytest
 
 from cubestack.emulator.camera.common.exposure import looking, star_light
 from cubestack.emulator.camera.common.optics import Optics
+from cubestack.emulator.camera.common.scene_file import hazard_tables
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
-from cubestack.emulator.scene.file import SceneError, made_of, readers_of
+from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import SKY_HAZARDS, SkyHazard
 from cubestack.emulator.scene.sky import SkyScene
 from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
@@ -21,7 +22,6 @@ def test_says_what_it_is(kind: type[SkyHazard]) -> None:
     assert 4 < len(kind.meaning) < 70
     assert 5 <= len(kind.strength.values) <= 7
     assert kind.strength.usual in kind.strength.values
-    assert all("meaning" in entry.metadata for entry in fields(kind))
     kind()  # every key has a default
 
 
@@ -64,14 +64,14 @@ def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
     hazard = kind.placed(kind.strength.usual, NOW, np.random.default_rng(4))
-    assert set(readers_of(kind)) == {entry.name for entry in fields(kind)}
+    assert set(kind.declared()) == {entry.name for entry in fields(kind)}
     values = {entry.name: getattr(hazard, entry.name) for entry in fields(kind)}
     table = {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in values.items()
         if value is not None
     }
-    assert made_of(SKY_HAZARDS)({kind.name: table}) == (hazard,)
+    assert hazard_tables(SKY_HAZARDS).read({kind.name: table}) == (hazard,)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)

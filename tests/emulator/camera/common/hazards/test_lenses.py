@@ -91,18 +91,3 @@ def test_what_the_lens_can_not_image_stops_no_other_star() -> None:
     residuals = lens(LensResiduals(rms_px=2.0, seed=1)).residuals
     with_nan = np.concatenate([[[np.nan, np.nan]], GRID])
     np.testing.assert_array_equal(displaced(with_nan, residuals)[1:], displaced(GRID, residuals))
-
-
-@pytest.mark.parametrize(
-    ("hazard", "values", "refused"),
-    [
-        (Defocus, {"sigma_px": 21.0}, r"sigma_px of the hazard defocus must be in 0.3..20"),
-        (FocalLength, {"percent": 11.0}, r"percent of the hazard focal-length must be in -10..10"),
-        (LensResiduals, {"rms_px": -0.1}, r"rms_px of the hazard lens-residuals must be in 0..10"),
-    ],
-)
-def test_what_can_not_be_is_refused(
-    hazard: type[SensorHazard], values: dict[str, float], refused: str
-) -> None:
-    with pytest.raises(SceneError, match=refused):
-        hazard(**values)  # type: ignore[arg-type]

@@ -11,7 +11,6 @@ from cubestack.emulator.camera.common.hazards.protons import (
     lost_kev,
     mean_loss_kev,
 )
-from cubestack.emulator.scene.file import SceneError
 
 CUBESTAR = Exposure((512, 1024), 5.6, 0.3856, 20.0, 36.48)
 ONE = np.ones(1)
@@ -112,16 +111,3 @@ def test_the_same_frame_has_the_same_tracks_and_another_has_others() -> None:
     other = charge(Protons(hits=100), 2)
     assert np.sum((first > 0) & (other > 0)) < 0.05 * np.sum(first > 0)
     assert Protons(hits=0).charge(CUBESTAR, drawn(0)) is None
-
-
-@pytest.mark.parametrize(
-    ("values", "refused"),
-    [
-        ({"orbit": "moon"}, r"orbit must be one of \['quiet', 'anomaly', 'solar'\], not 'moon'"),
-        ({"hits": -1}, "hits of the hazard protons must be in 0..20000, not -1"),
-        ({"depth_um": 0.0}, "depth_um of the hazard protons must be in 1..50, not 0"),
-    ],
-)
-def test_what_can_not_be_is_refused(values: dict[str, object], refused: str) -> None:
-    with pytest.raises(SceneError, match=refused):
-        Protons(**values)  # type: ignore[arg-type]
