@@ -2,7 +2,6 @@
 
 import math
 import operator
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -43,8 +42,8 @@ class ValueKind:
     Attributes:
         name: in JSON.
         what: for error texts: "a number".
-        read: converts what TOML, JSON or a program gave; TypeError or ValueError for another type.
-        parse: converts a text for ``read``; ValueError or LookupError where it can not.
+        read: converts what TOML, JSON or a program gave; raises one of ``_OTHER`` for another type.
+        parse: converts a text for ``read``; raises the same.
     """
 
     name: str
@@ -53,11 +52,12 @@ class ValueKind:
     parse: Callable[[str], Any]
 
 
+_OTHER = (ArithmeticError, LookupError, TypeError, ValueError)
+"""What reading a value of another type raises."""
+
+
 def _number(given: Any) -> float:
-    # No infinity, no not-a-number, and no whole number that no float holds.
-    if isinstance(given, bool) or not (
-        isinstance(given, Real) and abs(given) <= sys.float_info.max
-    ):
+    if isinstance(given, bool) or not isinstance(given, Real) or not math.isfinite(given):
         raise TypeError
     return float(given)
 
@@ -187,7 +187,7 @@ class Declaration:
             if self.choices:
                 return self.choice_values[given]
             value = self.kind.read(given)
-        except (LookupError, TypeError, ValueError):
+        except _OTHER:
             raise self.error(given) from None
         if not self.fits(value):
             raise self.error(given, self.limits)
@@ -197,7 +197,7 @@ class Declaration:
         """The value of a text, as on a command line; ValueError says what it must be."""
         try:
             parsed = given if self.choices else self.kind.parse(given)
-        except (LookupError, ValueError):
+        except _OTHER:
             raise self.error(given) from None
         return self.read(parsed)
 

@@ -92,11 +92,11 @@ class TableDeclaration(Declaration):
 def table(
     default: Any,
     meaning: str,
-    keys: Mapping[str, Declaration] | type[Any],
+    keys: Any,
     make: Callable[[dict[str, Any]], Any] | None = None,
     **more: Any,
 ) -> Any:
-    """A table with ``keys``, or one that makes a class of `DeclaredValues`."""
+    """A table with ``keys``, or one that makes an object of ``keys``, a class of declared values."""
     if isinstance(keys, type):
         owner: Any = keys
         keys, make = owner.declared(), make or (lambda values: owner(**values))

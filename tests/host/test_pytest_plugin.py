@@ -79,7 +79,7 @@ TAKES = f"marker cubestack takes {', '.join(KEYS)}, layout, firmware, semihostin
 WRONG_MARKERS = {
     "(3)": TAKES,
     "(sead=3)": TAKES,
-    "(faults='seed = -1')": "seed must be a whole number from 0, not -1",
+    "(faults='seed = -1')": "seed must be at least 0, not -1",
     "(layout='2')": "layout is an option of cubestar, not of aramis",
     "(profile='best')": "profile of aramis must be one of published, extended, not 'best'",
     "(faults='none.toml')": "none.toml: No such file or directory",

@@ -118,11 +118,11 @@ def test_keys_alone_put_the_pointing_and_the_emulation_sees_it(page: Any) -> Non
 @pytest.mark.slow
 def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
     fill(page, "ra_deg", "400")
-    told(page, "scene: ra_deg must be -360 to 360, not 400")
+    told(page, "scene: ra_deg must be -360 to 360 deg, not 400")
     field = page.locator(f"#scene-keys {VALUE.format('ra_deg')}").first
     assert field.get_attribute("aria-invalid") == "true"
     page.click("#scene-apply")
-    page.wait_for_selector("#lines li.bad >> text=scene: ra_deg must be -360 to 360, not 400")
+    page.wait_for_selector("#lines li.bad >> text=scene: ra_deg must be -360 to 360 deg, not 400")
     page.click("#scene-present")
     told(page, "/^right ascension/")
     assert field.get_attribute("aria-invalid") is None
@@ -139,7 +139,7 @@ def test_fields_are_those_of_the_readers(page: Any) -> None:
     kinds = page.locator("[aria-label='kind of hazards'] option").all_text_contents()
     assert {"moon", "earth-limb", "hot-pixels"} <= set(kinds)
     page.select_option("#scene-kind", "picture")
-    told(page, "a picture needs the key file")
+    told(page, "needs the key file")
     assert page.locator("#scene-keys label:has-text('exposure_ms')").count() == 1
 
 

@@ -71,7 +71,7 @@ def test_another_scene_is_looked_at_and_not_shown(controlled: Controlled) -> Non
         ({"kind": "picture", "file": "/none.png"}, "scene: none.png can not be read"),
         (
             {"kind": "sky", "ra_deg": 1, "dec_deg": 0, "hazards": {"moon": [{"scatter": 1}]}},
-            "scatter of the hazard moon must be in 0..0.2",
+            "scatter must be 0 to 0.2, not 1",
         ),
     ],
 )
