@@ -96,7 +96,7 @@ def table(
     make: Callable[[dict[str, Any]], Any] | None = None,
     **more: Any,
 ) -> Any:
-    """A table with ``keys``, or one that makes an object of ``keys``, a class of declared values."""
+    """A table with ``keys``, or one that makes ``keys``, a class of `DeclaredValues`."""
     if isinstance(keys, type):
         owner: Any = keys
         keys, make = owner.declared(), make or (lambda values: owner(**values))
