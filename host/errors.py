@@ -1,6 +1,6 @@
-"""What can go wrong between a host program and a node; every text is one line.
+"""Errors between a host program and a node; every text is one line.
 
-Values that a message can not carry raise ``InterfaceError`` of the interface tables (a ValueError)
+Values that a message cannot carry raise ``InterfaceError`` of the interface tables (a ValueError)
 before anything is sent.
 """
 
@@ -8,15 +8,15 @@ from enum import IntEnum
 
 
 class TargetError(ValueError):
-    """The text that names a target makes no sense."""
+    """The text does not name a target."""
 
 
 class CameraFileError(ValueError):
-    """A camera file is missing, unreadable, or lacks something."""
+    """A camera file is missing, unreadable or incomplete."""
 
 
 class HostError(OSError):
-    """Base of everything that fails while talking to a node."""
+    """Base of all errors while talking to a node."""
 
 
 class TransportError(HostError):
@@ -28,27 +28,27 @@ class PortOpenError(TransportError):
 
 
 class PortClosedError(TransportError):
-    """The other side has gone."""
+    """The other side closed the connection."""
 
 
 class RecordingMismatchError(TransportError):
-    """A recording has no such request at this place."""
+    """The recording has another request at this position."""
 
 
 class NodeError(HostError):
-    """The node did not do what was asked."""
+    """The node did not perform the request."""
 
 
 class NoAnswerError(NodeError, TimeoutError):
-    """Nothing, or nothing whole, came back in time."""
+    """No complete answer came in time."""
 
 
 class BadAnswerError(NodeError):
-    """An answer came that the interface does not allow."""
+    """The answer violates the interface."""
 
 
 class NotSupportedError(NodeError):
-    """The tables have a message that the node does not."""
+    """The node does not have this message of the tables."""
 
 
 class StepFailedError(NodeError):
@@ -56,10 +56,10 @@ class StepFailedError(NodeError):
 
 
 class CommandRefusedError(NodeError):
-    """A telecommand was refused.
+    """The node rejected a telecommand.
 
     Attributes:
-        code: the acknowledge's error code; a plain int when the interface does not know it.
+        code: error code of the acknowledge; a plain int if the interface does not define it.
     """
 
     def __init__(self, command: str, code: IntEnum | int, reason: str = "") -> None:

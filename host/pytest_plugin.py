@@ -1,4 +1,4 @@
-"""pytest fixtures: for each registered device one of its name, emulated, for tests of a driver.
+"""pytest fixtures: one per registered device, by its name, for tests of a driver.
 
 ::
 
@@ -8,10 +8,10 @@
         assert driver.attitude().valid
 
 Marker ``cubestack(scene=…, seed=…, faults=…)`` sets a device up: ``scene`` and ``faults`` are
-paths, or a scene of the emulator and the text of a plan. It takes every option of the device's
-board too: ``profile="extended"``. ``time.sleep`` and the clocks of the code under test are virtual
-but with ``wall_time=True``. Seed, virtual time and number of fault
-events go into the JUnit report; what the faults did is shown below a test that failed.
+paths, or a scene object and the text of a plan. It also takes every option of the device's board,
+e.g. ``profile="extended"``. ``time.sleep`` and the clocks of the code under test are virtual unless
+``wall_time=True``. The JUnit report has seed, virtual time and number of fault events; a failed
+test prints the fault events.
 """
 
 from contextlib import nullcontext
@@ -47,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--cubestack-profile",
         choices=PROFILES,
-        help=f"of all devices without one of their own (default {DEFAULT_PROFILE})",
+        help=f"for devices without a scene of their own (default {DEFAULT_PROFILE})",
     )
     group.addoption(
         "--cubestack-engine",
@@ -58,7 +58,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--cubestack-wall-time",
         action="store_true",
-        help="leave time.sleep and the clocks of drivers alone (default: they are virtual)",
+        help="keep wall time in drivers (default: their sleeps and clocks are virtual)",
     )
 
 
@@ -75,7 +75,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _fixture(name: str) -> Any:
-    """The fixture of a device: powered up as the test's marker says, and down after it."""
+    """The fixture of a device: powered up as the test's marker says, closed after the test."""
 
     def powered(request: pytest.FixtureRequest) -> "Iterator[AnyEmulated]":
         from cubestack.emulator.faults.plan import load_plan, parse_plan
@@ -112,7 +112,7 @@ def _fixture(name: str) -> Any:
 
 def _options(item: pytest.Item) -> dict[str, Any]:
     options: dict[str, Any] = {}
-    for marker in reversed(list(item.iter_markers(MARKER))):  # the closest one has the last word
+    for marker in reversed(list(item.iter_markers(MARKER))):  # the closest marker wins
         known = dict.fromkeys((*KEYS, *(one.name for own in devices() for one in own.all_options)))
         if marker.args or not set(marker.kwargs) <= set(known):
             raise pytest.UsageError(
@@ -126,7 +126,7 @@ def _options(item: pytest.Item) -> dict[str, Any]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> "Generator[None, pytest.TestReport, pytest.TestReport]":
-    """Show what the faults did below a test that failed."""
+    """Print the fault events of a failed test."""
     report = yield
     if call.when == "call" and report.failed:
         for name, device in item.stash.get(_DEVICES, {}).items():

@@ -1,14 +1,13 @@
-"""Targets that host tools talk to, by a text: what it names, and how it is opened.
+"""Targets of host tools: the text that names one, and how to open it.
 
 ==========================  ===================================================================
 /dev/ttyUSB0, ./ttyCUBE     a serial port
 tcp://HOST:PORT             a serial line on TCP
 rfc2217://HOST:PORT         a serial port on TCP whose rate the client sets
-i2c:BUS[:ADDR]              /dev/i2c-BUS, or the emulated bus where there is no such file; 7-bit
+i2c:BUS[:ADDR]              /dev/i2c-BUS, or the emulated bus if that file does not exist; 7-bit
                             address of the node (default: the device's)
-recorded:FILE               a recording, which answers like the device did
-emulated:DEVICE             a device that is powered up in this process; time passes while the host
-                            waits
+recorded:FILE               a recording, which answers as the device did
+emulated:DEVICE             a device emulated in this process; time passes while the host waits
 ==========================  ===================================================================
 """
 
@@ -48,7 +47,7 @@ FORMS = (
     "a serial port, tcp://HOST:PORT, rfc2217://HOST:PORT, i2c:BUS:ADDR, emulated:DEVICE, "
     "recorded:FILE"
 )
-"""What a target may be, for the help."""
+"""The forms of a target, for the help."""
 
 
 @dataclass
@@ -60,11 +59,11 @@ class Target:
         interface: of its messages.
         node: client of the node protocol.
         line: the serial line under it; None on I2C.
-        registers: client of the register-pointer protocol; None where it is not within reach.
-        service_port: serial line with the one-letter protocol; None where it is not within reach.
+        registers: client of the register-pointer protocol, or None.
+        service_port: serial line with the one-letter protocol, or None.
         controls: None for a device that is not emulated here.
-        device: what it is; None for an interface that nobody registered.
-        recorded: file with what was said by now; None where nothing is recorded.
+        device: its declaration; None for an unregistered interface.
+        recorded: file with the session so far, or None.
     """
 
     name: str
@@ -84,10 +83,10 @@ class Target:
 
 
 def device_of(name: str | None, target: str) -> AnyDevice:
-    """The device called ``name``; TargetError when none is given, or it is unknown."""
+    """The device called ``name``; raises TargetError if it is None or unknown."""
     if name is None:
         known = ", ".join(device_names())
-        raise TargetError(f"{target} does not tell which device it is: give --device ({known})")
+        raise TargetError(f"{target} does not name the device: add --device ({known})")
     return device(name)
 
 
@@ -115,15 +114,15 @@ def open_target(
         baud: of the serial line; None for the published one.
         scene: scene file of an emulated device; None for its default.
         seed: of an emulated device.
-        record: file for a recording of what is said; of an emulated device, at its pins.
+        record: file for a recording of the session; an emulated device is recorded at its pins.
         control: control port of the process that emulates the device.
         options: of an emulated device's board, its profile among them.
 
     Raises:
-        TargetError: the text names nothing, or the device is not told.
+        TargetError: the text names no target, or not the device.
         TransportError: it does not open.
-        RecordingError: a file is no recording.
-        ValueError: a scene file that is none, or a file that can not be written.
+        RecordingError: the file is not a recording.
+        ValueError: an invalid scene file, or a file that cannot be written.
     """
     if backup and text.startswith((EMULATED, RECORDED, I2C)):
         raise TargetError(f"--backup is for a serial line, not for {text}")
@@ -237,8 +236,8 @@ def _open_service_port(target: Target, text: str, tape: HostRecorder | None) -> 
 def connect(text: str, device: str | None = None, *, baud: int | None = None) -> Any:
     """The client of the device that ``text`` names, such as ``"/dev/ttyUSB0"``.
 
-    Its class is the device's own. ``device`` is needed where the text does not tell it. Closing it
-    closes the port. Raises what ``open_target`` does.
+    Its class is the device's own. ``device`` is needed if the text does not name it. Closing it
+    closes the port. Raises as ``open_target`` does.
     """
     target = open_target(text, device, baud=baud)
     if target.device is None:
@@ -251,7 +250,7 @@ def connect(text: str, device: str | None = None, *, baud: int | None = None) ->
 def _registers(
     interface: Interface, bus: I2cBus, wait: Callable[[float], None]
 ) -> RegisterClient | None:
-    """Client of a device's registers on ``bus``; None where it has none."""
+    """Client of a device's registers on ``bus``, or None."""
     registers = interface.registers
     return None if registers is None else RegisterClient(bus, registers, wait=wait)
 
@@ -277,7 +276,7 @@ def _open_i2c(text: str, name: str | None, tape: HostRecorder | None) -> Target:
 
 
 def _open_bus(number: int) -> SMBus:
-    """The device file of bus ``number``; where there is none, the emulated bus of that number."""
+    """The device file of bus ``number``, or else the emulated bus of that number."""
     from smbus2 import SMBus
 
     try:
@@ -323,4 +322,4 @@ def _open_recorded(text: str) -> Target:
 
 
 def _no_wait(_seconds: float) -> None:
-    """A recording has all the time in the world."""
+    """Waiting takes no time with a recording."""

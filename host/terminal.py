@@ -1,4 +1,4 @@
-"""What the terminal shows: results on standard output, progress on standard error."""
+"""Terminal output: results on standard output, progress on standard error."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -18,13 +18,13 @@ _errors = Console(stderr=True)
 T = TypeVar("T")
 
 Told = Callable[[int, int], None]
-"""Told how much is done, and of how many."""
+"""Callback of progress: (done, total)."""
 
 _WIDEST = 10_000
-"""Columns that no table has."""
+"""More columns than any table has."""
 
 EVERY_S = 5.0
-"""Between two lines that tell how far it is, where there is no terminal to draw a bar on."""
+"""Time between progress lines when standard error is not a terminal."""
 
 
 class _Rate(bars.ProgressColumn):
@@ -40,26 +40,26 @@ def _draws(shown: Console) -> bool:
 
 
 def hush(quiet: bool) -> None:
-    """Show neither progress nor lines for the reader while ``quiet``."""
+    """Suppress progress and messages while ``quiet``."""
     _errors.quiet = quiet
 
 
 def say(text: str) -> None:
-    """A line for the reader, not for a script: on standard error."""
+    """Print a message on standard error."""
     _errors.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def tell(text: str) -> None:
-    """A line of a result: on standard output, and never broken in two.
+    """Print a line of a result on standard output, never wrapped.
 
-    On the terminal it comes above a bar that is shown.
+    On a terminal it appears above the progress bar.
     """
     above = _open[0].console if _open and console.is_terminal else console
     above.print(text, markup=False, soft_wrap=True)
 
 
 def head(title: str) -> None:
-    """A title above what follows: ruled where the terminal is wide enough, else a plain line."""
+    """Print a title: with a rule if the terminal is wide enough, else plain."""
     if console.is_terminal and len(title) + 4 <= console.width:
         console.rule(Text(title))
     else:
@@ -67,7 +67,7 @@ def head(title: str) -> None:
 
 
 def show(table: Table) -> None:
-    """Print a table: drawn where the terminal is wide enough, else plain lines that lose nothing.
+    """Print a table: drawn if the terminal is wide enough, else as plain lines with all cells.
 
     Plain is a line for each row, its cells in columns, and the title above.
     """
@@ -93,7 +93,7 @@ def _on_one_line(cell: RenderableType) -> RenderableType:
 
 
 def progress_bar() -> bars.Progress:
-    """A progress display on standard error; it stays silent when that is no terminal."""
+    """A progress display on standard error; silent if that is not a terminal."""
     return bars.Progress(
         bars.TextColumn("{task.description}"),
         bars.BarColumn(),
@@ -104,16 +104,16 @@ def progress_bar() -> bars.Progress:
         console=_errors,
         disable=_errors.quiet or not _draws(_errors),
         transient=True,
-        redirect_stdout=False,  # it may be a file, and not the terminal
+        redirect_stdout=False,  # it may be a file
     )
 
 
 def progress(
     items: Iterable[T], total: int, label: str, *, quiet: bool = False, before: int = 0
 ) -> Iterator[T]:
-    """Pass ``items`` through, and tell how far they are unless ``quiet``.
+    """Pass ``items`` through and show progress unless ``quiet``.
 
-    The first ``before`` of them were done before, and tell nothing about the rate.
+    ``before`` of them were done earlier and don't count for the rate.
     """
     with busy(label, before, quiet=quiet) as shown:
         shown(0, total)
@@ -124,11 +124,11 @@ def progress(
 
 @contextmanager
 def busy(label: str, before: int = 0, *, quiet: bool = False) -> Iterator[Told]:
-    """Tell that ``label`` goes on as long as the block lasts; it may be inside of another.
+    """Show that ``label`` is in progress during the block; blocks can be nested.
 
-    On a terminal that is a bar which goes away; elsewhere a line every `EVERY_S` of wall time, of
-    the innermost one. Yields what may be told how much is done, and of how many, of which
-    ``before`` were done before. While ``quiet`` nothing is told.
+    On a terminal it is a bar; elsewhere a line every `EVERY_S` of wall time for the innermost
+    block. Yields a callback for (done, total), of which ``before`` were done earlier. ``quiet``
+    shows none.
     """
     if quiet:
         yield lambda _done, _total: None
@@ -152,10 +152,10 @@ def busy(label: str, before: int = 0, *, quiet: bool = False) -> Iterator[Told]:
         teller.join()
 
 
-#: The display that is on the terminal; a second one can not be.
+#: The display on the terminal; there is only one.
 _open: list[bars.Progress] = []
 
-#: Who tells how far it is where there is no terminal: the last one.
+#: Printers of progress lines; the last one is active.
 _telling: "list[_Teller]" = []
 
 
@@ -173,7 +173,7 @@ def _shown_bar() -> Iterator[bars.Progress]:
 
 
 class _Teller(Thread):
-    """Says every few seconds how far something is, as one step of it may take long."""
+    """Prints progress every few seconds, since one step may take long."""
 
     def __init__(self, label: str, before: int) -> None:
         super().__init__(daemon=True)

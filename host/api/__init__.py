@@ -1,4 +1,4 @@
-"""Firmware-in-the-loop emulator of CubeSat camera sensors: what a user's program needs.
+"""Firmware-in-the-loop emulator of CubeSat camera sensors: the public library.
 
 ::
 
@@ -14,8 +14,8 @@
     for frame in cubestack.measure("cubestar", frames=20, mag_limit=3.8):
         print(frame.error_cross_deg)
 
-Deeper modules are for those who change the project. Nothing of the emulator is loaded before it is
-used.
+Everything else is internal, but for ``cubestack.sensor``. Names load on first use, so importing
+``cubestack`` does not load the emulator.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from cubestack.host.experiments.measure import measure
     from cubestack.host.transport.smbus import CubeSMBus
 
-    # What a type checker sees: which name gives which client. See ``host.devices`` for the rest.
+    # For type checkers: the client class by the device's name.
     @overload
     def open_device(
         name: Literal["cubestar"], scene: Any = None, **options: Any
@@ -97,7 +97,7 @@ __all__ = [
 
 __version__: Final = version("cubestack")
 
-#: Where each name comes from; loaded at its first use.
+#: Module of each name, loaded on first use.
 _HOMES: Final = {
     "Aramis": "host.clients.aramis.client",
     "BoardOption": "host.devices.device",
@@ -121,7 +121,7 @@ _HOMES: Final = {
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name at its first use."""
+    """Load a name on first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"cubestack.{_HOMES[name]}"), name)

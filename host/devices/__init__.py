@@ -1,1 +1,1 @@
-"""Devices by name, and what opens one."""
+"""Device declarations and their registry."""

@@ -1,8 +1,8 @@
-"""What a sensor is to everything generic: one declaration, found by its name.
+"""The declaration of a sensor, which all generic code works with.
 
-Command, shell, fixtures, conformance, registers, recordings, faults and gateware tools ask a
-``Device`` and name no sensor. What needs the emulator is behind a callable, so that listing devices
-loads none of it.
+Command line, shell, fixtures, conformance, recordings, faults and gateware tools query a
+``Device`` and name no sensor. Attributes that need the emulator are callables, so listing devices
+does not load it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from cubestack.host.devices.experiment import AnyExperiment
     from cubestack.host.pictures.overlay import Overlay
 
-#: How an FPGA is run: compiled where there is a compiler, always compiled, compiled with every
-#: clock made one by one, or Amaranth's simulator.
+#: How to run an FPGA: compiled if a compiler is installed, always compiled, compiled without
+#: shortcuts (clock by clock), or in Amaranth's simulator.
 Engine = Literal["auto", "compiled", "exact", "python"]
 
-#: Passes items through and shows how many of a total are done: (items, total, label) -> items.
+#: Progress display: (items, total, label) -> the same items.
 Shown = Callable[[Iterable[Any], int, str], Iterator[Any]]
 
 BoardT_co = TypeVar("BoardT_co", bound="Board", covariant=True)
@@ -95,7 +95,7 @@ PROFILE_OPTIONS = (
 
 @dataclass(frozen=True)
 class ConformanceNotes:
-    """What the protocol suite must know of a device beside its tables, by the tables' names.
+    """Facts for the protocol suite that the tables don't have, by the tables' names.
 
     Attributes:
         effects: checks of telecommands whose success takes more to see than a setting that is read
@@ -118,14 +118,14 @@ class ConformanceNotes:
 
 @dataclass(frozen=True)
 class Report:
-    """A command about a device: `cubestack NAME`.
+    """A command that a device adds: `cubestack NAME`.
 
     Several devices may have one of the same name: `cubestack NAME DEVICE`.
 
     Attributes:
         name: of the command.
         summary: one phrase for lists.
-        load: gives what it does.
+        load: returns the experiment.
     """
 
     name: str
@@ -214,11 +214,11 @@ class Device(Generic[BoardT_co, ClientT_co]):
         return load and load()
 
     def scene(self, given: Any) -> Any:
-        """The scene that ``given`` means: None the default, text or a path a file, else itself."""
+        """The scene of ``given``: None the default, text or a path a file, else itself."""
         if given is None:
             return self.default_scene()
         return self.load_scene(Path(given)) if isinstance(given, str | Path) else given
 
 
-#: A device, whichever it is.
+#: Any device.
 AnyDevice: TypeAlias = "Device[Board, DeviceClient]"

@@ -1,4 +1,4 @@
-"""What an experiment is: a device measured end to end, each result beside the truth."""
+"""The contract of experiments: a device measured end to end, each result beside the truth."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -11,8 +11,8 @@ from cubestack.host.options import Options
 class Result:
     """One result; a frozen dataclass whose attributes are those of the JSON output.
 
-    With an attribute ``right``, true, false, or None where the truth is not known, results can be
-    judged by `--min-right`.
+    An attribute ``right`` (True, False, or None if the truth is unknown) is what `--min-right`
+    counts.
     """
 
     def as_dict(self) -> dict[str, Any]:
@@ -21,7 +21,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Mark:
-    """A published error, beside which ours are drawn.
+    """A published error, drawn beside ours.
 
     Attributes:
         error: name of ours in the results.
@@ -56,7 +56,7 @@ ResultT = TypeVar("ResultT", bound=Result)
 
 
 class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
-    """How a command measures one device, or what it looks up about it.
+    """How a command measures one device, or looks up facts about it.
 
     Attributes:
         options: what can be chosen.
@@ -78,7 +78,7 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
     marks: tuple[Mark, ...] = ()
 
     def count(self, options: OptionsT) -> int:
-        """How many results there will be."""
+        """Number of results to expect."""
         return 1
 
     @abstractmethod
@@ -97,19 +97,19 @@ class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
 
     @abstractmethod
     def summarise(self, results: Sequence[ResultT], wall_s: float) -> Iterable[str]:
-        """What the results, which took ``wall_s``, are together: lines for a reader."""
+        """Summary of all results, line by line; they took ``wall_s``."""
 
     def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
-        """What a campaign's report says of its results, as JSON has them, beside their rates.
+        """Sections of a campaign's report besides the rates, from results as JSON has them.
 
         Raises ValueError without matplotlib.
         """
         yield from ()
 
     def succeeded(self, results: Sequence[ResultT]) -> bool:
-        """Whether the run was a success; to find nothing is one, unless an experiment says else."""
+        """Whether the run succeeded; by default, finding nothing is a success."""
         return True
 
 
-#: An experiment with whatever device.
+#: Any experiment.
 AnyExperiment: TypeAlias = Experiment[Any, Any, Any]

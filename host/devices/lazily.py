@@ -1,4 +1,4 @@
-"""Things that are named by a text, ``"package.module:name"``, and loaded when they are used."""
+"""Loaders for ``"package.module:name"``: the module is imported on first use."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,7 +11,7 @@ def get(what: str) -> Callable[[], Any]:
 
 
 def call(what: str, *first: Any, **always: Any) -> Callable[..., Any]:
-    """A callable that calls it with these arguments, and those that are given then."""
+    """A callable that passes these arguments, then its own, to the named function."""
 
     def called(*given: Any, **options: Any) -> Any:
         return resolve_name(what)(*first, *given, **always, **options)

@@ -1,4 +1,4 @@
-"""Every device by name: those that come with this distribution, and those of others.
+"""All registered devices by name: built-in ones and those of other distributions.
 
 Another distribution registers a device by an entry point in the group ``cubestack.devices``: its
 name is the device's, its value leads to a ``Device``.
@@ -13,13 +13,13 @@ from cubestack.host.errors import TargetError
 
 GROUP = "cubestack.devices"
 
-#: Those that come with this distribution, in the order of all lists.
+#: Built-in devices, in the order of all lists.
 BUILT_IN = ("cubestar", "cubesense", "aramis")
 
 
 @cache
 def _entries() -> dict[str, EntryPoint]:
-    """Where each device is declared; a name is whoever's claims it first."""
+    """The declaration of each device; the first to claim a name has it."""
     entries = {
         name: EntryPoint(name, f"cubestack.host.sensors.{name}:DEVICE", GROUP) for name in BUILT_IN
     }
@@ -35,7 +35,7 @@ def device_names() -> tuple[str, ...]:
 
 @cache
 def device(name: str) -> AnyDevice:
-    """The device of this name, in any case; TargetError says what is wrong with it."""
+    """The device of this name in any case; raises TargetError if unknown or not loadable."""
     entry = _entries().get(name.lower())
     if entry is None:
         raise TargetError(f"no device {name!r}; known: {', '.join(device_names())}")
@@ -49,7 +49,7 @@ def device(name: str) -> AnyDevice:
 
 
 def devices() -> Iterator[AnyDevice]:
-    """All registered devices that load; one that doesn't is told when it is asked for by name."""
+    """All registered devices that load; ``device`` reports why another one doesn't."""
     for name in device_names():
         try:
             yield device(name)

@@ -1,7 +1,7 @@
-"""Logs of a device's results, line by line in time, and how much they scatter.
+"""Logs of a device's results over time, and their scatter.
 
-CubeStar thesis, appendix A (the interface that polls attitudes and keeps them) and section 6.1: a
-straight line through the logged angles stands for the truth, what is left of them is the error.
+CubeStar thesis, appendix A (an interface that polls and stores attitudes) and section 6.1: a
+straight line fitted to the logged angles replaces the truth; the residuals are the errors.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -25,7 +25,7 @@ def log_lines(
     interval_s: float = 1.0,
     before_each: Callable[[], None] = lambda: None,
 ) -> Iterator[Columns]:
-    """The device's latest result again and again, each as a line of a log.
+    """The device's latest result, polled; each as a line of the log.
 
     Args:
         client: of the device.
@@ -51,7 +51,7 @@ def log_lines(
 
 
 def scatter(lines: Sequence[Columns]) -> dict[str, tuple[float, float, int]]:
-    """How each angle goes with time, by its column: (deg/s, standard deviation in deg, lines).
+    """Trend of each angle by its column: (deg/s, standard deviation in deg, number of lines).
 
     Of the straight line through it, whatever turns it makes, and of what is left; by the time of
     the pictures where the device tells that. Angles with less than three values are left out.

@@ -1,4 +1,4 @@
-"""Where telemetry shows what telecommands set, and what that is after power-up."""
+"""Settings that telemetry shows: where, and their values after power-up."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -27,7 +27,7 @@ class Setting:
 
 
 def settings(interface: Interface, notes: ConformanceNotes) -> Iterator[Setting]:
-    """All that an interface shows, of each key where there are keys."""
+    """All settings that an interface shows, for each value of the key fields."""
     for message in interface.telecommands:
         if not message.supported:
             continue
@@ -79,7 +79,7 @@ def read_back(
 
 
 def keys_of(message: Message, notes: ConformanceNotes) -> dict[str, Value]:
-    """Key fields, at the values that are tried."""
+    """Key fields and the values to try."""
     reset = message.reset_values()
     return {name: value for name, value in reset.items() if name in notes.keys}
 

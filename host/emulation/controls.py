@@ -1,4 +1,4 @@
-"""What can be done to an emulated device from outside of its ports, by shell or replay."""
+"""Actions on an emulated device other than by its ports, for shell and replay."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ CLEAR = "clear"
 
 
 class Controls(Protocol):
-    """What can be done to an emulated device past its ports, wherever it is emulated.
+    """Actions on an emulated device, in this process or another.
 
     Attributes:
         channels: supply channels.
@@ -28,13 +28,13 @@ class Controls(Protocol):
     fault_parameters: Mapping[str, tuple[str, ...]]
 
     def fault(self, words: list[str]) -> None:
-        """Let something break; ValueError for what is not in ``faults``."""
+        """Inject a fault; raises ValueError unless it is in ``faults``."""
 
     def fault_log(self) -> list[str]:
-        """A line for each thing that faults have done, with its virtual time."""
+        """The fault events, a line each with its virtual time."""
 
     def scene(self, path: Path) -> None:
-        """Show the scene in a file; ValueError for one that is none."""
+        """Load a scene file; raises ValueError if it is invalid."""
 
     def currents(self) -> dict[str, float]:
         """Supply currents in mA: all, and each channel's."""
@@ -43,9 +43,9 @@ class Controls(Protocol):
         """Switch a channel; ValueError for an unknown one."""
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
-        """Words of the processor that runs own firmware, with a text each, by name.
+        """Memory words of the processor that runs the user's firmware, each with a text, by name.
 
-        ValueError for what is not there.
+        Raises ValueError for an unknown name.
         """
 
     def time_s(self) -> float: ...
@@ -54,16 +54,15 @@ class Controls(Protocol):
 
 
 def spoken(kinds: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Words of ``fault`` for all kinds at their targets."""
+    """Arguments of ``fault`` for all kinds and their targets."""
     return (*(f"{kind} {target}" for kind, at in kinds.items() for target in at), CLEAR)
 
 
 class EmulatedControls:
-    """Faults, scene, load switches and time of an emulated device, in a shell's words.
+    """Faults, scene, load switches and time of a device emulated in this process.
 
     Attributes:
-        on_act: told of what was done: the words of the shell, and the text of a file that they
-            name.
+        on_act: called after each action with the shell's words and the text of the file they name.
     """
 
     def __init__(self, emulated: AnyEmulated) -> None:
@@ -82,7 +81,7 @@ class EmulatedControls:
         }
 
     def act(self, control: Control) -> None:
-        """Do what a recording has; ValueError for what can not be done."""
+        """Perform an action of a recording; raises ValueError if it is not possible."""
         match control.words:
             case ("fault", *words) if words:
                 self.fault(words)
@@ -99,7 +98,7 @@ class EmulatedControls:
                 raise TargetError(f"nothing does {' '.join(control.words)!r}")
 
     def fault(self, words: list[str]) -> None:
-        """Let something break; ValueError for what is not in ``faults``."""
+        """Inject a fault; raises ValueError unless it is in ``faults``."""
         if words == [CLEAR]:
             self._board.faults.clear()
         else:
@@ -107,11 +106,11 @@ class EmulatedControls:
         self.on_act(("fault", *words), "")
 
     def fault_log(self) -> list[str]:
-        """A line for each thing that faults have done, with its virtual time."""
+        """The fault events, a line each with its virtual time."""
         return [str(event) for event in self._board.faults.log]
 
     def scene(self, path: Path) -> None:
-        """Show the scene in a file; ValueError for one that is none."""
+        """Load a scene file; raises ValueError if it is invalid."""
         try:
             self._emulated.scene = path
         except FileNotFoundError:
@@ -133,15 +132,15 @@ class EmulatedControls:
         self.on_act(("power", channel, "on" if on else "off"), "")
 
     def peek(self, what: str) -> dict[str, tuple[int | None, str]]:
-        """Words of the processor that runs own firmware, with a text each, by name.
+        """Memory words of the processor that runs the user's firmware, each with a text, by name.
 
-        ValueError for what is not there.
+        Raises ValueError for an unknown name.
         """
         from cubestack.emulator.boards.processor_registers import peek
 
         insight = self._board.insight
         if insight is None:
-            raise TargetError("peek: this device runs no firmware of its own: give --firmware")
+            raise TargetError("peek: this device runs no own firmware; start it with --firmware")
         found = peek(insight.machine, insight.symbols, what)
         return {one.name: (one.value, one.text) for one in found}
 

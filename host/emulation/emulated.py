@@ -1,12 +1,12 @@
-"""An emulated device that is powered up: virtual time, scene, faults, and all its ports.
+"""A powered-up emulated device: virtual time, scene, faults and all its ports.
 
 - ``client``: this project's client on the serial line.
-- ``serial()``: pyserial's interface in virtual time, for drivers in Python; repeatable to the byte.
+- ``serial()``: pyserial's interface in virtual time, for Python drivers; repeatable to the byte.
 - ``smbus()``: smbus2's interface, likewise.
 - ``run()``: any program, on a pseudo-terminal.
 - ``run_on_i2c()``: any program that opens /dev/i2c-N.
 
-Only one host is at a serial line at a time: plugging one in takes out the one before.
+A serial line has one host at a time: a new one replaces the one before.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.ports.realtime import RealtimeScheduler
 
 PORT = "{port}"
-"""What ``run`` replaces in a command by the path of the serial port."""
+"""Placeholder for the port's path in a command of ``run``."""
 
 
 @dataclass(eq=False)
@@ -49,8 +49,8 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
         device: what it is.
         board: the emulated board, with all its parts.
         seed: of everything random.
-        chosen: its profile, and the switches that differ, as keywords of ``open_device``.
-        follows: what moves its scene, with what is moved; empty when it stays as it was put.
+        chosen: its profile and the switches that differ, as keywords of ``open_device``.
+        follows: what moves its scene, e.g. an orbit; empty for a scene that stays as set.
     """
 
     device: Device[BoardT_co, ClientT_co]
@@ -62,9 +62,9 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 
     @property
     def client(self) -> ClientT_co:
-        """This project's client on the serial line; plugged in again after any other host.
+        """This project's client on the serial line; it replaces any other host.
 
-        On I2C where that line has been given another protocol.
+        It uses I2C if the serial line carries another protocol.
         """
         if self._client is None:
             self._client = self.device.client(node_client(self.board, self.device.interface))
@@ -86,14 +86,14 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 
     @property
     def scene(self) -> Any:
-        """What the cameras see; a scene, the path of a scene file, or None for the default one."""
+        """The scene; set it to a scene, the path of a scene file, or None for the default."""
         return self.board.scene
 
     @scene.setter
     def scene(self, scene: Any) -> None:
         for key, value in scene_options(self.device, scene).items():
             if value != self.chosen.get(key, ""):
-                raise ValueError(f"{scene}: {key} is chosen when the device is powered up")
+                raise ValueError(f"{scene}: {key} can only be chosen at power-up")
         self.board.scene = self.device.scene(scene)
 
     # --- ports ----------------------------------------------------------------------------------
@@ -112,11 +112,11 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
     def run(
         self, *command: str | Path, timeout_s: float = 60.0, pace: Literal["real", "fast"] = "fast"
     ) -> subprocess.CompletedProcess[str]:
-        """Run a program against the serial line; its exit status and output.
+        """Run a program against the serial line; returns exit status and output.
 
-        Every "{port}" in ``command`` becomes the path of a pseudo-terminal; a warning tells of a
-        program that sets another baud rate, parity or stop bits than the device has. Raises
-        subprocess.TimeoutExpired when it has not ended after ``timeout_s`` of wall time.
+        Every "{port}" in ``command`` becomes the path of a pseudo-terminal. Warns if the program
+        sets another baud rate, parity or stop bits than the device has. Raises
+        subprocess.TimeoutExpired after ``timeout_s`` of wall time.
         """
         from cubestack.emulator.i2cdev.scheduler import open_scheduler
         from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
@@ -141,7 +141,7 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
                 endpoint.close()
 
     def run_on_i2c(self, *command: str | Path, bus: int = 7) -> int:
-        """Run a program that finds the device on /dev/i2c-``bus``; its exit status."""
+        """Run a program that sees the device on /dev/i2c-``bus``; returns its exit status."""
         from cubestack.emulator.i2cdev.adapter import I2cAdapter
         from cubestack.emulator.i2cdev.running import emulated_bus, run_program
 
@@ -160,26 +160,26 @@ class EmulatedDevice(Closable, Generic[BoardT_co, ClientT_co]):
 
 
 def node_client(board: Board, interface: Interface) -> Client:
-    """On the satellite's serial line; on I2C where that line has been given another protocol."""
+    """A client on the satellite's serial line, or on I2C if that line carries another protocol."""
     if board.lines[0].has_node:
         return NodeClient(board.serial(), interface)
     bus = board.i2c()
     return I2cClient(bus, interface, wait=bus.wait)
 
 
-#: A powered-up device, whichever it is.
+#: Any powered-up device.
 AnyEmulated: TypeAlias = "EmulatedDevice[Board, DeviceClient]"
 
 
 def _watch(
     program: subprocess.Popen[str], timeout_s: float, scheduler: RealtimeScheduler
 ) -> subprocess.CompletedProcess[str]:
-    """Wait for a program, and end the scheduler after it."""
+    """Wait for a program, then stop the scheduler."""
     try:
         output, errors = program.communicate(timeout=timeout_s)
         return subprocess.CompletedProcess(program.args, program.returncode, output, errors)
     except subprocess.TimeoutExpired:
-        with program:  # closes the pipes unread, as a child of it may hold them for ever
+        with program:  # closes the pipes unread: a child process may keep them open for ever
             program.kill()
         raise
     finally:
@@ -189,9 +189,9 @@ def _watch(
 def check_options(
     device: AnyDevice, options: Mapping[str, object], shown: Callable[[str], str] = str
 ) -> None:
-    """Refuse options, and values, that ``device`` does not have; ValueError says what it has.
+    """Raise ValueError for options or values that ``device`` does not have.
 
-    ``shown`` is how an option's name is told.
+    ``shown`` formats an option's name for the error.
     """
     own = {option.name: option for option in device.all_options}
     for name, value in options.items():
@@ -208,9 +208,9 @@ def check_options(
 
 
 def scene_options(device: AnyDevice, scene: Any) -> dict[str, str]:
-    """What a scene file says of the device that looks at it, as keywords of ``open_device``.
+    """Device options in a scene file, as keywords of ``open_device``.
 
-    Nothing where ``scene`` is no file's path. ValueError names the file, and what is right.
+    Empty if ``scene`` is not the path of a file. Raises ValueError that names the file.
     """
     if not isinstance(scene, str | Path):
         return {}
@@ -234,9 +234,9 @@ def power_up(
     beside: AnyEmulated | None = None,
     **options: Any,
 ) -> EmulatedDevice[BoardT_co, ClientT_co]:
-    """Power up ``device``; beside the arguments of ``open_device``, any keyword of its board.
+    """Power up ``device``; takes the arguments of ``open_device`` and any keyword of its board.
 
-    Profile and switches that are not given are those of the scene file.
+    Profile and switches default to those of the scene file.
     """
     from cubestack.emulator.native.cache import reported
 
@@ -275,12 +275,12 @@ def open_device(
         seed: of everything random.
         engine: how its FPGA is run.
         baud: of its first serial line; None for the published rate.
-        beside: another device, whose virtual time and I2C bus it shares.
+        beside: another device that shares its virtual time and I2C bus.
         options: of this device's board; see ``cubestack emulate --help``.
 
     Raises:
-        TargetError: nobody registered that name.
-        ValueError: a scene or an option that makes no sense; the text says which.
+        TargetError: no device has that name.
+        ValueError: a scene or an option is invalid; the text says which.
     """
     device = registered(name)
     check_options(device, options)

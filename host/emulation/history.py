@@ -1,5 +1,5 @@
-"""Devices on record since they were powered up, so that they can be made once more as they were at
-an earlier time: powered up alike, and all that was done to them done again."""
+"""History of devices since power-up. To go back to an earlier time, they are powered up again and
+their recordings replayed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cubestack.host.terminal import say
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a device was made, ready to make it once more."""
+    """The set-up of a device, to power it up again."""
 
     device: AnyDevice
     scene: Any
@@ -38,7 +38,7 @@ class Recipe:
 
     @classmethod
     def of(cls, recording: Recording, setup: Setup) -> Recipe:
-        """From a recording's header and the ``setup`` to take; ValueError for what is unknown."""
+        """From a recording's header and ``setup``; raises ValueError for unknown options."""
         found = device(recording.device)
         options: dict[str, Any] = dict(setup.options)
         made = recording.setup
@@ -57,7 +57,7 @@ class Recipe:
         return cls(found, scene, plan, setup, recording.bauds.get("uart"), options)
 
     def make(self, engine: Engine, **more: Any) -> AnyEmulated:
-        """Power it up, its faults planned; ``more`` are keywords of ``power_up``."""
+        """Power it up with its fault plan; ``more`` are keywords of ``power_up``."""
         options = self.options | more
         seed, baud = self.setup.seed, self.baud
         made = power_up(self.device, self.scene, seed=seed, engine=engine, baud=baud, **options)
@@ -76,14 +76,14 @@ class _Kept:
 
 
 class History:
-    """Keeps the records of devices that share one virtual time.
+    """Records devices that share one virtual time, and rebuilds them as they were.
 
     Attributes:
-        devices: as they are now; the list has others after ``begin_again``.
-        ports: at their serial lines: number of the device, name of the line, port. Nothing passes
-            them while the past is made again.
-        bus: master of their I2C bus, likewise.
-        on_arrival: told of each device when it is as it was.
+        devices: the present devices; ``begin_again`` replaces them.
+        ports: (index of the device, name of the line, port) of each serial line. No byte passes
+            them during a replay.
+        bus: master of their I2C bus, likewise blocked.
+        on_arrival: called with each device when the replay has reached its time.
     """
 
     ports: Sequence[tuple[int, str, SerialPort]] = ()
@@ -96,9 +96,9 @@ class History:
         paths: Sequence[Path],
         engine: Engine = "auto",
     ) -> None:
-        """Record ``devices``, made by ``setups``, in files; before any of their ports is opened.
+        """Record ``devices``, set up by ``setups``, in files; call it before any port opens.
 
-        Raises ValueError for a file that can not be written.
+        Raises ValueError for a file that cannot be written.
         """
         self.devices = devices
         self.on_arrival: Callable[[AnyEmulated], None] = lambda _made: None
@@ -108,23 +108,23 @@ class History:
 
     @property
     def again(self) -> bool:
-        """Whether the past is being made again."""
+        """Whether a replay is running."""
         return bool(self._replays)
 
     def controls(self) -> list[EmulatedControls]:
-        """Of each device; what they do is on record."""
+        """The recorded controls of each device."""
         return [self._controls(*one) for one in zip(self.devices, self._kept, strict=True)]
 
     def file(self, number: int) -> Path:
-        """The recording of a device up to now."""
+        """Text of a device's recording up to now."""
         self._kept[number].recorder.flush()
         return self._kept[number].path
 
     def begin_again(self, end_ps: int) -> None:
-        """Make all devices once more, at time 0 of their kernel.
+        """Power all devices up again at time 0 of their kernel, and replay.
 
-        While that goes on, what was done to them by ``end_ps`` is done again, until ``arrive``.
-        Raises ValueError before anything is touched.
+        All actions up to ``end_ps`` are repeated until ``arrive``. Raises ValueError before it
+        changes anything.
         """
         recordings = [load_recording(self.file(number)) for number in range(len(self.devices))]
         begun = [one.until(end_ps) for one in recordings]
@@ -154,7 +154,7 @@ class History:
         ]
 
     def arrive(self) -> None:
-        """From here on nothing is done again, and the ports lead to the new devices."""
+        """End the replay and connect the ports to the new devices."""
         for replay in self._replays:
             replay.stop()
         self._replays.clear()
@@ -167,7 +167,7 @@ class History:
             self.on_arrival(one)
 
     def close(self) -> None:
-        """End the records; the files stay."""
+        """Stop recording; the files stay."""
         for one in self._kept:
             one.stack.close()
 
@@ -187,7 +187,7 @@ class History:
 def _replay(
     recording: Recording, made: AnyEmulated, act: Callable[[Any], None], *, alone: bool
 ) -> Replay:
-    """Play a recording's host; of a shared bus, all have its transfers, and one plays them."""
+    """Replay a recording's host; only one replays the transfers of a shared bus."""
     if not alone:
         own = tuple(one for one in recording.events if not isinstance(one, BusTransfer))
         recording = replace(recording, events=own)

@@ -1,4 +1,4 @@
-"""Files that tell what firmware of the user's own does: profile and coverage; and a debugger."""
+"""Profile and coverage files of the user's firmware, and the debugger port."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InsightFiles:
-    """Where to write what; None for not at all."""
+    """Paths of the files to write; None for no file."""
 
     profile: Path | None = None
     coverage: Path | None = None
 
     def open(self, stack: ExitStack) -> Callable[[AnyEmulated], None]:
-        """Open the files; ``stack`` writes them, of all devices that the answer was given.
+        """Open the files; ``stack`` writes them for each device passed to the returned function.
 
-        Raises ValueError for a file that can not be written.
+        Raises ValueError for a file that cannot be written.
         """
         from cubestack.emulator.iss.insight.callgrind import write_callgrind
         from cubestack.emulator.iss.insight.lcov import write_lcov
@@ -56,18 +56,18 @@ class InsightFiles:
 
 
 def own_firmware(emulated: AnyEmulated, what: str) -> Any:
-    """The insight into a device's own firmware; ValueError where it runs none."""
+    """The insight into a device's own firmware; raises ValueError if it runs none."""
     insight = emulated.board.insight
     if insight is None:
         name = emulated.device.name
-        raise ValueError(f"{what}: {name} runs no firmware of its own: give --firmware")
+        raise ValueError(f"{what}: {name} runs no own firmware; add --firmware")
     return insight
 
 
 def open_gdb(emulated: AnyEmulated, port: int, *, wait: bool) -> GdbEndpoint:
-    """Serve a debugger of a device's own firmware on a TCP port of this machine.
+    """Serve gdb for a device's own firmware on a local TCP port.
 
-    Raises ValueError where it runs none, PortError when the port can not be had.
+    Raises ValueError if it runs none, PortError if the port is not available.
     """
     from cubestack.emulator.boards.debugging import open_debugger
 

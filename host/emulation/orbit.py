@@ -1,4 +1,4 @@
-"""Devices on one satellite: what their cameras see follows its orbit, in virtual time."""
+"""Scenes of the devices on one satellite, driven by its orbit in virtual time."""
 
 from collections.abc import Generator, Sequence
 from typing import Any
@@ -10,18 +10,18 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.host.emulation.emulated import AnyEmulated
 
 INTERVAL_S = 0.125
-"""Virtual time from one look at the orbit to the next.
+"""Virtual time between updates of the scenes.
 
-Between two looks the body turns evenly and the Earth stands still, which in a low orbit is off by
-half an interval's 0.06 deg/s at most: 0.004 deg, far below what a sun and nadir sensor resolves.
+Between updates the body turns evenly and the Earth stands still. In a low orbit the error is at
+most 0.004 deg (half an interval at 0.06 deg/s), far below the resolution of a sun and nadir sensor.
 """
 
 
 def follow(orbit: Orbit, devices: Sequence[AnyEmulated]) -> None:
-    """Have all ``devices``, which share their virtual time, see what there is on ``orbit``.
+    """Update the scenes of all ``devices``, which share their virtual time, along ``orbit``.
 
-    ValueError names a device that looks at neither sky nor Earth, a mounting without a device, and
-    elements that hold no orbit.
+    Raises ValueError for a device that looks at neither sky nor Earth, a mounting without a device,
+    and elements that describe no orbit.
     """
     names = [one.device.name for one in devices]
     for name in orbit.mountings:
@@ -48,7 +48,7 @@ def _look(orbit: Orbit, devices: Sequence[AnyEmulated]) -> None:
 
 
 def _seen(orbit: Orbit, device: AnyEmulated) -> Any:
-    """What a device sees from now on, with all else of its scene as it is."""
+    """The device's scene from now on; its other parts stay as they are."""
     given = device.scene
     scene = getattr(given, "scene", given)  # a view's
     if isinstance(scene, SkyScene):

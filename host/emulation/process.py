@@ -1,4 +1,4 @@
-"""A process of `cubestack emulate` that ends with whoever wants it, by whichever way."""
+"""A `cubestack emulate` process that ends with its parent, however that ends."""
 
 import os
 import subprocess
@@ -9,17 +9,16 @@ from queue import SimpleQueue
 from threading import Thread
 
 ENDING_S = 10.0
-"""Wall time that a process has to end when it is asked to."""
+"""Wall time for a process to end on request."""
 
 
 @contextmanager
 def emulating(
     words: Sequence[str], environment: Mapping[str, str] | None = None
 ) -> Iterator[Iterator[str]]:
-    """Run `cubestack emulate` with ``words`` as long as the block lasts.
+    """Run `cubestack emulate` with ``words`` for the duration of the block.
 
-    Yields what it says, line by line, to its end. It ends when this process does, even if that is
-    killed.
+    Yields its output line by line. It ends with this process, even if that is killed.
     """
     theirs, ours = os.pipe()
     process = subprocess.Popen(
@@ -33,7 +32,7 @@ def emulating(
     os.close(theirs)
     said = SimpleQueue[str | None]()
 
-    def listen() -> None:  # what it says must not fill the pipe, whoever asks for it
+    def listen() -> None:  # its output must not fill the pipe when nobody reads it
         assert process.stderr is not None
         with process.stderr:
             for line in process.stderr:

@@ -1,4 +1,4 @@
-"""Recordings and traces of an emulated device, made at its pins."""
+"""Recordings and traces at the pins of an emulated device."""
 
 from contextlib import ExitStack
 from dataclasses import replace
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 def start_recorder(
     emulated: AnyEmulated, stream: IO[str], setup: "Setup | None" = None
 ) -> "Recorder":
-    """Record every byte of all ports; before any is opened.
+    """Record every byte of all ports; call it before any port opens.
 
-    ``setup`` is for the header, which tells the profile in any case.
+    ``setup`` goes into the header, with the profile.
     """
     from cubestack.emulator.recording.recorder import Recorder
 
@@ -49,7 +49,7 @@ def start_trace(emulated: AnyEmulated, stream: IO[str]) -> "VcdTrace":
 
 
 def create_file(path: Path, stack: ExitStack) -> IO[str]:
-    """``path`` for writing, closed by ``stack``; ValueError when it can not be written."""
+    """Open ``path`` for writing; ``stack`` closes it. Raises ValueError if it cannot be written."""
     try:
         return stack.enter_context(path.open("w", encoding="utf-8", newline=""))
     except OSError as error:

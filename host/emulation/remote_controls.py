@@ -1,4 +1,4 @@
-"""What can be done to a device that another process emulates, by its control port."""
+"""Actions on a device that another process emulates, over its control port."""
 
 import http.client
 import json
@@ -13,43 +13,45 @@ from cubestack.host.errors import PortOpenError, TargetError, TransportError
 from cubestack.host.recording.setups import read_document
 
 TOKEN = "CUBESTACK_TOKEN"
-"""Variable of the environment with the control port's token."""
+"""Environment variable with the control port's token."""
 
 HTTP_ERRORS = 400
-"""The first status of one."""
+"""HTTP statuses from here on are errors."""
 
 TIMEOUT_S = 60.0
-"""Wall time for an answer."""
+"""Time-out of a request in s."""
 
 PATIENT = ("/run", "/back", "/trace")
-"""What takes as long as it does."""
+"""Ends of paths that have no time-out."""
 
 
 class ControlClient:
-    """Asks a control port (docs/control.md)."""
+    """Client of a control port (docs/control.md)."""
 
     def __init__(self, url: str, token: str) -> None:
-        """Nothing is asked yet; TargetError for what is no address."""
+        """Send nothing yet; raises TargetError for an invalid address."""
         try:
             parts = urlsplit(url)
             host, port = parts.hostname, parts.port
         except ValueError:
             host = port = None
         if not host or not port:
-            raise TargetError(f"{url} is no control port: it is like http://127.0.0.1:8700")
+            raise TargetError(
+                f"{url} is not the address of a control port; give one like http://127.0.0.1:8700"
+            )
         self.url, self._address = f"http://{parts.netloc}", (host, port)
         self._headers = {"Authorization": f"Bearer {token}"}
 
     def ask(self, method: str, path: str, body: object = None) -> dict[str, Any]:
         """The answer.
 
-        Raises ValueError for what makes no sense there, TransportError when nobody answers.
+        Raises ValueError if the request was rejected, TransportError if nobody answers.
         """
         told: dict[str, Any] = json.loads(self.fetch(method, path, body))
         return told
 
     def fetch(self, method: str, path: str, body: object = None) -> bytes:
-        """The answer as it is; raises as ``ask`` does."""
+        """The raw answer; raises as ``ask`` does."""
         patient = path.partition("?")[0].endswith(PATIENT)
         timeout_s = None if patient else TIMEOUT_S
         connection = http.client.HTTPConnection(*self._address, timeout=timeout_s)
@@ -67,20 +69,20 @@ class ControlClient:
         finally:
             connection.close()
         if answer.status == http.client.UNAUTHORIZED:
-            raise PortOpenError(f"{self.url} wants its token in ${TOKEN}")
+            raise PortOpenError(f"{self.url} requires its token in ${TOKEN}")
         if error:
             raise TargetError(str(error))
         return content
 
 
 class RemoteControls:
-    """See ``Controls``; an emulation that runs at its pace meanwhile.
+    """``Controls`` of an emulation that keeps running at its own pace.
 
     Attributes:
         client: of the control port.
         device: name of the device.
         chosen: its seed, profile, switches and firmware, where they were given.
-        no_past: why nobody can go back there; empty where one can.
+        no_past: why going back in time is not possible; empty if it is.
     """
 
     def __init__(self, client: ControlClient, device: str) -> None:
@@ -119,7 +121,7 @@ class RemoteControls:
         return float(self._state()["time_s"])
 
     def advance(self, seconds: float) -> None:
-        """See ``Controls``; it goes on afterwards if it went on before."""
+        """See ``Controls``; a running emulation continues afterwards."""
         state = self._state()
         self.client.ask("POST", "/run", {"to_s": state["time_s"] + seconds})
         if not state["held"]:
@@ -134,9 +136,9 @@ class RemoteControls:
 
 
 def controlled(url: str, device: str | None = None) -> RemoteControls:
-    """The controls of a device at a control port, by the token in the environment.
+    """The controls of a device behind a control port; the token comes from the environment.
 
-    ``device`` is needed where there are several: TargetError.
+    Raises TargetError without ``device`` if there are several.
     """
     client = ControlClient(url, os.environ.get(TOKEN, ""))
     known = client.ask("GET", "/")["devices"]

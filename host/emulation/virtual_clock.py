@@ -1,8 +1,7 @@
-"""The clock of drivers under test: while devices are emulated, their code sleeps in virtual time.
+"""Virtual time for drivers under test: their clocks and sleeps follow the emulated devices.
 
-A driver that polls with ``time.sleep`` and watches ``time.monotonic`` runs as it is. What the
-standard library, pytest and this package ask for stays wall time, and so does any other thread than
-the one that powered the device up.
+A driver that uses ``time.sleep`` and ``time.monotonic`` runs unmodified. The standard library,
+pytest and this package keep wall time, as do all threads but the one that powered the device up.
 """
 
 from __future__ import annotations
@@ -20,29 +19,29 @@ if TYPE_CHECKING:
 NS_PER_S = 10**9
 
 LOOK_NS = 10_000
-"""What a look at the clock takes, so that a loop which does nothing else comes to its end."""
+"""Virtual time per reading of the clock, so that a polling loop ends."""
 
 KEEP_WALL_TIME = frozenset(
     sys.stdlib_module_names
     | {"cubestack", "pytest", "_pytest", "pluggy", "xdist", "execnet", "hypothesis", "_hypothesis"}
 )
-"""Top-level names of the modules whose clock is left alone."""
+"""Top-level modules that keep wall time."""
 
 CLOCKS: dict[str, Callable[[], int]] = {
     "monotonic": time.monotonic_ns,
     "perf_counter": time.perf_counter_ns,
     "time": time.time_ns,
 }
-"""Function of ``time`` to what gives the same in ns."""
+"""Functions of ``time``, with their equivalents in ns."""
 
 _sleep = time.sleep
 
 
 class VirtualClock:
-    """``time`` of the code under test, for as long as ``follow`` says.
+    """Replaces ``time`` for the code under test while ``follow`` is active.
 
-    With several devices, each with a virtual time of its own, it is that of the one which is
-    furthest, and a sleep lets all of them go on.
+    With several devices that have separate virtual times, the latest counts, and a sleep advances
+    all of them.
     """
 
     def __init__(self) -> None:
@@ -58,7 +57,7 @@ class VirtualClock:
 
     @contextmanager
     def follow(self, device: AnyEmulated) -> Iterator[None]:
-        """Go by the virtual time of ``device`` too."""
+        """Follow the virtual time of ``device`` too."""
         if not self._devices:
             self._thread = threading.get_ident()
             self._elapsed_ns = 0
@@ -74,7 +73,7 @@ class VirtualClock:
                 self._restore()
 
     def _elapsed(self) -> int:
-        """In ns since the first device; never less than before."""
+        """Elapsed ns since the first device; never decreases."""
         times = (_now_ns(device) + ahead for device, ahead in self._devices.items())
         self._elapsed_ns = max(self._elapsed_ns, *times)
         return self._elapsed_ns
@@ -84,7 +83,7 @@ class VirtualClock:
             device.wait(seconds)
 
     def _followed(self, caller: Any) -> bool:
-        """Whether the code that asks is that under test."""
+        """Whether the caller is code under test."""
         top = str(caller.f_globals.get("__name__")).partition(".")[0]
         return (
             bool(self._devices)
@@ -92,7 +91,8 @@ class VirtualClock:
             and top not in KEEP_WALL_TIME
         )
 
-    # A module that is imported meanwhile may keep these for ever, so they know when to be real.
+    # A module imported meanwhile may keep these for ever, so each call checks whether to be
+    # virtual.
 
     def _virtual_sleep(self) -> Callable[[float], None]:
         def sleep(seconds: float, /) -> None:
@@ -117,7 +117,7 @@ class VirtualClock:
         return clock
 
     def _replace(self) -> None:
-        """In ``time``, and where a module under test has taken a function of it by name."""
+        """Replace functions of ``time``, there and in modules under test that imported them."""
         for module in list(sys.modules.values()):
             name = getattr(module, "__name__", "")
             if module is time or str(name).partition(".")[0] not in KEEP_WALL_TIME:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 PS_PER_S = 10**12
 
 LONGEST_S = 3600.0
-"""What "for ever" is: nothing of a device takes as long."""
+"""Stands for "for ever": no action of a device takes as long."""
 
 
 class VirtualSerial(Closable):
@@ -36,7 +36,7 @@ class VirtualSerial(Closable):
         return len(self._ahead)
 
     def read(self, size: int = 1) -> bytes:
-        """Read ``size`` bytes, or what came within ``timeout``."""
+        """Read ``size`` bytes, or fewer if ``timeout`` expires."""
         left_s = LONGEST_S if self.timeout is None else self.timeout
         while self.in_waiting < size:
             began_ps = self._line.now_ps
@@ -50,7 +50,7 @@ class VirtualSerial(Closable):
         return data
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
-        """Read to the end of ``expected``, to ``size`` bytes, or until ``timeout`` is over."""
+        """Read until ``expected``, ``size`` bytes, or the time-out."""
         late_ps = (
             self._line.now_ps + (LONGEST_S if self.timeout is None else self.timeout) * PS_PER_S
         )

@@ -36,7 +36,7 @@ def measure(
             ``mag_limit=3.8``, ``no_noise=True``; options of its board among them.
 
     Raises:
-        TargetError: nobody registered that name.
+        TargetError: no device has that name.
         ValueError: a command that the device does not have, an option, or a value of one, that can
             not be; the text says what is right.
     """

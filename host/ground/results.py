@@ -106,4 +106,4 @@ FORMS: dict[str, Callable[[ResultLog], bytes]] = {
     "csv": ResultLog.csv,
     "parquet": ResultLog.parquet,
 }
-"""By what the name of a file ends with."""
+"""By the file's suffix."""

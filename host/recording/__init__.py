@@ -1,1 +1,1 @@
-"""Recordings from the host's side: made, played back, and how a device was set up."""
+"""Recordings on the host's side: recorder, playback, and device set-ups."""

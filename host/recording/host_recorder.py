@@ -1,9 +1,8 @@
-"""Records a host's own view of a real device: what it wrote and what came, with wall time.
+"""Records a session with a real device as the host sees it, in wall time.
 
-For devices that are not emulated here; an emulated one is recorded at its pins, by
-``emulator.recording.recorder``. Times are those at which bytes were handed over, so they say less
-than a wire would: a replay to an emulated device shows differences in time. As a target of host
-tools (``recorded:FILE``) such a recording is as good.
+An emulated device is recorded at its pins instead (``emulator.recording.recorder``). Times here are
+those of the system calls, not of the wire, so a replay to an emulated device shows differences in
+time. As a target (``recorded:FILE``) both kinds of recording work alike.
 """
 
 import time
@@ -23,7 +22,7 @@ I2C_M_RD = 0x0001
 
 
 class HostRecorder:
-    """Stands between a host tool and its lines and bus."""
+    """Wraps a host tool's lines and bus."""
 
     def __init__(
         self,
@@ -32,7 +31,7 @@ class HostRecorder:
         *,
         clock_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Write to ``stream``, which stays its owner's; ``clock_ns`` never runs back.
+        """Write to ``stream``, which the caller closes; ``clock_ns`` must be monotonic.
 
         ``setup`` says what is recorded.
         """
@@ -57,7 +56,7 @@ class HostRecorder:
         return (self._clock_ns() - self._start_ns) * PS_PER_NS
 
     def write(self, event: recording.LineBytes | recording.BusTransfer) -> None:
-        """Record an event; who reads the file meanwhile finds whole lines."""
+        """Record an event; a concurrent reader sees whole lines."""
         assert self._writer is not None
         self._writer.write(event)
         self._writer.flush()
@@ -84,7 +83,7 @@ class _RecordingLine:
         self.transport.close()
 
     def _put(self, side: recording.Side, data: bytes, now_ps: int) -> None:
-        """In the order of the calls: what was read was there before what is written next."""
+        """Records in the order of the calls."""
         if data:
             first_ps = max(self.last_ps, now_ps - (side == "device") * len(data) * self.byte_ps)
             self.recorder.write(recording.LineBytes(first_ps, self.port, side, data, self.byte_ps))

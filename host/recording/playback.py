@@ -1,7 +1,7 @@
-"""Recordings as targets: host programs talk to a file that answers like the device did.
+"""Recordings as targets: a file answers host programs like the device did.
 
-What the host writes must be what was recorded; the first byte that differs is named with its
-field. Waiting costs no time. The format is that of ``firmware_model.formats.recording``.
+The host must write the recorded bytes; the first different byte raises an error with its field.
+Waiting takes no time. The format is that of ``firmware_model.formats.recording``.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ class RecordedTransport:
     """A serial line of a recording, as a ``Transport``."""
 
     def __init__(self, recording: Recording, interface: Interface, port: str = "uart") -> None:
-        """Stand at the beginning; RecordingMismatchError for a port that was not recorded."""
+        """Rewind; raises RecordingMismatchError for a port that was not recorded."""
         if port not in recording.bauds:
             known = ", ".join(recording.bauds) or "none"
             raise RecordingMismatchError(f"{recording.name} has no line {port!r}; it has: {known}")
@@ -28,7 +28,7 @@ class RecordedTransport:
         self._written = self._read = 0
 
     def write(self, data: bytes) -> None:
-        """Take what the host sends; RecordingMismatchError when something else was recorded."""
+        """Compare what the host sends; raises RecordingMismatchError if it differs."""
         for offset, byte in enumerate(data):
             index = self._written + offset
             if index < len(self._expected) and self._expected[index] == byte:
@@ -43,7 +43,7 @@ class RecordedTransport:
         self._written += len(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """What the device said before the host's next byte, at most ``max_bytes``."""
+        """What the device sent before the host's next byte, at most ``max_bytes``."""
         end = len(self._answers)
         if self._written < len(self._write_times):
             next_ps = self._write_times[self._written]
@@ -54,7 +54,7 @@ class RecordedTransport:
         return data
 
     def close(self) -> None:
-        """Nothing: a recording holds no port."""
+        """Do nothing: a recording has no port."""
 
 
 class RecordedI2c:
@@ -67,9 +67,9 @@ class RecordedI2c:
         self._done = 0
 
     def i2c_rdwr(self, *messages: Any) -> None:
-        """Answer like the next recorded transfer, its error included.
+        """Answer as in the next recorded transfer, errors included.
 
-        Raises RecordingMismatchError when the transfer is not the recorded one.
+        Raises RecordingMismatchError if the transfer differs from the recorded one.
         """
         if self._done >= len(self._transfers):
             raise RecordingMismatchError(

@@ -1,7 +1,7 @@
-"""What a recording's host and device said to each other, message by message, by the tables.
+"""Messages between host and device in a recording, decoded by the tables.
 
-Node protocol only, on the serial line and on I2C: a device answers one request at a time, so an
-answer belongs to the last request before it.
+It decodes the node protocol on the serial line and on I2C. A device answers one request at a time,
+so an answer belongs to the last request before it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -25,13 +25,13 @@ class Said:
     """A request and its answer.
 
     Attributes:
-        time_s: when the request was whole; on I2C when the transfer began.
+        time_s: end of the request; on I2C, start of the transfer.
         port: where.
         kind: telecommand or telemetry.
         name: of the message, or its ID where the tables have none.
-        values: of a telecommand's parameters, or of the telemetry; nothing without an answer.
-        message: what the tables have of it; None without values.
-        error: what is wrong with it; empty where nothing is.
+        values: a telecommand's parameters, or the telemetry; empty without an answer.
+        message: its declaration; None without values.
+        error: what is wrong with it, or empty.
     """
 
     time_s: float
@@ -43,7 +43,7 @@ class Said:
     error: str = ""
 
     def rows(self) -> list[dict[str, str | float | None]]:
-        """A row for each field, or one where there is none; for a table of everything said."""
+        """A row per field, or one row without fields; for a table of all messages."""
         told: dict[str, str | float | None] = {
             "time_s": self.time_s,
             **{"port": self.port, "kind": self.kind, "message": self.name, "error": self.error},
@@ -68,7 +68,7 @@ COLUMNS = ("time_s", "port", "kind", "message", "error", *FIELD_COLUMNS)
 
 
 def said(recording: Recording, interface: Interface) -> list[Said]:
-    """All requests of the node protocol in a recording, in the order of time."""
+    """All node-protocol requests of a recording, by time."""
     found = [*_on_the_line(recording.line(LINE), interface)]
     found += (one for transfer in recording.transfers if (one := _on_the_bus(transfer, interface)))
     return sorted(found, key=lambda one: one.time_s)
@@ -96,7 +96,7 @@ def _on_the_line(blocks: Iterable[LineBytes], interface: Interface) -> Iterator[
                 decoders["device"].reset()
             elif asked is not None:
                 yield _exchange(asked, payload, interface)
-                asked = None  # what comes unasked is a picture's next frame
+                asked = None  # an unrequested frame is the next block of an image
     if asked is not None:
         yield _exchange(asked, None, interface)
 
@@ -117,7 +117,7 @@ def _exchange(asked: _Asked, answer: bytes | None, interface: Interface) -> Said
 
 
 def _on_the_bus(transfer: BusTransfer, interface: Interface) -> Said | None:
-    """None for a transfer with another device, or with its registers."""
+    """None for a transfer to another device or to its registers."""
     messages = [one for one in transfer.messages if one.address == interface.i2c_address]
     written = b"".join(one.data for one in messages if not one.read)
     read = b"".join(one.data for one in messages if one.read)
@@ -132,7 +132,7 @@ def _on_the_bus(transfer: BusTransfer, interface: Interface) -> Said | None:
 
 
 def _told(time_s: float, port: str, message: Message, data: bytes, error: str) -> Said:
-    """A message that carries ``data``, if any; ``error`` is what is wrong with it so far."""
+    """The message that ``data`` encodes, if any; ``error`` is its error so far."""
     about = time_s, port, message.kind.value, message.name
     if not data and error:
         return Said(*about, error=error)

@@ -1,4 +1,4 @@
-"""How a recorded device was made, from the options of commands and back."""
+"""Set-up of a recorded device, from and to command options."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -18,7 +18,7 @@ def emulated_setup(
     faults: Path | None = None,
     options: Mapping[str, Option] | None = None,
 ) -> Setup:
-    """Of a device that is emulated here; its files were read already."""
+    """Set-up of an emulated device; its files were already read."""
     return Setup(
         version(DISTRIBUTION),
         seed=seed,
@@ -29,7 +29,7 @@ def emulated_setup(
 
 
 def taped_setup(target: str) -> Setup:
-    """Of a device that is not emulated here."""
+    """Set-up of a device that is not emulated here."""
     return Setup(version(DISTRIBUTION), target=target)
 
 
@@ -41,9 +41,9 @@ def setup_for(
     faults: Path | None,
     tell: Callable[[str], None],
 ) -> Setup:
-    """What a replay makes its device from: what was recorded, unless something else is given.
+    """Set-up for a replay: the recorded one, with replacements.
 
-    ``tell`` gets a line for each thing that is not as it was.
+    ``tell`` gets a line for each difference.
     """
     recorded = recording.setup
     if recorded is None:
@@ -79,7 +79,7 @@ def _chosen(
 
 
 def read_document(path: Path) -> Document:
-    """A file for a recording; raises ValueError when it can not be read."""
+    """A file's name and text for a recording; raises ValueError if it cannot be read."""
     try:
         return Document(str(path), path.read_text(encoding="utf-8", errors="replace"))
     except OSError as error:
@@ -88,9 +88,9 @@ def read_document(path: Path) -> Document:
 
 @contextmanager
 def written(document: Document) -> Iterator[Path]:
-    """A file with a document's text: the one of its name if that still has it, else another one.
+    """A file with a document's text: the original if unchanged, else a copy.
 
-    Files that the text names are looked for beside the former only.
+    Files that the text names are found only beside the original.
     """
     path = Path(document.name)
     try:

@@ -1,4 +1,4 @@
-"""What was said in a recording as a table: a row for each field of each message."""
+"""A recording's messages as a table: a row per field of each message."""
 
 import csv
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ from cubestack.host.export.parquet import parquet_file
 from cubestack.host.recording.said import COLUMNS, Said
 
 NUMBERS = ("time_s", "value")
-"""Columns that are numbers."""
+"""Numeric columns."""
 
 
 def csv_table(messages: Iterable[Said]) -> bytes:
@@ -21,10 +21,10 @@ def csv_table(messages: Iterable[Said]) -> bytes:
 
 
 def parquet_table(messages: Iterable[Said]) -> bytes:
-    """The table as a Parquet file; ValueError without pyarrow."""
+    """The table as a Parquet file; raises ValueError without pyarrow."""
     rows = [row for one in messages for row in one.rows()]
     return parquet_file({name: [row[name] for row in rows] for name in COLUMNS}, NUMBERS)
 
 
 TABLES = {"csv": csv_table, "parquet": parquet_table}
-"""By what the name of a file ends with."""
+"""By the file's suffix."""

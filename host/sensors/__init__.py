@@ -1,1 +1,1 @@
-"""The sensors that come with this distribution, each declared once for everything generic."""
+"""Declarations of the built-in sensors."""

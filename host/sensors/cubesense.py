@@ -57,7 +57,7 @@ DEVICE: "Device[CubeSenseBoard, CubeSense]" = Device(
         ),
         Report(
             "upsets",
-            "turn over bits of FPGAs and memories, and see what comes of it",
+            "flip bits of FPGAs and memories, and report the effects",
             get(f"{STUDIES}.upsets:EXPERIMENT"),
         ),
     ),

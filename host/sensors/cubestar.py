@@ -24,13 +24,13 @@ STUDIES = "cubestack.host.studies.cubestar"
 
 POINTING_DEG = (84.0, -1.0, 0.0)  # Orion's belt
 MAG_LIMIT = 3.8
-"""Stars of the onboard list only: with fainter ones in view, the threshold wants raising first."""
+"""Only stars of the onboard list: fainter ones would require a higher threshold first."""
 
 REFERENCE = "reference"
-"""Name of this project's program in C among firmware files."""
+"""Value of ``firmware`` that selects the reference firmware in C."""
 
 WIDEST_PAIR_DEG = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))
-"""The list in flash has every pair that a switch wants."""
+"""The list in flash has every pair that any switch setting needs."""
 
 
 def _open_board(
@@ -47,7 +47,7 @@ def _open_board(
         board.machine.semihosting(semihosting)
         return board
     if semihosting:
-        raise ValueError("semihosting is a way of own firmware to print: name one by firmware")
+        raise ValueError("semihosting needs own firmware; choose an image with firmware")
     from cubestack.emulator.boards.cubestar.board import CubeStarBoard
     from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 
@@ -69,12 +69,12 @@ def _open_with(
     switches: CubeStarSwitches = DEFAULT_SWITCHES,
     **common: Any,
 ) -> "CubeStarFirmwareBoard":
-    """A board that runs an image; ValueError for what only our own program can be told."""
+    """A board that runs an image; raises ValueError for options of the Python program."""
     from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
     from cubestack.emulator.iss.image import load_image
 
     if switches != DEFAULT_SWITCHES:
-        raise ValueError("own firmware has no profile and no switches: leave them out")
+        raise ValueError("own firmware has no profile and no switches; leave them out")
     name, mark, wanted = firmware.partition("#")
     if name == REFERENCE:
         from cubestack.firmware_model.reference.image import reference_image
@@ -109,7 +109,7 @@ def _default_scene() -> "Scene":
 
 
 def _layout_notice(value: str) -> str | None:
-    """What a user must know of a layout that can not be built from the published parts."""
+    """A warning for a layout that the published parts cannot build."""
     if value == Layout.COPIED.value:
         return None
     from cubestack.emulator.boards.cubestar.layouts import fpga_of
@@ -118,7 +118,7 @@ def _layout_notice(value: str) -> str | None:
     if fpga.fits:
         return None
     return (
-        f"layout {value} can not be built with an AGLN030: its FPGA takes {fpga.pins} "
+        f"layout {value} can't be built with an AGLN030: its FPGA takes {fpga.pins} "
         f"pins of {fpga.part_pins}, {fpga.tiles} tiles of {fpga.part_tiles}"
     )
 

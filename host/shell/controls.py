@@ -1,4 +1,4 @@
-"""The shell's commands on an emulated device past its ports: scene, fault, power, time."""
+"""Shell commands for an emulated device: scene, fault, power, time, peek."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ ON_OFF = ("on", "off")
 SCENE = "scene FILE"
 FAULT = "fault [KIND [TARGET] [PARAMETER=VALUE ...] [for_s=SECONDS]]"
 LOG = "log"
-"""What follows ``fault`` to see what faults have done."""
+"""Argument of ``fault`` that lists the fault events."""
 POWER = "power [CHANNEL on|off]"
 TIME = "time [SECONDS]"
 PEEK = "peek UNIT[.REGISTER]|VARIABLE|ADDRESS"
@@ -20,17 +20,22 @@ PEEK = "peek UNIT[.REGISTER]|VARIABLE|ADDRESS"
 
 @dataclass
 class ControlCommands:
-    """The commands on one target, which stays its owner's."""
+    """The commands on one target; the caller closes it."""
 
     target: Target
 
     def commands(self) -> list[ShellCommand]:
         return [
-            ShellCommand(SCENE, "show another scene", self._scene, True),
-            ShellCommand(FAULT, "let something break; fault clear, fault log", self._fault, True),
-            ShellCommand(POWER, "supply currents, load switches", self._power, True),
-            ShellCommand(TIME, "virtual time; let it pass", self._time, True),
-            ShellCommand(PEEK, "what own firmware's processor has there", self._peek, True),
+            ShellCommand(SCENE, "load another scene", self._scene, True),
+            ShellCommand(
+                FAULT,
+                "inject a fault; `fault clear` ends all, `fault log` lists events",
+                self._fault,
+                True,
+            ),
+            ShellCommand(POWER, "show supply currents, switch loads", self._power, True),
+            ShellCommand(TIME, "show virtual time, or let it pass", self._time, True),
+            ShellCommand(PEEK, "show memory of the processor with own firmware", self._peek, True),
         ]
 
     def _scene(self, words: list[str]) -> Result:
@@ -74,5 +79,5 @@ class ControlCommands:
 
     @property
     def _controls(self) -> Controls:
-        assert self.target.controls is not None  # else the shell has refused
+        assert self.target.controls is not None  # the shell rejects any other
         return self.target.controls

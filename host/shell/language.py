@@ -1,8 +1,8 @@
-"""The register shell's language: one line is one command, its words come from the tables.
+"""The register shell's language: one command per line, with names from the tables.
 
-Every command gives a ``Result``: rows for a reader, and data for a program. What can be completed
-is in ``complete``. A line that makes no sense raises ShellError, a ValueError, before anything is
-sent; what a device does not do raises the client's errors.
+Every command returns a ``Result``: rows for people, data for programs. ``complete`` completes a
+line. An invalid line raises ShellError (a ValueError) before anything is sent; a device's failure
+raises the client's errors.
 """
 
 import shlex
@@ -29,7 +29,7 @@ class Shell:
     """The commands on one target.
 
     Attributes:
-        target: what they act on.
+        target: the target they act on.
         commands: by name.
         on_row: called with each result of ``watch`` as it comes.
     """
@@ -51,8 +51,8 @@ class Shell:
     def execute(self, line: str) -> Result | None:
         """Run one command; None for an empty line or a comment (#).
 
-        Raises ShellError, InterfaceError, TransportError, NodeError. Of a node that has not
-        answered yet, the error tells what is likely to be wrong.
+        Raises ShellError, InterfaceError, TransportError, NodeError. If the node has never
+        answered, the error includes the likely cause.
         """
         try:
             words = shlex.split(line, comments=True)
@@ -70,7 +70,7 @@ class Shell:
         return self.asked(lambda: command.run(arguments))
 
     def asked(self, act: Callable[[], T]) -> T:
-        """What ``act`` gets from the node; errors as ``execute``'s."""
+        """Result of ``act`` on the node; raises as ``execute`` does."""
         try:
             found = act()
         except (NoAnswerError, BadAnswerError) as error:
@@ -80,7 +80,7 @@ class Shell:
         return found
 
     def _why_silent(self) -> str:
-        """Looked for once: what was told stays true until there is an answer."""
+        """Diagnosed once; it stays valid until an answer comes."""
         line = self.target.line
         if self._answered or line is None or self.target.registers is not None:
             return ""
@@ -89,7 +89,7 @@ class Shell:
         return self._silent_because
 
     def complete(self, line: str) -> list[str]:
-        """Words that may stand where ``line`` ends, in the order of the tables."""
+        """Completions of ``line``, in the order of the tables."""
         *before, word = line.split(" ")
         before = [part for part in before if part]
         known = _arguments(self.target, self._names, before) if before else list(self.commands)
@@ -133,7 +133,7 @@ def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
 
 
 def _next_words(phrases: Iterable[str], before: list[str]) -> list[str]:
-    """Words that may follow ``before`` in one of ``phrases``."""
+    """Words that can follow ``before`` in any of ``phrases``."""
     split = [phrase.split() for phrase in phrases]
     fitting = [words for words in split if words[: len(before)] == before]
     return list(dict.fromkeys(words[len(before)] for words in fitting if len(words) > len(before)))

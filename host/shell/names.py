@@ -1,4 +1,4 @@
-"""What a target has, by what a user calls it: a name in any case, a message's number, an address.
+"""Messages and registers of a target, found by name in any case, number or address.
 
 A number (``128``, ``0x80``) is that of a message, ``@0x05`` the address of a register.
 """
@@ -14,27 +14,27 @@ from cubestack.host.targets import Target
 
 ADDRESS = "@"
 NEAR = 3
-"""How many names or numbers a refusal suggests."""
+"""Number of suggestions in an error."""
 
 CUTOFF = 0.55
-"""Least likeness of a name that is suggested."""
+"""Least similarity of a suggested name."""
 
 Found = Message | PointerRegister
 
 
 def number_of(found: Found) -> str:
-    """What may stand for its name on a line."""
+    """Name that a line can use."""
     return str(found.id) if isinstance(found, Message) else f"{ADDRESS}{found.address:#04x}"
 
 
 @dataclass
 class Names:
-    """Messages and registers within reach of one target, which stays its owner's."""
+    """Messages and registers of one target; the caller closes it."""
 
     target: Target
 
     def of(self, command: str) -> list[str]:
-        """All names that ``command`` (read, watch, write or list) takes, in the tables' order."""
+        """All names that ``command`` (read, watch, write or list) accepts, in the tables' order."""
         return [found.name for found in self.all_of(command)]
 
     def all_of(self, command: str) -> list[Found]:
@@ -51,12 +51,12 @@ class Names:
 
     @property
     def registers(self) -> list[PointerRegister]:
-        """Registers in the order of their addresses; none where they are not within reach."""
+        """Registers by address; empty if the target has no access to them."""
         registers = self.target.registers
         return [] if registers is None else list(registers.registers)
 
     def find(self, word: str, *kinds: Kind) -> Found | None:
-        """The message of one of ``kinds``, or the register, that ``word`` means."""
+        """The message of one of ``kinds``, or register, called ``word``; or None."""
         if word.startswith(ADDRESS):
             address = _integer(word.removeprefix(ADDRESS))
             return next((found for found in self.registers if found.address == address), None)
@@ -67,7 +67,7 @@ class Names:
         return next((found for found in self.registers if found.name.lower() == name), None)
 
     def need(self, command: str, word: str, *kinds: Kind) -> Found:
-        """As ``find``; ShellError, which suggests what is near, when there is nothing."""
+        """As ``find``, but raises ShellError with suggestions."""
         found = self.find(word, *kinds)
         if found is not None:
             return found
@@ -82,7 +82,7 @@ class Names:
         raise ShellError(f"{command}: nothing is called {word!r}; {near}")
 
     def fields(self, word: str, kind: Kind) -> tuple[Field, ...]:
-        """Fields of what ``word`` means; none when it means nothing."""
+        """Fields of the message or register called ``word``; empty if there is none."""
         found = self.find(word, kind)
         if found is None:
             return ()
@@ -106,7 +106,7 @@ def _near_names(word: str, known: list[str]) -> str:
     close = get_close_matches(word.lower(), lower, n=NEAR, cutoff=CUTOFF)
     close += [name for name in lower if word.lower() in name and name not in close]
     if not close:
-        return "list shows what there is"
+        return "`list` lists all names"
     *others, last = [lower[name] for name in close[:NEAR]]
     return f"did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
 

@@ -1,4 +1,4 @@
-"""The shell's commands on a device's ports: image (download), bench (letters), raw (bytes)."""
+"""Shell commands on a device's ports: image (download), bench (letters), raw (bytes)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RAW_TIMEOUT_S = 0.3
-"""Silence after which the answer to raw bytes is over."""
+"""Silence that ends the answer to raw bytes."""
 
 LETTER_TIMEOUT_S = 10.0
 SHORT_ANSWER = 8
-"""Longest answer to a bench letter that is shown."""
+"""Longest shown answer to a bench letter."""
 
 IMAGE = "image FILE.png [SOURCE]"
 BENCH = "bench LETTER"
@@ -28,15 +28,15 @@ RAW = "raw HEX ..."
 
 @dataclass
 class PortCommands:
-    """The commands on one target, which stays its owner's."""
+    """The commands on one target; the caller closes it."""
 
     target: Target
 
     def commands(self) -> list[ShellCommand]:
         return [
-            ShellCommand(IMAGE, "download the picture", self._image),
-            ShellCommand(BENCH, "a letter of the bench protocol", self._bench),
-            ShellCommand(RAW, "send bytes, show what comes", self._raw),
+            ShellCommand(IMAGE, "download the image", self._image),
+            ShellCommand(BENCH, "send a letter of the bench protocol", self._bench),
+            ShellCommand(RAW, "send bytes, show the answer", self._raw),
         ]
 
     def _image(self, words: list[str]) -> Result:
@@ -51,7 +51,7 @@ class PortCommands:
         return Result([("", f"{path}: {columns} x {rows}")], data)
 
     def _download(self, source: str | None) -> "NDArray[np.uint8]":
-        """The picture in the device's memory, or in ``source``; TargetError where there is none."""
+        """The image in memory, or in ``source``; raises TargetError if it sends none."""
         device, name = self.target.device, self.target.interface.name
         if device is None:
             raise TargetError(f"image: {name} sends no picture")

@@ -1,4 +1,4 @@
-"""The shell's commands on messages and registers: read, write, watch, dump, list."""
+"""Shell commands on messages and registers: read, write, watch, dump, list."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ LIST = "list [NAME]"
 
 @dataclass
 class RegisterCommands:
-    """The commands on one target, which stays its owner's.
+    """The commands on one target; the caller closes it.
 
     Attributes:
         names: what the target has.
@@ -39,11 +39,13 @@ class RegisterCommands:
 
     def commands(self) -> list[ShellCommand]:
         return [
-            ShellCommand(READ, "a telemetry frame or register; NAME may be a number", self._read),
+            ShellCommand(
+                READ, "read a telemetry frame or register; NAME can be a number", self._read
+            ),
             ShellCommand(WRITE, "send a telecommand, write a register", self._write),
-            ShellCommand(WATCH, "read again and again", self._watch),
+            ShellCommand(WATCH, "read repeatedly", self._watch),
             ShellCommand(DUMP, "read all telemetry that has no side effect", self._dump),
-            ShellCommand(LIST, "what there is, or the fields of one", self._list),
+            ShellCommand(LIST, "list all names, or the fields of one", self._list),
         ]
 
     def _read(self, words: list[str]) -> Result:
@@ -165,13 +167,13 @@ def parse_value(field: Field, text: str) -> object:
             return convert(text)
         except ValueError:
             continue
-    return text  # the name of a choice, or what ``pack`` refuses with the right words
+    return text  # the name of a choice, or an error that ``pack`` words
 
 
 def parse_values(message: Message, words: Sequence[str]) -> dict[str, object]:
     """Parameters of a telecommand: FIELD=VALUE in any order, or the values in the table's order.
 
-    A field that is not given keeps no value: InterfaceError, as for one that does not exist.
+    Raises InterfaceError for a missing or an unknown field.
     """
     values: dict[str, object] = {}
     for position, word in enumerate(words):

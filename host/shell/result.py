@@ -1,4 +1,4 @@
-"""What the shell's commands have in common: what they give, how they are described and refused."""
+"""What the shell's commands share: results, descriptions and errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ GREATEST = 1e9
 
 
 class ShellError(ValueError):
-    """A line makes no sense; the text is one line and says what would."""
+    """An invalid line; the text is one line and says what is valid."""
 
 
 @dataclass
@@ -27,7 +27,7 @@ class Result:
 
 @dataclass(frozen=True)
 class ShellCommand:
-    """A command of the shell: how it is called, what it does, and what it needs."""
+    """A shell command: usage, action, and what it needs."""
 
     usage: str
     meaning: str
@@ -40,13 +40,13 @@ class ShellCommand:
 
 
 def check_count(usage: str, words: Sequence[str], least: int, most: int) -> None:
-    """Raise ShellError unless there are ``least`` to ``most`` words behind a command's name."""
+    """Raise ShellError unless ``least`` to ``most`` words follow the command's name."""
     if not least <= len(words) <= most:
         raise ShellError(f"{usage.split()[0]}: {len(words)} words; usage: {usage}")
 
 
 def to_number(command: str, text: str, least: float) -> float:
-    """A number of at least ``least``; ShellError for anything else."""
+    """A number of at least ``least``; raises ShellError otherwise."""
     try:
         value = float(text)
     except ValueError:

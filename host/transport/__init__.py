@@ -1,1 +1,1 @@
-"""How bytes travel: serial port, TCP, RFC 2217, I2C."""
+"""Transports: serial port, TCP, RFC 2217, I2C."""

@@ -1,4 +1,4 @@
-"""smbus2's SMBus on an emulated bus, for Python programs that are not started by ``cubestack run``.
+"""smbus2's SMBus on an emulated bus, for Python programs not started by ``cubestack run``.
 
 ::
 
@@ -7,7 +7,7 @@
     with CubeSMBus(7) as bus:                    # the bus that `cubestack emulate` serves
         print(bus.read_byte_data(0x1A, 0x83))
 
-It has every method of SMBus and raises what that raises: OSError with the errno of Linux's driver.
+It has every method of SMBus and raises the same: OSError with the errno of Linux's driver.
 """
 
 import os
@@ -32,21 +32,21 @@ class BusLink(Protocol):
     """A device file of an emulated bus."""
 
     def call(self, call: Call, body: bytes) -> tuple[int, bytes]:
-        """Do a call and wait for its end; result (0 or more, or a negative errno) and data."""
+        """Perform a call; returns the result (0 or more, or a negative errno) and data."""
 
     def close(self) -> None: ...
 
 
 class CubeSMBus(SMBus):
-    """An SMBus whose bus is emulated, by another process or in this one."""
+    """An SMBus on a bus that this or another process emulates."""
 
     def __init__(
         self, bus: int | str | None = None, force: bool = False, *, link: BusLink | None = None
     ) -> None:
         """Open ``bus``: a number, ``/dev/i2c-N``, or the path of the socket that serves it.
 
-        ``link`` takes its place when the board is in this process: ``board.i2c()``. Without either,
-        call ``open``. Raises PortOpenError when nobody serves it.
+        ``link`` replaces it if the board is in this process: ``board.i2c()``. Without either, call
+        ``open``. Raises PortOpenError if no process serves it.
         """
         self._link = link
         self._addressed: tuple[int, bool] | None = None
@@ -77,7 +77,7 @@ class CubeSMBus(SMBus):
         self._pec = 0
 
     def enable_pec(self, enable: bool = True) -> None:
-        """Let transactions carry a packet error code, or not."""
+        """Enable or disable packet error codes."""
         self._ioctl(Ioctl.PEC, int(enable))
         self._pec = int(enable)
 
@@ -156,7 +156,7 @@ class CubeSMBus(SMBus):
         self._transact(i2c_addr, force, WRITE, register, SmbusSize.I2C_BLOCK_DATA, _counted(data))
 
     def i2c_rdwr(self, *i2c_msgs: Any) -> None:
-        """One combined transfer of smbus2's ``i2c_msg``s, which take what is read."""
+        """One combined transfer of smbus2's ``i2c_msg``s, which receive the data read."""
         messages = [_plain(message) for message in i2c_msgs]
         data = self._call(Call.RDWR, linux.pack_rdwr(messages))
         for message, part in zip(i2c_msgs, linux.split_rdwr(messages, data), strict=True):
@@ -228,7 +228,7 @@ class _SocketLink:
             (length,) = linux.LENGTH.unpack(self._receive(linux.LENGTH.size))
             return linux.split_reply(self._receive(length))
         except OSError as error:
-            raise PortClosedError("the emulation has gone") from error
+            raise PortClosedError("the emulation has ended") from error
 
     def _receive(self, count: int) -> bytes:
         data = b""
@@ -244,7 +244,7 @@ class _SocketLink:
 
 
 def _find_socket(bus: int | str) -> Path:
-    """The socket of a bus: that of `cubestack run` around this program, else of `emulate`."""
+    """The socket of a bus: of the `cubestack run` around this program, else of `emulate`."""
     text = str(bus).removeprefix(DEVICE)
     if not text.isdecimal():
         return Path(text)
@@ -255,7 +255,7 @@ def _find_socket(bus: int | str) -> Path:
 
 
 def _plain(message: Any) -> linux.RdwrMessage:
-    """A message of smbus2; of a read whose length comes from the device, the first byte counts."""
+    """A message of smbus2; if the device sends the length, the first byte has it."""
     content = bytes(message)
     if message.flags & MessageFlag.READ:
         content = content[:1] if message.flags & MessageFlag.RECEIVE_LENGTH else b""

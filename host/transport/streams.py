@@ -1,7 +1,7 @@
-"""Byte transports: a serial port through pyserial, a TCP socket, RFC 2217; all look the same.
+"""Byte transports with one interface: serial port (pyserial), TCP socket, RFC 2217.
 
-A transport is what the client needs of a line: anything with these three methods will do, as the
-emulator's in-process link does.
+A client accepts anything with the three methods of ``Transport``, such as the emulator's
+in-process link.
 """
 
 import select
@@ -28,22 +28,22 @@ class Transport(Protocol):
         """Send all of ``data``; raises TransportError."""
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """Wait for a byte, then return what is there, at most ``max_bytes``.
+        """Wait for a byte, then return all that arrived, at most ``max_bytes``.
 
-        Empty when nothing came within ``timeout_s``; 0 does not wait. Raises TransportError.
+        Returns nothing after ``timeout_s``; 0 does not wait. Raises TransportError.
         """
 
     def close(self) -> None: ...
 
 
 def port_of(line: Transport) -> Transport:
-    """The port beneath a line that is recorded, else the line itself."""
+    """The port under a recorded line, else the line itself."""
     beneath: Transport = getattr(line, "transport", line)
     return beneath
 
 
 def read_answer(line: Transport, length: int, silence_s: float) -> bytes:
-    """What comes, until it is ``length`` bytes or the line is silent for ``silence_s``."""
+    """Bytes until ``length`` of them or a silence of ``silence_s``."""
     answer = bytearray()
     while len(answer) < length and (data := line.read(READ_BYTES, silence_s)):
         answer += data
@@ -55,8 +55,8 @@ class Reopening(Transport, ABC):
 
     Attributes:
         name: the port's, in messages.
-        reopens: whether a line that has gone is opened again when it is used next: a cable that
-            was pulled and put back, a server that was started again.
+        reopens: whether the next use opens a lost line again: after a pulled cable or a
+            restarted server.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Reopening(Transport, ABC):
 
     @contextmanager
     def _used(self) -> Iterator[None]:
-        """Around what touches the line: PortClosedError for a failure."""
+        """Converts failures of the block to PortClosedError."""
         try:
             if self._gone and self.reopens:
                 self._open_again()
@@ -81,7 +81,7 @@ class Reopening(Transport, ABC):
 
 
 class SerialTransport(Reopening):
-    """A serial port, or any URL that pyserial knows."""
+    """A serial port, or any URL that pyserial supports."""
 
     def __init__(self, port: str, baud: int) -> None:
         """Open ``port`` at ``baud``, 8N1; raises PortOpenError."""
@@ -96,7 +96,7 @@ class SerialTransport(Reopening):
         return int(self._port.baudrate)
 
     def set_baud(self, baud: int) -> bool:
-        """Change it; whether the port can. Raises PortClosedError."""
+        """Change the baud rate; returns whether the port can. Raises PortClosedError."""
         try:
             self._port.baudrate = baud
         except ValueError:
@@ -111,7 +111,7 @@ class SerialTransport(Reopening):
             self._port.write(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """What is there, once a byte has come; raises PortClosedError."""
+        """As ``Transport.read``; raises PortClosedError."""
         with self._used():
             self._set_timeout(timeout_s)
             first: bytes = self._port.read(1)
@@ -136,15 +136,15 @@ class Rfc2217Transport(SerialTransport):
     """A serial port behind an RFC 2217 server."""
 
     def _set_timeout(self, timeout_s: float) -> None:
-        # Through the property, pyserial would negotiate all settings anew, 50 ms each time.
+        # Setting the property would make pyserial negotiate all settings again, 50 ms each time.
         self._port._timeout = timeout_s
 
 
 class TcpTransport(Reopening):
     """A TCP connection that carries the bytes of a serial line.
 
-    Not pyserial's ``socket://``: that one never says that more than one byte is waiting, so an
-    answer would come byte by byte.
+    pyserial's ``socket://`` never reports more than one waiting byte, so an answer would come byte
+    by byte.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -161,7 +161,7 @@ class TcpTransport(Reopening):
             self._socket.sendall(data)
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
-        """What is there, once a byte has come; PortClosedError, also when the other side ends."""
+        """As ``Transport.read``; raises PortClosedError, also if the other side closes."""
         with self._used():
             if not select.select([self._socket], [], [], timeout_s)[0]:
                 return b""
@@ -203,8 +203,8 @@ _OPENERS: dict[str, Callable[[str, int], Transport]] = {
 def open_transport(target: str, baud: int) -> Transport:
     """Open ``target``: a port's path (/dev/ttyUSB0, ./ttySENSOR), tcp:// or rfc2217://HOST:PORT.
 
-    ``baud`` is not for tcp://. Raises TargetError (a ValueError) for a text that names nothing,
-    TransportError when it does not open.
+    ``baud`` does not apply to tcp://. Raises TargetError (a ValueError) for an invalid text,
+    TransportError if it does not open.
     """
     if not target:
         raise TargetError(
@@ -220,7 +220,7 @@ def open_transport(target: str, baud: int) -> Transport:
 
 
 def _reason(error: Exception) -> str:
-    """The plain reason of a failure, without pyserial's wrapping."""
+    """The plain reason of a failure, without pyserial's prefix."""
     inner = error.__context__ if isinstance(error, serial.SerialException) else error
     text = inner.strerror if isinstance(inner, OSError) and inner.strerror else str(error)
     if isinstance(inner, termios.error):

@@ -18,11 +18,11 @@ from cubestack.host.transport.streams import Transport
 @pytest.mark.parametrize(
     ("text", "device", "error"),
     [
-        ("/dev/null0", None, r"/dev/null0 does not tell .* give --device \(cubestar, cubesense"),
+        ("/dev/null0", None, r"/dev/null0 does not name .* add --device \(cubestar, cubesense"),
         ("/dev/null0", "cubestr", "no device 'cubestr'; known: cubestar"),
         ("i2c:x:0x1a", "cubestar", r"i2c:x:0x1a: must be i2c:BUS:ADDR"),
         ("i2c:7:0x99", "cubestar", "0x08 to 0x77"),
-        ("i2c:7:0x33", None, "give --device"),
+        ("i2c:7:0x33", None, "add --device"),
     ],
 )
 def test_text_that_names_nothing(text, device, error):

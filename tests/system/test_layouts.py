@@ -287,7 +287,7 @@ def test_only_option_3_needs_too_many_pins() -> None:
 def test_the_commands_say_what_can_not_be_built(measure: Measure, emulate: Emulate) -> None:
     option = next(one for one in device("cubestar").options if one.name == "layout")
     (line,) = filter(None, map(option.notice, option.choices))
-    assert "layout 3 can not be built with an AGLN030: its FPGA takes 95 pins of 77" in line
+    assert "layout 3 can't be built with an AGLN030: its FPGA takes 95 pins of 77" in line
     (frame,) = measure("--layout", "3", "--mag-limit", 3.8)
     assert frame["phase_ms"]["transfer"] == 0
     with emulate("--layout", "two-boards", "--tcp", "0") as served:

@@ -132,7 +132,7 @@ def test_a_scene_file_chooses_the_profile_unless_something_else_is_said(tmp_path
             with pytest.raises(ValueError, match=r"other\.toml: profile of cubestar must be"):
                 device.scene = other
             other.write_text(SKY + 'set = "tracking=verified"\n')
-            with pytest.raises(ValueError, match=r"other\.toml: set is chosen when"):
+            with pytest.raises(ValueError, match=r"other\.toml: set can only be chosen"):
                 device.scene = other
             other.write_text(SKY + f'profile = "{device.chosen["profile"]}"\n')
             device.scene = other

@@ -84,7 +84,7 @@ def test_firmware_is_sent_and_runs(desk: Desk, served: Serving) -> None:
     kept = next(row["now"] for row in desk.about["options"] if row["name"] == "firmware")
     status, told = restart(served, {"options": {"firmware": kept, "profile": "extended"}})
     assert status == 502
-    assert told["error"].endswith("own firmware has no profile and no switches: leave them out")
+    assert told["error"].endswith("own firmware has no profile and no switches; leave them out")
     status, told = restart(served, {"options": {"firmware": kept}})
     assert (status, dict(told["rows"])["profile"]) == (200, "published")
 

@@ -175,7 +175,7 @@ def test_controls_of_a_device_that_is_not_emulated(shell, command):
         ("read", r"read: 0 words; usage: read NAME \[FIELD\]"),
         ("read Identifcation", "nothing is called 'Identifcation'; did you mean Identification"),
         ("read threshold", "nothing is called 'threshold'; did you mean Detection"),
-        ("read zzzzz", "nothing is called 'zzzzz'; list shows what there is"),
+        ("read zzzzz", "nothing is called 'zzzzz'; `list` lists all names"),
         ("read 250", r"no telemetry has number 250; near: \d+ \(\w+\), \d+"),
         ("read 37", "no telemetry has number 37; near: 128"),
         ("write 128", "no telecommand has number 128; near: "),

@@ -36,7 +36,7 @@ def test_an_emulation_that_ends_within_an_answer(
 
     serving = threading.Thread(target=answer)
     serving.start()
-    with pytest.raises(PortClosedError, match="the emulation has gone"):
+    with pytest.raises(PortClosedError, match="the emulation has ended"):
         CubeSMBus(str(tmp_path / "bus"))
     serving.join()
 
