@@ -244,7 +244,7 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
 
 def test_reads_that_act_are_those_of_the_tables() -> None:
     """A telecommand without parameters is whole with its ID, which is where a read begins."""
-    rows = section(text_of("docs/i2c.md"), "Reads that act").splitlines()
+    rows = section(text_of("docs/i2c-bus.md"), "Reads that act").splitlines()
     for device in devices():
         found = [
             ", ".join(f"{one.id} {one.name}" for one in messages if one.supported) or "none"

@@ -22,7 +22,7 @@ def test_it_tells_all_that_it_can(controlled: Controlled) -> None:
 
 
 def test_the_page_has_every_call() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "control.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "control-api.md").read_text("utf-8")
     for call in CALLS:
         assert f"`{call.method} {call.path.replace('{device}', 'NAME')}`" in page
         assert all(f"`{name}`" in page for name in call.takes)
