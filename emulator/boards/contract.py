@@ -51,19 +51,12 @@ class BoardOptions(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class SerialLine:
-    """A serial port of a device.
+    """A serial port of a device."""
 
-    Attributes:
-        name: name of the port in recordings.
-        title: its protocol.
-        suffix: appended to the pty path of the first line.
-        uart: the device's end.
-    """
-
-    name: str
-    title: str
-    suffix: str
-    uart: Uart
+    name: str  # name of the port in recordings
+    title: str  # its protocol
+    suffix: str  # appended to the pty path of the first line
+    uart: Uart  # the device's end
 
     @property
     def baud(self) -> int:

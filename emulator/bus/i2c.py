@@ -35,17 +35,14 @@ class I2cMessage:
     """A message to a 7-bit ``address``: writes ``data``, or reads ``read`` bytes into it.
 
     With neither, only the address is sent, for writing: a probe.
-
-    Attributes:
-        block: a read whose first byte is the number of bytes that follow the ``read`` ones.
-        probe_read: only the address is sent, for reading.
     """
 
     address: int
     data: bytearray = field(default_factory=bytearray)
     read: int = 0
+    # a read whose first byte is the number of bytes that follow the ``read`` ones
     block: bool = False
-    probe_read: bool = False
+    probe_read: bool = False  # only the address is sent, for reading
 
     @property
     def reading(self) -> bool:

@@ -24,19 +24,12 @@ Parity = Literal["N", "E", "O", "M", "S"]
 
 @dataclass(frozen=True)
 class LineFormat:
-    """Settings of one end of a line.
+    """Settings of one end of a line."""
 
-    Attributes:
-        baud: bits per second, 1..``FASTEST_BAUD``.
-        data_bits: 5 to 8.
-        parity: see ``Parity``.
-        stop_bits: 1, 1.5 or 2.
-    """
-
-    baud: int
-    data_bits: int = 8
-    parity: Parity = "N"
-    stop_bits: float = 1
+    baud: int  # bits per second, 1..``FASTEST_BAUD``
+    data_bits: int = 8  # 5 to 8
+    parity: Parity = "N"  # see ``Parity``
+    stop_bits: float = 1  # 1, 1.5 or 2
 
     def __post_init__(self) -> None:
         if not 0 < self.baud <= FASTEST_BAUD:
@@ -77,19 +70,12 @@ class LineFormat:
 
 
 class Character(NamedTuple):
-    """A received character.
+    """A received character."""
 
-    Attributes:
-        time_ps: middle of the first stop bit.
-        value: the data bits.
-        framing_error: the stop bit was low.
-        parity_error: the parity bit was wrong.
-    """
-
-    time_ps: int
-    value: int
-    framing_error: bool
-    parity_error: bool
+    time_ps: int  # middle of the first stop bit
+    value: int  # the data bits
+    framing_error: bool  # the stop bit was low
+    parity_error: bool  # the parity bit was wrong
 
 
 _HALF = Fraction(1, 2)

@@ -27,22 +27,14 @@ FORWARDED = (signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(frozen=True)
 class HostBus:
-    """A bus for programs.
-
-    Attributes:
-        busy: whether its devices have work without the host.
-        adapter: the master of the bus; None if that is in another process.
-        port: the port that a scheduler must serve.
-        files: opens a device file of the bus.
-        path: path of its socket.
-    """
+    """A bus for programs."""
 
     kernel: Kernel
-    busy: Callable[[], bool]
-    adapter: I2cAdapter | None
-    port: Endpoint
-    files: Files
-    path: str
+    busy: Callable[[], bool]  # whether its devices have work without the host
+    adapter: I2cAdapter | None  # the master of the bus; None if that is in another process
+    port: Endpoint  # the port that a scheduler must serve
+    files: Files  # opens a device file of the bus
+    path: str  # path of its socket
 
 
 def emulated_bus(

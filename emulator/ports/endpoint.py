@@ -12,13 +12,9 @@ class PortError(OSError):
 
 
 class Endpoint(ABC):
-    """A port that a scheduler serves.
+    """A port that a scheduler serves."""
 
-    Attributes:
-        name: name in messages.
-    """
-
-    name: str
+    name: str  # name in messages
 
     @property
     def congested(self) -> bool:

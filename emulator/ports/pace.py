@@ -14,18 +14,12 @@ PS_PER_NS = 1000
 
 @dataclass
 class Pace:
-    """A scale that converts wall time to virtual time.
+    """A scale that converts wall time to virtual time."""
 
-    Attributes:
-        kernel: virtual time; pauses of it do not count as wall time.
-        mode: "real": virtual time follows wall time; "fast": it runs ahead while there is work.
-        clock_ns: monotonic wall time in ns, from any origin.
-        speed: virtual seconds per second of wall time, where virtual time follows wall time.
-    """
-
-    kernel: Kernel
-    mode: Mode
-    clock_ns: Callable[[], int] = time.monotonic_ns
+    kernel: Kernel  # virtual time; pauses of it do not count as wall time
+    mode: Mode  # "real": virtual time follows wall time; "fast": it runs ahead while there is work
+    clock_ns: Callable[[], int] = time.monotonic_ns  # monotonic wall time in ns, from any origin
+    # virtual seconds per second of wall time, where virtual time follows wall time
     speed: float = field(default=1.0, init=False)
 
     def __post_init__(self) -> None:

@@ -47,20 +47,15 @@ def wait_ready(watched: Watched, timeout_s: float) -> None:
 
 @dataclass
 class RealtimeScheduler:
-    """Runs an environment against endpoints until it is stopped.
-
-    Attributes:
-        busy: whether the device has work, or bytes are on a wire.
-        pace: relation of virtual time to wall time (see the module).
-        report: receives a line when pace "real" can not be kept.
-        wait: waits for descriptors with a time-out in s, as ``wait_ready``.
-    """
+    """Runs an environment against endpoints until it is stopped."""
 
     env: Kernel
     endpoints: Sequence[Endpoint]
-    busy: Callable[[], bool]
-    pace: Pace
+    busy: Callable[[], bool]  # whether the device has work, or bytes are on a wire
+    pace: Pace  # relation of virtual time to wall time (see the module)
+    # receives a line when pace "real" can not be kept
     report: Callable[[str], None] = lambda _text: None
+    # waits for descriptors with a time-out in s, as ``wait_ready``
     wait: Callable[[Watched, float], None] = wait_ready
 
     def __post_init__(self) -> None:

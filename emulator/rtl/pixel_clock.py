@@ -67,18 +67,13 @@ class PixelSource(Protocol):
 
 @dataclass
 class LoadedSegment:
-    """A segment with its source's clock and line lengths.
-
-    Attributes:
-        half_period: time between a rising and a falling edge in ps.
-        pixels: the rendered lines; None before that.
-    """
+    """A segment with its source's clock and line lengths."""
 
     segment: PixelSegment
-    half_period: Fraction
+    half_period: Fraction  # time between a rising and a falling edge in ps
     line_clocks: int
     active_columns: int
-    pixels: NDArray[np.uint8] | None = None
+    pixels: NDArray[np.uint8] | None = None  # the rendered lines; None before that
 
     @classmethod
     def of(cls, source: PixelSource, segment: PixelSegment) -> "LoadedSegment":

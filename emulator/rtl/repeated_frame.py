@@ -22,19 +22,12 @@ class _Segment:
 
 @dataclass(frozen=True)
 class RepeatedFrame:
-    """A :class:`~cubestack.emulator.rtl.pixel_clock.PixelSource`: blanking, then the image.
+    """A :class:`~cubestack.emulator.rtl.pixel_clock.PixelSource`: blanking, then the image."""
 
-    Attributes:
-        image: (rows, columns).
-        period: period of the pixel clock in ps.
-        line_clocks: clocks from one line to the next.
-        blank_clocks: clocks before the first line.
-    """
-
-    image: NDArray[np.uint8]
-    period: Fraction
-    line_clocks: int
-    blank_clocks: int = 0
+    image: NDArray[np.uint8]  # (rows, columns)
+    period: Fraction  # period of the pixel clock in ps
+    line_clocks: int  # clocks from one line to the next
+    blank_clocks: int = 0  # clocks before the first line
 
     @property
     def active_columns(self) -> int:

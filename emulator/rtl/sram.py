@@ -45,20 +45,15 @@ LONG_AGO = -(10**12)
 
 @dataclass(frozen=True)
 class SramTiming:
-    """Limits of the part in ps. Address set-up and hold times are 0, as for this class of parts.
+    """Limits of the part in ps. Address set-up and hold times are 0, as for this class of parts."""
 
-    Attributes:
-        access_ps: address or chip enable to valid data, at most (AS7C34096A-12).
-        output_enable_ps: output enable to valid data, at most (AS7C34096A-12).
-        output_disable_ps: output disable to a free bus, at most (assumed, as output enable).
-        write_pulse_ps: width of the write pulse, at least (assumed, usual for a 12 ns part).
-        data_setup_ps: data valid before the end of the write, at least (assumed, likewise).
-    """
-
-    access_ps: int = 12_000
-    output_enable_ps: int = 6_000
+    access_ps: int = 12_000  # address or chip enable to valid data, at most (AS7C34096A-12)
+    output_enable_ps: int = 6_000  # output enable to valid data, at most (AS7C34096A-12)
+    # output disable to a free bus, at most (assumed, as output enable)
     output_disable_ps: int = 6_000
+    # width of the write pulse, at least (assumed, usual for a 12 ns part)
     write_pulse_ps: int = 8_000
+    # data valid before the end of the write, at least (assumed, likewise)
     data_setup_ps: int = 6_000
 
 
@@ -128,17 +123,13 @@ class Sram:
 
     A write takes effect at the end of its pulse, with the address and data from just before that
     instant: hold times are 0, so address and data may change together with the end of the pulse.
-
-    Attributes:
-        memory: the stored bytes, shape (size,); a live view.
-        violations: log of violations; several memories may share it.
-        name: the memory's name in violations.
     """
 
-    memory: NDArray[np.uint8]
+    memory: NDArray[np.uint8]  # the stored bytes, shape (size,); a live view
     timing: SramTiming = field(default_factory=SramTiming)
+    # log of violations; several memories may share it
     violations: ViolationLog = field(default_factory=ViolationLog)
-    name: str = "SRAM"
+    name: str = "SRAM"  # the memory's name in violations
 
     def __post_init__(self) -> None:
         self.power(True)

@@ -35,24 +35,15 @@ def angular_radius_deg(altitude_km: float) -> float:
 
 @dataclass(frozen=True)
 class Earth:
-    """The Earth below a satellite.
+    """The Earth below a satellite."""
 
-    Attributes:
-        altitude_km: altitude of the satellite, above 0.
-        unevenness: standard deviation of the surface's brightness, relative to its mean.
-        glow_km: scale height of the limb's glow; 0 for none.
-        seed: seed of the surface.
-        shine: relative brightness (n,) of the surface at unit vectors (n, 3) in its axes; None:
-            even.
-        glow_heights: scale heights above which the glow is neglected.
-    """
-
-    altitude_km: float
-    unevenness: float
-    glow_km: float
-    seed: int
+    altitude_km: float  # altitude of the satellite, above 0
+    unevenness: float  # standard deviation of the surface's brightness, relative to its mean
+    glow_km: float  # scale height of the limb's glow; 0 for none
+    seed: int  # seed of the surface
+    # relative brightness (n,) of the surface at unit vectors (n, 3) in its axes; None: even
     shine: Callable[[Values], Values] | None = None
-    glow_heights: float = GLOW_HEIGHTS
+    glow_heights: float = GLOW_HEIGHTS  # scale heights above which the glow is neglected
 
     @property
     def distance(self) -> float:

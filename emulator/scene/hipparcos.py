@@ -70,19 +70,12 @@ class CatalogueError(ValueError):
 
 @dataclass(frozen=True)
 class Sky:
-    """Stars ordered by their Hipparcos numbers. The arrays are read-only.
+    """Stars ordered by their Hipparcos numbers. The arrays are read-only."""
 
-    Attributes:
-        epoch: Julian year of the directions.
-        hip: Hipparcos numbers, int32, shape (n,).
-        vectors: unit vectors in ICRS axes, float64, shape (n, 3).
-        v_mag: Johnson V magnitudes, float64, shape (n,).
-    """
-
-    epoch: float
-    hip: NDArray[np.int32]
-    vectors: NDArray[np.float64]
-    v_mag: NDArray[np.float64]
+    epoch: float  # Julian year of the directions
+    hip: NDArray[np.int32]  # Hipparcos numbers, int32, shape (n,)
+    vectors: NDArray[np.float64]  # unit vectors in ICRS axes, float64, shape (n, 3)
+    v_mag: NDArray[np.float64]  # Johnson V magnitudes, float64, shape (n,)
 
     def __len__(self) -> int:
         return len(self.hip)

@@ -53,21 +53,16 @@ class Attitude(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Position and surroundings of the satellite at a time; directions are ICRS.
+    """Position and surroundings of the satellite at a time; directions are ICRS."""
 
-    Attributes:
-        time_s: time since the orbit's start.
-        position_km, velocity_km_s: (3,) relative to the Earth's centre.
-        sun, moon: unit vectors (3,) from the satellite.
-        sun_km: distance of the Sun.
-    """
-
-    time_s: float
+    time_s: float  # time since the orbit's start
+    # (3,) relative to the Earth's centre
     position_km: Vector
     velocity_km_s: Vector
+    # unit vectors (3,) from the satellite
     sun: Vector
     moon: Vector
-    sun_km: float
+    sun_km: float  # distance of the Sun
 
     @property
     def altitude_km(self) -> float:
@@ -103,15 +98,11 @@ def hidden_share(radius: float, other: float, apart: float) -> float:
 
 @dataclass(frozen=True)
 class Inertial:
-    """A fixed attitude, or a constant body rate.
+    """A fixed attitude, or a constant body rate."""
 
-    Attributes:
-        quaternion: (4,) at the start, scalar last, ICRS to body.
-        rate_deg_s: body rate (3,).
-    """
-
+    # (4,) at the start, scalar last, ICRS to body
     quaternion: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
-    rate_deg_s: tuple[float, ...] = (0.0, 0.0, 0.0)
+    rate_deg_s: tuple[float, ...] = (0.0, 0.0, 0.0)  # body rate (3,)
 
     def matrix(self, surroundings: Surroundings) -> Vector:
         turned = propagate(self.quaternion, self.rate_deg_s, surroundings.time_s)
@@ -120,13 +111,9 @@ class Inertial:
 
 @dataclass(frozen=True)
 class NadirPointing:
-    """Body z to the Earth's centre, body y opposite to the orbit's normal, then an offset.
+    """Body z to the Earth's centre, body y opposite to the orbit's normal, then an offset."""
 
-    Attributes:
-        offset_deg: rotation vector (3,) in body axes.
-    """
-
-    offset_deg: tuple[float, ...] = (0.0, 0.0, 0.0)
+    offset_deg: tuple[float, ...] = (0.0, 0.0, 0.0)  # rotation vector (3,) in body axes
 
     def matrix(self, surroundings: Surroundings) -> Vector:
         z = surroundings.nadir
@@ -138,12 +125,9 @@ class NadirPointing:
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Quaternions at times; between two of them the satellite turns at a constant rate.
+    """Quaternions at times; between two of them the satellite turns at a constant rate."""
 
-    Attributes:
-        points: (time in s, quaternion (4,) ICRS to body), ordered by time, else SceneError.
-    """
-
+    # (time in s, quaternion (4,) ICRS to body), ordered by time, else SceneError
     points: tuple[tuple[float, tuple[float, ...]], ...]
 
     def __post_init__(self) -> None:
@@ -175,21 +159,14 @@ def rate_between(first: Vector, second: Vector, seconds: float) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A satellite, its attitude, and how its cameras are mounted.
+    """A satellite, its attitude, and how its cameras are mounted."""
 
-    Attributes:
-        satellite: SGP4's elements.
-        start: date and time of virtual time 0, UTC.
-        attitude: attitude profile.
-        mountings: mountings of star trackers by device; default along body z.
-        hazards: whether Earth, Sun and Moon disturb star trackers.
-    """
-
-    satellite: Satrec
-    start: datetime
-    attitude: Attitude = field(default_factory=NadirPointing)
+    satellite: Satrec  # SGP4's elements
+    start: datetime  # date and time of virtual time 0, UTC
+    attitude: Attitude = field(default_factory=NadirPointing)  # attitude profile
+    # mountings of star trackers by device; default along body z
     mountings: dict[str, Mounting] = field(default_factory=dict)
-    hazards: bool = True
+    hazards: bool = True  # whether Earth, Sun and Moon disturb star trackers
 
     @cached_property
     def _start_days(self) -> tuple[float, float]:

@@ -19,21 +19,15 @@ from cubestack.firmware_model.mcu.external_bus import EBI
 
 @dataclass(frozen=True)
 class FpgaPin:
-    """A pin of the FPGA, or a bus, connected to neighbouring port pins.
+    """A pin of the FPGA, or a bus, connected to neighbouring port pins."""
 
-    Attributes:
-        name: name of the FPGA's pin.
-        port, bit: the machine's port pin of the lowest bit.
-        input: the FPGA drives it.
-        alert: changes also raise the machine's pin interrupts.
-    """
-
-    name: str
+    name: str  # name of the FPGA's pin
+    # the machine's port pin of the lowest bit
     port: int
     bit: int
     width: int = 1
-    input: bool = False
-    alert: bool = False
+    input: bool = False  # the FPGA drives it
+    alert: bool = False  # changes also raise the machine's pin interrupts
 
 
 class FpgaCoupling:

@@ -24,26 +24,17 @@ TAKE = 4
 
 @dataclass(frozen=True)
 class Transactions:
-    """Consecutive reads or writes.
+    """Consecutive reads or writes."""
 
-    Attributes:
-        addresses: (n,) int32, C-contiguous, of 24 bits each.
-        data: (n,) uint8, C-contiguous: the bytes to write, or the destination of the bytes read.
-        cycle: period of the core clock in ps.
-        cycles: core cycles from the start of one transaction to that of the next.
-        select: number of the chip select.
-        above: the first byte read that is larger ends the sequence.
-        timing: phases of a transaction.
-    """
-
-    addresses: NDArray[np.int32]
+    addresses: NDArray[np.int32]  # (n,) int32, C-contiguous, of 24 bits each
+    # (n,) uint8, C-contiguous: the bytes to write, or the destination of the bytes read
     data: NDArray[np.uint8]
     write: bool
-    cycle: Fraction
-    cycles: int
-    select: int = 0
-    above: int = 255
-    timing: BusTiming = EBI
+    cycle: Fraction  # period of the core clock in ps
+    cycles: int  # core cycles from the start of one transaction to that of the next
+    select: int = 0  # number of the chip select
+    above: int = 255  # the first byte read that is larger ends the sequence
+    timing: BusTiming = EBI  # phases of a transaction
 
     def __post_init__(self) -> None:
         for array, kind in ((self.addresses, np.int32), (self.data, np.uint8)):
@@ -81,19 +72,14 @@ class Transactions:
 
 
 class Driver(NamedTuple):
-    """C functions of compiled FPGAs, for other compiled code to call.
+    """C functions of compiled FPGAs, for other compiled code to call."""
 
-    Attributes:
-        handle: first argument of the functions.
-        set, get, burst: addresses of the functions.
-        pins: number of each pin.
-    """
-
-    handle: int
+    handle: int  # first argument of the functions
+    # addresses of the functions
     set: int
     get: int
     burst: int
-    pins: Mapping[str, int]
+    pins: Mapping[str, int]  # number of each pin
 
 
 class FpgaPort(Protocol):

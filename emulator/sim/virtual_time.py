@@ -11,13 +11,9 @@ PS_PER_US = 10**6
 
 
 class Kernel(simpy.Environment):
-    """SimPy's environment with an integer clock in ps.
+    """SimPy's environment with an integer clock in ps."""
 
-    Attributes:
-        held_ns: wall time of all finished pauses.
-    """
-
-    held_ns: int = 0
+    held_ns: int = 0  # wall time of all finished pauses
 
     def __init__(self, initial_time: int = 0) -> None:
         super().__init__(initial_time)

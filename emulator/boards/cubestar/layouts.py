@@ -25,22 +25,16 @@ States = dict[str, str]
 
 @dataclass(frozen=True)
 class LayoutBoard:
-    """One layout.
+    """One layout."""
 
-    Attributes:
-        top: name of the design in each of its FPGAs.
-        states: states of the parts "fpga"... and "memory", from the control pins and whether the
-            processor accesses a memory.
-        boards: prefixes of the FPGAs' control pins.
-        external_ram: the processor has a separate memory.
-    """
-
-    top: str
+    top: str  # name of the design in each of its FPGAs
     wiring: Callable[[], Wiring]
     power: PowerTable
+    # states of the parts "fpga"... and "memory", from the control pins and whether the processor
+    # accesses a memory
     states: Callable[[Pins, bool], States]
-    boards: tuple[str, ...] = ("",)
-    external_ram: bool = False
+    boards: tuple[str, ...] = ("",)  # prefixes of the FPGAs' control pins
+    external_ram: bool = False  # the processor has a separate memory
 
     @property
     def controls(self) -> tuple[str, ...]:

@@ -14,14 +14,10 @@ _INVERSION_PX = 1e-11
 
 @dataclass(frozen=True)
 class Residual:
-    """Polynomials across the sensor.
+    """Polynomials across the sensor."""
 
-    Attributes:
-        shape: rows and columns of the area with coordinates -1..1.
-        across, down: coefficients in px: for each power of x, those of the powers of y.
-    """
-
-    shape: tuple[int, int]
+    shape: tuple[int, int]  # rows and columns of the area with coordinates -1..1
+    # coefficients in px: for each power of x, those of the powers of y
     across: Coefficients
     down: Coefficients
 

@@ -12,19 +12,13 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 @dataclass(frozen=True)
 class RollingShutter:
-    """One frame's exposure: row r is exposed in the ``exposure_lines`` before its readout.
+    """One frame's exposure: row r is exposed in the ``exposure_lines`` before its readout."""
 
-    Attributes:
-        readout_ps: time at which row 0 is read out; row r follows r line times later.
-        line_ps: one line time in ps, exact.
-        exposure_lines: exposure in line times.
-        programmed_lines: exposure set in the registers; it differs only in the undefined frame
-            after the sensor was enabled.
-    """
-
-    readout_ps: int
-    line_ps: Fraction
-    exposure_lines: int
+    readout_ps: int  # time at which row 0 is read out; row r follows r line times later
+    line_ps: Fraction  # one line time in ps, exact
+    exposure_lines: int  # exposure in line times
+    # exposure set in the registers; it differs only in the undefined frame after the sensor was
+    # enabled
     programmed_lines: int
 
     @property

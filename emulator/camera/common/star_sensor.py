@@ -9,17 +9,13 @@ from cubestack.emulator.scene.sky import PictureScene, Scene, SkyScene
 
 
 class StarSensor(ImageSensor[Scene, SkyCondition]):
-    """A sensor for the sky or a photograph.
-
-    Attributes:
-        word_bytes: bytes per address of its registers.
-    """
+    """A sensor for the sky or a photograph."""
 
     scene_types = (SkyScene, PictureScene)
     sees = "a star tracker's scene is a sky or a picture"
     columns: ClassVar[int]
     rows: ClassVar[int]
-    word_bytes: ClassVar[int]
+    word_bytes: ClassVar[int]  # bytes per address of its registers
 
     def _check(self, scene: Scene, condition: SkyCondition) -> None:
         lens = condition.optics

@@ -37,17 +37,11 @@ HOT_DN12_PER_S_AT_20_C = 1500.0  # assumed: mean of an exponential distribution
 
 @dataclass(frozen=True)
 class Corrections:
-    """The sensor's corrections that are on.
+    """The sensor's corrections that are on."""
 
-    Attributes:
-        defects: known defective pixels get the mean of their neighbours in the row.
-        fixed_pattern: most of the fixed pattern is subtracted.
-        dark: the mean of the dark rows is subtracted.
-    """
-
-    defects: bool = True
-    fixed_pattern: bool = True
-    dark: bool = True
+    defects: bool = True  # known defective pixels get the mean of their neighbours in the row
+    fixed_pattern: bool = True  # most of the fixed pattern is subtracted
+    dark: bool = True  # the mean of the dark rows is subtracted
 
 
 def dark_dn12_per_second(temperature_c: float) -> float:

@@ -29,22 +29,15 @@ HOT_SHARE = 500.0  # assumed: mean dark current of hot pixels relative to the ot
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """The terms of equation 3.8 that are on.
+    """The terms of equation 3.8 that are on."""
 
-    Attributes:
-        shot: noise of the stars' light.
-        dark: dark current, hot pixels and their noise.
-        background: background light and its noise.
-        quantisation: the converter's 10 bits, of which 8 are wired; off: the nearest of 256 counts,
-            the smallest error with eight bits.
-        readout: noise of the amplifiers.
-    """
-
-    shot: bool = True
-    dark: bool = True
-    background: bool = True
+    shot: bool = True  # noise of the stars' light
+    dark: bool = True  # dark current, hot pixels and their noise
+    background: bool = True  # background light and its noise
+    # the converter's 10 bits, of which 8 are wired; off: the nearest of 256 counts, the smallest
+    # error with eight bits
     quantisation: bool = True
-    readout: bool = True
+    readout: bool = True  # noise of the amplifiers
 
     @classmethod
     def none(cls) -> "NoiseTerms":

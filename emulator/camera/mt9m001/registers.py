@@ -14,26 +14,19 @@ GAINS = ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """Settings of a frame.
+    """Settings of a frame."""
 
-    Attributes:
-        enabled: whether frames are sent.
-        row, column: first pixel of the window, counted from the first active one; may be negative.
-        rows, columns: size of the window.
-        row_clocks: pixel clocks from line to line.
-        blank_rows: minimum of row times between the last line and the next frame.
-        exposure_rows: exposure in row times.
-        gains: for even rows and columns; odd rows, even columns; even rows, odd columns; both odd.
-    """
-
-    enabled: bool
+    enabled: bool  # whether frames are sent
+    # first pixel of the window, counted from the first active one; may be negative
     row: int
     column: int
+    # size of the window
     rows: int
     columns: int
-    row_clocks: int
-    blank_rows: int
-    exposure_rows: int
+    row_clocks: int  # pixel clocks from line to line
+    blank_rows: int  # minimum of row times between the last line and the next frame
+    exposure_rows: int  # exposure in row times
+    # for even rows and columns; odd rows, even columns; even rows, odd columns; both odd
     gains: tuple[float, float, float, float]
 
     @property

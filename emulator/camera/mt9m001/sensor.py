@@ -37,16 +37,11 @@ REMEMBERED = 8
 
 @dataclass(frozen=True)
 class _Frame:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-        first: number of the clock edge at which FRAME_VALID rises.
-        shutter: exposure of its rows; row 0 is the window's first.
-    """
-
-    first: int
+    first: int  # number of the clock edge at which FRAME_VALID rises
     settings: SensorSettings
-    shutter: RollingShutter
+    shutter: RollingShutter  # exposure of its rows; row 0 is the window's first
 
     @property
     def valid_until(self) -> int:

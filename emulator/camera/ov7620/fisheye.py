@@ -59,15 +59,12 @@ def undistorted(radius_px: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Fisheye:
-    """One camera's lens. Pixel coordinates have (0, 0) at the first pixel's centre.
+    """One camera's lens. Pixel coordinates have (0, 0) at the first pixel's centre."""
 
-    Attributes:
-        cx, cy: boresight and centre of distortion, px.
-        error: deviation from the polynomial; ``cx`` and ``cy`` already contain that of the centre.
-    """
-
+    # boresight and centre of distortion, px
     cx: float
     cy: float
+    # deviation from the polynomial; ``cx`` and ``cy`` already contain that of the centre
     error: LensError = NOMINAL
 
     def project(self, vector: ArrayLike) -> NDArray[np.float64] | None:
@@ -117,18 +114,13 @@ class Fisheye:
 
 @dataclass(frozen=True, eq=False)
 class FieldOfView:
-    """The pixels within a lens' field, in the order of the image.
+    """The pixels within a lens' field, in the order of the image."""
 
-    Attributes:
-        index: flat indices (n,) in the image of 480 rows of 640.
-        vectors: unit vectors (n, 3) in camera axes, float32.
-        pixel_rad: angle (n,) that a pixel spans, the mean of both directions, float32.
-        lit: share (n,) of each pixel within the field; below 1 only along the rim, float32.
-    """
-
-    index: NDArray[np.int64]
-    vectors: NDArray[np.float32]
+    index: NDArray[np.int64]  # flat indices (n,) in the image of 480 rows of 640
+    vectors: NDArray[np.float32]  # unit vectors (n, 3) in camera axes, float32
+    # angle (n,) that a pixel spans, the mean of both directions, float32
     pixel_rad: NDArray[np.float32]
+    # share (n,) of each pixel within the field; below 1 only along the rim, float32
     lit: NDArray[np.float32]
 
 

@@ -26,19 +26,12 @@ ON_DESCRIPTOR = ("read", "write", "readv", "writev", "fstat", "dup")
 
 @dataclass(frozen=True)
 class Abi:
-    """System call interface of a processor architecture.
+    """System call interface of a processor architecture."""
 
-    Attributes:
-        audit_arch: AUDIT_ARCH_* of linux/audit.h.
-        calls: system call numbers by name.
-        seccomp: number of the call that installs a filter.
-        compact_stat: whether struct stat is that of asm-generic/stat.h.
-    """
-
-    audit_arch: int
-    calls: Mapping[str, int]
-    seccomp: int
-    compact_stat: bool
+    audit_arch: int  # AUDIT_ARCH_* of linux/audit.h
+    calls: Mapping[str, int]  # system call numbers by name
+    seccomp: int  # number of the call that installs a filter
+    compact_stat: bool  # whether struct stat is that of asm-generic/stat.h
 
 
 def _calls(table: str) -> dict[str, int]:

@@ -19,17 +19,12 @@ _PART = struct.Struct("=QQ")
 
 
 class Marshalled(NamedTuple):
-    """A call for the emulated bus.
+    """A call for the emulated bus."""
 
-    Attributes:
-        call: kind of call.
-        body: its packed body.
-        finish: receives result and data of the reply, writes the data to the program's memory and
-            returns the result of the call; raises OSError.
-    """
-
-    call: linux.Call
-    body: bytes
+    call: linux.Call  # kind of call
+    body: bytes  # its packed body
+    # receives result and data of the reply, writes the data to the program's memory and returns the
+    # result of the call; raises OSError
     finish: Callable[[int, bytes], int]
 
 

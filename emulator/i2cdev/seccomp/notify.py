@@ -35,19 +35,12 @@ CHUNK_BYTES = 256  # most paths are shorter
 
 
 class Notification(NamedTuple):
-    """A pending call.
+    """A pending call."""
 
-    Attributes:
-        id: identifies the call in the answer.
-        pid: calling thread.
-        number: number of the system call.
-        arguments: its six arguments.
-    """
-
-    id: int
-    pid: int
-    number: int
-    arguments: tuple[int, ...]
+    id: int  # identifies the call in the answer
+    pid: int  # calling thread
+    number: int  # number of the system call
+    arguments: tuple[int, ...]  # its six arguments
 
 
 class Listener:

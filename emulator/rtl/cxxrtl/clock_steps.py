@@ -28,18 +28,14 @@ def port(name: str) -> str:
 
 @dataclass
 class _Evaluation:
-    """The statements of eval().
+    """The statements of eval()."""
 
-    Attributes:
-        types: type of each assigned name.
-        assignments: names and expressions, in their order.
-        at_edge: by clock, the blocks that set ``.next`` at its rising edge.
-        resets: by condition on a register, the registers that it resets.
-    """
-
-    types: dict[str, str] = field(default_factory=dict)
+    types: dict[str, str] = field(default_factory=dict)  # type of each assigned name
+    # names and expressions, in their order
     assignments: list[tuple[str, str]] = field(default_factory=list)
+    # by clock, the blocks that set ``.next`` at its rising edge
     at_edge: dict[str, list[str]] = field(default_factory=dict)
+    # by condition on a register, the registers that it resets
     resets: dict[str, set[str]] = field(default_factory=dict)
 
 

@@ -23,18 +23,12 @@ _BUS_CLOCKS = 0xFFFF_FFFF
 
 @dataclass(frozen=True)
 class Timing:
-    """Waits of the memories in cycles; ValueError for values that the registers can not hold.
+    """Waits of the memories in cycles; ValueError for values that the registers can not hold."""
 
-    Attributes:
-        flash_waits: wait states, 0 to 2; two are needed above 32 MHz.
-        cache: whether the instruction cache is on.
-        prefetch: whether the flash reads ahead.
-        bus: address set-up, set-up, strobe and hold of the external bus.
-    """
-
-    flash_waits: int = 2
-    cache: bool = True
-    prefetch: bool = False
+    flash_waits: int = 2  # wait states, 0 to 2; two are needed above 32 MHz
+    cache: bool = True  # whether the instruction cache is on
+    prefetch: bool = False  # whether the flash reads ahead
+    # address set-up, set-up, strobe and hold of the external bus
     bus: tuple[int, int, int, int] = (1, 1, 3, 0)
 
     def __post_init__(self) -> None:

@@ -39,17 +39,11 @@ _CAMERA = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 
 @dataclass(frozen=True)
 class Solution:
-    """Cycles and results of an image.
+    """Cycles and results of an image."""
 
-    Attributes:
-        cycles: cycles of each phase that ran.
-        quaternion: bits of its four components, as integers.
-        stars: number of centroids.
-    """
-
-    cycles: dict[str, int]
-    quaternion: tuple[int, ...]
-    stars: int
+    cycles: dict[str, int]  # cycles of each phase that ran
+    quaternion: tuple[int, ...]  # bits of its four components, as integers
+    stars: int  # number of centroids
 
 
 def default_settings() -> str:

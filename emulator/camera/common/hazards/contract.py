@@ -16,21 +16,13 @@ Field = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Exposure:
-    """One exposure of one sensor.
+    """One exposure of one sensor."""
 
-    Attributes:
-        shape: rows and columns.
-        pitch_um: pixel pitch.
-        seconds: exposure of each pixel.
-        temperature_c: temperature of the sensor.
-        electrons_per_count: charge of one grey value of 8 bits, at this frame's gain.
-    """
-
-    shape: tuple[int, int]
-    pitch_um: float
-    seconds: float
-    temperature_c: float
-    electrons_per_count: float
+    shape: tuple[int, int]  # rows and columns
+    pitch_um: float  # pixel pitch
+    seconds: float  # exposure of each pixel
+    temperature_c: float  # temperature of the sensor
+    electrons_per_count: float  # charge of one grey value of 8 bits, at this frame's gain
 
     @property
     def area_cm2(self) -> float:
@@ -40,23 +32,14 @@ class Exposure:
 
 @dataclass(frozen=True)
 class Lens:
-    """The properties of a lens that hazards may change.
+    """The properties of a lens that hazards may change."""
 
-    Attributes:
-        f_number: focal length divided by aperture.
-        pitch_um: pixel pitch of the sensor.
-        shape: rows and columns of the sensor.
-        spot_px: standard deviation of a point's image.
-        scale: focal length relative to its nominal value.
-        residuals: displacements of the image.
-    """
-
-    f_number: float
-    pitch_um: float
-    shape: tuple[int, int]
-    spot_px: float
-    scale: float = 1.0
-    residuals: tuple[Residual, ...] = ()
+    f_number: float  # focal length divided by aperture
+    pitch_um: float  # pixel pitch of the sensor
+    shape: tuple[int, int]  # rows and columns of the sensor
+    spot_px: float  # standard deviation of a point's image
+    scale: float = 1.0  # focal length relative to its nominal value
+    residuals: tuple[Residual, ...] = ()  # displacements of the image
 
 
 @dataclass(frozen=True, kw_only=True)
