@@ -1,8 +1,8 @@
-"""A closed attitude loop: a rigid body outside, an emulated star tracker as its only eye.
+"""A closed attitude loop: a simulated rigid body with an emulated star tracker.
 
-python attitude_loop.py. Every two seconds the simulator asks the CubeStar over its serial line for
-the attitude, lets virtual time pass, and turns the body by a proportional and derivative law; what
-the tracker sees next is where the body then points.
+python attitude_loop.py. Every two seconds the program reads the attitude from the CubeStar over its
+serial line, turns the body with a proportional-derivative controller, advances virtual time, and
+points the tracker's camera where the body then points.
 """
 
 import numpy as np
@@ -17,9 +17,9 @@ from cubestack.emulator.scene.orbit import rate_between
 from cubestack.emulator.scene.sky import Pose, SkyScene
 
 STEP_S = 2.0
-INERTIA = 0.01  # kg m2, alike about all axes
-GAIN, DAMPING = 0.01, 0.16  # rad/s2 for a rad, and for a rad/s
-MOST_N_M = 1e-5  # of the wheels
+INERTIA = 0.01  # kg m2, about each axis
+GAIN, DAMPING = 0.01, 0.16  # rad/s2 per rad, and per rad/s
+LARGEST_TORQUE_N_M = 1e-5  # of the wheels
 
 
 def loop(steps: int, start_deg: float = 3.0, seed: int = 0) -> list[float]:
@@ -39,14 +39,14 @@ def loop(steps: int, start_deg: float = 3.0, seed: int = 0) -> list[float]:
                 off = -rate_between(matrix_from_quaternion(wanted), seen, 1.0)  # deg
                 turning = np.zeros(3) if last is None else (last - off) / STEP_S
                 torque = INERTIA * np.radians(GAIN * off - DAMPING * turning)
-                torque = np.clip(torque, -MOST_N_M, MOST_N_M)
+                torque = np.clip(torque, -LARGEST_TORQUE_N_M, LARGEST_TORQUE_N_M)
             else:
                 off, torque = None, np.zeros(3)
             last = off
             tracker.wait(max(0.0, (step + 1) * STEP_S - tracker.time_s))
             attitude = propagate(attitude, rate, STEP_S)
             rate = rate + np.degrees(torque / INERTIA) * STEP_S
-            # The tracker's camera sees the body turn on from here.
+            # From here on, the tracker's camera turns with the body.
             pose = Pose(attitude, tuple(rate), tracker.time_s)
             tracker.scene = SkyScene(pose.at(0.0), tuple(rate))
             left = rate_between(matrix_from_quaternion(wanted), matrix_from_quaternion(attitude), 1)

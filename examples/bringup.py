@@ -1,7 +1,7 @@
 """First contact with a CubeStar, step by step: python bringup.py TARGET.
 
 TARGET is a serial port, tcp://HOST:PORT or rfc2217://HOST:PORT, of a real board or an emulated one
-(cubestack emulate cubestar --pty ./ttyCUBESTAR). Ends with 1 at the first step that fails.
+(cubestack emulate cubestar --pty ./ttyCUBESTAR). The exit status is 1 if a step fails.
 """
 
 import sys
@@ -10,7 +10,7 @@ import cubestack
 
 
 def step(number: int, text: str, good: bool) -> None:
-    """Say how a step went; the first bad one ends the program."""
+    """Print the result of a step; exit if it failed."""
     print(f"{number} {'ok  ' if good else 'FAIL'} {text}")
     if not good:
         sys.exit(1)
@@ -34,8 +34,8 @@ with cubestack.connect(sys.argv[1], "cubestar") as cubestar:
 
     cubestar.capture()
     times = cubestar.phase_times()
-    step(3, f"picture stored in {times['capture']:.0f} ms", times["capture"] < 1000)
-    step(4, f"picture transferred in {times['transfer']:.0f} ms", times["transfer"] < 1000)
+    step(3, f"image stored in {times['capture']:.0f} ms", times["capture"] < 1000)
+    step(4, f"image transferred in {times['transfer']:.0f} ms", times["transfer"] < 1000)
 
     status = cubestar.process_image()
     detected = client.telemetry("DetectionSummary")["NumStarsDetected"]

@@ -3,8 +3,8 @@
  *   flight_driver /dev/ttyUSB0
  *
  * Frames of the node protocol: 1F 7F, payload with every 1F doubled, 1F FF. A telecommand is answered
- * by one error byte, telemetry by its data. Whatever the line does, a request ends after TIMEOUT_MS,
- * and telemetry is asked for again; a telecommand is not, as it may have been executed.
+ * by one error byte, telemetry by its data. Every request ends after TIMEOUT_MS at the latest.
+ * Telemetry requests are repeated; telecommands are not, because they may have been executed.
  */
 #define _DEFAULT_SOURCE
 #include <errno.h>
@@ -49,7 +49,7 @@ static int send_frame(int port, uint8_t identifier) {
     return write(port, frame, sizeof frame) == sizeof frame ? 0 : -1;
 }
 
-/* Payload of the next frame into `payload`; its length, -1 when none came in time. */
+/* Stores the payload of the next frame; returns its length, or -1 after the time-out. */
 static int receive_frame(int port, uint8_t *payload) {
     enum { OUTSIDE, OUTSIDE_ESCAPED, INSIDE, INSIDE_ESCAPED } state = OUTSIDE;
     const int64_t deadline = now_ms() + TIMEOUT_MS;

@@ -1,7 +1,7 @@
-"""One orbit with a CubeStar and a CubeSense on one bus, each asked once a second over I2C.
+"""One orbit with a CubeStar and a CubeSense on one bus, each queried once per second over I2C.
 
-python one_orbit.py ORBIT.toml FOLDER [SECONDS]. Writes results.csv, each result beside the truth,
-and errors.png where matplotlib is there, and tells how fast that was.
+python one_orbit.py ORBIT.toml FOLDER [SECONDS]. Writes results.csv with each result beside the
+truth, and errors.png if matplotlib is installed, and prints the speed.
 """
 
 import csv
@@ -25,12 +25,12 @@ COLUMNS = ("time_s", "shadow", "star_deg", "asked", "off_deg")
 
 
 def scene_of(device: Any) -> Any:
-    """What its cameras see, without what they are like."""
+    """The scene of a device, without the condition of its cameras."""
     return device.scene.scene if isinstance(device.scene, View) else device.scene
 
 
 def off_deg(sense: Any, camera: Camera) -> float | None:
-    """How far a direction is off; None where none was found."""
+    """Error of a direction; None if none was found."""
     measured = sense.client.capture_and_detect(camera)
     if measured.detect != DetectResult.SUCCESS:
         return None
@@ -44,7 +44,7 @@ def off_deg(sense: Any, camera: Camera) -> float | None:
 
 
 def star_deg(star: Any) -> float | None:
-    """How far the latest attitude is off in all; None where the firmware has none."""
+    """Total error of the latest attitude; None if it is not valid."""
     found = star.client.attitude()
     if not found.valid:
         return None
@@ -53,7 +53,7 @@ def star_deg(star: Any) -> float | None:
 
 
 def fly(path: Path, seconds: float) -> list[dict[str, Any]]:
-    """A row for each second: the star tracker's loop runs by itself, the cameras take turns."""
+    """One row per second: the star tracker runs its own loop, CubeSense's cameras take turns."""
     orbit, rows = load_orbit(path), list[dict[str, Any]]()
     with (
         cubestack.open_device("cubestar", profile="extended") as star,
@@ -67,7 +67,7 @@ def fly(path: Path, seconds: float) -> list[dict[str, Any]]:
             camera = Camera.SUN if len(rows) % 2 else Camera.NADIR
             found = off_deg(sense, camera)
             row = {"time_s": round(begun, 3), "shadow": round(orbit.around(begun).shadow, 4)}
-            star.wait(max(0.0, begun + 0.8 - star.time_s))  # its loop is at rest
+            star.wait(max(0.0, begun + 0.8 - star.time_s))  # its loop is idle then
             row |= {"asked": camera.name, "off_deg": found, "star_deg": star_deg(star)}
             rows.append(row)
             star.wait(max(0.0, begun + 1.0 - star.time_s))
@@ -75,7 +75,7 @@ def fly(path: Path, seconds: float) -> list[dict[str, Any]]:
 
 
 def errors(rows: list[dict[str, Any]]) -> dict[str, list[tuple[float, float | None]]]:
-    """Times and errors, by what was measured; None where there is no result."""
+    """Times and errors by sensor; an error is None if there is no result."""
     found = {"star tracker, attitude": [(row["time_s"], row["star_deg"]) for row in rows]}
     for camera in ("SUN", "NADIR"):
         asked = [row for row in rows if row["asked"] == camera]
@@ -84,7 +84,7 @@ def errors(rows: list[dict[str, Any]]) -> dict[str, list[tuple[float, float | No
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
-    """Errors over time; grey where the Sun is hidden."""
+    """Plot errors over time; grey where the Earth hides the Sun."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 6), layout="constrained")
@@ -105,7 +105,6 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 def main() -> None:
-    """Fly, write and tell."""
     if len(sys.argv) not in (3, 4):
         sys.exit("usage: python one_orbit.py ORBIT.toml FOLDER [SECONDS]")
     folder, seconds = Path(sys.argv[2]), float(sys.argv[3]) if len(sys.argv) > 3 else 5700.0
@@ -125,7 +124,7 @@ def main() -> None:
     try:
         draw(rows, folder / "errors.png")
     except ImportError:
-        print("no picture: pip install 'cubestack[plots]'")
+        print("no errors.png: matplotlib is not installed")
 
 
 if __name__ == "__main__":

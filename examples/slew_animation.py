@@ -1,8 +1,8 @@
-"""A slow slew as a CubeStar sees it: an animation of the stars that it finds, frame by frame.
+"""An animation of a slow slew: the stars that a CubeStar finds, frame by frame.
 
-python slew_animation.py FILE.gif [FRAMES]. The device runs in this process, in virtual time, its
-program with profile "extended". Each frame is one picture that it took and the stars that it told;
-the yellow marks are where bright stars truly were, which the device is never told.
+python slew_animation.py FILE.gif [FRAMES]. The device runs in this process, in virtual time, with
+profile "extended". Each frame shows an image and the stars that the device reported in it. Yellow
+marks show the true positions of bright stars, which the device does not have.
 """
 
 import sys
@@ -25,17 +25,17 @@ from cubestack.host.studies.cubestar.demo import left_out_by
 FRAMES = 28
 EVERY_S = 4.0
 RATE_DEG_S = (0.0, 0.25, 0.0)
-"""About the camera's x, y and z: to the right, by one degree a frame."""
+"""About the camera's x, y and z: to the right, by one degree per frame."""
 
 START_DEG = (98.0, -6.0, 20.0)
 WIDTH_PX = 640
 SHOWN_MS = 220
 GREYS, SHADES = 8, 3
-"""Of the palette: greys, and steps from black to each colour of a mark."""
+"""Number of greys, and of steps from black to each colour of a mark, in the palette."""
 
 
 def main(path: Path, frames: int) -> None:
-    """Slew, draw each frame, and write them as a GIF."""
+    """Slew, draw each frame, and write the animation."""
     scene = SkyScene(quaternion_from_pointing(*START_DEG), rate_deg_s=RATE_DEG_S, seed=1)
     sheets, started, right = [], time.monotonic(), 0
     with cubestack.open_device("cubestar", scene, profile="extended") as emulated:
@@ -69,7 +69,7 @@ def main(path: Path, frames: int) -> None:
 
 
 def palette_colours() -> list[tuple[int, ...]]:
-    """What the sheets are drawn in, with steps in between for smooth edges."""
+    """Colours of the sheets, with intermediate steps for smooth edges."""
     greys = [(255 * step // (GREYS - 1),) * 3 for step in range(GREYS)]
     shades = [
         tuple(part * step // SHADES for part in colour)

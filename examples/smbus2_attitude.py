@@ -27,6 +27,6 @@ with SMBus(int(sys.argv[1])) as bus:
     while telemetry(bus, 131, 1) != b"\1":  # TcmdProcessed
         time.sleep(0.05)
     if telemetry(bus, 132, 1) != b"\x1d":  # TaskStatus: calculated
-        sys.exit("no attitude in this picture")
+        sys.exit("no attitude in this image")
     x, y, z, w = (raw / 10000 for raw in struct.unpack("<4h", telemetry(bus, 177, 18)[:8]))
     print(f"{x:+.4f} {y:+.4f} {z:+.4f} {w:+.4f}")

@@ -1,6 +1,6 @@
-"""A suite for a driver of one's own, with pytest and the fixtures of cubestack.
+"""Tests of your own driver, with pytest and the fixtures of cubestack.
 
-The driver here asks a CubeStar for its identification. A real one would be imported.
+The driver here reads the identification of a CubeStar. You would import a real one.
 """
 
 from typing import Any
@@ -9,15 +9,14 @@ import pytest
 
 
 class MyDriver:
-    """Talks to a port that looks like pyserial's."""
+    """A driver on a port with the interface of pyserial's."""
 
     def __init__(self, port: Any) -> None:
-        """Use ``port``."""
         self.port = port
         self.port.timeout = 0.1
 
     def node_type(self, attempts: int = 3) -> int:
-        """First byte of telemetry 128; TimeoutError when no good answer comes."""
+        """First byte of telemetry 128; raises TimeoutError without a good answer."""
         for _ in range(attempts):
             self.port.reset_input_buffer()
             self.port.write(bytes([0x1F, 0x7F, 128, 0x1F, 0xFF]))
@@ -27,21 +26,20 @@ class MyDriver:
         raise TimeoutError("no answer")
 
 
-def test_it_finds_a_cubestar(cubestar: Any) -> None:
-    """A good line."""
+def test_reads_the_node_type(cubestar: Any) -> None:
     assert MyDriver(cubestar.serial()).node_type() == 5
 
 
-def test_it_asks_again_when_a_byte_is_lost(cubestar: Any) -> None:
-    """For a millisecond, every byte is."""
+def test_retries_after_lost_bytes(cubestar: Any) -> None:
+    """Every byte is lost for a millisecond."""
     driver = MyDriver(cubestar.serial())
     cubestar.faults.inject("uart-drop", for_s=0.001)
     assert driver.node_type() == 5
     assert cubestar.faults.events > 0
 
 
-def test_it_gives_up_in_time(cubestar: Any) -> None:
-    """Nothing gets through; time is virtual, so this takes none."""
+def test_times_out_on_a_dead_line(cubestar: Any) -> None:
+    """No byte arrives. Time is virtual, so the test does not wait."""
     driver = MyDriver(cubestar.serial())
     cubestar.faults.inject("uart-drop")
     with pytest.raises(TimeoutError):
@@ -50,14 +48,14 @@ def test_it_gives_up_in_time(cubestar: Any) -> None:
 
 
 @pytest.mark.cubestack(seed=5, faults="[[fault]]\nkind = 'latch-up'\nat_s = 0.3\n")
-def test_a_latch_up_costs_one_picture(cubestar: Any) -> None:
-    """The plan strikes while the first picture is taken."""
+def test_latch_up_spoils_one_image(cubestar: Any) -> None:
+    """The fault happens during the first capture."""
     assert cubestar.client.capture_and_process().name == "CAPTURE_FAILED"
     assert cubestar.client.capture_and_process().name == "CALCULATED"
 
 
-@pytest.mark.cubestack(profile="extended")  # as published, the lens is off by tenths of a degree
-def test_the_nadir_camera_measures(cubesense: Any) -> None:
-    """In view are the Earth at (-8, 12) degrees, and the Sun."""
+@pytest.mark.cubestack(profile="extended")  # in `published`, the lens adds tenths of a degree
+def test_measures_the_nadir_direction(cubesense: Any) -> None:
+    """The default scene has the Earth at (-8, 12) degrees."""
     measured = cubesense.client.capture_and_detect(1)
     assert (measured.alpha_deg, measured.beta_deg) == pytest.approx((-8, 12), abs=0.1)

@@ -1,7 +1,7 @@
-// Takes a picture through the FPGA whenever 'p' comes on the satellite's UART, and answers with the
-// sum of its pixels and the place of the brightest one. All from reset on is here;
-// docs/own-firmware.md walks through it.
-#include "processor.h"  // made by `cubestack registers cubestar --processor --format c`
+// Captures an image through the FPGA whenever 'p' arrives on the satellite's UART, and answers with
+// the sum of its pixels and the position of the brightest one. Complete from reset on;
+// docs/own-firmware.md explains it.
+#include "processor.h"  // from `cubestack export cubestar --format processor-c`
 
 #define COLUMNS 1024u
 #define ROWS 512u
@@ -69,7 +69,7 @@ static void start_clock(void) {
 
 enum mode { INPUT = 1, PUSH_PULL = 4, OPEN_DRAIN_PULL_UP = 10 };
 
-// The registers of the ports follow each other: CTRL, MODEL, MODEH, DOUT, DOUTSET, DOUTCLR, ...
+// Each port has these registers, in this order: CTRL, MODEL, MODEH, DOUT, DOUTSET, DOUTCLR, ...
 static volatile uint32_t *port_of(unsigned pin) { return &GPIO->PA_CTRL + pin / 16 * 9; }
 
 static void set(unsigned pin, unsigned level) { port_of(pin)[level ? 4 : 5] = 1u << pin % 16; }
@@ -92,7 +92,7 @@ void uart_handler(void) { command = (int)SATELLITE_UART->RXDATA; }
 static void start_uart(void) {
     make(SATELLITE_UART_TX_PIN, PUSH_PULL, 1);
     make(SATELLITE_UART_RX_PIN, INPUT, 1);
-    // Sixteen samples a bit; the divider counts in 256ths.
+    // Sixteen samples per bit; the divider counts in 256ths.
     SATELLITE_UART->CLKDIV = (CLOCK_HZ * 16u / SATELLITE_BAUD - 256u) & USART_CLKDIV_DIV;
     SATELLITE_UART->ROUTE = USART_ROUTE_TXPEN | USART_ROUTE_RXPEN |
                             SATELLITE_UART_LOCATION << USART_ROUTE_LOCATION_SHIFT;
@@ -137,7 +137,7 @@ static int sent(void) {
     return acknowledged;
 }
 
-// Write a register of `count` bytes, the most significant one first; 0 when nobody answers.
+// Writes a register of `count` bytes, most significant byte first; returns 0 without an acknowledge.
 static int write_camera(uint16_t address, uint32_t value, int count) {
     CAMERA_I2C->TXDATA = CAMERA_ADDRESS << 1;
     CAMERA_I2C->CMD = I2C_CMD_START;
@@ -153,13 +153,13 @@ static int write_camera(uint16_t address, uint32_t value, int count) {
     return acknowledged;
 }
 
-// CubeStar thesis, appendix D: 8 bits, 7/27 of 10 MHz frames a second, the longest exposure.
+// CubeStar thesis, appendix D: 8 bits, 2.59 frames per second (value 7), the longest exposure.
 static int start_camera(void) {
     return write_camera(0x8100, 0x20, 1) && write_camera(0x851C, 7, 2) &&
            write_camera(0x8444, 0x0002, 2) && write_camera(0x8500, 0x03, 1);
 }
 
-// Picture
+// Image
 
 static void start_fpga(void) {
     make(FPGA_ENABLE, PUSH_PULL, 0);
