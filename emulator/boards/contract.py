@@ -79,6 +79,7 @@ class Board(ABC):
 
     Attributes:
         seed: seed of all random numbers except the scene's.
+        rng: source of random numbers that follows from ``seed``.
         lines: serial lines, the satellite's first.
         on_close: functions that ``close`` calls first.
         engine: FPGAs and their SRAMs; None on a board without.
@@ -126,7 +127,7 @@ class Board(ABC):
         self.power = PowerModel(self.kernel, power)
         self.lines: tuple[SerialLine, ...] = ()
         self.on_close: list[Callable[[], None]] = []
-        self._rng = np.random.default_rng([seed, *self.random_stream])
+        self.rng = np.random.default_rng([seed, *self.random_stream])
 
     @property
     @abstractmethod
@@ -216,4 +217,4 @@ class Board(ABC):
         return uart
 
     def _scramble(self, memory: NDArray[np.uint8]) -> None:
-        memory[:] = np.frombuffer(self._rng.bytes(memory.size), np.uint8)
+        memory[:] = np.frombuffer(self.rng.bytes(memory.size), np.uint8)

@@ -1,33 +1,52 @@
 """The board of a plain node: a microcontroller with a ``NodeProgram``, optionally an FPGA."""
 
-from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar, Unpack
 
 from cubestack.emulator.boards.contract import Board, BoardOptions
+from cubestack.emulator.boards.peripherals import NodePeripherals
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import PowerTable
 from cubestack.emulator.sim.processor import Processor
-from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
+from cubestack.firmware_model.node import checks
 from cubestack.firmware_model.node.program import POWER_ON, NodeProgram
 
 ProgramT = TypeVar("ProgramT", bound=NodeProgram)
 SceneT = TypeVar("SceneT")
 
 
+@dataclass(frozen=True)
+class _OwnPins:
+    """Pins of the processor that lead to no FPGA."""
+
+    inputs: Mapping[str, Callable[[], int]]
+    outputs: Mapping[str, Callable[[int], None]]
+
+    def __contains__(self, pin: object) -> bool:
+        return pin in self.inputs or pin in self.outputs
+
+    def get_pin(self, pin: str) -> int:
+        return self.inputs[pin]()
+
+    def set_pin(self, pin: str, level: int) -> None:
+        self.outputs[pin](level)
+
+
 class NodeBoard(Board, Generic[ProgramT, SceneT]):
     """One emulated node; a sensor's subclass defines the class attributes.
 
     Attributes:
-        interface: its messages.
+        program_type: class of the firmware.
         supplies: must contain a part "processor" with the states "sleep" and "run".
         costs: cycles of the processor's operations.
         scene_type: class of its scenes.
         boot_us: time from reset to the first instruction of ``main``.
     """
 
-    interface: ClassVar[Interface]
+    program_type: ClassVar[type[NodeProgram]]
     supplies: ClassVar[PowerTable]
     costs: ClassVar[CostTable]
     scene_type: ClassVar[type[Any]]
@@ -49,19 +68,22 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
             engine: see ``make_engine``; without an FPGA, ValueError for any but "auto".
             baud: rate of the satellite's UART; None for the interface's.
             common: seed, kernel and i2c_bus, see ``Board``.
+
+        Raises SensorError for a mistake in the declaration of the sensor.
         """
+        self._check_class()
         super().__init__(self.supplies, **common)
         self.scene = scene
+        interface = self.program_type.interface
         wiring = self._wiring()
         if wiring is not None:
             self.engine = make_engine(wiring, engine)
             for memory in self.engine.memories.values():
                 self._scramble(memory)
         elif engine != "auto":
-            raise ValueError(f"{self.interface.name} has no FPGA; omit engine {engine!r}")
-        self._node_link(
-            lambda: self.program.link, baud or self.interface.baud, self.interface.i2c_address
-        )
+            raise ValueError(f"{interface.name} has no FPGA; omit engine {engine!r}")
+        self._boot(Meter(self.costs)).check()
+        self._node_link(lambda: self.program.link, baud or interface.baud, interface.i2c_address)
         meter = Meter(self.costs)
 
         def boot(_cause: int) -> ProgramT:
@@ -76,12 +98,37 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
             boot,
             power_on_cause=POWER_ON,
             boot_us=self.boot_us,
+            other_pins=_OwnPins(self.inputs(), self.outputs()),
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
         )
 
-    @abstractmethod
+    def inputs(self) -> Mapping[str, Callable[[], int]]:
+        """Pins that the program reads and that lead to no FPGA, each with what returns its level.
+
+        The result register of a converter is a pin too: its level is the number.
+        """
+        return {}
+
+    def outputs(self) -> Mapping[str, Callable[[int], None]]:
+        """Pins that the program sets and that lead to no FPGA, each with what takes its level."""
+        return {}
+
     def _boot(self, meter: Meter) -> ProgramT:
         """The program after a reset, which charges its cycles to ``meter``."""
+        return self.program_type(NodePeripherals(self), meter)  # type: ignore[return-value]
+
+    def _check_class(self) -> None:
+        owner = type(self)
+        checks.check_class(
+            owner,
+            program_type="the class of its firmware, a NodeProgram",
+            scene_type="the class of its scenes",
+            costs="the cost table of its processor, such as CORTEX_M3",
+            supplies="a PowerTable",
+        )
+        checks.check_class(self.program_type, interface="the table of its messages")
+        parts = self.supplies.parts
+        checks.check_supplies(owner, {name: part.ma for name, part in parts.items()})
 
     def _wiring(self) -> Wiring | None:
         return None
@@ -94,5 +141,6 @@ class NodeBoard(Board, Generic[ProgramT, SceneT]):
     def scene(self, scene: object) -> None:
         if not isinstance(scene, self.scene_type):
             known = self.scene_type.__name__
-            raise TypeError(f"a scene of {self.interface.name} is a {known}, not {scene!r}")
+            name = self.program_type.interface.name
+            raise TypeError(f"a scene of {name} is a {known}, not {scene!r}")
         self._scene: SceneT = scene

@@ -25,7 +25,7 @@ WRITTEN_DIGITS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class CameraField:
     """What a camera sees of the sky.
 
     Attributes:
@@ -54,8 +54,8 @@ class Sight:
     """
 
     title: str
-    fields: tuple[Field, ...]
-    now: tuple[Field, ...] = ()
+    fields: tuple[CameraField, ...]
+    now: tuple[CameraField, ...] = ()
     bodies: tuple[Body, ...] = ()
     marks: Mapping[str, Matrix] = field(default_factory=dict)
     stars: bool = False
@@ -98,7 +98,7 @@ class SceneForm(Generic[V]):
     sight: Callable[[V, int], Sight]
 
 
-def _field(one: Field) -> dict[str, Any]:
+def _field(one: CameraField) -> dict[str, Any]:
     return {"name": one.name, "axes": rounded(one.axes), "outline": rounded(one.outline)}
 
 

@@ -19,10 +19,15 @@ from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
 from cubestack.firmware_model.mcu import requests
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.node.checks import shown_path
 
 LOOK_AHEAD_PS = 10 * PS_PER_MS
 
 Steps = Generator[simpy.Event, Any, Any]
+
+
+class RequestError(ValueError):
+    """A program requests what cannot be; the line says where."""
 
 
 class Program(Protocol):
@@ -161,7 +166,10 @@ class Processor:
                 yield from self._pay()
                 if isinstance(request, requests.Reset):
                     return request.cause
-                answer = yield from self._perform(request)
+                try:
+                    answer = yield from self._perform(request)
+                except ValueError as error:
+                    raise RequestError(f"{_place(routine)}: {error}") from error
 
     def _pay(self) -> Steps:
         """Stay busy for the charged cycles, and for those that interrupts charge meanwhile."""
@@ -199,7 +207,9 @@ class Processor:
                 self._follow()
                 return self.camera_bus.transfer(request, self.env.now)
             case _:
-                raise TypeError(f"unknown request {request!r} from a program")
+                raise ValueError(
+                    f"a program must yield a request, not {request!r}; a routine takes `yield from`"
+                )
 
     @property
     def _cycle(self) -> Fraction:
@@ -214,7 +224,7 @@ class Processor:
     def _port(self) -> FpgaPort:
         """The FPGA; read anew after each wait, as a fault may have replaced it."""
         if self.fpga is None:
-            raise ValueError("this board has no FPGA, but its program requests access to one")
+            raise ValueError("this board has no FPGA, and no such pin of its own")
         return self.fpga
 
     def _pins_of(self, request: requests.SetPin | requests.ReadPin) -> Pins | FpgaPort:
@@ -292,3 +302,11 @@ class Processor:
             if not request.write and request.data[done - 1] > request.above:
                 break
         return done
+
+
+def _place(routine: Any) -> str:
+    """File and line where a program waits for the answer to a request."""
+    while hasattr(getattr(routine, "gi_yieldfrom", None), "gi_frame"):
+        routine = routine.gi_yieldfrom
+    code, frame = getattr(routine, "gi_code", None), getattr(routine, "gi_frame", None)
+    return f"{shown_path(code.co_filename)}:{frame.f_lineno}" if code and frame else repr(routine)

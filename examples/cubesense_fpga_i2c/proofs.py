@@ -24,7 +24,7 @@ from cubestack.hdl.proofs.properties import (
     starts_in,
     writer_wires,
 )
-from cubestack.hdl.proofs.prover import Fault, Proof, past
+from cubestack.hdl.proofs.prover import Proof, StuckWire, past
 
 _TARGET = (
     "addressing",
@@ -185,7 +185,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             "pin but SDA is",
             _fpga(side),
             partial(_idle, side),
-            Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
+            StuckWire("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
             _target_wires(),
         ),
         f"{side}-sda-i2c": Proof(
@@ -193,11 +193,11 @@ def _proofs(side: Side) -> dict[str, Proof]:
             "never moved while SCL is high",
             _fpga(side),
             partial(_pulls_sda, side),
-            Fault("registers.target.reading", 1),
+            StuckWire("registers.target.reading", 1),
             _target_wires(),
         ),
         f"{side}-ack-i2c": Proof(
-            ACKNOWLEDGES, _fpga(side), _acknowledges, Fault("pix_writer.ack", 1), _WRITERS
+            ACKNOWLEDGES, _fpga(side), _acknowledges, StuckWire("pix_writer.ack", 1), _WRITERS
         ),
     }
 
@@ -209,7 +209,7 @@ PROOFS = {
         "has two",
         proof_design(CubeSenseI2cPair),
         _one_driver,
-        Fault("nadir.registers.target.group", 1),
+        StuckWire("nadir.registers.target.group", 1),
         _PAIR_WIRES,
     ),
     **_proofs("sun"),

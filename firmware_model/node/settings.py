@@ -6,6 +6,7 @@ The layout derives from the telecommand table, so a new setting is one more name
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from cubestack.firmware_model.interface.codec.field import InterfaceError, suggestion
 from cubestack.firmware_model.interface.codec.message import Interface
 
 
@@ -23,7 +24,13 @@ class Settings:
         self._values = {name: dict(m.reset_values()) for name, m in self._messages.items()}
 
     def get(self, command: str, field: str) -> Any:
-        return self._values[command][field]
+        """A parameter of a setting telecommand; InterfaceError for an unknown one."""
+        try:
+            return self._values[command][field]
+        except KeyError:
+            known = self._values.get(command, self._values)
+            hint = suggestion(field if command in self._values else command, list(known))
+            raise InterfaceError(f"no setting {command!r}, {field!r}; {hint}") from None
 
     def all(self, *commands: str) -> dict[str, Any]:
         """All parameters of ``commands``, whose names must differ."""

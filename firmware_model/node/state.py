@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+from cubestack.firmware_model.interface.codec.field import InterfaceError, suggestion
+
 
 class NodeState:
     """RAM that every node's program has: ``flags``, the names of the raised ones."""
@@ -16,5 +18,7 @@ class NodeState:
     def raise_flag(self, name: str) -> None:
         """Raise an error flag; KeyError if telemetry does not declare it."""
         if name not in self._declared:
-            raise KeyError(f"telemetry declares no flag {name!r}")
+            raise InterfaceError(
+                f"no error flag {name!r} in telemetry; {suggestion(name, sorted(self._declared))}"
+            )
         self.flags.add(name)

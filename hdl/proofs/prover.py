@@ -62,7 +62,7 @@ class UnknownWireError(ValueError):
     """A harness names a wire that the design does not have."""
 
 
-class Fault(NamedTuple):
+class StuckWire(NamedTuple):
     """A planted bug: an internal wire is stuck at a level."""
 
     wire: str
@@ -81,7 +81,7 @@ class Proof:
     #: each wire. Input ports are free. ``size`` is the one from ``make``, and ``registers`` are all
     #: of the design's.
     harness: Callable[[Module, SimpleNamespace], None]
-    fault: Fault  #: a bug with which the proof must fail
+    fault: StuckWire  #: a bug with which the proof must fail
     #: internal wires of the design that ``harness`` uses, by its names for them. Submodules are
     #: named as in the design, without the numbers that make names unique.
     wires: Mapping[str, str] = field(default_factory=dict)

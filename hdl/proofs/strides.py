@@ -9,12 +9,12 @@ from amaranth.lib.wiring import In
 from cubestack.hdl.blocks.pinned import PinnedComponent
 from cubestack.hdl.blocks.stride import Stride
 from cubestack.hdl.proofs.properties import first_step
-from cubestack.hdl.proofs.prover import Fault, Proof, past
+from cubestack.hdl.proofs.prover import Proof, StuckWire, past
 
 Make = Callable[[bool], tuple[PinnedComponent, SimpleNamespace]]
 
 
-def stride_proof(make: Make, name: str, fault: Fault) -> Proof:
+def stride_proof(make: Make, name: str, fault: StuckWire) -> Proof:
     """The proof of the stride ``name``; ``make`` and ``fault`` as in ``Proof``."""
 
     def stride_design(small: bool) -> tuple[PinnedComponent, SimpleNamespace]:

@@ -44,6 +44,13 @@ def _documents() -> str:
     return next(one.removeprefix("Documentation, ") for one in links if one.startswith("Doc"))
 
 
+def add_failed(commands: "argparse._SubParsersAction[Any]", name: str, error: str) -> None:
+    """Declare a command that ends with this error, whatever its options."""
+    command = commands.add_parser(name, help="does not load")
+    failed: Any = lambda *_: command.exit(2, f"{command.prog}: {error}\n")  # noqa: E731
+    command.parse_known_args = failed  # type: ignore[method-assign]
+
+
 def typed(kind: Kind[T]) -> Callable[[str], T]:
     """The type of an argument of this kind; its error says what would be right."""
 

@@ -46,7 +46,7 @@ class Command:
 
 
 BUILT_IN = {
-    name: Command(group, summary, f"cubestack.host.cli.{name}")
+    name: Command(group, summary, f"cubestack.host.cli.{name.replace('-', '_')}")
     for group, name, summary in (
         (EMULATOR, "emulate", "serve emulated devices on serial ports until Ctrl-C"),
         (EMULATOR, "run", "run an unmodified program that sees an emulated I2C bus"),
@@ -59,6 +59,7 @@ BUILT_IN = {
         (EMULATOR, "hdl", "FPGA designs: area, Verilog files, proofs, waveforms of failed tests"),
         (TOOLS, "replay", "play a recording to an emulated device and compare its answers"),
         (TOOLS, "decode", "list the messages of a recording, or write them as a table"),
+        (TOOLS, "new-sensor", "write a sensor of your own: messages, firmware, board, tests"),
         (TOOLS, "completion", "print the completion script for bash, zsh or fish"),
     )
 }

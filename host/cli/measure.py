@@ -20,7 +20,7 @@ from typing import Any
 
 from rich.table import Table
 
-from cubestack.host.cli.arguments import add_options, chosen, typed
+from cubestack.host.cli.arguments import add_failed, add_options, chosen, typed
 from cubestack.host.cli.device_options import (
     add_engine_arguments,
     add_insight_arguments,
@@ -30,7 +30,9 @@ from cubestack.host.cli.device_options import (
 )
 from cubestack.host.devices.device import AnyDevice, BoardOption
 from cubestack.host.devices.experiment import AnyExperiment, Result
-from cubestack.host.devices.registry import devices
+from cubestack.host.devices.registry import device as registered
+from cubestack.host.devices.registry import device_names
+from cubestack.host.errors import TargetError
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import between
@@ -58,8 +60,13 @@ def add_devices(
     """Declare the devices for which an experiment is ``found``, and its options; their parsers."""
     parsers = []
     commands = parser.add_subparsers(dest="device", required=True, metavar="device")
-    for device in devices():
-        experiment = found(device)
+    for name in device_names():
+        try:
+            device = registered(name)
+            experiment = found(device)
+        except TargetError as error:  # must not keep the others from being measured
+            add_failed(commands, name, str(error))
+            continue
         if experiment is None:
             continue
         command = commands.add_parser(

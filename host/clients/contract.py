@@ -222,11 +222,11 @@ class DeviceClient(Closable):
 
         Raises as ``Client.command`` does.
         """
-        self._perform(SET_PROFILE, Profile=profile)
+        self.perform(SET_PROFILE, Profile=profile)
 
     def set_switch(self, switch: str, value: str) -> None:
         """Set one switch, as `cubestack registers DEVICE --switches` lists them; see above."""
-        self._perform(SET_SWITCH, **switch_parameters(switch, value))
+        self.perform(SET_SWITCH, **switch_parameters(switch, value))
 
     def take_picture(self) -> None:
         """Take a picture of the sky, whatever the device makes of it.
@@ -243,7 +243,7 @@ class DeviceClient(Closable):
         """
         raise TargetError(f"{self.client.interface.name} has no results that could be logged")
 
-    def _perform(self, name: str, **parameters: object) -> None:
+    def perform(self, name: str, **parameters: object) -> None:
         """Send a telecommand and wait until it is done."""
         self._send(name, **parameters)
         self.client.wait_processed(self.step_timeout_s)

@@ -7,6 +7,7 @@ does not load it.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from keyword import iskeyword
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 
@@ -34,6 +35,9 @@ Shown = Callable[[Iterable[Any], int, str], Iterator[Any]]
 BoardT_co = TypeVar("BoardT_co", bound="Board", covariant=True)
 ClientT_co = TypeVar("ClientT_co", bound=DeviceClient, covariant=True)
 
+
+VERSION = 1
+"""Of what `cubestack.sensor` offers to sensors of other distributions."""
 
 FILE = "FILE"
 """``metavar`` of an option that names a file."""
@@ -133,6 +137,12 @@ class Report:
     load: "Callable[[], AnyExperiment]"
 
 
+def check_name(name: str) -> None:
+    """Raise ValueError for a name that a device cannot have."""
+    if not name.isidentifier() or not name.islower() or iskeyword(name):
+        raise ValueError(f"a device's name is an identifier of small letters, not {name}")
+
+
 @dataclass(frozen=True)
 class Device(Generic[BoardT_co, ClientT_co]):
     """A sensor.
@@ -166,6 +176,7 @@ class Device(Generic[BoardT_co, ClientT_co]):
         processor: its processor as firmware of one's own sees it; None where that can not run.
         image_sensor: registers of its image sensor, where its interface reads single ones.
         scene_form: what tools can do with its scenes beside reading files; None for nothing.
+        written_for: version of `cubestack.sensor`.
     """
 
     name: str
@@ -190,13 +201,18 @@ class Device(Generic[BoardT_co, ClientT_co]):
     overlay: "Callable[[Any, str], Overlay] | None" = None
     image_sensor: CameraRegisterMap | None = None
     scene_form: "Callable[[], SceneForm[Any]] | None" = None
+    written_for: int = VERSION
 
     def __post_init__(self) -> None:
-        """Refuse a name that can not be everywhere: ValueError."""
-        if not self.name.isidentifier() or not self.name.islower():
-            raise ValueError(f"a device's name is an identifier of small letters, not {self.name}")
+        """Raise ValueError for a name that cannot be used everywhere, or a newer version."""
+        check_name(self.name)
         if self.interface.name.lower() != self.name:
             raise ValueError(f"the interface of {self.name} is called {self.interface.name}")
+        if self.written_for > VERSION:
+            raise ValueError(
+                f"{self.name} is written for version {self.written_for} of cubestack.sensor; "
+                f"this cubestack has version {VERSION}: install a newer cubestack"
+            )
 
     @property
     def switches(self) -> type[Switches]:

@@ -5,15 +5,29 @@ from functools import partial
 from pkgutil import resolve_name
 from typing import Any
 
+from cubestack.host.errors import TargetError
+
+
+def load(what: str) -> Any:
+    """Load it; TargetError says, in one line, where that failed."""
+    try:
+        return resolve_name(what)
+    except Exception as error:
+        from cubestack.firmware_model.node.checks import place_of
+
+        place = place_of(error.__traceback__, what.split(".")[0].split(":")[0])
+        kind = "" if isinstance(error, ValueError | ImportError) else f"{type(error).__name__}: "
+        raise TargetError(f"{what} does not load: {place}{kind}{error}") from error
+
 
 def get(what: str) -> Callable[[], Any]:
-    return partial(resolve_name, what)
+    return partial(load, what)
 
 
 def call(what: str, *first: Any, **always: Any) -> Callable[..., Any]:
     """A callable that passes these arguments, then its own, to the named function."""
 
     def called(*given: Any, **options: Any) -> Any:
-        return resolve_name(what)(*first, *given, **always, **options)
+        return load(what)(*first, *given, **always, **options)
 
     return called

@@ -9,6 +9,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from cubestack.host.devices.device import AnyDevice, Device
+from cubestack.host.devices.lazily import load
 from cubestack.host.errors import TargetError
 
 GROUP = "cubestack.devices"
@@ -40,12 +41,24 @@ def device(name: str) -> AnyDevice:
     if entry is None:
         raise TargetError(f"no device {name!r}; known: {', '.join(device_names())}")
     try:
-        found = entry.load()
-    except Exception as error:
-        raise TargetError(f"device {name}: {entry.value} does not load: {error}") from error
-    if not isinstance(found, Device) or found.name != entry.name:
-        raise TargetError(f"device {name}: {entry.value} is no Device of that name")
+        found = load(entry.value)
+        if not isinstance(found, Device) or found.name != entry.name:
+            raise TargetError(f"{entry.value} is no Device of that name")
+    except TargetError as error:
+        raise TargetError(f"device {name}: {error}") from error
+    if entry.name not in BUILT_IN:
+        _check(found, entry.value)
     return found
+
+
+def _check(found: AnyDevice, place: str) -> None:
+    from cubestack.firmware_model.node.checks import check_address, check_interface
+
+    try:
+        check_interface(found.interface)
+        check_address(found.interface, [device(name).interface for name in BUILT_IN])
+    except ValueError as error:
+        raise TargetError(f"device {found.name}: {place}: {error}") from None
 
 
 def devices() -> Iterator[AnyDevice]:

@@ -15,7 +15,7 @@ from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs import cubesense, cubestar
 from cubestack.hdl.proofs.properties import idle_is_reset
-from cubestack.hdl.proofs.prover import Fault, Proof, ProofResult, UnknownWireError, prove
+from cubestack.hdl.proofs.prover import Proof, ProofResult, StuckWire, UnknownWireError, prove
 from cubestack.hdl.proofs.verdicts import Verdict, verdict_text
 from tests.tiers import quick
 
@@ -67,7 +67,7 @@ def below(limit: int, wires: dict[str, str] | None = None, fault: str = "counter
     def harness(m: Module, d: SimpleNamespace) -> None:
         m.d.comb += Assert(d.address < limit)
 
-    return Proof("", lambda _: (Counter(), None), harness, Fault(fault, 3), wires or {})
+    return Proof("", lambda _: (Counter(), None), harness, StuckWire(fault, 3), wires or {})
 
 
 @pytest.mark.parametrize(("limit", "proved"), [(3, False), (16, True)])

@@ -87,7 +87,7 @@ class AramisBoard(Board):
         if engine != "auto":
             raise ValueError(f"AraMiS has no FPGA: its engine must be 'auto', not {engine!r}")
         super().__init__(ARAMIS_POWER, **common)
-        self.sdram = self._rng.integers(1 << 32, size=SDRAM_BYTES // 4, dtype="<u4").view(np.uint8)
+        self.sdram = self.rng.integers(1 << 32, size=SDRAM_BYTES // 4, dtype="<u4").view(np.uint8)
         self.catalogue_flash = np.full(FLASH_BYTES, 0xFF, np.uint8)
         if catalogue is not None:
             coded = flash_image(catalogue.pack())
@@ -166,7 +166,7 @@ class AramisBoard(Board):
         Returns their number; ValueError for a rate outside 0..1.
         """
         target = self.catalogue_flash if memory == "flash" else self.sdram
-        return flip_bits(target, rate, self._rng)
+        return flip_bits(target, rate, self.rng)
 
     def sites(self) -> Sites:
         # Its camera and processor have no specific faults.

@@ -14,7 +14,7 @@ from cubestack.emulator.camera.common.view import SkyCondition, SkyView, View
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, pointing_from_matrix
 from cubestack.emulator.scene.form import (
-    Field,
+    CameraField,
     Matrix,
     SceneForm,
     Sight,
@@ -100,9 +100,9 @@ def _sight(view: SkyView, now_ps: int) -> Sight:
     )
 
 
-def _camera(quaternion: Matrix, border: Matrix) -> Field:
+def _camera(quaternion: Matrix, border: Matrix) -> CameraField:
     axes = matrix_from_quaternion(quaternion)
-    return Field("camera", axes, border @ axes)
+    return CameraField("camera", axes, border @ axes)
 
 
 def outline(lens: Optics) -> Matrix:

@@ -13,7 +13,7 @@ from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
 from cubestack.emulator.scene.form import (
     WRITTEN_DIGITS,
-    Field,
+    CameraField,
     Matrix,
     SceneForm,
     Sight,
@@ -104,6 +104,6 @@ def _sight(view: EarthSunView, now_ps: int) -> Sight:
     )
 
 
-def _camera(scene: EarthSunScene, camera: Target, time_ps: int) -> Field:
+def _camera(scene: EarthSunScene, camera: Target, time_ps: int) -> CameraField:
     axes: Matrix = scene.axes(camera, time_ps)
-    return Field(f"{camera.name.lower()} camera", axes, RIM @ axes)
+    return CameraField(f"{camera.name.lower()} camera", axes, RIM @ axes)

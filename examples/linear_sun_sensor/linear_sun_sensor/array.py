@@ -12,7 +12,7 @@ from math import cos, radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
+from cubestack.sensor import PixelClock, StreamSegment
 from linear_sun_sensor.interface import PITCH_MM, PIXELS, SLIT_MM
 from linear_sun_sensor.scene import SlitScene
 

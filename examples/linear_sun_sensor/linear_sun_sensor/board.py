@@ -4,16 +4,20 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from cubestack.emulator.boards.node import NodeBoard
-from cubestack.emulator.boards.peripherals import NodePeripherals
-from cubestack.emulator.faults.sites import CameraSite, Sites
-from cubestack.emulator.rtl.contract import RtlEngine
-from cubestack.emulator.rtl.wiring import CameraPins, Level, MemoryPins, Wiring
-from cubestack.emulator.sim.power import Part, PowerTable
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.sensor import (
+    CORTEX_M3,
+    CameraPins,
+    CameraSite,
+    Level,
+    MemoryPins,
+    NodeBoard,
+    Part,
+    PowerTable,
+    RtlEngine,
+    Sites,
+    Wiring,
+)
 from linear_sun_sensor.array import LinearArray
-from linear_sun_sensor.interface import INTERFACE
 from linear_sun_sensor.pins import ACK, ADC, DATA, DCLK, ENABLE, EXPOSE, OSC, RNW, SI, VALID
 from linear_sun_sensor.program import SunSlitProgram
 from linear_sun_sensor.scene import SlitScene
@@ -46,7 +50,7 @@ class SunSlitBoard(NodeBoard[SunSlitProgram, SlitScene]):
         array: the photodiodes, which look at the scene.
     """
 
-    interface = INTERFACE
+    program_type = SunSlitProgram
     costs = CORTEX_M3
     scene_type = SlitScene
     supplies = PowerTable(
@@ -66,9 +70,6 @@ class SunSlitBoard(NodeBoard[SunSlitProgram, SlitScene]):
         self.array = LinearArray(lambda: self.scene, lambda: self.engine.get_pin(SI))
         self.engine.attach(self.array)
         self.power.on_switch = lambda _channel, on: self._switch(on, self.kernel.now)
-
-    def _boot(self, meter: Meter) -> SunSlitProgram:
-        return SunSlitProgram(NodePeripherals(self), meter)
 
     def _wiring(self) -> Wiring:
         return wiring()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.host.clients.contract import DeviceClient, Progress
+from cubestack.sensor import DeviceClient, Progress
 from linear_sun_sensor.interface import Outcome
 
 
@@ -24,7 +24,7 @@ class SunSlit(DeviceClient):
 
     def measure(self) -> SunAngle:
         """Expose and look for the Sun."""
-        self._perform("Measure")
+        self.perform("Measure")
         values = self.client.telemetry("SunAngle")
         outcome = Outcome(int(values["Outcome"]))
         angle = float(values["Angle"]) if outcome is Outcome.MEASURED else None
@@ -32,11 +32,11 @@ class SunSlit(DeviceClient):
 
     def set_exposure(self, microseconds: int) -> None:
         """Set the integration time, 400 to 50000 us."""
-        self._perform("SetExposure", Exposure=microseconds)
+        self.perform("SetExposure", Exposure=microseconds)
 
     def set_threshold(self, level: int) -> None:
         """Set what is taken for the Sun, 1 to 200 DN above the darkest pixel."""
-        self._perform("SetThreshold", Threshold=level)
+        self.perform("SetThreshold", Threshold=level)
 
     def picture(
         self, source: str | None = None, progress: Progress | None = None

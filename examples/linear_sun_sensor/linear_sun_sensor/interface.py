@@ -5,10 +5,7 @@ Frames, buses and the messages of every node are those of the CubeSpace family.
 
 from enum import IntEnum
 
-from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16
-from cubestack.firmware_model.interface.codec.message import Interface, Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.codec.node_messages import NODE_TELECOMMANDS, node_telemetry
+from cubestack.sensor import Field, Message, enum8, f32, node_interface, u8, u16
 
 PIXELS = 128
 PITCH_MM = 0.0635
@@ -30,19 +27,16 @@ class Outcome(IntEnum):
 _EXPOSURE = u16("Exposure", "integration time", "us", reset=2000)
 _THRESHOLD = u8("Threshold", "what is taken for the Sun, above the darkest pixel", "DN", reset=40)
 
-INTERFACE = Interface(
-    name="SunSlit",
-    version=1,
+INTERFACE = node_interface(
+    "SunSlit",
     i2c_address=0x28,
-    baud=57_600,
+    flags={"ReadoutError": "the FPGA did not acknowledge a readout"},
     telecommands=(
-        *NODE_TELECOMMANDS,
         Message(10, "Measure", "expose, read the array, look for the Sun; result: SunAngle"),
         Message(11, "SetExposure", "set the integration time").of(_EXPOSURE.within(400, 50_000)),
         Message(12, "SetThreshold", "set the threshold").of(_THRESHOLD.within(1, 200)),
     ),
     telemetries=(
-        *node_telemetry(40, {"ReadoutError": "the FPGA did not acknowledge a readout"}),
         Message(140, "SunAngle", "the latest measurement").of(
             f32("Angle", "of the Sun, from the boresight along the array", "deg"),
             f32("Centroid", "of its light, from the first pixel's middle", "px"),
@@ -55,5 +49,4 @@ INTERFACE = Interface(
             Field(f"bytes{PIXELS}", "Pixels", "brightness of each, from the first one on")
         ),
     ),
-    ack_errors=AckError,
 )

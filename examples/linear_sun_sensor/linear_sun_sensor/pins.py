@@ -1,6 +1,6 @@
 """Pins of SunSlit's FPGA, in the order of the gateware's ports: one table for all who need them."""
 
-from cubestack.firmware_model.interface.pins import Pin, sram_pins
+from cubestack.sensor import Pin, sram_pins
 
 OSC = Pin("OSC", "input", "oscillator of FPGA, array and converter")
 ADC = Pin("ADC", "input", "converter: the pixel that the array puts out", 8)

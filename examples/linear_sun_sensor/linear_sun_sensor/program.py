@@ -8,18 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.mcu.requests import (
+from cubestack.sensor import (
+    Action,
     AwaitPin,
+    Meter,
+    NodeHardware,
+    NodeProgram,
     Pay,
     ReadTimer,
     Routine,
     SetPin,
-    Sleep,
+    Source,
     StrobeRead,
+    pause,
 )
-from cubestack.firmware_model.node.hardware import NodeHardware
-from cubestack.firmware_model.node.program import Action, NodeProgram, Source
 from linear_sun_sensor.interface import INTERFACE, PITCH_MM, PIXELS, SLIT_MM, Outcome
 from linear_sun_sensor.pins import ACK, ENABLE, EXPOSE, RNW
 
@@ -48,23 +50,19 @@ class SunSlitProgram(NodeProgram):
         latest: the latest measurement.
     """
 
+    interface = INTERFACE
+
     def __init__(self, hardware: NodeHardware, meter: Meter) -> None:
-        """Reset."""
-        super().__init__(hardware, meter, INTERFACE)
+        super().__init__(hardware, meter)
         self._memory = np.zeros(2 * PIXELS, np.uint8)  # both readouts
         self.latest = Measurement()
 
     def actions(self) -> Mapping[str, Action]:
-        """What telecommands do that are no settings."""
         return {"Measure": self._measure}
 
     def sources(self) -> Mapping[str, Source]:
-        """Values of telemetry."""
         return {
             "SunAngle": lambda: {n.capitalize(): value for n, value in vars(self.latest).items()},
-            "Settings": lambda: (
-                self.settings.all("SetExposure") | self.settings.all("SetThreshold")
-            ),
             "Pixels": lambda: {"Pixels": self._memory[PIXELS:].tobytes()},
         }
 
@@ -90,8 +88,7 @@ class SunSlitProgram(NodeProgram):
         yield SetPin(RNW, 0)
         yield SetPin(ENABLE, 1)
         yield SetPin(EXPOSE, 1)
-        now_us: int = yield ReadTimer()
-        yield Sleep(now_us + self.settings.get("SetExposure", "Exposure"), wakeable=False)
+        yield from pause(self.settings.get("SetExposure", "Exposure"))
         yield SetPin(EXPOSE, 0)
         stored: bool = yield AwaitPin(ACK, 1, READOUT_US, POLL_CYCLES)
         if stored:

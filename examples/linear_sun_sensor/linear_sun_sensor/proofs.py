@@ -4,13 +4,7 @@ from types import SimpleNamespace
 
 from amaranth.hdl import Module
 
-from cubestack.hdl.proofs.properties import (
-    idle_is_reset,
-    outputs_rest,
-    starts_in,
-    written_is_driven,
-)
-from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.sensor import Proof, StuckWire, properties
 from linear_sun_sensor.pins import CLK, PINS
 from linear_sun_sensor.top import SunSlitTop
 
@@ -20,13 +14,13 @@ def _make(_small: bool) -> tuple[SunSlitTop, None]:
 
 
 def _idle(m: Module, d: SimpleNamespace) -> None:
-    outputs_rest(m, d, ~d.ENABLE, PINS, but=(CLK,))
-    idle_is_reset(m, d, ~d.ENABLE, set())
+    properties.outputs_rest(m, d, ~d.ENABLE, PINS, but=(CLK,))
+    properties.idle_is_reset(m, d, ~d.ENABLE, set())
 
 
 def _one_driver(m: Module, d: SimpleNamespace) -> None:
-    starts_in(m, ~d.ENABLE)
-    written_is_driven(m, d)
+    properties.starts_in(m, ~d.ENABLE)
+    properties.written_is_driven(m, d)
 
 
 PROOFS = {
@@ -34,12 +28,12 @@ PROOFS = {
         "With ENABLE low every register is reset, and every output but the array's clock rests",
         _make,
         _idle,
-        Fault("writer.osc_rst", 0),
+        StuckWire("writer.osc_rst", 0),
     ),
     "sunslit-drivers": Proof(
         "FPGA and SRAM never both drive the SRAM's data bus",
         _make,
         _one_driver,
-        Fault("writer.store", 1),
+        StuckWire("writer.store", 1),
     ),
 }

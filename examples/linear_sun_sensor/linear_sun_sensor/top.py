@@ -12,10 +12,8 @@ the reset of DCLK's domain as it is.
 from amaranth.hdl import ClockDomain, ClockSignal, Module, Mux, ResetSignal, Signal
 from amaranth.lib.cdc import ResetSynchronizer
 
-from cubestack.hdl.blocks.frame_reader import FrameReader
-from cubestack.hdl.blocks.frame_writer import FrameWriter
-from cubestack.hdl.blocks.pinned import PinnedComponent
-from cubestack.hdl.flow.top import Clock, Top
+from cubestack.hdl.blocks import FrameReader, FrameWriter, PinnedComponent
+from cubestack.sensor import Clock, Top
 from linear_sun_sensor.interface import PIXELS
 from linear_sun_sensor.pins import PINS
 
@@ -31,11 +29,9 @@ class SunSlitTop(PinnedComponent):
     """
 
     def __init__(self) -> None:
-        """Make the top."""
         super().__init__(PINS)
 
     def elaborate(self, platform: object) -> Module:
-        """Wire start pulses, writer and reader to the pins."""
         m = Module()
         m.domains.osc = ClockDomain(async_reset=True)
         m.domains.dclk = ClockDomain(async_reset=True)

@@ -82,7 +82,7 @@ class Field:
 
     type: str
     name: str
-    meaning: str
+    meaning: str = ""
     unit: str = ""
     scale: float = 1.0
     choices: Choices | None = None

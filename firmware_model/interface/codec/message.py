@@ -62,7 +62,7 @@ class Message:
 
     id: int
     name: str
-    meaning: str
+    meaning: str = ""
     fields: tuple[Field, ...] = ()
     ordered: tuple[tuple[str, str], ...] = ()
     extension: bool = False
@@ -201,8 +201,10 @@ class Interface:
                 if message.kind is not kind:
                     raise InterfaceError(f"{message.name}: ID {message.id} is no {kind.value}'s")
             for one, two in pairwise(messages):
-                if one.id >= two.id:
-                    raise InterfaceError(f"{two.name}: ID {two.id} is taken or out of order")
+                if one.id == two.id:
+                    raise InterfaceError(f"{two.name}: ID {two.id} is taken by {one.name}")
+                if one.id > two.id:
+                    raise InterfaceError(f"{two.name}: ID {two.id} must be before {one.id}")
             if len({message.name.lower() for message in messages}) != len(messages):
                 raise InterfaceError(f"{self.name}: two {kind.value}s of one name")
 

@@ -3,10 +3,12 @@
 They are those of the CubeSpace family's nodes; ``firmware_model.node.program`` serves them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
 
 from cubestack.firmware_model.interface.codec.field import enum8, flags_at, u8, u16
-from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 
 #: Error flags of its link to the host, with their causes.
@@ -44,4 +46,41 @@ def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Messag
             u8("Latest", "ID of the latest telecommand, accepted or not"),
             enum8("Error", "its error code", choices=AckError),
         ),
+    )
+
+
+def node_interface(
+    name: str,
+    *,
+    i2c_address: int,
+    telecommands: Iterable[Message],
+    telemetries: Iterable[Message],
+    flags: Mapping[str, str] = MappingProxyType({}),
+    version: int = 1,
+    baud: int = 57_600,
+    **more: Any,
+) -> Interface:
+    """The interface of a plain node: the messages of every node, then its own.
+
+    Args:
+        name: of the device, in any case.
+        i2c_address: 7 bits; also the node type in telemetry Identification.
+        telecommands: its own, by ascending ID, 3 to 127.
+        telemetries: its own, by ascending ID, 132 to 255.
+        flags: its own error flags, each with its cause.
+        version: that the node reports.
+        baud: default baud rate of its serial line.
+        more: further attributes of `Interface`.
+
+    Raises InterfaceError.
+    """
+    return Interface(
+        name=name,
+        version=version,
+        i2c_address=i2c_address,
+        baud=baud,
+        telecommands=(*NODE_TELECOMMANDS, *telecommands),
+        telemetries=(*node_telemetry(i2c_address, flags), *telemetries),
+        ack_errors=AckError,
+        **more,
     )

@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import SUN_RUN, SUN_THRES
 from cubestack.hdl.cubesense.dataflow import Side
 from cubestack.hdl.proofs.cubesense.designs import column_row, fpga
 from cubestack.hdl.proofs.properties import domain, starts_in, wires_below, writer_wires
-from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.hdl.proofs.prover import Proof, StuckWire
 
 # Nadir scan: it visits exactly the declared addresses in order.
 
@@ -221,13 +221,13 @@ def as_flown_proofs() -> dict[str, Proof]:
             "With one search the sun's FPGA writes nothing while it sends a picture",
             fpga("sun", gateware="one-search"),
             _sends_only,
-            Fault("dataflow.store", 1),
+            StuckWire("dataflow.store", 1),
         ),
         "sun-keeps-coordinates-as-flown": Proof(
             "As flown the coordinates stay until a bright pixel is written",
             make,
             _keeps_coordinates,
-            Fault("search.store", 1),
+            StuckWire("search.store", 1),
             writer_wires("writer", "pix", below="pix_writer")
             | wires_below("search", "x", "y", "pixel"),
         ),
@@ -235,7 +235,7 @@ def as_flown_proofs() -> dict[str, Proof]:
             "As flown the Sun window wraps over the ends of the address",
             make,
             _wraps,
-            Fault("reader.window.next_column", 3),
+            StuckWire("reader.window.next_column", 3),
             {**window, **wires_below("reader.window", "in_window", "state"), **at},
         ),
     }
@@ -249,21 +249,21 @@ def edge_proofs(side: Side, mcu_addressing: bool = False) -> dict[str, Proof]:
             "The nadir scan visits exactly the declared addresses in order",
             make,
             _scans,
-            Fault("reader.scan.line_ends", 0),
+            StuckWire("reader.scan.line_ends", 0),
             _SCAN,
         ),
         f"{side}-window{option}": Proof(
             "The Sun window lies inside of the picture, around the first Sun pixel",
             make,
             _windows,
-            Fault("reader.window.clamped_y", 3),
+            StuckWire("reader.window.clamped_y", 3),
             _WINDOW,
         ),
         f"{side}-first-pixel{option}": Proof(
             "The first Sun pixel is the first of three bright ones side by side",
             make,
             partial(_first_sun_pixel, side),
-            Fault("search.bright", 1),
+            StuckWire("search.bright", 1),
             _searching(side),
         ),
     }

@@ -16,7 +16,7 @@ from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubesense.designs import column_row, fpga, proof_design
 from cubestack.hdl.proofs.cubesense.edge import as_flown_proofs, edge_proofs
 from cubestack.hdl.proofs.properties import starts_in, wires_below, writer_wires
-from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.hdl.proofs.prover import Proof, StuckWire
 
 # The address never leaves the image.
 
@@ -138,7 +138,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             "The SRAM address never leaves the picture",
             fpga(side),
             _address_stays_inside,
-            Fault("reader.window.clamped_x", 7),
+            StuckWire("reader.window.clamped_x", 7),
             _POSITIONS,
         ),
         **{
@@ -146,7 +146,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
                 properties.ACKNOWLEDGES,
                 fpga(side, mcu_addressing),
                 _acknowledges,
-                Fault("pix_writer.counter.last_row", 1),
+                StuckWire("pix_writer.counter.last_row", 1),
                 _WRITERS,
             )
             for mcu_addressing in (False, True)
@@ -156,7 +156,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
                 "With EN high every register but the Sun's coordinates is reset, and they rest",
                 fpga(side, mcu_addressing),
                 _idle,
-                Fault("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
+                StuckWire("pix_writer.pix_rst" if side == "sun" else "link_writer.link_rst", 0),
             )
             for mcu_addressing in (False, True)
         },
@@ -166,7 +166,7 @@ def _proofs(side: Side) -> dict[str, Proof]:
             "What is read first is at the address that the microcontroller gave",
             fpga(side, mcu_addressing=True),
             _takes_addresses,
-            Fault("dataflow.take_address", 1),
+            StuckWire("dataflow.take_address", 1),
             _TAKEN,
         ),
     }
@@ -178,7 +178,7 @@ PROOFS = {
             "No wire of the two FPGAs has two drivers in any settled state",
             proof_design(partial(CubeSensePair, mcu_addressing=mcu_addressing)),
             partial(_drivers, mcu_addressing),
-            Fault("nadir.dataflow.pass_edge", 1),
+            StuckWire("nadir.dataflow.pass_edge", 1),
             _DRIVERS,
         )
         for mcu_addressing in (False, True)
@@ -187,7 +187,7 @@ PROOFS = {
         "No wire of the two FPGAs has two drivers in any settled state",
         proof_design(CubeSensePair, "one-search"),
         partial(_drivers, False),
-        Fault("nadir.dataflow.pass_edge", 1),
+        StuckWire("nadir.dataflow.pass_edge", 1),
         _DRIVERS,
     ),
     **as_flown_proofs(),
@@ -195,7 +195,7 @@ PROOFS = {
         "With EN high every register but the Sun's coordinates and the window's address is reset",
         fpga("sun", gateware="as-flown"),
         partial(_idle, further=("reader.window.shown",)),
-        Fault("pix_writer.pix_rst", 0),
+        StuckWire("pix_writer.pix_rst", 0),
     ),
     **_proofs("sun"),
     **_proofs("nadir"),

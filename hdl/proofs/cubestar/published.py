@@ -13,7 +13,7 @@ from cubestack.hdl.cubestar.board import CubeStarBoard
 from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.properties import starts_in, wires_below
-from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.hdl.proofs.prover import Proof, StuckWire
 from cubestack.hdl.proofs.strides import stride_proof
 
 Make = Callable[[bool], tuple[CubeStarBoard, SimpleNamespace]]
@@ -83,9 +83,9 @@ def _reads_in_order(m: Module, d: SimpleNamespace) -> None:
 
 #: Wires of a board's only writer.
 WRITER = properties.writer_wires("writer", "pix")
-LAST_ROW = Fault("writer.counter.last_row", 1)
-LAST_COLUMN = Fault("writer.counter.last_column", 0)
-ROW_ENDS = Fault("writer.counter.last_column", 1)
+LAST_ROW = StuckWire("writer.counter.last_row", 1)
+LAST_COLUMN = StuckWire("writer.counter.last_column", 0)
+ROW_ENDS = StuckWire("writer.counter.last_column", 1)
 
 BANK_RESTS = "With ENABLE low every register but the bank is reset, and the bank rests"
 
@@ -104,20 +104,23 @@ PROOFS = {
         "FPGA and SRAM never both drive the SRAM's data bus",
         full(CubeStarTop),
         properties.written_is_driven,
-        Fault("writer.store", 1),
+        StuckWire("writer.store", 1),
     ),
     "cubestar-idle": Proof(
-        BANK_RESTS, full(CubeStarTop), partial(bank_rests, PUBLISHED), Fault("writer.pix_rst", 0)
+        BANK_RESTS,
+        full(CubeStarTop),
+        partial(bank_rests, PUBLISHED),
+        StuckWire("writer.pix_rst", 0),
     ),
     "cubestar-read": Proof(
         "Each data clock presents the next byte, from the first one on",
         full(CubeStarTop),
         _reads_in_order,
-        Fault("reader.counter.last_column", 0),
+        StuckWire("reader.counter.last_column", 0),
         wires_below("reader.counter", "column", "row"),
     ),
     "cubestar-row": stride_proof(full(CubeStarTop), "row", ROW_ENDS),
     "cubestar-row-read": stride_proof(
-        full(CubeStarTop), "row-read", Fault("reader.counter.last_column", 1)
+        full(CubeStarTop), "row-read", StuckWire("reader.counter.last_column", 1)
     ),
 }

@@ -13,7 +13,7 @@ from cubestack.hdl.proofs import properties
 from cubestack.hdl.proofs.cubestar import published
 from cubestack.hdl.proofs.cubestar.published import inside
 from cubestack.hdl.proofs.properties import starts_in, writer_wires, written_is_driven
-from cubestack.hdl.proofs.prover import Fault, Proof
+from cubestack.hdl.proofs.prover import Proof, StuckWire
 from cubestack.hdl.proofs.strides import stride_proof
 
 _SHARED, _DOUBLE, _BOARDS = map(published.full, (CubeStarShared, CubeStarDouble, CubeStarTwoBoards))
@@ -121,10 +121,10 @@ PROOFS = {
         "FPGA, SRAM and processor never drive the same data lines",
         _SHARED,
         _shared_drivers,
-        Fault("bus.writing", 1),
+        StuckWire("bus.writing", 1),
     ),
     "cubestar-shared-idle": Proof(
-        published.BANK_RESTS, _SHARED, partial(published.bank_rests, SHARED), Fault("bus.on", 1)
+        published.BANK_RESTS, _SHARED, partial(published.bank_rests, SHARED), StuckWire("bus.on", 1)
     ),
     "cubestar-shared-row": stride_proof(_SHARED, "row", published.ROW_ENDS),
     "cubestar-double-ack": Proof(
@@ -145,7 +145,7 @@ PROOFS = {
         "The memory that is stored in is the camera's alone, the other one the bus's",
         _DOUBLE,
         _apart,
-        Fault("reached2", 1),
+        StuckWire("reached2", 1),
         {
             **{"into": "into", "address": "bus.address"},
             **{f"writer_{name}": f"writer.{name}" for name in ("address", "store", "data")},
@@ -155,13 +155,13 @@ PROOFS = {
         "FPGA, SRAMs and processor never drive the same data lines",
         _DOUBLE,
         _double_drivers,
-        Fault("write1", 1),
+        StuckWire("write1", 1),
     ),
     "cubestar-double-idle": Proof(
         "With ENABLE low every register but the latched INTO is reset",
         _DOUBLE,
         _double_idle,
-        Fault("bus.on", 1),
+        StuckWire("bus.on", 1),
     ),
     "cubestar-double-row-1": stride_proof(_DOUBLE, "row-1", published.ROW_ENDS),
     "cubestar-double-row-2": stride_proof(_DOUBLE, "row-2", published.ROW_ENDS),
@@ -169,7 +169,7 @@ PROOFS = {
         properties.ACKNOWLEDGES,
         _BOARDS,
         _boards_acknowledge,
-        Fault("board2.writer.counter.last_row", 1),
+        StuckWire("board2.writer.counter.last_row", 1),
         writer_wires("board1", "pix", "board1.writer")
         | writer_wires("board2", "pix", "board2.writer"),
     ),
@@ -177,12 +177,12 @@ PROOFS = {
         "With its ENABLE low every register of a board but the bank is reset, and the bank rests",
         _BOARDS,
         _boards_idle,
-        Fault("board2.writer.pix_rst", 0),
+        StuckWire("board2.writer.pix_rst", 0),
     ),
     "cubestar-boards-drivers": Proof(
         "Two boards drive the bus together only when both are selected",
         _BOARDS,
         _one_board_drives,
-        Fault("board2.bus.reading", 1),
+        StuckWire("board2.bus.reading", 1),
     ),
 }

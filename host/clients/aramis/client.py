@@ -99,7 +99,7 @@ class Aramis(DeviceClient):
 
         Raises StepFailedError when the star tracker does not get ready.
         """
-        self._perform("Activate")
+        self.perform("Activate")
         status = self.client.telemetry("SensorStatus")
         state = aramis.SensorState(int(status["State"]))
         if state is not aramis.SensorState.READY:
@@ -108,7 +108,7 @@ class Aramis(DeviceClient):
 
     def deactivate(self) -> None:
         """Stop camera and loop."""
-        self._perform("Deactivate")
+        self.perform("Deactivate")
 
     def set_time(self, julian_date: float) -> None:
         """Set the clock to a Julian date in days; a float holds it to 0.05 ms."""
@@ -135,12 +135,12 @@ class Aramis(DeviceClient):
             raise ValueError("a rough direction is a vector or two angles: give one of them")
         if near is not None:
             x, y, z = (float(part) for part in np.asarray(near, np.float64))
-            self._perform("GetAttitudeNearVector", X=x, Y=y, Z=z)
+            self.perform("GetAttitudeNearVector", X=x, Y=y, Z=z)
         elif near_rad is not None:
             ascension, declination = near_rad
-            self._perform("GetAttitudeNearPoint", RightAscension=ascension, Declination=declination)
+            self.perform("GetAttitudeNearPoint", RightAscension=ascension, Declination=declination)
         else:
-            self._perform("GetAttitude")
+            self.perform("GetAttitude")
         return self.attitude()
 
     def take_picture(self) -> None:
@@ -187,13 +187,13 @@ class Aramis(DeviceClient):
     def set_body_rotation(self, quaternion: Sequence[float]) -> None:
         """Set the rotation (4,) from the star tracker's axes to the spacecraft's."""
         x, y, z, w = (float(part) for part in quaternion)
-        self._perform("SetBodyRotation", Q0=x, Q1=y, Q2=z, Q3=w)
+        self.perform("SetBodyRotation", Q0=x, Q1=y, Q2=z, Q3=w)
 
     def latch_up_action(self, off_s: float = 0.1) -> None:
         """Turn the camera unit off, wait, and turn it on again."""
         self._send("LatchUpAction", Step=aramis.LatchUpStep.OFF)
         self.client.pause(off_s)
-        self._perform("LatchUpAction", Step=aramis.LatchUpStep.ON)
+        self.perform("LatchUpAction", Step=aramis.LatchUpStep.ON)
 
     def load_catalogue(self, image: bytes, progress: Progress | None = None) -> CatalogueState:
         """Load a catalogue's ``image``, write it to flash and use it; returns its state.

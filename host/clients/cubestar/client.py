@@ -114,11 +114,11 @@ class CubeStar(DeviceClient):
     def configure(self, settings: Mapping[str, Mapping[str, object]]) -> None:
         """Send telecommands, name to parameters, as ``Calibration.settings`` has them."""
         for name, parameters in settings.items():
-            self._perform(name, **parameters)
+            self.perform(name, **parameters)
 
     def capture(self) -> None:
         """Capture a picture; raises StepFailedError when none arrived."""
-        self._perform("CaptureImage")
+        self.perform("CaptureImage")
         status = self.task_status()
         if status is not TaskStatus.CAPTURED:
             raise StepFailedError(f"no picture captured: task status {status.name}")
@@ -129,12 +129,12 @@ class CubeStar(DeviceClient):
 
     def capture_and_process(self) -> TaskStatus:
         """Capture a picture, detect, identify and estimate; returns how far it came."""
-        self._perform("CaptureAndProcess")
+        self.perform("CaptureAndProcess")
         return self.task_status()
 
     def process_image(self) -> TaskStatus:
         """Detect, identify and estimate with the picture in memory; returns how far it came."""
-        self._perform("ProcessImage")
+        self.perform("ProcessImage")
         return self.task_status()
 
     def task_status(self) -> TaskStatus:
@@ -164,7 +164,7 @@ class CubeStar(DeviceClient):
         size = ImageBlockSize.BYTES_128
         image = np.empty((cubestar.IMAGE_BYTES // size.length, size.length), np.uint8)
         for number in range(len(image)):
-            self._perform("ImageBlockSet", BlockNumber=number, BlockSize=size)
+            self.perform("ImageBlockSet", BlockNumber=number, BlockSize=size)
             block = self.client.telemetry("ImageBlock")["Block"]
             assert isinstance(block, bytes)
             image[number] = np.frombuffer(block, np.uint8)
@@ -192,7 +192,7 @@ class CubeStar(DeviceClient):
             raise ValueError(
                 f"an uploaded picture is uint8 {(ROWS, COLUMNS)}, not {image.dtype} {image.shape}"
             )
-        self._perform("UploadImage")
+        self.perform("UploadImage")
         blocks = image.reshape(-1, cubestar.UPLOAD_BLOCK_BYTES)
         lit = np.flatnonzero(blocks.any(axis=1))
         for done, number in enumerate(lit, start=1):

@@ -7,6 +7,7 @@ import pytest
 
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
 from cubestack.firmware_model.cubestar.state import Attitude, Retained, State
+from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.interface.cubestar import INTERFACE, MatchMode
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
@@ -117,5 +118,5 @@ def test_pictures_and_times_beyond_32_bits_wrap() -> None:
 
 
 def test_a_flag_that_is_not_declared_is_a_programming_error() -> None:
-    with pytest.raises(KeyError, match="declares no flag 'Oops'"):
+    with pytest.raises(InterfaceError, match="no error flag 'Oops' in telemetry; known: "):
         state(Memories()).raise_flag("Oops")

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from cubestack.firmware_model.interface.codec.field import u8, u16
-from cubestack.firmware_model.interface.codec.message import Interface, Message
+from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
-from cubestack.firmware_model.interface.codec.node_messages import NODE_TELECOMMANDS, node_telemetry
+from cubestack.firmware_model.interface.codec.node_messages import node_interface
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 from cubestack.firmware_model.node.program import TELECOMMAND, Action, NodeProgram, Source
@@ -20,36 +20,31 @@ from ..runner import Runner
 WORK_US = 500
 
 _LEVEL = u8("Level", "a setting", reset=7)
-INTERFACE = Interface(
-    name="Plain",
+INTERFACE = node_interface(
+    "Plain",
     version=3,
     i2c_address=0x30,
-    baud=57_600,
+    flags={"Overdone": "more than 9 in all"},
     telecommands=(
-        *NODE_TELECOMMANDS,
         Message(10, "Work", "take some time").of(u8("Amount", "to be added", maximum=9)),
         Message(11, "SetLevel", "set the level").of(_LEVEL),
     ),
     telemetries=(
-        *node_telemetry(99, {"Overdone": "more than 9 in all"}),
         Message(140, "Done", "all amounts").of(u16("Sum", "of them")),
         Message(141, "Settings", "what was set").of(_LEVEL),
     ),
-    ack_errors=AckError,
 )
 
 
 class Adder(NodeProgram):
+    interface = INTERFACE
     total = 0
 
     def actions(self) -> Mapping[str, Action]:
         return {"Work": self._work}
 
     def sources(self) -> Mapping[str, Source]:
-        return {
-            "Done": lambda: {"Sum": self.total},
-            "Settings": lambda: self.settings.all("SetLevel"),
-        }
+        return {"Done": lambda: {"Sum": self.total}}
 
     def _work(self, values: dict[str, Any]) -> Routine[None]:
         now_us: int = yield ReadTimer()
@@ -68,7 +63,7 @@ class Node(Runner, HostSide):
         self._boot()
 
     def start(self) -> Routine[None]:
-        self.program = Adder(self, self.meter, INTERFACE)
+        self.program = Adder(self, self.meter)
         return self.program.main()
 
     @property
@@ -140,7 +135,7 @@ def test_a_reset_forgets_all_but_the_time(node: Node) -> None:
     assert node.resets == [TELECOMMAND]
     assert node.telemetry("Settings") == {"Level": 7}
     identification = node.telemetry("Identification")
-    assert (identification["NodeType"], identification["InterfaceVersion"]) == (99, 3)
+    assert (identification["NodeType"], identification["InterfaceVersion"]) == (0x30, 3)
     assert (identification["RuntimeSeconds"], identification["RuntimeMilliseconds"]) == (2, 345)
 
 

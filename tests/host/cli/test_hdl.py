@@ -12,7 +12,7 @@ from cubestack.hdl.flow import tools
 from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs.cubestar import PROOFS
-from cubestack.hdl.proofs.prover import Fault
+from cubestack.hdl.proofs.prover import StuckWire
 
 from ...conftest import Run
 
@@ -86,7 +86,7 @@ def test_proofs_as_text_and_as_json(run: Run) -> None:
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
 def test_what_is_not_proved_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     proof = PROOFS["cubestar-drivers"]
-    monkeypatch.setitem(PROOFS, "cubestar-drivers", replace(proof, fault=Fault("bank", 1)))
+    monkeypatch.setitem(PROOFS, "cubestar-drivers", replace(proof, fault=StuckWire("bank", 1)))
     outcome = run("hdl", "prove", "cubestar-drivers")
     assert (outcome.code, "NOT FOUND" in outcome.out) == (1, True)
 

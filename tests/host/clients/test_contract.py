@@ -37,10 +37,10 @@ def test_a_full_buffer_is_waited_for_once(interface: Interface, device: type[Dev
     node = FakeNode(interface)
     client = device(NodeClient(UartLink(node), interface))
     node.refusals.append(AckError.BUFFER_FULL)
-    client._perform("StopLoop")
+    client.perform("StopLoop")
     node.refusals.extend([AckError.BUFFER_FULL] * 2)
     with pytest.raises(CommandRefusedError, match="BUFFER_FULL"):
-        client._perform("StopLoop")
+        client.perform("StopLoop")
     assert [name for name, _ in node.log] == ["StopLoop"]
 
 

@@ -1,0 +1,42 @@
+"""Scenes that are declared by the keys of their files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from cubestack.emulator.scene.file import SceneError, read_scene_file
+from cubestack.emulator.scene.form import SceneForm, Sight, differing
+from cubestack.firmware_model.values import DeclaredValues, described, read_table
+
+
+@dataclass(frozen=True)
+class DeclaredScene(DeclaredValues):
+    """Base of frozen dataclasses whose fields are declared values, each a key of scene files.
+
+    Attributes:
+        kind: what files of such scenes have as ``kind``.
+    """
+
+    kind: ClassVar[str]
+    error = SceneError
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """The scene of a TOML file; SceneError names the key that is wrong."""
+        kinds = {cls.kind: lambda table: cls(**read_table(table, cls.declared()))}
+        return read_scene_file(path, kinds, f'"{cls.kind}"')
+
+    def sight(self, now_ps: int) -> Sight:
+        """Where it is on a map of the sky, at a time; by default nowhere."""
+        return Sight("no map", ())
+
+    @classmethod
+    def form(cls) -> SceneForm[Self]:
+        """What tools can do with such scenes beside reading files."""
+        return SceneForm(
+            {cls.kind: described(cls.declared())}, lambda board: board.scene, _table, cls.sight
+        )
+
+
+def _table(scene: DeclaredScene) -> dict[str, Any]:
+    return {"kind": scene.kind} | differing(scene, type(scene)())

@@ -1,0 +1,194 @@
+"""Mistakes in the declaration of a sensor, each reported in one line.
+
+The line names the file, or the entry point, the message or field, and what is expected. What a
+declaration cannot express at all (two messages of one ID, limits beyond a type) is rejected by the
+declaration itself, with an `InterfaceError`.
+"""
+
+import ast
+import inspect
+import os
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import cache, partial
+from types import TracebackType
+from typing import Any
+
+from cubestack.firmware_model.interface.codec.field import InterfaceError, suggestion
+from cubestack.firmware_model.interface.codec.message import Interface, Message
+
+NEEDED = ("host_message", "i2c_interrupt", "port_read", "port_write", "uart_interrupt")
+"""Operations of every node's program."""
+
+CHARGING = ("charge", "book")
+"""Methods of a meter whose keywords are operations."""
+
+
+class SensorError(ValueError):
+    """A mistake in the declaration of a sensor; the text is one line."""
+
+
+def check_interface(interface: Interface) -> None:
+    """Every message and field has a meaning."""
+    for message in interface.messages:
+        if not message.meaning:
+            raise SensorError(f"{_titled(message)} has no meaning; add a phrase for a reader")
+        for field in message.fields:
+            if not field.meaning:
+                raise SensorError(
+                    f"{_titled(message)}: field {field.name} has no meaning; "
+                    "add a phrase for a reader"
+                )
+
+
+def check_address(interface: Interface, others: Iterable[Interface]) -> None:
+    """No other device has its I2C address."""
+    for other in others:
+        taken = [other.i2c_address]
+        if other.registers is not None:
+            taken.append(other.registers.i2c_address)
+        if interface.i2c_address in taken:
+            raise SensorError(
+                f"{interface.name}: I2C address {interface.i2c_address:#04x} is in use by "
+                f"{other.name}; choose another i2c_address"
+            )
+
+
+def check_class(owner: type[Any], **attributes: str) -> None:
+    """A class has these attributes, each with what it must be."""
+    for name, wanted in attributes.items():
+        if not hasattr(owner, name):
+            raise SensorError(f"{_file(owner)}: {owner.__name__} has no {name}: {wanted}")
+
+
+def check_actions(
+    owner: type[Any], interface: Interface, actions: Mapping[str, Callable[..., Any]]
+) -> None:
+    """Actions are generator functions, and each is a telecommand's."""
+    known = [message.name for message in interface.telecommands]
+    for name, action in actions.items():
+        _check_name(f"{_file(owner)}: {owner.__name__}.actions()", name, "telecommand", known)
+        if not inspect.isgeneratorfunction(action):
+            raise SensorError(
+                f"{place(action, owner)}: the action of telecommand {name} is no generator "
+                "function; yield what takes time, or Pay()"
+            )
+
+
+def check_sources(
+    owner: type[Any], interface: Interface, sources: Mapping[str, Callable[[], dict[str, Any]]]
+) -> None:
+    """Each telemetry has a source, whose values fit; reads those that nothing changes."""
+    at = f"{_file(owner)}: {owner.__name__}.sources()"
+    known = [message.name for message in interface.telemetries]
+    for name in sources:
+        _check_name(at, name, "telemetry", known)
+    for message in interface.telemetries:
+        if not message.supported:
+            continue
+        if message.name not in sources:
+            raise SensorError(f"{at} has no source of {_titled(message)}; add {message.name!r}")
+        source = sources[message.name]
+        if not message.has_side_effect:
+            check_values(message, source(), partial(place, source, owner))
+
+
+def check_values(message: Message, values: Any, where: Callable[[], str]) -> None:
+    """``values`` are those of a telemetry's fields, and each fits; ``where`` is their source."""
+    names = [field.name for field in message.fields]
+    if not isinstance(values, dict) or values.keys() != set(names):
+        given = ", ".join(values) if isinstance(values, dict) else repr(values)
+        raise SensorError(
+            f"{where()}: the source of {_titled(message)} must return {', '.join(names)}, "
+            f"not {given or 'nothing'}"
+        )
+    for field in message.fields:
+        try:
+            field.encode(values[field.name], saturate=False)
+        except InterfaceError as error:
+            raise SensorError(f"{where()}: {_titled(message)}, {error}") from None
+
+
+def check_charges(owner: type[Any], operations: Collection[str], processor: str) -> None:
+    """The operations that the modules of a program charge by name are those of its cost table."""
+    if missing := sorted({*NEEDED} - {*operations}):
+        raise SensorError(
+            f"{_file(owner)}: the costs of {processor} need {', '.join(missing)} for every node"
+        )
+    for base in owner.__mro__:
+        for name, line in _charged(base.__module__) if _is_foreign(base) else ():
+            if name not in operations:
+                raise SensorError(
+                    f"{line}: no operation {name!r} in the costs of {processor}; "
+                    f"{suggestion(name, sorted(operations))}"
+                )
+
+
+def check_supplies(owner: type[Any], states: Mapping[str, Collection[str]]) -> None:
+    """The power table has a part "processor" with the states that a program switches."""
+    if not {"sleep", "run"} <= set(states.get("processor", ())):
+        raise SensorError(
+            f"{_file(owner)}: supplies of {owner.__name__} need a part 'processor' with the "
+            "currents 'sleep' and 'run'"
+        )
+
+
+def place_of(traceback: TracebackType | None, package: str) -> str:
+    """Where an error left the modules of ``package``: "file:line: ", or nothing."""
+    found = ""
+    while traceback is not None:
+        frame = traceback.tb_frame
+        if str(frame.f_globals.get("__name__")).split(".")[0] == package:
+            found = f"{shown_path(frame.f_code.co_filename)}:{traceback.tb_lineno}: "
+        traceback = traceback.tb_next
+    return found
+
+
+def shown_path(file: str) -> str:
+    """A file's path, from the current folder where it is below that."""
+    relative = os.path.relpath(file)
+    return file if relative.startswith(os.pardir) else relative
+
+
+def _check_name(at: str, name: str, kind: str, known: list[str]) -> None:
+    if name not in known:
+        raise SensorError(f"{at} has {name!r}, which is no {kind}; {suggestion(name, known)}")
+
+
+def _titled(message: Message) -> str:
+    return f"{message.kind.value} {message.id} {message.name}"
+
+
+def _is_foreign(owner: type[Any]) -> bool:
+    return owner.__module__.split(".")[0] not in ("cubestack", "builtins", "abc", "typing")
+
+
+@cache
+def _charged(module: str) -> tuple[tuple[str, str], ...]:
+    """Operations that a module charges by keyword, each with its place."""
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except (OSError, TypeError, KeyError):
+        return ()
+    file = shown_path(str(sys.modules[module].__file__))
+    return tuple(
+        (keyword.arg, f"{file}:{keyword.lineno}")
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr in CHARGING
+        for keyword in node.keywords
+        if keyword.arg is not None
+    )
+
+
+def place(function: Callable[..., Any], owner: type[Any]) -> str:
+    """File and line of a function, or the file of its class."""
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    if code is None or not _is_foreign(owner):
+        return _file(owner)
+    return f"{shown_path(code.co_filename)}:{code.co_firstlineno}"
+
+
+def _file(owner: type[Any]) -> str:
+    return shown_path(str(getattr(sys.modules.get(owner.__module__), "__file__", owner.__module__)))

@@ -1,0 +1,69 @@
+"""Write a sensor of your own as a folder that installs: a photodiode behind a converter.
+
+It measures, passes `cubestack conformance` and its own tests; change it step by step
+into your sensor. What it can use is listed in docs/: reference-sensor.
+
+example:
+  cubestack new-sensor glow
+  pip install --no-build-isolation -e ./glow-sensor
+  cubestack measure glow --frames 5
+"""
+
+import argparse
+from collections.abc import Iterator
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+
+from cubestack.host.devices.device import check_name
+from cubestack.host.devices.registry import device_names, devices
+from cubestack.host.terminal import tell
+
+FILES = {
+    "pyproject.toml": "pyproject.toml.txt",
+    "{name}/__init__.py": "__init__.py.txt",
+    "{name}/sensor.py": "sensor.py.txt",
+    "tests/test_{name}.py": "test.py.txt",
+}
+"""Templates of a sensor called Glow, by the paths of what they become."""
+
+ADDRESSES = range(0x29, 0x78)
+"""I2C addresses to choose from; examples have the lower ones."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", metavar="NAME", help="of the device: small letters and digits")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder to write (default ./NAME-sensor)"
+    )
+
+
+def run(args: argparse.Namespace) -> None:
+    """Write it; ValueError for a name that cannot be used, or a folder that exists."""
+    name, folder = args.name, args.out or Path(f"{args.name}-sensor")
+    check_name(name)
+    if name in device_names():
+        raise ValueError(f"there is a device {name} already: {', '.join(device_names())}")
+    if find_spec(name) is not None:
+        raise ValueError(f"there is a Python module {name} already; choose another name")
+    if folder.exists():
+        raise ValueError(f"{folder} exists already; remove it, or choose another with --out")
+    for path, text in rendered(name):
+        place = folder / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(text, encoding="utf-8")
+        tell(str(place))
+    tell(f"install it: pip install --no-build-isolation -e {folder}")
+
+
+def rendered(name: str) -> Iterator[tuple[str, str]]:
+    """Paths and texts of the files of a new sensor."""
+    taken = {one.interface.i2c_address for one in devices()}
+    address = next(one for one in ADDRESSES if one not in taken)
+    for path, template in FILES.items():
+        text = files("cubestack.host.cli").joinpath("new_sensor_files", template)
+        words = {"Glow": name.capitalize(), "glow": name, "0x29": f"{address:#04x}"}
+        found = text.read_text(encoding="utf-8")
+        for word, replacement in words.items():
+            found = found.replace(word, replacement)
+        yield path.format(name=name), found
