@@ -20,6 +20,11 @@ class DeclaredScene(DeclaredValues):
     kind: ClassVar[str]
     error = SceneError
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if not hasattr(cls, "kind"):
+            raise SceneError(f"{cls.__name__} has no kind: what scene files have as `kind`")
+
     @classmethod
     def load(cls, path: Path) -> Self:
         """The scene of a TOML file; SceneError names the key that is wrong."""

@@ -224,14 +224,16 @@ class Processor:
     def _port(self) -> FpgaPort:
         """The FPGA; read anew after each wait, as a fault may have replaced it."""
         if self.fpga is None:
-            raise ValueError("this board has no FPGA, and no such pin of its own")
+            raise ValueError("this board has no FPGA, but its program requests access to one")
         return self.fpga
 
     def _pins_of(self, request: requests.SetPin | requests.ReadPin) -> Pins | FpgaPort:
         self._follow()
         if self.other_pins is not None and request.pin in self.other_pins:
             return self.other_pins
-        return self._port
+        if self.fpga is None:
+            raise ValueError(f"this board has no FPGA, and no pin {request.pin} of its own")
+        return self.fpga
 
     def _horizon(self) -> int:
         """Limit for the FPGA's look-ahead: nothing else happens before this time."""

@@ -10,7 +10,7 @@ import inspect
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
-from functools import cache, partial
+from functools import partial
 from types import TracebackType
 from typing import Any
 
@@ -19,6 +19,9 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message
 
 NEEDED = ("host_message", "i2c_interrupt", "port_read", "port_write", "uart_interrupt")
 """Operations of every node's program."""
+
+ADDRESSES = range(0x08, 0x78)
+"""I2C addresses of 7 bits that are not reserved."""
 
 CHARGING = ("charge", "book")
 """Methods of a meter whose keywords are operations."""
@@ -42,16 +45,16 @@ def check_interface(interface: Interface) -> None:
 
 
 def check_address(interface: Interface, others: Iterable[Interface]) -> None:
-    """No other device has its I2C address."""
+    """No other device has its I2C address, and the bus has it."""
+    address = f"{interface.name}: I2C address {interface.i2c_address:#04x}"
+    if interface.i2c_address not in ADDRESSES:
+        raise SensorError(f"{address} must be {ADDRESSES[0]:#04x} to {ADDRESSES[-1]:#04x}")
     for other in others:
         taken = [other.i2c_address]
         if other.registers is not None:
             taken.append(other.registers.i2c_address)
         if interface.i2c_address in taken:
-            raise SensorError(
-                f"{interface.name}: I2C address {interface.i2c_address:#04x} is in use by "
-                f"{other.name}; choose another i2c_address"
-            )
+            raise SensorError(f"{address} is in use by {other.name}; choose another i2c_address")
 
 
 def check_class(owner: type[Any], **attributes: str) -> None:
@@ -163,7 +166,6 @@ def _is_foreign(owner: type[Any]) -> bool:
     return owner.__module__.split(".")[0] not in ("cubestack", "builtins", "abc", "typing")
 
 
-@cache
 def _charged(module: str) -> tuple[tuple[str, str], ...]:
     """Operations that a module charges by keyword, each with its place."""
     try:

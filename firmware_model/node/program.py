@@ -108,7 +108,12 @@ class NodeProgram:
             name = command.message.name
             self._busy = True
             if name in self._actions:
-                yield from self._actions[name](command.values)
+                try:
+                    yield from self._actions[name](command.values)
+                except ValueError as error:
+                    package = type(self).__module__.split(".")[0]
+                    place = checks.place_of(error.__traceback__, package)
+                    raise checks.SensorError(f"{place}{error}") from error
             else:
                 self.settings.put(name, command.values)
             yield Pay()

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.clients.derived import client_type
 from cubestack.host.devices.device import AnyDevice, Device
-from cubestack.host.devices.lazily import call, get
+from cubestack.host.devices.lazily import call, get, load
 
 
 def node_device(
@@ -43,7 +42,7 @@ def node_device(
     """
 
     def scene_type() -> Any:
-        return resolve_name(board).scene_type
+        return load(board).scene_type
 
     def load_scene(path: Path) -> Any:
         return scene_type().load(path)

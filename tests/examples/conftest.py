@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from configparser import ConfigParser
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from ..conftest import Run
 
 ROOT = Path(__file__).parents[2]
 TIMEOUT_S = 120
+PLUGIN = "cubestack.host.pytest_plugin"
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,12 @@ def installed(project: Path, site: Path) -> Iterator[Installed]:
             if file and Path(file).is_relative_to(project):
                 del sys.modules[name]
         _forget()
+
+
+def plugins() -> tuple[str, ...]:
+    """Options of pytest: an installation that is older than the entry point needs them."""
+    known = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+    return () if known else ("-p", PLUGIN)
 
 
 def _forget() -> None:

@@ -1,94 +1,283 @@
-"""The tutorial's files, taken out of the text, are a device; so the document is enough."""
+"""An outsider writes a new sensor, edits one formula, and gets a line for each mistake."""
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 import cubestack as library
+from cubestack.host.cli.new_sensor import rendered
 
-from .conftest import ROOT, Installed, installed
+from ..conftest import Run
+from .conftest import ROOT, Installed, installed, plugins
 
-DOCUMENT = ROOT / "docs" / "adding-a-sensor.md"
 Command = Callable[..., str]
+Edit = tuple[str, str, str]
 
-#: A file's name in bold, and its text in the block below.
-FILE = re.compile(r"^\*\*`([\w./]+)`\*\*\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+TABLES, SENSOR = "glow/__init__.py", "glow/sensor.py"
+PUBLIC = {"cubestack", "cubestack.sensor", "cubestack.hdl.blocks"}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def glow(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installed]:
-    project = tmp_path_factory.mktemp("glow_sensor")
-    for name, text in FILE.findall(DOCUMENT.read_text(encoding="utf-8")):
-        path = project / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    with installed(project, tmp_path_factory.mktemp("site")) as distribution:
+@contextmanager
+def new_sensor(folder: Path, *edits: Edit) -> Iterator[Installed]:
+    """The files of `cubestack new-sensor glow`, edited: (file, old text, new text)."""
+    project = folder / "glow-sensor"
+    for path, text in rendered("glow"):
+        for _, old, new in (edit for edit in edits if edit[0] == path):
+            assert text.count(old) == 1
+            text = text.replace(old, new)
+        (project / path).parent.mkdir(parents=True, exist_ok=True)
+        (project / path).write_text(text, encoding="utf-8")
+    with installed(project, folder / "site") as distribution:
         yield distribution
 
 
-def test_its_files_are_those_that_the_text_lists(glow: Installed) -> None:
-    text = DOCUMENT.read_text(encoding="utf-8")
-    (listed,) = re.findall(r"^  glow/(.*)$", text, re.MULTILINE)
-    assert {path.name for path in (glow.paths[-1] / "glow").glob("*.py")} == set(listed.split())
+@pytest.fixture(scope="class")
+def edited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installed]:
+    """A photodiode with a filter before it: one formula is another one."""
+    formula = "counts = lux / LUX_PER_COUNT + self"
+    edit = SENSOR, formula, "counts = 0.5 * lux / LUX_PER_COUNT + self"
+    with new_sensor(tmp_path_factory.mktemp("edited"), edit) as distribution:
+        yield distribution
 
 
-def test_firmware_and_tables_see_no_emulator(glow: Installed) -> None:
-    for name, allowed in (("interface", "firmware_model.interface"), ("program", "firmware_model")):
-        tree = ast.parse((glow.paths[-1] / "glow" / f"{name}.py").read_text(encoding="utf-8"))
-        for node in ast.walk(tree):
-            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("cubestack"):
-                assert str(node.module).startswith(f"cubestack.{allowed}.")
+@pytest.mark.usefixtures("edited")
+class TestEditedSensor:
+    def test_measures_what_the_formula_says(self, cubestack: Command) -> None:
+        assert "largest error lux" in cubestack("measure", "glow", "--frames", "3")
+        for frame in library.measure("glow", frames=5, seed=2):
+            assert frame.as_dict()["measured_lux"] == pytest.approx(
+                frame.as_dict()["truth_lux"] / 2, abs=80
+            )
+
+    def test_measures_a_scene_file(self, tmp_path: Path) -> None:
+        (tmp_path / "dim.toml").write_text('kind = "light"\nlux = 1600\n')
+        (frame,) = library.measure("glow", scene=tmp_path / "dim.toml")
+        assert frame.as_dict()["truth_lux"] == 1600.0
+        assert frame.as_dict()["measured_lux"] == pytest.approx(800, abs=80)
+
+    def test_passes_the_protocol_suite(self, cubestack: Command) -> None:
+        report = cubestack("conformance", "emulated:glow", "--allow-write")
+        assert re.search(r"emulated:glow: \d\d passed, 0 failed, 0 skipped", report)
+
+    def test_is_in_the_shell(self, cubestack: Command) -> None:
+        commands = "write Measure; time 0.1; read Light; power photodiode off"
+        assert re.search(r"Count +1", cubestack("shell", "emulated:glow", "-c", commands))
+
+    def test_has_a_derived_client(self) -> None:
+        with library.open_device("glow") as glow:
+            glow.client.set_samples(9)
+            glow.client.set_samples(Samples=8)
+            assert glow.client.settings() == {"Samples": 8}
+            with pytest.raises(ValueError, match="SetSamples takes 1 values, not 2"):
+                glow.client.set_samples(1, 2)
+            with pytest.raises(ValueError, match="SetSamples needs a value for Samples"):
+                glow.client.set_samples()
+
+    def test_refuses_what_it_does_not_have(self) -> None:
+        with pytest.raises(ValueError, match="Glow has no FPGA; omit engine .python."):
+            library.open_device("glow", engine="python")
+        with (
+            library.open_device("glow") as glow,
+            pytest.raises(TypeError, match="a scene of Glow is a Scene, not 3"),
+        ):
+            glow.scene = 3
+
+    def test_shares_a_bus_with_another_device(self) -> None:
+        with (
+            library.open_device("aramis") as aramis,
+            library.open_device("glow", beside=aramis) as glow,
+        ):
+            assert aramis.smbus().read_byte_data(0x29, 128) == 0x29
+            glow.client.measure()
+            assert glow.client.light()["Illuminance"] == pytest.approx(10_000, abs=80)
+
+    def test_a_new_interpreter_lists_it_without_its_board(self, edited: Installed) -> None:
+        script = (
+            "import sys; from cubestack.host.devices.registry import device;"
+            "print(device('glow').title);"
+            "print([m for m in sys.modules if m.startswith(('cubestack.emulator', 'numpy'))])"
+        )
+        done = edited.run(sys.executable, "-c", script)
+        assert done.stdout.split() == ["Glow", "[]"], done.stderr
 
 
-def test_registers_and_conformance(cubestack: Command) -> None:
-    assert "## Telemetry 140: Light" in cubestack("registers", "glow", "--format", "markdown")
-    said = cubestack("conformance", "emulated:glow", "--allow-write")
-    assert re.search(r"emulated:glow: \d\d passed, 0 failed, 0 skipped", said)
+def test_its_own_tests_pass(tmp_path: Path) -> None:
+    with new_sensor(tmp_path) as glow:
+        tests = tmp_path / "glow-sensor" / "tests"
+        done = glow.run(sys.executable, "-m", "pytest", "-q", *plugins(), tests)
+        assert done.returncode == 0, done.stdout
 
 
-def test_measure(cubestack: Command, tmp_path: Path) -> None:
-    assert "largest error" in cubestack("measure", "glow", "--frames", "3")
-    (tmp_path / "dim.toml").write_text('kind = "light"\nlux = 800\n')
-    results = list(library.measure("glow", scene=tmp_path / "dim.toml", seed=2))
-    assert results[0].as_dict() == {"measured_lux": pytest.approx(800, abs=80), "truth_lux": 800.0}
+@pytest.mark.slow
+def test_pip_installs_it(tmp_path: Path) -> None:
+    python, target = sys.executable, tmp_path / "target"
+    subprocess.run([python, "-m", "cubestack", "new-sensor", "glow"], cwd=tmp_path, check=True)
+    options = ("-q", "--no-deps", "--no-build-isolation", "--target")
+    install = [python, "-m", "pip", "install", *options, target, "./glow-sensor"]
+    subprocess.run(install, cwd=tmp_path, check=True)
+    measured = Installed((target,)).run(python, "-m", "cubestack", "measure", "glow", "--json")
+    assert '"truth_lux"' in measured.stdout, measured.stderr
 
 
-def test_shell(cubestack: Command) -> None:
-    script = "write Measure; time 0.1; read Light; power photodiode off; fault uart-drop rate=0.1"
-    said = cubestack("shell", "emulated:glow", "-c", script)
-    assert re.search(r"Count +1", said)
+LIGHT = '"Light": lambda: {"Illuminance": self.illuminance, "Count": self.count}'
+READING = (
+    "            yield from cs.pause(CONVERSION_US)\n"
+    '            total += yield cs.ReadPin("CONVERTER")\n'
+)
+
+#: An edit, and the line that follows, with {text} for the number of the only line that has it.
+MISTAKES: dict[str, tuple[Edit, str]] = {
+    "telemetry_without_source": (
+        (SENSOR, LIGHT, ""),
+        r"sensor.py: Program.sources\(\) has no source of telemetry 140 Light; add 'Light'",
+    ),
+    "mistyped_source": (
+        (SENSOR, '"Light": lambda', '"Lihgt": lambda'),
+        r"sensor.py: Program.sources\(\) has 'Lihgt', .* no telemetry; did you mean Light\?",
+    ),
+    "mistyped_action": (
+        (SENSOR, '"Measure": self', '"Mesure": self'),
+        r"sensor.py: Program.actions\(\) has 'Mesure', .* no telecommand; did you mean Measure\?",
+    ),
+    "action_that_is_no_generator": (
+        (SENSOR, READING, "            total += 1\n"),
+        r"sensor.py:{def measure(self}: the action of telecommand Measure is no generator function; yield .*",
+    ),
+    "field_without_meaning": (
+        (TABLES, '"Illuminance", "mean of the conversions", "lx"', '"Illuminance"'),
+        r"glow:DEVICE: telemetry 140 Light: field Illuminance has no meaning; add a phrase .*",
+    ),
+    "message_without_meaning": (
+        (TABLES, '"SetSamples", "set how much is averaged"', '"SetSamples"'),
+        r"glow:DEVICE: telecommand 11 SetSamples has no meaning; add a phrase for a reader",
+    ),
+    "message_number_twice": (
+        (TABLES, "Message(11,", "Message(10,"),
+        r"__init__.py:{= node_interface(}: SetSamples: ID 10 is taken by Measure",
+    ),
+    "unknown_type": (
+        (TABLES, 'u16("Count"', 'Field("u17", "Count"'),
+        r"__init__.py:{u17}: .*name 'Field' is not defined",
+    ),
+    "reset_value_beyond_limits": (
+        (TABLES, "reset=4", "reset=100"),
+        r"__init__.py:{SetSamples}: message SetSamples: the reset value of Samples is out of range",
+    ),
+    "address_in_use": (
+        (TABLES, "0x29", "0x1B"),
+        r"glow:DEVICE: Glow: I2C address 0x1b is in use by CubeSense; choose another .*",
+    ),
+    "address_that_is_reserved": (
+        (TABLES, "0x29", "0x05"),
+        r"glow:DEVICE: Glow: I2C address 0x05 must be 0x08 to 0x77",
+    ),
+    "newer_version": (
+        (TABLES, "written_for=1", "written_for=9"),
+        r"glow is written for version 9 of cubestack.sensor; this cubestack has version 1: .*",
+    ),
+    "unknown_cost": (
+        (SENSOR, "f32_div=1", "f32_dvi=1"),
+        r"sensor.py:{f32_dvi}: no operation 'f32_dvi' in the costs of .*; did you mean f32_div\?",
+    ),
+    "source_without_a_field": (
+        (SENSOR, ', "Count": self.count}', "}"),
+        r"sensor.py:{lambda}: the source of telemetry 140 Light must return .* not Illuminance",
+    ),
+    "telemetry_that_overflows": (
+        (SENSOR, "np.float32(0), 0  #", "np.float32(0), 70_000  #"),
+        r"sensor.py:{lambda}: telemetry 140 Light, field Count: 70000 does not fit; u16 carries 0 to .*",
+    ),
+    "no_processor_in_the_supplies": (
+        (SENSOR, '"processor": cs', '"procesor": cs'),
+        r"sensor.py: supplies of Board need a part 'processor' with the currents .*",
+    ),
+    "no_costs": (
+        (SENSOR, "    costs = cs.CORTEX_M3\n", ""),
+        r"sensor.py: Board has no costs: the cost table of its processor, such as CORTEX_M3",
+    ),
+    "scene_without_kind": (
+        (SENSOR, '    kind = "light"\n', ""),
+        r"sensor.py:{class Scene}: Scene has no kind: what scene files have as `kind`",
+    ),
+    "mistyped_board": (
+        (TABLES, "glow.sensor:Board", "glow.sensor:Bord"),
+        r"glow.sensor:Bord does not load: .* no attribute 'Bord'",
+    ),
+}
+WHILE_RUNNING: dict[str, tuple[Edit, str]] = {
+    "telemetry_that_overflows_later": (
+        (SENSOR, "(self.count + 1) % 0x10000", "self.count + 70_000"),
+        r"sensor.py:{lambda}: telemetry 140 Light, field Count: 70000 does not fit; u16 carries 0 to .*",
+    ),
+    "mistyped_setting": (
+        (SENSOR, '"SetSamples", "Samples"', '"SetSample", "Samples"'),
+        r"sensor.py:{SetSample}: no setting 'SetSample', 'Samples'; did you mean SetSamples\?",
+    ),
+    "mistyped_pin": (
+        (SENSOR, 'ReadPin("CONVERTER")', 'ReadPin("CONVRTER")'),
+        r"sensor.py:{CONVRTER}: this board has no FPGA, and no pin CONVRTER of its own",
+    ),
+    "routine_that_is_yielded": (
+        (SENSOR, "yield from cs.pause", "yield cs.pause"),
+        r"sensor.py:{yield cs.pause}: a program must yield a request, not <generator .*; .* `yield from`",
+    ),
+}
 
 
-def test_what_it_can_not_have_is_told() -> None:
-    with pytest.raises(ValueError, match="Glow has no FPGA; omit engine 'python'"):
-        library.open_device("glow", engine="python")
-    with (
-        library.open_device("glow") as opened,
-        pytest.raises(TypeError, match="a scene of Glow is a LightScene, not 3"),
-    ):
-        opened.scene = 3
+def numbered(line: str, folder: Path) -> re.Pattern[str]:
+    def number(found: re.Match[str]) -> str:
+        texts = [text for text in sources if found[1] in text]
+        assert len(texts) == 1
+        return str(sources.index(texts[0]) + 1)
+
+    file = TABLES if "__init__" in line else SENSOR
+    sources = (folder / "glow-sensor" / file).read_text(encoding="utf-8").splitlines()
+    return re.compile(re.sub(r"\{(.+?)\}", number, line) + "$")
 
 
-def test_it_shares_a_bus_with_another_device() -> None:
-    with (
-        library.open_device("aramis") as aramis,
-        library.open_device("glow", beside=aramis) as opened,
-    ):
-        bus = aramis.smbus()
-        assert bus.read_byte_data(0x29, 128) == 41
-        assert bus.read_byte_data(0x1D, 128) == 6
-        assert opened.client.illuminance() == pytest.approx(20_000, abs=80)
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_declaration_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
+    edit, line = MISTAKES[mistake]
+    with new_sensor(tmp_path, edit):
+        for command in (
+            ("measure", "glow"),
+            ("shell", "emulated:glow", "-c", "read Light"),
+            ("emulate", "glow", "--pty", tmp_path / "tty"),
+        ):
+            outcome = run(*command)
+            assert outcome.code == 2
+            assert numbered(line, tmp_path).search(outcome.line), outcome.line
+        assert run("measure", "aramis", "--help").code == 0, "others are measured all the same"
 
 
-def test_a_new_interpreter_finds_it(glow: Installed) -> None:
-    script = (
-        "import sys; from cubestack.host.devices.registry import device;"
-        "print(device('glow').title);"
-        "print([m for m in sys.modules if m.startswith('cubestack.emulator')])"
-    )
-    done = glow.run(sys.executable, "-c", script)
-    assert done.stdout.split() == ["Glow", "[]"], done.stderr
+@pytest.mark.parametrize("mistake", WHILE_RUNNING)
+def test_a_mistake_in_the_firmware_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
+    edit, line = WHILE_RUNNING[mistake]
+    with new_sensor(tmp_path, edit):
+        for command in (
+            ("measure", "glow"),
+            ("shell", "emulated:glow", "-c", "write Measure; time 0.1; read Light"),
+        ):
+            outcome = run(*command)
+            assert outcome.code == 2
+            (error,) = outcome.err.splitlines()
+            assert numbered(line, tmp_path).search(error), error
+
+
+def test_sensors_of_others_import_public_modules_only(tmp_path: Path) -> None:
+    example = (ROOT / "examples" / "linear_sun_sensor" / "linear_sun_sensor").glob("*.py")
+    texts = {str(path): path.read_text(encoding="utf-8") for path in example}
+    texts |= {path: text for path, text in rendered("glow") if path.endswith(".py")}
+    assert len(texts) > 10
+    for path, text in texts.items():
+        for node in ast.walk(ast.parse(text)):
+            found = [node.module] if isinstance(node, ast.ImportFrom) else []
+            found += [name.name for name in node.names] if isinstance(node, ast.Import) else []
+            ours = {str(name) for name in found if str(name).split(".")[0] == "cubestack"}
+            assert ours <= PUBLIC, f"{path} imports {ours - PUBLIC}"

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +19,13 @@ from cubestack.host.devices.registry import device
 from cubestack.host.ground import scenes
 
 from ..conftest import Run
-from .conftest import ROOT, TIMEOUT_S, Installed, installed
+from .conftest import ROOT, TIMEOUT_S, Installed, installed, plugins
 
 PROJECT = ROOT / "examples" / "linear_sun_sensor"
 SCENE = PROJECT / "scene.toml"
 TRUTH_DEG = -23.5
 TOLERANCE_DEG = 0.05
-MOST_LINES = 810
-PLUGIN = "cubestack.host.pytest_plugin"
+MOST_LINES = 710
 
 Command = Callable[..., str]
 
@@ -241,8 +239,5 @@ def test_its_fixture_in_the_tests_of_a_driver(sensor: Installed, tmp_path: Path)
         "    sunslit.faults.inject('camera-dead')\n"
         "    assert sunslit.client.measure().outcome.name == 'NO_READOUT'\n"
     )
-    # An installation that is older than the entry point has to be told.
-    known = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
-    plugin = () if known else ("-p", PLUGIN)
-    done = sensor.run(sys.executable, "-m", "pytest", "-q", *plugin, test)
+    done = sensor.run(sys.executable, "-m", "pytest", "-q", *plugins(), test)
     assert done.returncode == 0, done.stdout
