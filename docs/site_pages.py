@@ -1,4 +1,4 @@
-"""Hooks of mkdocs that generate two pages: all commands, and all public names of `cubestack`.
+"""Hooks of mkdocs that generate pages: commands, public names of `cubestack`, `cubestack.sensor`.
 
 Links that lead out of the documents lead to the repository.
 """
@@ -7,19 +7,27 @@ import inspect
 import re
 from argparse import _SubParsersAction
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 
 import cubestack
+import cubestack.sensor
+from cubestack.firmware_model.mcu.costs import CostTable
 from cubestack.host.cli.main import make_parser
+from cubestack.host.cli.new_sensor import rendered
 
 REPOSITORY = "https://github.com/cubestack/cubestack/blob/main/"
 
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages."""
-    pages = {"reference-commands.md": commands(), "reference-python.md": python()}
+    pages = {
+        "reference-commands.md": commands(),
+        "reference-python.md": python(),
+        "reference-sensor.md": sensor(),
+    }
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
     return files
@@ -57,24 +65,57 @@ def python() -> str:
     return "\n".join(parts)
 
 
-def _members(owner: type) -> list[str]:
+def sensor() -> str:
+    """What sensors of other distributions import, and the files of a new one."""
+    parts = [f"# Python for sensors\n\n```text\n{inspect.getdoc(cubestack.sensor)}\n```\n"]
+    for topic, names in cubestack.sensor.TOPICS.items():
+        parts.append(f"\n## {topic}\n")
+        for name in names:
+            found = getattr(cubestack.sensor, name)
+            parts.append(f"\n### {name}\n\n{_described(name, found)}")
+            parts += _members(found, "####") if inspect.isclass(found) else []
+    parts.append("\n## Files of `cubestack new-sensor glow`\n")
+    for path, text in rendered("glow"):
+        language = "toml" if path.endswith(".toml") else "python"
+        parts.append(f"\n`{path}`\n\n```{language}\n{text}```\n")
+    return "\n".join(parts)
+
+
+def _members(owner: type, heading: str = "###") -> list[str]:
     own = [(name, one) for name, one in vars(owner).items() if not name.startswith("_")]
     documented = [(name, one) for name, one in own if callable(one) or isinstance(one, property)]
     return [
-        f"\n### {owner.__name__}.{name}\n\n{_described(name, one)}"
+        f"\n{heading} {owner.__name__}.{name}\n\n{_described(name, one)}"
         for name, one in documented
         if inspect.getdoc(one)
     ]
 
 
 def _described(name: str, found: Any) -> str:
-    """How it is called, with types by their own names, and what it says of itself."""
+    """How it is called, with types by their own names, and its docstring."""
     try:
         given = "" if isinstance(found, property) else str(inspect.signature(found))
     except (TypeError, ValueError):
         given = ""
-    text = inspect.getdoc(found) if callable(found) or given == "" else repr(found)
-    return f"```text\n{name}{re.sub(r'(?:[A-Za-z_]+[.])+(?=[A-Za-z])', '', given)}\n\n{text}\n```\n"
+    return f"```text\n{name}{_plain(given)}\n\n{_text(found)}\n```\n"
+
+
+def _text(found: Any) -> str:
+    if isinstance(found, CostTable):
+        cycles = ", ".join(f"{name} {cycles}" for name, cycles in found.cycles.items())
+        return f"{found.name} at {found.clock_hz / 1e6:g} MHz; cycles: {cycles}"
+    if isinstance(found, partial):
+        kind = getattr(found.args[0], "name", found.args[0])
+        return f"A `{found.func.__name__.replace('_declare', 'Declaration')}` of type {kind}."
+    if inspect.isclass(found) or inspect.isroutine(found) or isinstance(found, property):
+        return str(inspect.getdoc(found))
+    return _plain(repr(found))
+
+
+def _plain(text: str) -> str:
+    """``text`` without the modules of names, and without the addresses of functions."""
+    text = re.sub(r"<function .*? at 0x\w+>", "...", text)
+    return re.sub(r"(?:[A-Za-z_]+[.])+(?=[A-Za-z])", "", text)
 
 
 def _help(parser: Any) -> str:

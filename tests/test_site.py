@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import cubestack
+import cubestack.sensor
 from cubestack.host.cli.commands import commands
 from cubestack.host.cli.reports import reports
 
@@ -47,7 +48,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
 def test_every_document_is_in_the_navigation() -> None:
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     named = set(re.findall(r": ([\w-]+\.md)$", text, re.MULTILINE))
-    generated = {"reference-commands.md", "reference-python.md"}
+    generated = {"reference-commands.md", "reference-python.md", "reference-sensor.md"}
     assert named - generated == {path.name for path in (ROOT / "docs").glob("*.md")}
     assert yaml.safe_load(text)["theme"]["font"] is False
 
@@ -63,10 +64,11 @@ def test_every_command_and_every_public_name_is_described(site: Path) -> None:
         "calibrate-cubestar",
     ):  # commands of commands
         assert f'id="cubestack-{words}"' in page
-    names = (site / "reference-python.html").read_text(encoding="utf-8")
-    for name in (name for name in cubestack.__all__ if not name.startswith("_")):
-        assert f'id="{name.lower()}"' in names
-    assert "\nNone\n</code>" not in names  # a docstring that is missing
+    for file, module in (("python", cubestack), ("sensor", cubestack.sensor)):
+        names = (site / f"reference-{file}.html").read_text(encoding="utf-8")
+        for name in (name for name in module.__all__ if not name.startswith("_")):
+            assert f'id="{name.lower()}"' in names
+        assert "\nNone\n</code>" not in names  # a docstring that is missing
 
 
 def test_search_works_from_a_file(site: Path, chromium: Any) -> None:

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.form import Sight as Sight
     from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG as SUN_RADIUS_DEG
     from cubestack.emulator.scene.hazards.contract import Body as Body
+    from cubestack.firmware_model.values import Declaration as Declaration
     from cubestack.firmware_model.values import choice as choice
     from cubestack.firmware_model.values import flag as flag
     from cubestack.firmware_model.values import moment as moment
@@ -109,7 +110,12 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.interface.pins import sram_pins as sram_pins
     from cubestack.hdl.flow.top import Clock as Clock
     from cubestack.hdl.flow.top import Top as Top
-    from cubestack.hdl.proofs import properties as properties
+    from cubestack.hdl.proofs.properties import acknowledges as acknowledges
+    from cubestack.hdl.proofs.properties import idle_is_reset as idle_is_reset
+    from cubestack.hdl.proofs.properties import outputs_rest as outputs_rest
+    from cubestack.hdl.proofs.properties import starts_in as starts_in
+    from cubestack.hdl.proofs.properties import writer_wires as writer_wires
+    from cubestack.hdl.proofs.properties import written_is_driven as written_is_driven
     from cubestack.hdl.proofs.prover import Proof as Proof
     from cubestack.hdl.proofs.prover import StuckWire as StuckWire
 

@@ -1,7 +1,7 @@
 """Write a sensor of your own as a folder that installs: a photodiode behind a converter.
 
 It measures, passes `cubestack conformance` and its own tests; change it step by step
-into your sensor. What it can use is listed in docs/: reference-sensor.
+into your sensor, as docs/adding-a-sensor.md shows.
 
 example:
   cubestack new-sensor glow
@@ -43,11 +43,11 @@ def run(args: argparse.Namespace) -> None:
     name, folder = args.name, args.out or Path(f"{args.name}-sensor")
     check_name(name)
     if name in device_names():
-        raise ValueError(f"there is a device {name} already: {', '.join(device_names())}")
+        raise ValueError(f"{name} is a device already; choose another name")
     if find_spec(name) is not None:
-        raise ValueError(f"there is a Python module {name} already; choose another name")
+        raise ValueError(f"{name} is a Python module already; choose another name")
     if folder.exists():
-        raise ValueError(f"{folder} exists already; remove it, or choose another with --out")
+        raise ValueError(f"{folder} exists; remove it, or choose another with --out")
     for path, text in rendered(name):
         place = folder / path
         place.parent.mkdir(parents=True, exist_ok=True)

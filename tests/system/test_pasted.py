@@ -112,7 +112,7 @@ def test_a_client_of_a_port_that_nobody_serves_is_left_out(tmp_path: Path, comma
     assert left_out(line, tmp_path, long=False) == ""
 
 
-@pytest.mark.parametrize("line", ["pip install ./glow_sensor", "cubestack ground run.rec"])
+@pytest.mark.parametrize("line", ["pip install -e ./glow-sensor", "cubestack ground run.rec"])
 def test_what_a_reader_has_to_bring_is_left_out(tmp_path: Path, line: str) -> None:
     assert left_out(line, tmp_path, long=False)
 

@@ -4,7 +4,14 @@ from types import SimpleNamespace
 
 from amaranth.hdl import Module
 
-from cubestack.sensor import Proof, StuckWire, properties
+from cubestack.sensor import (
+    Proof,
+    StuckWire,
+    idle_is_reset,
+    outputs_rest,
+    starts_in,
+    written_is_driven,
+)
 from linear_sun_sensor.pins import CLK, PINS
 from linear_sun_sensor.top import SunSlitTop
 
@@ -14,13 +21,13 @@ def _make(_small: bool) -> tuple[SunSlitTop, None]:
 
 
 def _idle(m: Module, d: SimpleNamespace) -> None:
-    properties.outputs_rest(m, d, ~d.ENABLE, PINS, but=(CLK,))
-    properties.idle_is_reset(m, d, ~d.ENABLE, set())
+    outputs_rest(m, d, ~d.ENABLE, PINS, but=(CLK,))
+    idle_is_reset(m, d, ~d.ENABLE, set())
 
 
 def _one_driver(m: Module, d: SimpleNamespace) -> None:
-    properties.starts_in(m, ~d.ENABLE)
-    properties.written_is_driven(m, d)
+    starts_in(m, ~d.ENABLE)
+    written_is_driven(m, d)
 
 
 PROOFS = {
