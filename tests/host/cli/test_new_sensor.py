@@ -27,7 +27,7 @@ def test_writes_a_small_folder_that_the_linter_passes(name: str, run: Run, tmp_p
     assert sum(len(text.splitlines()) for text in texts) <= MOST_LINES
     for command in (["check", "--select", "E,F,W,I,UP,B,SIM,RUF,C4,PT,N"], ["format", "--check"]):
         ruff = [sys.executable, "-m", "ruff", *command, "--isolated", "--line-length", "100"]
-        done = subprocess.run([*ruff, folder], capture_output=True, text=True)
+        done = subprocess.run(ruff, cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout
 
 
