@@ -1,8 +1,8 @@
 #include "api.h"
 
-#include "armv7m/cpu.h"
-#include "armv7m/system.h"
-#include "efm32gg/part.h"
+#include "armv7m/core/cpu.h"
+#include "armv7m/system/system.h"
+#include "efm32gg/part/part.h"
 
 #include <algorithm>
 #include <memory>
@@ -332,7 +332,7 @@ void iss_fpga(IssMachine *machine, const FpgaDriver *driver, const FpgaWire *wir
     if (!machine->part)
         return;
     machine->link = std::make_unique<FpgaLink>(*machine->part, *driver, wires, count);
-    machine->part->outside = machine->link.get();
+    machine->part->attached = machine->link.get();
 }
 
 void iss_fpga_running(IssMachine *machine, uint32_t running) {

@@ -4,7 +4,7 @@
 
 #pragma once
 
-#include "efm32gg/outbox.h"
+#include "efm32gg/part/outbox.h"
 #include "fpga_link.h"
 
 #include <cstdint>

@@ -31,8 +31,8 @@ def _compile(
 ) -> Path:
     (scratch / "registers.h").write_text(header)
     units = [file for file in files if file.suffix == ".cpp"]
-    # A peripheral's file has the names of its own registers, so each is compiled by itself.
-    apart = [file for file in units if file.parent.name == "efm32gg"]
+    # Each peripheral imports the names of its own registers, so each file is compiled by itself.
+    apart = [file for file in units if FOLDER / "efm32gg" in file.parents]
     unity = scratch / "simulator.cpp"
     unity.write_text("".join(f'#include "{file}"\n' for file in units if file not in apart))
     return compile_library(

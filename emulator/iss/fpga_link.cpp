@@ -1,6 +1,6 @@
 #include "fpga_link.h"
 
-#include "efm32gg/part.h"
+#include "efm32gg/part/part.h"
 
 using efm32gg::Event;
 
@@ -17,12 +17,12 @@ FpgaLink::FpgaLink(efm32gg::Part &part, const FpgaDriver &fpga, const FpgaWire *
     : part(part), fpga(fpga), wires(given, given + count), driven(count), seen(count),
       looking(Event::of<&FpgaLink::look>(this)) {
     for (const FpgaWire &wire : wires)
-        (wire.input ? senses : drives)[wire.port] |= mask_of(wire) << wire.bit;
+        (wire.input ? part_inputs : part_outputs)[wire.port] |= mask_of(wire) << wire.bit;
 }
 
 FpgaLink::~FpgaLink() { part.cancel(looking); }
 
-uint32_t FpgaLink::sense(int port, int64_t now) {
+uint32_t FpgaLink::input_levels(int port, int64_t now) {
     advance(now);
     uint32_t levels = 0;
     for (const FpgaWire &wire : wires)
@@ -31,7 +31,7 @@ uint32_t FpgaLink::sense(int port, int64_t now) {
     return levels;
 }
 
-void FpgaLink::drive(int port, uint32_t changed, uint32_t levels, int64_t now) {
+void FpgaLink::outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) {
     for (std::size_t n = 0; n < wires.size(); n++) {
         const FpgaWire &wire = wires[n];
         if (wire.port != port || wire.input || !(changed >> wire.bit & mask_of(wire)))
@@ -45,7 +45,7 @@ void FpgaLink::drive(int port, uint32_t changed, uint32_t levels, int64_t now) {
     }
 }
 
-bool FpgaLink::external(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) {
+bool FpgaLink::bus_access(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) {
     if (!fpga.slow_external)
         return false;
     const int32_t answer = fpga.slow_external(bank, address, write ? value : -1, now);

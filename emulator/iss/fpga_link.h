@@ -9,8 +9,8 @@
 
 #pragma once
 
-#include "efm32gg/outside.h"
-#include "efm32gg/schedule.h"
+#include "efm32gg/part/attached_circuit.h"
+#include "efm32gg/part/schedule.h"
 
 #include <cstdint>
 #include <vector>
@@ -41,7 +41,7 @@ namespace efm32gg {
 class Part;
 }
 
-class FpgaLink : public efm32gg::Outside {
+class FpgaLink : public efm32gg::AttachedCircuit {
 public:
     // How late a pin that changes by itself is seen by pin interrupts.
     static constexpr int64_t LOOK = efm32gg::MICROSECOND;
@@ -49,9 +49,9 @@ public:
     FpgaLink(efm32gg::Part &part, const FpgaDriver &fpga, const FpgaWire *wires, int32_t count);
     ~FpgaLink();
 
-    uint32_t sense(int port, int64_t now) override;
-    void drive(int port, uint32_t changed, uint32_t levels, int64_t now) override;
-    bool external(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) override;
+    uint32_t input_levels(int port, int64_t now) override;
+    void outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) override;
+    bool bus_access(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) override;
 
     // Cameras that run, one bit each, as the engine has it.
     void set_running(uint32_t mask);

@@ -1,9 +1,9 @@
 // The C face of Insight: what profile.py calls.
 
-#include "../api.h"
+#include "api.h"
 
-#include "../armv7m/system.h"
-#include "insight.h"
+#include "armv7m/system/system.h"
+#include "insight/insight.h"
 
 using insight::Insight;
 

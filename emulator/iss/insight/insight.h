@@ -7,7 +7,7 @@
 // it came from, the open calls of the one task are kept until it goes on.
 #pragma once
 
-#include "armv7m/cpu.h"
+#include "armv7m/core/cpu.h"
 
 #include <algorithm>
 #include <cstdint>

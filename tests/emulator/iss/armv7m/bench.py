@@ -68,15 +68,13 @@ class _LogEntry(ctypes.Structure):
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL:
     here = Path(__file__).parent / "system_bench.cpp"
-    core = sorted((FOLDER / "armv7m").glob("*.cpp"))
-    files = [here, *core, *sorted((FOLDER / "armv7m").glob("*.h"))]
+    core = sorted((FOLDER / "armv7m").rglob("*.cpp"))
+    files = [here, *core, *sorted((FOLDER / "armv7m").rglob("*.h"))]
 
     def build(sources: list[Path], compiler: Compiler, scratch: Path, log: Path) -> Path:
         unity = scratch / "bench.cpp"
         unity.write_text("".join(f'#include "{file}"\n' for file in sources))
-        return compile_library(
-            compiler, scratch / "bench.so", log, [f"-I{FOLDER}", f"-I{FOLDER / 'armv7m'}", unity]
-        )
+        return compile_library(compiler, scratch / "bench.so", log, [f"-I{FOLDER}", unity])
 
     recipe = cache.recipe("the core's bench", "bench", files, partial(build, [*core, here]))
     library = ctypes.CDLL(str(cache.library_of(recipe)))

@@ -2,8 +2,8 @@
 // 0x20000000, a log at 0x40001000, and interrupt lines at 0x40002000 that programs can set. Events
 // at chosen cycles pull lines; all else is a bus error.
 
-#include "armv7m/cpu.h"
-#include "armv7m/system.h"
+#include "armv7m/core/cpu.h"
+#include "armv7m/system/system.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,0 +1,145 @@
+#include "armv7m/exceptions/nvic.h"
+
+namespace armv7m {
+
+Nvic::Nvic(int interrupts, int priority_bits)
+    : exceptions(FIRST_INTERRUPT + interrupts),
+      priority_mask(0xFFu << (8 - priority_bits) & 0xFF) {
+    reset();
+}
+
+void Nvic::reset() {
+    const ExceptionSet levels = lines;    // the lines are the peripherals', not ours
+    enable = pend = act = {};
+    for (int16_t &each : priorities) each = 0;
+    priorities[RESET] = -3, priorities[NMI] = -2, priorities[HARD_FAULT] = -1;
+    for (int number = NMI; number < FIRST_INTERRUPT; number++)
+        enable.set(number, number <= HARD_FAULT || number == SVCALL || number >= PEND_SV);
+    for (int number = FIRST_INTERRUPT; number < exceptions; number++)
+        if (levels.has(number)) pend.set(number, true);
+    set_grouping(0);    // finds first and active, too
+}
+
+void Nvic::set_enabled(int number, bool value) {
+    enable.set(number, value);
+    find_first();
+}
+
+void Nvic::set_pending(int number, bool value) {
+    pend.set(number, value);
+    if (!value) {
+        if (number == first) find_first();
+    } else if (enable.has(number) &&
+               (!first || priorities[number] < priorities[first] ||
+                (priorities[number] == priorities[first] && number < first))) {
+        first = number;
+    }
+}
+
+void Nvic::set_active(int number, bool value) {
+    act.set(number, value);
+    find_active();
+}
+
+void Nvic::set_priority(int number, uint32_t value) {
+    if (number <= HARD_FAULT || number >= exceptions) return;
+    priorities[number] = (int16_t)(value & priority_mask);
+    find_first();
+    find_active();
+}
+
+void Nvic::set_grouping(uint32_t prigroup) {
+    subpriority_mask = (int)((2u << prigroup) - 1);
+    find_first();
+    find_active();
+}
+
+bool Nvic::set_line(int number, bool level) {
+    if (lines.has(number) == level) return false;
+    lines.set(number, level);
+    if (level) set_pending(number, true);
+    return level;
+}
+
+bool Nvic::repend(int number) {
+    if (!lines.has(number)) return false;
+    set_pending(number, true);
+    return true;
+}
+
+void Nvic::find_first() {
+    first = 0;
+    for (int index = 0; index < ExceptionSet::WORDS; index++) {
+        for (uint32_t left = pend.word[index] & enable.word[index]; left; left &= left - 1) {
+            const int number = 32 * index + __builtin_ctz(left);
+            if (!first || priorities[number] < priorities[first]) first = number;
+        }
+    }
+}
+
+void Nvic::find_active() {
+    int most_urgent = THREAD_PRIORITY;
+    for (int index = 0; index < ExceptionSet::WORDS; index++) {
+        for (uint32_t left = act.word[index]; left; left &= left - 1) {
+            const int number = 32 * index + __builtin_ctz(left);
+            if (priorities[number] < most_urgent) most_urgent = priorities[number];
+        }
+    }
+    active_group = most_urgent == THREAD_PRIORITY ? most_urgent : group(most_urgent);
+}
+
+int Nvic::active_count() const {
+    int count = 0;
+    for (uint32_t word : act.word) count += __builtin_popcount(word);
+    return count;
+}
+
+uint32_t Nvic::interrupts(const ExceptionSet &set, uint32_t index) const {
+    // Interrupt 0 is exception 16: a register's 32 bits lie across two words.
+    if (index >= ExceptionSet::WORDS) return 0;
+    const uint32_t above = index + 1 < ExceptionSet::WORDS ? set.word[index + 1] : 0;
+    return set.word[index] >> 16 | above << 16;
+}
+
+uint32_t Nvic::read(uint32_t offset) const {
+    const uint32_t index = offset % 0x80 / 4;
+    switch (offset / 0x80) {
+    case 0: case 1: return interrupts(enable, index);    // ISER, ICER
+    case 2: case 3: return interrupts(pend, index);      // ISPR, ICPR
+    case 4: return interrupts(act, index);               // IABR
+    }
+    return offset >= 0x300 ? priority_word(FIRST_INTERRUPT + (int)(offset - 0x300)) : 0;
+}
+
+void Nvic::write(uint32_t offset, uint32_t value) {
+    const uint32_t bank = offset / 0x80, index = offset % 0x80 / 4;
+    if (bank > 3) return;    // IABR is read-only; priorities come by write_priorities
+    for (uint32_t left = value; left; left &= left - 1) {
+        const int number = FIRST_INTERRUPT + (int)(32 * index) + __builtin_ctz(left);
+        if (number >= exceptions) break;
+        switch (bank) {
+        case 0: enable.set(number, true); break;
+        case 1: enable.set(number, false); break;
+        case 2: pend.set(number, true); break;
+        case 3: pend.set(number, lines.has(number) && !act.has(number)); break;
+        }
+    }
+    find_first();
+}
+
+uint32_t Nvic::priority_word(int first_number) const {
+    uint32_t word = 0;
+    for (int lane = 0; lane < 4; lane++) {
+        const int number = first_number + lane;
+        if (number > HARD_FAULT && number < exceptions)
+            word |= (uint32_t)priorities[number] << 8 * lane;
+    }
+    return word;
+}
+
+void Nvic::write_priorities(int first_number, uint32_t value, uint32_t lanes) {
+    for (int lane = 0; lane < 4; lane++)
+        if (lanes >> lane & 1) set_priority(first_number + lane, value >> 8 * lane & 0xFF);
+}
+
+}  // namespace armv7m

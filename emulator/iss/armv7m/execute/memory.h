@@ -1,0 +1,328 @@
+// Loads and stores (ARMv7-M ARM A4.6, A4.7; cycles in cycles.h). Part of Cpu::loop.
+
+// The start of a load: it waits for its address, and for a store that is still on the bus. A single
+// store only waits until its data can follow that store's.
+#define WAIT_FOR_BUS() \
+    do { \
+        now += op->stall; \
+        if (now < bus_free) now = bus_free; \
+    } while (0)
+#define WAIT_FOR_STORE() \
+    do { \
+        now += op->stall; \
+        if (now + 1 < bus_free) now = bus_free - 1; \
+    } while (0)
+#define LAST_LOAD_FEEDS(base_register, index_register) \
+    ((base_register) == loaded || (index_register) == loaded)
+#define NO_REGISTER 16u
+#define NOT_BEHIND ((uint32_t)loaded)    // a load with write-back overlaps with none before it
+#define KEEP_SP(number, value) ((number) == 13 ? (value) & ~3u : (value))
+
+// Reads `value` of `type` from `address`; afterwards `now` is behind the load.
+#define READ(type, address, index_register) \
+    uint32_t value; \
+    WAIT_FOR_BUS(); \
+    { \
+        constexpr uint32_t bytes = sizeof(type); \
+        const Page &page = map[(address) >> 20]; \
+        const uint32_t offset = (address) & 0xFFFFF; \
+        const bool behind = now == load_end && !LAST_LOAD_FEEDS(op->n, index_register); \
+        if (LIKELY(!(offset & (bytes - 1)) && offset < page.read_limit)) { \
+            type content; \
+            std::memcpy(&content, page.host + offset, bytes); \
+            value = (uint32_t)content; \
+            now += 2 - behind + page.read_wait; \
+        } else { \
+            r[15] = PC, cycles = now + 1 - behind; \
+            const Result result = load((address), bytes, value, privileged()); \
+            if (UNLIKELY(result != Result::Done)) { \
+                abandon(op, result, false); \
+                goto failed; \
+            } \
+            value = (uint32_t)(type)value; \
+            now = cycles + 1; \
+        } \
+        load_end = now; \
+    }
+
+// Writes the low bytes of `value`; `extra`: whether it takes a cycle more.
+#define WRITE(type, address, value, extra) \
+    WAIT_FOR_STORE(); \
+    { \
+        constexpr uint32_t bytes = sizeof(type); \
+        const Page &page = map[(address) >> 20]; \
+        const uint32_t offset = (address) & 0xFFFFF; \
+        const uint32_t late = (extra); \
+        if (LIKELY(!(offset & (bytes - 1)) && offset < page.write_limit)) { \
+            const type content = (type)(value); \
+            std::memcpy(page.host + offset, &content, bytes); \
+            if (UNLIKELY(page.marks[offset >> 6])) written(page.host + offset, bytes); \
+            bus_free = now + 2 + page.write_wait; \
+        } else { \
+            const int64_t data_phase = now + 1; \
+            r[15] = PC, cycles = data_phase; \
+            const Result result = store((address), bytes, (value), privileged()); \
+            bus_free = cycles + 1; \
+            if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed; \
+            cycles = data_phase; \
+        } \
+        now += 1 + late; \
+    }
+
+#define LOAD(name, type) \
+    HANDLE(name##_O) { \
+        const uint32_t address = r[op->n] + op->value; \
+        READ(type, address, NO_REGISTER) \
+        r[op->d] = value, loaded = op->d; \
+        NEXT(0); \
+    } \
+    HANDLE(name##_M) { \
+        const uint32_t address = r[op->n] + (r[op->m] << op->shift); \
+        READ(type, address, op->m) \
+        r[op->d] = value, loaded = op->d; \
+        NEXT(0); \
+    } \
+    HANDLE(name##_P) { \
+        const uint32_t address = r[op->n] + op->value; \
+        READ(type, address, NOT_BEHIND) \
+        r[op->n] = KEEP_SP(op->n, address); \
+        r[op->d] = value, loaded = op->d; \
+        NEXT(0); \
+    } \
+    HANDLE(name##_Q) { \
+        const uint32_t address = r[op->n]; \
+        READ(type, address, NOT_BEHIND) \
+        r[op->n] = KEEP_SP(op->n, address + op->value); \
+        r[op->d] = value, loaded = op->d; \
+        NEXT(0); \
+    } \
+    HANDLE(name##_L) { \
+        const uint32_t address = ((PC + 4) & ~3u) + op->value; \
+        READ(type, address, NO_REGISTER) \
+        r[op->d] = value, loaded = op->d; \
+        NEXT(0); \
+    }
+
+LOAD(LDR, uint32_t)
+LOAD(LDRH, uint16_t)
+LOAD(LDRB, uint8_t)
+LOAD(LDRSH, int16_t)
+LOAD(LDRSB, int8_t)
+
+#define STORE(name, type) \
+    HANDLE(name##_O) { \
+        const uint32_t address = r[op->n] + op->value; \
+        WRITE(type, address, r[op->d], 0) \
+        NEXT(0); \
+    } \
+    HANDLE(name##_M) { \
+        const uint32_t address = r[op->n] + (r[op->m] << op->shift); \
+        WRITE(type, address, r[op->d], now != load_end) \
+        NEXT(0); \
+    } \
+    HANDLE(name##_P) { \
+        const uint32_t address = r[op->n] + op->value; \
+        WRITE(type, address, r[op->d], now == load_end) \
+        r[op->n] = KEEP_SP(op->n, address); \
+        NEXT(0); \
+    } \
+    HANDLE(name##_Q) { \
+        const uint32_t address = r[op->n]; \
+        WRITE(type, address, r[op->d], now == load_end) \
+        r[op->n] = KEEP_SP(op->n, address + op->value); \
+        NEXT(0); \
+    }
+
+STORE(STR, uint32_t)
+STORE(STRH, uint16_t)
+STORE(STRB, uint8_t)
+
+// A word into SP or PC. In handler mode an EXC_RETURN value leaves the exception.
+HANDLE(LDR_WIDE) {
+    uint32_t address = op->a == 4 ? ((PC + 4) & ~3u) + op->value : r[op->n];
+    if (op->a == 0 || op->a == 2) address += op->value;
+    if (op->a == 1) address += r[op->m] << op->shift;
+    READ(uint32_t, address, NO_REGISTER)
+    if (op->a == 2) r[op->n] = KEEP_SP(op->n, address);
+    if (op->a == 3) r[op->n] = KEEP_SP(op->n, address + op->value);
+    if (op->d == 13) {
+        r[13] = value & ~3u, loaded = 13;
+        NEXT(0);
+    }
+    load_end = -1;
+    target = value;
+    now -= 1;    // which jump_loaded counts again
+    goto jump_loaded;
+}
+
+HANDLE(LOAD_USER) {
+    const uint32_t address = r[op->n] + op->value;
+    uint32_t value;
+    WAIT_FOR_BUS();
+    r[15] = PC, cycles = now + 1;
+    const Result result = load(address, op->a, value, false);
+    if (UNLIKELY(result != Result::Done)) {
+        abandon(op, result, false);
+        goto failed;
+    }
+    if (op->m) value = op->a == 1 ? (uint32_t)(int8_t)value : (uint32_t)(int16_t)value;
+    r[op->d] = value, loaded = op->d;
+    now = load_end = cycles + 1;
+    NEXT(0);
+}
+HANDLE(STORE_USER) {
+    const uint32_t address = r[op->n] + op->value;
+    WAIT_FOR_STORE();
+    r[15] = PC, cycles = now + 1;
+    const uint32_t content = op->a == 4 ? r[op->d] : r[op->d] & ((1u << 8 * op->a) - 1);
+    const Result result = store(address, op->a, content, false);
+    bus_free = cycles + 1;
+    if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+    NEXT(1);
+}
+
+// LDM, POP: all registers are written at the end, so that a fault leaves them alone. (The part
+// restarts an LDM that an interrupt would split; here the interrupt waits for its end.)
+HANDLE(LDM) {
+    uint32_t contents[16], list = op->list;
+    const uint32_t registers = (uint32_t)__builtin_popcount(list);
+    uint32_t address = op->a ? r[op->n] - 4 * registers : r[op->n];
+    const uint32_t end = op->a ? address : address + 4 * registers;
+    const Page &page = map[address >> 20];
+    const uint32_t offset = address & 0xFFFFF;
+    if (UNLIKELY(address & 3)) {
+        fault_address = address;
+        FAIL(Fault::Unaligned);
+    }
+    WAIT_FOR_BUS();
+    if (LIKELY((uint64_t)offset + 4 * registers <= page.read_limit)) {
+        std::memcpy(contents, page.host + offset, 4 * registers);
+        now += 1 + (int64_t)registers * (1 + page.read_wait);
+    } else {
+        r[15] = PC, cycles = now + 1;
+        for (uint32_t i = 0; i < registers; i++) {
+            const Result result = load(address + 4 * i, 4, contents[i], privileged());
+            if (UNLIKELY(result != Result::Done)) {
+                abandon(op, result, false);
+                goto failed;
+            }
+            cycles++;
+        }
+        now = cycles;
+    }
+    if (op->m) r[op->n] = KEEP_SP(op->n, end);
+    const uint32_t *next = contents;
+    for (list &= 0x7FFF; list; list &= list - 1) r[__builtin_ctz(list)] = *next++;
+    if (op->list & 0x8000) {
+        target = *next;
+        now -= 1;
+        goto jump_loaded;
+    }
+    NEXT(0);
+}
+HANDLE(STM) {
+    uint32_t contents[16], list = op->list, *next = contents;
+    const uint32_t registers = (uint32_t)__builtin_popcount(list);
+    const uint32_t address = op->a ? r[op->n] - 4 * registers : r[op->n];
+    const uint32_t end = op->a ? address : address + 4 * registers;
+    const Page &page = map[address >> 20];
+    const uint32_t offset = address & 0xFFFFF;
+    if (UNLIKELY(address & 3)) {
+        fault_address = address;
+        FAIL(Fault::Unaligned);
+    }
+    for (; list; list &= list - 1) *next++ = r[__builtin_ctz(list)];
+    WAIT_FOR_BUS();
+    if (LIKELY((uint64_t)offset + 4 * registers <= page.write_limit)) {
+        std::memcpy(page.host + offset, contents, 4 * registers);
+        if (UNLIKELY(page.marks[offset >> 6] || page.marks[(offset + 4 * registers - 1) >> 6]))
+            written(page.host + offset, 4 * registers);
+        now += 1 + (int64_t)registers * (1 + page.write_wait);
+    } else {
+        r[15] = PC, cycles = now + 1;
+        for (uint32_t i = 0; i < registers; i++) {
+            const Result result = store(address + 4 * i, 4, contents[i], privileged());
+            if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+            cycles++;
+        }
+        now = cycles;
+    }
+    if (op->m) r[op->n] = KEEP_SP(op->n, end);
+    NEXT(0);
+}
+
+HANDLE(LDRD) {
+    const uint32_t start = op->n == 15 ? (PC + 4) & ~3u : r[op->n];
+    const uint32_t address = op->m == 2 ? start : start + op->value;
+    if (UNLIKELY(address & 3)) FAIL(Fault::Unaligned);
+    WAIT_FOR_BUS();
+    r[15] = PC, cycles = now + 1;
+    uint32_t low, high;
+    Result result = load(address, 4, low, privileged());
+    cycles++;
+    if (LIKELY(result == Result::Done)) result = load(address + 4, 4, high, privileged());
+    if (UNLIKELY(result != Result::Done)) {
+        abandon(op, result, false);
+        goto failed;
+    }
+    now = cycles + 1;
+    if (op->m) r[op->n] = KEEP_SP(op->n, start + op->value);
+    r[op->d] = low, r[op->a] = high;
+    NEXT(0);
+}
+HANDLE(STRD) {
+    const uint32_t start = r[op->n];
+    const uint32_t address = op->m == 2 ? start : start + op->value;
+    if (UNLIKELY(address & 3)) FAIL(Fault::Unaligned);
+    WAIT_FOR_BUS();
+    r[15] = PC, cycles = now + 1;
+    Result result = store(address, 4, r[op->d], privileged());
+    if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+    cycles++;
+    result = store(address + 4, 4, r[op->a], privileged());
+    if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+    now = cycles + 1;
+    if (op->m) r[op->n] = KEEP_SP(op->n, start + op->value);
+    NEXT(0);
+}
+
+// Exclusives. The part's monitor tags no address (TRM 2.3): any store exclusive after a load
+// exclusive succeeds, unless CLREX or an exception came between.
+HANDLE(LDREX) {
+    const uint32_t address = r[op->n] + op->value, bytes = op->shift;
+    uint32_t value;
+    if (UNLIKELY(address & (bytes - 1))) FAIL(Fault::Unaligned);
+    WAIT_FOR_BUS();
+    const bool behind = now == load_end && op->n != loaded;
+    r[15] = PC, cycles = now + 1 - behind;
+    const Result result = load(address, bytes, value, privileged());
+    if (UNLIKELY(result != Result::Done)) {
+        abandon(op, result, false);
+        goto failed;
+    }
+    exclusive = true;
+    r[op->d] = value, loaded = op->d;
+    now = load_end = cycles + 1;
+    NEXT(0);
+}
+// d = data, m = result.
+HANDLE(STREX) {
+    const uint32_t address = r[op->n] + op->value, bytes = op->shift;
+    if (UNLIKELY(address & (bytes - 1))) FAIL(Fault::Unaligned);
+    WAIT_FOR_BUS();
+    const bool behind = now == load_end && op->n != loaded && op->d != loaded;
+    r[15] = PC, cycles = now + 1 - behind;
+    if (exclusive) {
+        const uint32_t content = bytes == 4 ? r[op->d] : r[op->d] & ((1u << 8 * bytes) - 1);
+        const Result result = store(address, bytes, content, privileged());
+        if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+    }
+    r[op->m] = !exclusive, loaded = op->m;
+    exclusive = false;
+    now = load_end = cycles + 1;
+    NEXT(0);
+}
+HANDLE(CLREX) {
+    exclusive = false;
+    NEXT(1);
+}

@@ -1,0 +1,114 @@
+// Where code comes from: regions with their decoded operations, or single instructions aside.
+
+#include "armv7m/core/cpu.h"
+#include "armv7m/decode/codes.h"
+#include "armv7m/decode/decode.h"
+#include "armv7m/system/system.h"
+
+#include <cstring>
+
+namespace armv7m {
+
+// Prepares the loop for code at `pc`. False: fetch_failed() tells why there is none.
+bool Cpu::find_code(uint32_t pc) {
+    lines = nullptr;
+    guarded = system->mpu.enabled();
+    fetch_fault = Fault::FetchViolation;
+    if (Mpu::execute_never(pc)) return false;
+    if (guarded && !system->mpu.allows(pc, Access::Fetch, privileged())) return false;
+    const Region *region = find_region(pc, 2);
+    if (region == nullptr || !region->readable) {
+        fetch_costs = guarded;
+        return run_aside(pc);
+    }
+    operations = code_of(*region)->operations.get();
+    code_base = region->base, code_size = region->size;
+    lines = region->lines;
+    fetch_costs = guarded || lines != nullptr;
+    return true;
+}
+
+// Decodes one instruction for itself, with markers behind it, so that the loop comes back.
+bool Cpu::run_aside(uint32_t pc) {
+    const Region *region = find_region(pc, 2);
+    uint32_t first, second = 0;
+    fetch_fault = Fault::FetchBus;
+    if (!fetch_half(pc, first)) return false;
+    if (is_wide(first) && !fetch_half(pc + 2, second)) return false;
+    aside[0] = is_wide(first) ? decode_32(first, second) : decode_16(first);
+    aside[1].code = aside[1].in_it = aside[2].code = aside[2].in_it = C_REGION_END;
+    if (region != nullptr) {    // it takes as long as in its place
+        const uint32_t offset = pc - region->base;
+        aside[0].stall = address_stall(aside[0], region->host, offset);
+        if (aside[0].code == C_IT)
+            aside[0].a = folds(offset, code_of(*region)->operations.get() + offset / 2);
+    }
+    operations = aside;
+    code_base = pc, code_size = 0;    // every branch leaves
+    return true;
+}
+
+bool Cpu::fetch_half(uint32_t address, uint32_t &value) {
+    const Region *region = find_region(address, 2);
+    if (region == nullptr || !region->readable) return bus.fetch_halfword(address, value);
+    value = 0;
+    std::memcpy(&value, region->host + (address - region->base), 2);
+    return true;
+}
+
+void Cpu::fetch_failed() {
+    system->fault(fetch_fault, r[15]);
+    attention_requested = true;
+}
+
+// Fills in the operation at `pc`, which lies in the current region. False: its second half does
+// not; it has to run aside.
+bool Cpu::decode_at(uint32_t pc, Operation *op) {
+    const uint32_t offset = pc - code_base;
+    for (const Code &code : codes) {
+        if (code.operations.get() != operations) continue;
+        uint16_t halves[2] = {0, 0};
+        std::memcpy(halves, code.host + offset, offset + 4 <= code_size ? 4 : 2);
+        if (is_wide(halves[0]) && offset + 4 > code_size) return false;
+        *op = is_wide(halves[0]) ? decode_32(halves[0], halves[1]) : decode_16(halves[0]);
+        op->stall = address_stall(*op, code.host, offset);
+        code.marks[offset >> 6] = code.marks[(offset + op->halves * 2 - 1) >> 6] = 1;
+        if (!breakpoints.empty() && breakpoint_at(pc)) op->code = op->in_it = C_BREAK;
+        return true;
+    }
+    return false;
+}
+
+// What the loop does at a branch's target, where it had to be left for it: a 32-bit instruction
+// across two words costs one cycle more, and the refill hides a stall.
+void Cpu::arrive() {
+    const bool odd = arriving == ArrivingOdd;
+    if (arriving == NotArriving) return;
+    arriving = NotArriving;
+    Operation *op = operations + ((r[15] - code_base) >> 1);
+    if (op->code == C_UNDECODED && !decode_at(r[15], op)) return;
+    if (odd && op->halves == 2) cycles++;
+    cycles -= op->stall;
+}
+
+// Charges the fetch of an instruction, and asks the MPU. False: it may not be fetched.
+bool Cpu::fetch_cost(uint32_t pc, uint32_t halves) {
+    const uint32_t last = pc + 2 * halves - 2;
+    if (guarded) {
+        for (uint32_t address = pc; address <= last; address += 2)
+            if (!system->mpu.allows(address, Access::Fetch, privileged())) {
+                fetch_fault = Fault::FetchViolation;
+                return false;
+            }
+    }
+    if (lines == nullptr) return true;
+    for (uint32_t line = pc >> lines->shift; line <= last >> lines->shift; line++) {
+        if (line == fetched) continue;
+        if (lines->tags[line & lines->mask] != line)
+            cycles += bus.fetch(line << lines->shift, line == fetched + 1);
+        fetched = line;
+    }
+    return true;
+}
+
+}  // namespace armv7m

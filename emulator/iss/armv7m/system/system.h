@@ -1,0 +1,230 @@
+// Everything of an ARMv7-M processor that is not instruction execution: exceptions, NVIC, system
+// control block, SysTick, MPU, DWT, ITM, debug registers, semihosting. Knows no part: what differs
+// between parts is in SystemParameters.
+//
+// Source: ARMv7-M Architecture Reference Manual (DDI 0403E), B1.5 (exception model), B3 (system
+// address map), C1 (debug); Cortex-M3 Technical Reference Manual r2p1 (DDI 0337) for what the
+// architecture leaves open and for cycles.
+//
+// How the instruction loop and the system work together:
+//  - An exception that becomes takeable calls cpu.attention(), which ends the inner loop after
+//    the running instruction. The outer loop then calls service(), which takes at most one
+//    exception, and goes on.
+//  - An instruction that cannot complete calls fault() and leaves the program counter on itself;
+//    SVC calls svc() with the program counter behind itself. Both end in service().
+//  - SysTick wraps at next_cycle(): the inner loop must not run beyond it.
+
+#pragma once
+
+#include "armv7m/debug/dwt.h"
+#include "armv7m/debug/itm.h"
+#include "armv7m/exceptions/nvic.h"
+#include "armv7m/memory/mpu.h"
+#include "armv7m/system/systick.h"
+
+#include <cstdint>
+
+namespace armv7m {
+
+class Cpu;
+
+struct SystemParameters {
+    uint32_t cpuid = 0x412FC231;         // Cortex-M3 r2p1
+    int interrupts = 39;                 // external interrupts
+    int priority_bits = 3;               // implemented bits of a priority
+    int mpu_regions = 8;                 // 0: no MPU
+    int comparators = 4;                 // of the DWT
+    uint32_t systick_calibration = 0xC0000000u;    // SYST_CALIB as it reads: NOREF, SKEW
+    // So many core cycles are so many ticks of SysTick's reference clock. 0: there is no
+    // reference, CLKSOURCE reads 1.
+    int64_t reference_cycles = 0, reference_ticks = 1;
+    bool semihosting = false;            // BKPT 0xAB is a call, not a fault; set_semihosting
+    bool trace_probe = true;             // the ITM is on after reset, as a probe would leave it
+};
+
+// What stops an instruction. B1.5.14.
+enum class Fault : uint8_t {
+    Undefined,        // UsageFault UNDEFINSTR
+    InvalidState,     // UsageFault INVSTATE: T bit clear, or ICI/IT bits where none may be
+    InvalidReturn,    // UsageFault INVPC
+    NoCoprocessor,    // UsageFault NOCP
+    Unaligned,        // UsageFault UNALIGNED: the trap is on, or the instruction never allows it
+    DivideByZero,     // UsageFault DIVBYZERO: ask divide_trap() first
+    FetchViolation,   // MemManage IACCVIOL: MPU, or execute-never memory
+    DataViolation,    // MemManage DACCVIOL
+    FetchBus,         // BusFault IBUSERR
+    LoadBus,          // BusFault PRECISERR
+    StoreBus,         // BusFault IMPRECISERR through the write buffer, else PRECISERR
+    Breakpoint,       // BKPT without a debugger: HardFault DEBUGEVT
+};
+
+enum class Sleep : uint8_t { Awake, Wfi, Wfe, OnExit };
+
+// What the system says to the part around it. The part's implementation must not call back into
+// the instruction loop; it may ask the core to stop.
+class SystemListener {
+public:
+    virtual ~SystemListener() = default;
+    virtual void reset_requested() {}                              // AIRCR.SYSRESETREQ, VECTRESET
+    virtual void locked_up() {}                                    // until a reset (or an NMI)
+    // In the middle of an exception's entry or return: whatever is due up to cpu.cycles happens
+    // now, so that a late interrupt is seen.
+    virtual void catch_up() {}
+    virtual int64_t time_ps() { return 0; }
+    virtual void itm(int port, uint32_t value, int bytes) { (void)port, (void)value, (void)bytes; }
+    virtual void semihosting_write(int handle, const uint8_t *text, int length) {
+        (void)handle, (void)text, (void)length;
+    }
+    virtual int semihosting_read() { return -1; }                  // a character of the console
+    virtual void semihosting_exit(uint32_t code) { (void)code; }   // the program has ended
+    virtual void unmodelled(const char *what) { (void)what; }      // to be logged once
+};
+
+// One exception number's line in a fault report or a debugger.
+struct ExceptionState {
+    int number, priority;
+    bool enabled, pending, active;
+};
+
+// The last fault (or lock-up, then `exception` is 0), for a report. `pc` is the instruction it is
+// laid to; `frame` is where the stack frame begins, 0 if stacking failed: r0-r3, r12, lr, pc, xPSR.
+struct FaultRecord {
+    uint32_t exception, cfsr, hfsr, dfsr, mmfar, bfar, pc, frame, exc_return;
+    uint32_t count;    // of all since power-on
+    int64_t cycle;
+};
+
+class System {
+public:
+    System(Cpu &cpu, const SystemParameters &parameters, SystemListener &listener);
+
+    // The core and the system as after a reset; SP and PC come from the vector table at 0. A
+    // power-on reset also clears the debug registers.
+    void reset(bool power_on);
+
+    // --- for the instruction loop -------------------------------------------------------------
+
+    // Brings SysTick up to now, takes the pending exception of the highest priority if it may
+    // be taken, wakes a sleeping processor. To be called whenever the inner loop ends.
+    void service();
+
+    // The cycle at which the system itself changes something next; INT64_MAX if never.
+    int64_t next_cycle() const { return systick.next_wrap(); }
+
+    // An instruction failed. True: it is abandoned, the program counter must be left on it.
+    // False: it goes on (a store through the write buffer; its fault comes later).
+    bool fault(Fault kind, uint32_t address = 0);
+
+    void svc();                                    // the program counter is behind the SVC
+    bool bkpt(uint32_t immediate);                 // true: done (semihosting), go on behind it
+    static bool is_exc_return(uint32_t value) { return value >= 0xF0000000u; }
+    void exception_return(uint32_t exc_return);    // written to PC in Handler mode
+    void wfi();
+    void wfe();
+    void sev();
+    void boost_changed();                          // PRIMASK, FAULTMASK or BASEPRI written
+
+    bool divide_trap() const { return (ccr & CCR_DIV_0_TRP) != 0; }
+    bool unaligned_trap() const { return (ccr & CCR_UNALIGN_TRP) != 0; }
+
+    // Private peripheral bus, 0xE0000000 to 0xE00FFFFF; size 1, 2 or 4. False: no such register
+    // for this access, which is a bus fault. The caller has checked nothing.
+    bool read(uint32_t address, int size, uint32_t &value);
+    bool write(uint32_t address, int size, uint32_t value);
+    uint32_t peek(uint32_t address);               // the debugger's read of a word: no effect
+
+    // --- for the part -------------------------------------------------------------------------
+
+    void set_interrupt_line(int interrupt, bool level);   // level-sensitive: re-pends while high
+    void pend_interrupt(int interrupt);                   // a pulse
+    void pend_nmi();
+    Sleep sleep() const { return sleeping; }
+    bool deep_sleep() const { return (scr & SCR_SLEEPDEEP) != 0; }
+    bool wakes() const;                            // asleep, but service() will wake it
+    bool locked_up() const { return lockup; }
+    void set_systick_reference(int64_t cycles, int64_t ticks);
+
+    // --- for debuggers and reports ------------------------------------------------------------
+
+    // A halting debugger is there: DHCSR.C_DEBUGEN reads 1, BKPT and the exceptions chosen in
+    // `catches` (as DEMCR.VC_*) stop the core and leave the reason in stopped_by().
+    void set_debugger(bool attached, uint32_t catches = 0);
+    enum class DebugStop : uint8_t { None, Breakpoint, VectorCatch };
+    DebugStop stopped_by() const { return debug_stop; }
+    void set_semihosting(bool on) { semihosting = on; }
+    void clear_debug_stop() { debug_stop = DebugStop::None; }
+
+    int execution_priority() const;                // lower is more urgent; 256: Thread
+    ExceptionState exception(int number) const;
+    const FaultRecord &last_fault() const { return record; }
+    uint32_t vector_table() const { return vtor; }
+
+    const SystemParameters parameters;
+    Nvic nvic;
+    SysTick systick;
+    Mpu mpu;
+    Dwt dwt;
+    Itm itm;
+
+private:
+    enum : uint32_t {
+        CCR_NONBASETHRDENA = 1, CCR_USERSETMPEND = 2, CCR_UNALIGN_TRP = 8, CCR_DIV_0_TRP = 16,
+        CCR_BFHFNMIGN = 256, CCR_STKALIGN = 512,
+        SCR_SLEEPONEXIT = 2, SCR_SLEEPDEEP = 4, SCR_SEVONPEND = 16,
+        ACTLR_DISDEFWBUF = 2,
+        DEMCR_MON_EN = 1u << 16, DEMCR_TRCENA = 1u << 24,
+    };
+
+    // exceptions/pending.cpp
+    void pend(int number);                         // asynchronous
+    void pend_synchronous(int number, bool derived = false);
+    bool escalates(int number) const;
+    bool takeable() const;
+    int boosted_priority(bool with_primask) const;
+    void priority_changed();
+    void lock_up();
+    void note_fault(int number, uint32_t exc_return);
+
+    // exceptions/entry_and_return.cpp
+    void enter();
+    bool push_frame(uint32_t &exc_return);
+    void take(uint32_t exc_return);
+    void chain(uint32_t exc_return);
+    void deactivate(int number);
+    bool pop_frame(uint32_t exc_return, uint32_t (&words)[8]);
+    bool fetch_vector(int number, uint32_t &vector);
+
+    // system.cpp
+    void fall_asleep(Sleep how);
+
+    // control_space.cpp
+    bool read_word(uint32_t address, bool look, uint32_t &value);
+    bool write_word(uint32_t address, uint32_t value, uint32_t lanes);
+    uint32_t read_scb(uint32_t offset) const;
+    void write_scb(uint32_t offset, uint32_t value, uint32_t lanes);
+    uint32_t icsr() const;
+    void write_icsr(uint32_t value);
+    uint32_t shcsr() const;
+    void write_shcsr(uint32_t value);
+    void write_demcr(uint32_t value);
+    bool user_may(uint32_t address, bool write) const;
+
+    // debug/semihosting.cpp
+    void semihost();
+
+    Cpu &cpu;
+    SystemListener &listener;
+    Sleep sleeping = Sleep::Awake;
+    int64_t asleep_since = 0;
+    bool event = false, lockup = false, debugger = false, frame_stacked = false;
+    bool semihosting;
+    DebugStop debug_stop = DebugStop::None;
+    uint32_t catch_mask = 0;
+    uint32_t actlr = 0, vtor = 0, prigroup = 0, scr = 0, ccr = CCR_STKALIGN;
+    uint32_t cfsr = 0, hfsr = 0, dfsr = 0, mmfar = 0, bfar = 0, demcr = 0, dcrdr = 0;
+    uint32_t patch_control = 0, patch_remap = 0, patch[8] = {};    // FPB, plain registers
+    uint32_t fault_pc = 0;
+    FaultRecord record{};
+};
+
+}  // namespace armv7m

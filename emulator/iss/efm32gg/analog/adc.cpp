@@ -1,0 +1,255 @@
+#include "efm32gg/analog/adc.h"
+
+#include "efm32gg/analog/inputs.h"
+#include "efm32gg/memory/dma.h"
+#include "efm32gg/pins/prs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace efm32gg {
+
+using namespace adc;
+
+namespace {
+
+constexpr int SOURCE = 8, REFLEX = 8;
+// The device information's calibration: temperature in degrees, and what the sensor reads there
+// with the 1.25 V reference, 12 bits, above bit 4 (5.6).
+constexpr uint32_t CALIBRATED_AT = 0x0FE081B2, CALIBRATED_READING = 0x0FE081BE;
+// Codes a degree with that reference (data sheet, 3.10, TGRAD_ADCTH).
+constexpr double CODES_PER_DEGREE = -6.27;
+
+enum Selected : uint32_t { TEMPERATURE = 8, VDD_THIRD, VDD, VSS, REFERENCE_HALF, DAC0, DAC1 };
+enum Reference : uint32_t { V1_25, V2_5, SUPPLY, V5_DIFF, EXTERNAL, EXTERNAL_TWICE, SUPPLY_TWICE };
+enum Resolution : uint32_t { BITS_12, BITS_8, BITS_6, OVERSAMPLED };
+enum WarmUp : uint32_t { NORMAL, FAST_BANDGAP, KEEP_SCAN_REFERENCE, KEEP_WARM };
+
+constexpr int BITS[] = {12, 8, 6, 12};
+
+}  // namespace
+
+Adc::Adc(Part &part, const Instance &instance) : Peripheral(part, instance) {}
+
+void Adc::reset() {
+    Peripheral::reset();
+    part.cancel(converted);
+    single_wanted = scanning = converting = stalled = false;
+    to_scan = 0;
+    warm_until = -1;
+    warm_reference = ~0u;
+    follow();
+}
+
+// -- what is converted --
+
+double Adc::volts(int input) const {
+    return part.memories.analog ? part.memories.analog[input] : 0;
+}
+
+double Adc::reference(uint32_t control) const {
+    switch (take(control, SINGLECTRL_REF)) {
+    case V1_25: return 1.25;
+    case V2_5: return 2.5;
+    case SUPPLY: return volts(analog::VDD);
+    case V5_DIFF: return 5.0;
+    case EXTERNAL: return volts(analog::ADC0_REFERENCE);
+    case EXTERNAL_TWICE: return 2 * volts(analog::ADC0_REFERENCE);
+    default: return 2 * volts(analog::VDD);
+    }
+}
+
+double Adc::input_volts(uint32_t selected, bool difference, double reference) const {
+    if (difference)
+        return selected < 4 ? volts((int)(2 * selected)) - volts((int)(2 * selected + 1)) : 0;
+    if (selected < TEMPERATURE)
+        return volts(analog::ADC0_CH0 + (int)selected);
+    switch (selected) {
+    case TEMPERATURE: {
+        uint32_t degrees = 0, reading = 0;
+        part.peek(CALIBRATED_AT, 1, degrees);
+        part.peek(CALIBRATED_READING, 2, reading);
+        const double code =
+            (reading >> 4) + (volts(analog::TEMPERATURE) - degrees) * CODES_PER_DEGREE;
+        return (code + 0.5) * 1.25 / 4096;
+    }
+    case VDD_THIRD: return volts(analog::VDD) / 3;
+    case VDD: return volts(analog::VDD);
+    case REFERENCE_HALF: return reference / 2;
+    default: return 0;
+    }
+}
+
+uint32_t Adc::result(uint32_t control, uint32_t selected) const {
+    const bool difference = control & SINGLECTRL_DIFF;
+    const double full = reference(control);
+    const double part_of = full > 0 ? input_volts(selected, difference, full) / full : 0;
+    const uint32_t resolution = take(control, SINGLECTRL_RES);
+    int bits = BITS[resolution];
+    if (resolution == OVERSAMPLED)  // each doubling gives a bit, up to 16 (28.3.7.4)
+        bits = std::min(16, 13 + (int)take(reg(CTRL), CTRL_OVSRSEL));
+    const double scale = std::ldexp(1.0, difference ? bits - 1 : bits);
+    const double lowest = difference ? -scale : 0;
+    const double clipped = std::min(std::max(std::floor(part_of * scale), lowest), scale - 1);
+    const int32_t code = std::isnan(clipped) ? 0 : (int32_t)clipped;
+    return control & SINGLECTRL_ADJ ? (uint32_t)code << (16 - bits) : (uint32_t)code;
+}
+
+// -- how long it takes --
+
+// Reference and converter warm up in units of TIMEBASE, a microsecond (28.3.4).
+int64_t Adc::warm_up(uint32_t control) {
+    const uint32_t chosen = take(control, SINGLECTRL_REF), mode = take(reg(CTRL), CTRL_WARMUPMODE);
+    if (mode == KEEP_WARM && warm_until >= 0 && warm_reference == chosen)
+        return 0;
+    const bool bandgap = chosen == V1_25 || chosen == V2_5 || chosen == V5_DIFF;
+    const int64_t units = 1 + (bandgap && mode != FAST_BANDGAP ? 4 : 0);
+    return units * (1 + (int64_t)take(reg(CTRL), CTRL_TIMEBASE));
+}
+
+// Acquisition and a clock a bit and one, times the oversampling (28.3.3), in ADC clocks.
+int64_t Adc::cycles(uint32_t control) const {
+    const uint32_t resolution = take(control, SINGLECTRL_RES);
+    const int64_t acquired = (int64_t)1 << std::min(take(control, SINGLECTRL_AT), 8u);
+    const int64_t times =
+        resolution == OVERSAMPLED ? (int64_t)2 << std::min(take(reg(CTRL), CTRL_OVSRSEL), 11u) : 1;
+    return (acquired + BITS[resolution] + 1) * times;
+}
+
+// -- conversions --
+
+void Adc::start_scan() {
+    scanning = true;
+    to_scan = take(reg(SCANCTRL), SCANCTRL_INPUTMASK);
+    if (reg(SCANCTRL) & SCANCTRL_DIFF)
+        to_scan &= 0xF;
+    scanning = to_scan != 0;
+}
+
+// Single ones go first.
+void Adc::begin() {
+    const Rate rate = part.unit_rate(instance);
+    if (converting || !rate.runs() || !(single_wanted || scanning))
+        return;
+    single_running = single_wanted;
+    if (!single_running)
+        scan_channel = __builtin_ctz(to_scan);
+    const uint32_t control = reg(single_running ? SINGLECTRL : SCANCTRL);
+    const int64_t length = warm_up(control) +
+                           cycles(control) * (1 + (int64_t)take(reg(CTRL), CTRL_PRESC));
+    warm_reference = take(control, SINGLECTRL_REF);
+    warm_until = part.now();
+    converting = true;
+    part.schedule(converted, part.now() + rate.span(length));
+}
+
+void Adc::on_converted(int64_t) {
+    if (!part.unit_rate(instance).runs()) {
+        stalled = true;
+        return;
+    }
+    converting = false;
+    uint32_t &status = reg(STATUS);
+    if (single_running) {
+        if (single_wanted) {
+            const uint32_t control = reg(SINGLECTRL);
+            reg(SINGLEDATA) = result(control, take(control, SINGLECTRL_INPUTSEL));
+            reg(IF) |= IF_SINGLE | (status & STATUS_SINGLEDV ? IF_SINGLEOF : 0);
+            status |= STATUS_SINGLEDV;
+            single_wanted = control & SINGLECTRL_REP;
+            part.prs->pulse(REFLEX, 0);
+        }
+    } else if (scanning) {
+        reg(SCANDATA) = result(reg(SCANCTRL), (uint32_t)scan_channel);
+        reg(IF) |= IF_SCAN | (status & STATUS_SCANDV ? IF_SCANOF : 0);
+        status = (status & ~STATUS_SCANDATASRC) | STATUS_SCANDV |
+                 give((uint32_t)scan_channel, STATUS_SCANDATASRC);
+        to_scan &= to_scan - 1;
+        scanning = to_scan != 0;
+        if (!scanning) {
+            part.prs->pulse(REFLEX, 1);
+            if (reg(SCANCTRL) & SCANCTRL_REP)
+                start_scan();
+        }
+    }
+    follow();
+    begin();
+    follow();
+}
+
+void Adc::clocks_changed() {
+    if (stalled && part.unit_rate(instance).runs()) {
+        stalled = false;
+        part.schedule(converted, part.now());
+    }
+    begin();
+    follow();
+}
+
+void Adc::prs_changed(int channel, bool level) {
+    if (!level)
+        return;
+    const auto triggered = [channel](uint32_t control) {
+        return control & SINGLECTRL_PRSEN && (int)take(control, SINGLECTRL_PRSSEL) == channel;
+    };
+    const bool single = triggered(reg(SINGLECTRL)), scan = triggered(reg(SCANCTRL));
+    if (!single && !scan)
+        return;
+    single_wanted |= single;
+    if (scan && !scanning)
+        start_scan();
+    begin();
+    follow();
+}
+
+// -- registers --
+
+uint32_t Adc::peek(uint32_t offset) const {
+    switch (offset) {
+    case SINGLEDATAP: return reg(SINGLEDATA);
+    case SCANDATAP: return reg(SCANDATA);
+    }
+    return Peripheral::peek(offset);
+}
+
+uint32_t Adc::read(uint32_t offset) {
+    const uint32_t value = peek(offset);
+    if (offset == SINGLEDATA || offset == SCANDATA) {
+        reg(STATUS) &= ~(offset == SINGLEDATA ? STATUS_SINGLEDV : STATUS_SCANDV);
+        follow();
+    }
+    return value;
+}
+
+void Adc::write(uint32_t offset, uint32_t value) {
+    Peripheral::write(offset, value);
+    if (offset == CTRL && take(value, CTRL_WARMUPMODE) != KEEP_WARM)
+        warm_until = -1;
+    if (offset != CMD)
+        return;
+    if (value & CMD_SINGLESTOP)
+        single_wanted = false;
+    else if (value & CMD_SINGLESTART)
+        single_wanted = true;
+    if (value & CMD_SCANSTOP)
+        scanning = false, to_scan = 0;
+    else if (value & CMD_SCANSTART && !scanning)
+        start_scan();
+    begin();
+    follow();
+}
+
+void Adc::follow() {
+    const bool kept = take(reg(CTRL), CTRL_WARMUPMODE) == KEEP_WARM && warm_until >= 0;
+    const bool warm = converting || kept;
+    uint32_t &status = reg(STATUS);
+    status &= STATUS_SINGLEDV | STATUS_SCANDV | STATUS_SCANDATASRC;
+    status |= (single_wanted ? STATUS_SINGLEACT : 0) | (scanning ? STATUS_SCANACT : 0) |
+              (warm ? STATUS_WARM : 0) | (warm && single_running ? STATUS_SINGLEREFWARM : 0) |
+              (warm && !single_running ? STATUS_SCANREFWARM : 0);
+    part.dma->request(SOURCE, 0, status & STATUS_SINGLEDV);
+    part.dma->request(SOURCE, 1, status & STATUS_SCANDV);
+    update_interrupts();
+}
+
+}  // namespace efm32gg

@@ -1,0 +1,138 @@
+#include "efm32gg/analog/comparator.h"
+
+#include "efm32gg/analog/inputs.h"
+#include "efm32gg/pins/gpio.h"
+#include "efm32gg/pins/prs.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace efm32gg {
+
+// CTRL, STATUS and IF have these at the same place in both.
+static constexpr uint32_t CTRL = acmp::CTRL, STATUS = acmp::STATUS;
+static_assert(+vcmp::CTRL == +acmp::CTRL && +vcmp::STATUS == +acmp::STATUS &&
+                  +vcmp::IF == +acmp::IF,
+              "one base for both comparators");
+static_assert(+acmp::CTRL_EN == +vcmp::CTRL_EN && +acmp::CTRL_IRISE == +vcmp::CTRL_IRISE &&
+              +acmp::CTRL_IFALL == +vcmp::CTRL_IFALL &&
+              +acmp::CTRL_WARMTIME == +vcmp::CTRL_WARMTIME);
+static_assert(+acmp::STATUS_ACMPACT == +vcmp::STATUS_VCMPACT &&
+              +acmp::STATUS_ACMPOUT == +vcmp::STATUS_VCMPOUT && +acmp::IF_EDGE == +vcmp::IF_EDGE);
+
+namespace {
+
+constexpr uint32_t ACTIVE = acmp::STATUS_ACMPACT, OUTPUT = acmp::STATUS_ACMPOUT;
+// Volts at CTRL_HYSTSEL, one way; data sheet, 3.12, typical.
+constexpr double HYSTERESIS[] = {0, 0.015, 0.022, 0.029, 0.036, 0.043, 0.050, 0.057};
+constexpr double SUPPLY_HYSTERESIS = 0.010;
+
+}  // namespace
+
+void Comparator::reset() {
+    Peripheral::reset();
+    part.cancel(warmed);
+}
+
+double Comparator::volts(int input) const {
+    return part.memories.analog ? part.memories.analog[input] : 0;
+}
+
+bool Comparator::pending() const {
+    return reg((uint32_t)layout.if_) & reg((uint32_t)layout.ien);
+}
+
+void Comparator::write(uint32_t offset, uint32_t value) {
+    const bool was = reg(CTRL) & acmp::CTRL_EN;
+    Peripheral::write(offset, value);
+    const bool is = reg(CTRL) & acmp::CTRL_EN;
+    if (is && !was) {
+        warm_up();
+    } else if (!is) {
+        part.cancel(warmed);
+        reg(STATUS) &= ~ACTIVE;
+    }
+    if (offset == CTRL && !(reg(STATUS) & ACTIVE))
+        set_output(inactive_output(), false);
+    look();
+}
+
+// 4 to 512 cycles of HFPERCLK.
+void Comparator::warm_up() {
+    const Rate rate = part.unit_rate(instance);
+    if (rate.runs())
+        part.schedule(warmed,
+                      part.now() + rate.span((int64_t)4 << take(reg(CTRL), acmp::CTRL_WARMTIME)));
+}
+
+void Comparator::on_warmed(int64_t) {
+    reg(STATUS) |= ACTIVE;
+    raise(acmp::IF_WARMUP);
+    // From the inactive value to the real one is an edge as any other.
+    look();
+}
+
+void Comparator::clocks_changed() {
+    if (reg(CTRL) & acmp::CTRL_EN && !(reg(STATUS) & ACTIVE) && !warmed.pending())
+        warm_up();
+}
+
+void Comparator::analog_changed() { look(); }
+
+void Comparator::look() {
+    if (reg(STATUS) & ACTIVE && part.mode < 4)
+        set_output(above(reg(STATUS) & OUTPUT), true);
+}
+
+void Comparator::set_output(bool output, bool tell) {
+    const bool before = reg(STATUS) & OUTPUT;
+    reg(STATUS) = output ? reg(STATUS) | OUTPUT : reg(STATUS) & ~OUTPUT;
+    show(output);
+    if (before == output)
+        return;
+    part.prs->set(reflex(), 0, output);
+    if (tell && reg(CTRL) & (output ? acmp::CTRL_IRISE : acmp::CTRL_IFALL))
+        raise(acmp::IF_EDGE);
+}
+
+// -- ACMP --
+
+Acmp::Acmp(Part &part, const Instance &instance) : Comparator(part, instance) {}
+
+bool Acmp::above(bool before) const {
+    const int channels = instance.index ? analog::ACMP1_CH0 : analog::ACMP0_CH0;
+    const uint32_t selected = reg(acmp::INPUTSEL), negative = take(selected, acmp::INPUTSEL_NEGSEL);
+    const double supply = volts(analog::VDD);
+    double against = 0;
+    if (negative < 8)
+        against = volts(channels + (int)negative);
+    else if (negative == 8)
+        against = 1.25;
+    else if (negative == 9)
+        against = 2.5;
+    else if (negative == 10)
+        against = supply * take(selected, acmp::INPUTSEL_VDDLEVEL) / 63;
+    const double step = HYSTERESIS[take(reg(CTRL), acmp::CTRL_HYSTSEL)];
+    return volts(channels + (int)take(selected, acmp::INPUTSEL_POSSEL)) >
+           against + (before ? -step : step);
+}
+
+void Acmp::show(bool output) {
+    const uint32_t routed = reg(acmp::ROUTE), location = take(routed, acmp::ROUTE_LOCATION);
+    if (routed & acmp::ROUTE_ACMPPEN && location < LOCATIONS)
+        part.gpio->function(ROUTES[route::ACMP0_OUT + instance.index][location], this, true,
+                            output != !!(reg(CTRL) & acmp::CTRL_GPIOINV));
+}
+
+void Acmp::update_interrupts() { line(0, pending() || (partner && partner->pending())); }
+
+// -- VCMP --
+
+// 1.667 V and 34 mV a step (27.3.3).
+bool Vcmp::above(bool before) const {
+    const double step = reg(CTRL) & vcmp::CTRL_HYSTEN ? SUPPLY_HYSTERESIS : 0;
+    const double level = 1.667 + 0.034 * take(reg(vcmp::INPUTSEL), vcmp::INPUTSEL_TRIGLEVEL);
+    return volts(analog::VDD) > level + (before ? -step : step);
+}
+
+}  // namespace efm32gg

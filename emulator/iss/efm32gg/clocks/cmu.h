@@ -1,0 +1,83 @@
+// Clock management unit: oscillators, clock tree, enable bits. EFM32GG Reference Manual, chapter 11.
+#pragma once
+
+#include "efm32gg/part/part.h"
+
+namespace efm32gg {
+
+class Cmu : public Peripheral {
+public:
+    static constexpr uint32_t HFXO_HERTZ = 48000000, LF_HERTZ = 32768, ULFRCO_HERTZ = 1000;
+
+    Cmu(Part &part, const Instance &instance);
+
+    void reset() override;
+    void write(uint32_t offset, uint32_t value) override;
+    uint32_t read(uint32_t offset) override;
+    uint32_t peek(uint32_t offset) const override;
+    void clocks_changed() override;
+
+    // The clock tree as the registers have it; rates begin at `now`.
+    void rates(Rates &rates, int64_t now) const;
+    Rate unit_rate(const Instance &instance) const;
+    bool enabled(const Instance &instance) const;
+    // Whether a unit's registers are behind HFPERCLK.
+    bool on_slow_bus(const Instance &instance) const;
+
+    // Oscillators follow the energy mode; on wake-up HFRCO is the core's clock.
+    void sleep(int mode);
+    void wake();
+    bool low_frequency_on() const;
+
+private:
+    enum Oscillators { HFRCO, HFXO, AUXHFRCO, LFRCO, LFXO, OSCILLATORS };
+    enum { SYNCED = 4 };
+
+    struct Oscillator {
+        Cmu *cmu;
+        int number;
+        bool enabled, ready;
+        Event started;
+    };
+
+    Oscillator oscillators[OSCILLATORS];
+    int selected = HFRCO;      // of HFCLK
+    int wanted = -1;           // selected, but not running yet
+    int sleeping = 0;
+    uint32_t effective[SYNCED] = {};   // LFACLKEN0 LFAPRESC0 LFBCLKEN0 LFBPRESC0 as they act
+    uint32_t pending = 0;              // of them, those that wait for synchronisation
+    Event synchronised[2];             // LFA, LFB
+    Event calibrated;
+    uint32_t calibration_top = 0;
+    Rate calibration_up;
+    int64_t calibration_began = 0;
+    struct Enable {
+        const Instance *instance;
+        uint32_t registers, mask;      // where its enable bit is; 0: always on
+        bool low_energy;
+        int synced;                    // of its LF clock: index into `effective`, or -1
+        uint32_t enable, prescaler;    // masks there
+    };
+    static const Enable UNITS[];
+    mutable const Instance *last = nullptr;
+    mutable Enable last_enable = {};
+
+    static uint32_t hertz(const Cmu &cmu, int oscillator);
+    Rate clock_of(int oscillator, int64_t now) const;
+    Rate low_frequency(uint32_t select, bool ultra_low, int64_t now) const;
+    bool running(int oscillator) const;
+    const Enable &enable_of(const Instance &instance) const;
+    bool locked_register(uint32_t offset) const;
+    uint32_t status() const;
+    void command_oscillators(uint32_t value);
+    void switch_on(int number);
+    void on_started(int number);
+    void select(int number);
+    void synchronise();
+    void on_synchronised(int domain);
+    void start_calibration();
+    void on_calibrated(int64_t time);
+    void check_limits();
+};
+
+}  // namespace efm32gg

@@ -1,0 +1,63 @@
+// Memory system controller: flash programming, wait states, instruction cache.
+// EFM32GG Reference Manual, chapter 7.
+#pragma once
+
+#include "armv7m/memory/bus.h"
+#include "efm32gg/part/part.h"
+
+namespace efm32gg {
+
+class Msc : public Peripheral {
+public:
+    static constexpr uint32_t CACHE_WORDS = 128;
+
+    Msc(Part &part, const Instance &instance);
+
+    void reset() override;
+    uint32_t read(uint32_t offset) override;
+    uint32_t peek(uint32_t offset) const override;
+    void write(uint32_t offset, uint32_t value) override;
+
+    // The core's clock is another: wait states are checked against it.
+    void clocks_set();
+
+    // Cycles that the fetch of a word costs; those that the cache has are not asked for.
+    uint32_t fetch(uint32_t address, bool sequential);
+    // Wait states of a data access to flash or information; stalls the core while flash is busy.
+    int64_t read_wait(uint32_t address);
+    bool ignores_bus_writes() const { return reg(msc::CTRL) & msc::CTRL_BUSFAULT; }
+
+    // Erasures by page of the flash since the part was made.
+    std::vector<uint32_t> wear;
+
+private:
+    armv7m::FetchLines lines{};
+    uint32_t cache[CACHE_WORDS], missing[CACHE_WORDS];
+    uint32_t wait_states = 0;
+    int64_t array_free = 0;          // cycle in which the flash array ends its read
+    uint32_t array_tag = 0;          // of the word that it read
+    uint32_t hits = 0, misses = 0;
+
+    uint32_t address = 0;            // of the write that comes next
+    bool data_loaded = false;        // WDATA has a word
+    bool sequence = false;           // WRITETRIG: words follow by themselves
+    bool triggered = false;          // the loaded word goes as soon as the array is free
+    bool erasing = false;
+    Event done;
+
+    bool counting() const { return reg(msc::STATUS) & msc::STATUS_PCRUNNING; }
+    void invalidate_cache();
+    void set_up_reads();
+    void check_wait_states();
+    void command(uint32_t value);
+    void load_address();
+    bool page_locked(uint32_t at) const;
+    uint8_t *page(uint32_t at);
+    void program();
+    void erase(uint32_t at, uint32_t size, int64_t time);
+    void busy(int64_t time);
+    void on_done(int64_t time);
+    void set_readable(bool readable);
+};
+
+}  // namespace efm32gg

@@ -1,0 +1,196 @@
+#include "efm32gg/part/part.h"
+
+#include "armv7m/core/cpu.h"
+#include "efm32gg/clocks/cmu.h"
+#include "efm32gg/clocks/emu.h"
+#include "efm32gg/clocks/rmu.h"
+#include "efm32gg/memory/ebi.h"
+#include "efm32gg/memory/msc.h"
+#include "efm32gg/pins/gpio.h"
+#include "efm32gg/pins/prs.h"
+#include "efm32gg/timers/wdog.h"
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstring>
+#include <utility>
+
+namespace efm32gg {
+
+armv7m::SystemParameters Part::system_parameters() {
+    armv7m::SystemParameters parameters;
+    parameters.interrupts = 39;
+    parameters.priority_bits = 3;
+    return parameters;
+}
+
+Part::Part(armv7m::Cpu &cpu, const Memories &memories)
+    : cpu(cpu), memories(memories), own_information(memories.information ? 0 : 3 * PAGE_SIZE, 0xFF),
+      information(memories.information ? memories.information : own_information.data()) {
+    for (int n = 0; n < instance::DEVINFO.layout->count; n++) {
+        const Register &word = instance::DEVINFO.layout->registers[n];
+        const uint32_t at = 2 * PAGE_SIZE + instance::DEVINFO.base - INFORMATION + word.offset;
+        std::memcpy(information + at, &word.reset, 4);
+    }
+    owned.reserve(64);
+    cmu = add(new Cmu(*this, instance::CMU));
+    emu = add(new Emu(*this, instance::EMU));
+    rmu = add(new Rmu(*this, instance::RMU));
+    msc = add(new Msc(*this, instance::MSC));
+    gpio = add(new Gpio(*this, instance::GPIO));
+    ebi = add(new Ebi(*this, instance::EBI));
+    prs = add(new Prs(*this, instance::PRS));
+    add(new Wdog(*this, instance::WDOG));
+    add_interfaces(*this);
+    for (const Instance *one : INSTANCES)
+        if (one->base >= PERIPHERALS && !peripheral_at(one->base))
+            add(new Unmodelled(*this, *one));
+
+    armv7m::Region flash, ram;
+    flash.size = memories.flash_size, flash.host = memories.flash, flash.writable = false;
+    ram.size = memories.ram_size, ram.host = memories.ram, ram.base = RAM;
+    cpu.add_region(flash);
+    cpu.add_region(ram);
+    ram.base = RAM_CODE;
+    cpu.add_region(ram);
+    reset(rmu::RSTCAUSE_PORST);
+}
+
+Part::~Part() = default;
+
+void Part::place(Peripheral &unit) {
+    if (unit.instance.base < PERIPHERALS)
+        return;
+    const uint32_t first = (unit.instance.base - PERIPHERALS) / SLOT;
+    for (uint32_t n = 0; n < (unit.layout.size + SLOT - 1) / SLOT && first + n < SLOTS; n++)
+        slots[first + n] = &unit;
+}
+
+Peripheral *Part::find(const char *name) const {
+    for (auto &one : owned)
+        if (std::strcmp(one->instance.name, name) == 0)
+            return one.get();
+    return nullptr;
+}
+
+// -- clocks -----------------------------------------------------------------------------------
+
+void Part::clocks_set() {
+    Rates wanted;
+    cmu->rates(wanted, now());
+    for (int n = 0; n < CLOCKS; n++)
+        if (!rates[n].same_frequency(wanted[n]))
+            rates[n] = wanted[n];
+    const bool starting = standing && standing_until != NEVER;
+    if (!starting && !cycle_time.same_frequency(rate(Clock::HFCORE)))
+        rebase(now());
+    set_bus_waits();
+    msc->clocks_set();
+}
+
+Rate Part::unit_rate(const Instance &instance) const { return cmu->unit_rate(instance); }
+bool Part::enabled(const Instance &instance) const { return cmu->enabled(instance); }
+
+// -- interrupts and resets ------------------------------------------------------------------------
+
+void Part::irq(int number, bool level) { cpu.system->set_interrupt_line(number, level); }
+
+void Part::request_reset(uint32_t cause) {
+    wanted_reset |= cause;
+    stop_wanted = true;
+    cpu.stop();
+}
+
+void Part::reset(uint32_t cause) {
+    wanted_reset |= cause;
+    perform_reset();
+}
+
+// What a reset costs before the first instruction: data sheet, 3.6, t_RESET.
+static constexpr int64_t START_UP = 163 * MICROSECOND;
+
+void Part::perform_reset() {
+    reset_cause = std::exchange(wanted_reset, 0);
+    const uint32_t cold = rmu::RSTCAUSE_PORST | rmu::RSTCAUSE_BODUNREGRST | rmu::RSTCAUSE_BODREGRST;
+    const int64_t time = now();
+    each([](Peripheral &one) { one.clocks_changing(); });
+    asleep = locked = hung = false;
+    mode = 0;
+    stalled_until = owed_cycles = 0;
+    rmu->caused(reset_cause);
+    each([](Peripheral &one) { one.reset(); });
+    standing = false;
+    standing_now = time;
+    Rates wanted;
+    cmu->rates(wanted, time);
+    std::copy(std::begin(wanted), std::end(wanted), std::begin(rates));
+    rebase(time);
+    set_bus_waits();
+    msc->clocks_set();
+    each([](Peripheral &one) { one.clocks_changed(); });
+    cpu.reset();
+    cpu.system->reset((reset_cause & cold) != 0);
+    stop_clock(time + START_UP);
+    Outgoing &said = send(Kind::RESET, 0, reset_cause);
+    if (reset_cause & rmu::RSTCAUSE_WDOGRST)
+        std::snprintf(said.text, sizeof said.text, "the watchdog has bitten");
+}
+
+void Part::reset_requested() { request_reset(rmu::RSTCAUSE_SYSREQRST); }
+
+void Part::locked_up() {
+    if (rmu->lockup_resets())
+        request_reset(rmu::RSTCAUSE_LOCKUPRST);
+    else
+        cpu.stop();
+}
+
+// -- outside ----------------------------------------------------------------------------------
+
+Outgoing &Part::send(Kind kind, int unit, int64_t value, int64_t extra, bool stop) {
+    if (stop) {
+        stop_wanted = true;
+        cpu.stop();
+    }
+    return outbox.add(kind, unit, value, extra, now());
+}
+
+void Part::log_once(const char *format, ...) {
+    char text[sizeof Outgoing::text];
+    va_list arguments;
+    va_start(arguments, format);
+    std::vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (logged.size() < 1000 && logged.insert(text).second)
+        std::memcpy(send(Kind::LOG, 0, 0, 0, false).text, text, sizeof text);
+}
+
+void Part::pin(int port, int bit, int level) { gpio->outside_drives(port, bit, level); }
+bool Part::pin_level(int port, int bit) const { return gpio->level(port, bit); }
+
+void Part::analog_changed() {
+    each([](Peripheral &one) { one.analog_changed(); });
+}
+
+void Part::itm(int port, uint32_t value, int bytes) {
+    send(Kind::ITM, port, value, bytes, false);
+    if (outbox.count > Outbox::CAPACITY / 2)
+        stop_wanted = true, cpu.stop();
+}
+
+void Part::semihosting_write(int handle, const uint8_t *text, int length) {
+    for (int at = 0; at < length;) {
+        Outgoing &item = send(Kind::SEMIHOSTING, handle, 0);
+        const int part = std::min<int>(length - at, sizeof item.text - 1);
+        std::memcpy(item.text, text + at, (size_t)part);
+        item.value = part;
+        at += part;
+    }
+}
+
+void Part::semihosting_exit(uint32_t code) {
+    std::snprintf(send(Kind::FAULT, 0, code).text, sizeof Outgoing::text,
+                  "the program has ended by semihosting, code %u", (unsigned)code);
+}
+
+}  // namespace efm32gg

@@ -1,0 +1,63 @@
+// Pins: modes, levels, interrupts of pins. EFM32GG Reference Manual, chapter 32.
+#pragma once
+
+#include "efm32gg/part/part.h"
+
+namespace efm32gg {
+
+class Gpio : public Peripheral {
+public:
+    static constexpr int PORTS = 6, PINS = 16;
+
+    using Peripheral::Peripheral;
+
+    void reset() override;
+    uint32_t read(uint32_t offset) override;
+    uint32_t peek(uint32_t offset) const override;
+    void write(uint32_t offset, uint32_t value) override;
+
+    // A peripheral drives a pin (port * 16 + bit; -1 is no pin), or lets go of it. `owner` is who;
+    // two of them on a pin are reported, and the later one wins.
+    void function(int pin, const Peripheral *owner, bool driven, bool level);
+
+    // The level at a pin now, whoever drives it.
+    bool level(int port, int bit) const { return levels[port] >> bit & 1; }
+    bool input(int pin) const { return pin >= 0 && level(pin / PINS, pin % PINS); }
+    // Whether a pin's mode lets it be read, or driven.
+    bool senses(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) != 0; }
+    bool drives(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) >= 4; }
+
+    // Tells `unit` of every change of a pin, by Peripheral::pin_changed.
+    void listen(Peripheral &unit) { listeners.push_back(&unit); }
+
+    // From outside the part; -1 lets go.
+    void outside_drives(int port, int bit, int level);
+
+protected:
+    void update_interrupts() override;
+
+private:
+    struct Port {
+        uint32_t functions = 0, function_levels = 0;    // pins that peripherals drive, and how
+        uint32_t outside = 0, outside_levels = 0;
+        uint32_t driven = 0, driven_levels = 0;         // what the part drives
+        uint32_t enabled = 0;                           // pins whose mode lets them be read
+    };
+
+    Port ports[PORTS];
+    uint32_t levels[PORTS] = {};
+    const Peripheral *owners[PORTS * PINS] = {};
+    std::vector<Peripheral *> listeners;
+
+    static uint32_t at(int port, uint32_t offset) { return offset + 0x24 * (uint32_t)port; }
+    uint32_t mode(int port, int bit) const;
+    bool locked(uint32_t offset) const;
+    void write_port(int port, uint32_t offset, uint32_t value);
+    void refresh(int port, uint32_t pins);
+    void set_levels(int port, uint32_t now_levels);
+    void edge(int port, int bit, bool level);
+    void modes_changed(int port);
+    void check_em4(int port, int bit, bool level);
+};
+
+}  // namespace efm32gg

@@ -1,0 +1,36 @@
+// Peripheral reflex system: signals of peripherals lead to others. EFM32GG Reference Manual,
+// chapter 13. Consumers are told by Peripheral::prs_changed.
+#pragma once
+
+#include "efm32gg/part/part.h"
+
+namespace efm32gg {
+
+class Prs : public Peripheral {
+public:
+    static constexpr int CHANNELS = 12;
+
+    using Peripheral::Peripheral;
+
+    void reset() override;
+    void write(uint32_t offset, uint32_t value) override;
+
+    // A producer's signal has that level; or it pulses for one clock. Sources and signals have
+    // the numbers of SOURCESEL and SIGSEL.
+    void set(int source, int signal, bool level);
+    void pulse(int source, int signal);
+    // Whether a channel has chosen that signal: units that count lazily ask.
+    bool listens(int source, int signal) const;
+    bool level(int channel) const { return levels >> channel & 1; }
+
+private:
+    uint8_t signals[64] = {};    // levels by source, a bit a signal
+    uint32_t levels = 0;
+
+    bool selects(int channel, int source, int signal) const;
+    bool input(int channel) const;
+    void update(int channel, bool was);
+    void tell(int channel, bool level);
+};
+
+}  // namespace efm32gg

@@ -1,0 +1,286 @@
+#include "efm32gg/timers/letimer.h"
+
+#include "efm32gg/pins/gpio.h"
+#include "efm32gg/pins/prs.h"
+
+#include <algorithm>
+
+namespace efm32gg {
+
+using namespace letimer;
+
+namespace {
+
+enum Repeat : uint32_t { FREE, ONE_SHOT, BUFFERED, DOUBLE };
+enum Action : uint32_t { NOTHING, TOGGLE, PULSE, PWM };
+constexpr uint32_t LAST = 0xFFFF;
+constexpr int REFLEX = 52;
+
+}  // namespace
+
+LeTimer::LeTimer(Part &part, const Instance &instance)
+    : LowEnergy(part, instance, FREEZE, SYNCBUSY, CMD) {}
+
+void LeTimer::reset() {
+    LowEnergy::reset();
+    part.cancel(due);
+    value = 0;
+    counted = 0;
+    ticks = Rate();
+    running = buffered = false;
+    for (int n = 0; n < 2; n++)
+        outputs[n] = pulsing[n] = false;
+    for (int n = 0; n < 2; n++)
+        for (int location = 0; location < LOCATIONS; location++)
+            part.gpio->function(ROUTES[route::LETIMER0_OUT0 + n][location], this, false, false);
+}
+
+uint32_t LeTimer::top() const { return reg(CTRL) & CTRL_COMP0TOP ? reg(COMP0) : LAST; }
+
+uint32_t LeTimer::action(int output) const {
+    return take(reg(CTRL), output ? CTRL_UFOA1 : CTRL_UFOA0);
+}
+
+int64_t LeTimer::steps() const {
+    return running && ticks.runs() ? ticks.edges(part.now()) - counted : 0;
+}
+
+// -- time passes --
+
+void LeTimer::fold() {
+    const int64_t passed = steps();
+    counted += passed;
+    pass(passed);
+}
+
+void LeTimer::pass(int64_t passed) {
+    while (passed > 0 && running) {
+        // Free running and unseen: whole turns but the last two change nothing.
+        const int64_t turn = (int64_t)top() + 1;
+        if (repeat_mode() == FREE && value <= top() && passed > 4 * turn && !outputs_matter())
+            passed = passed % turn + 2 * turn;
+        if (pulsing[0] || pulsing[1])
+            for (int n = 0; n < 2; n++)
+                outputs[n] = outputs[n] && !pulsing[n], pulsing[n] = false;
+        int64_t next = std::min(passed, (int64_t)value + 1);
+        for (const uint32_t compare : {reg(COMP0), reg(COMP1)})
+            if (compare < value)
+                next = std::min(next, (int64_t)value - compare);
+        if (outputs_matter())
+            next = std::min<int64_t>(next, action(0) == PULSE || action(1) == PULSE ? 1 : next);
+        const bool under = next == (int64_t)value + 1;
+        value = under ? top() : (uint32_t)(value - next);
+        passed -= next;
+        if (under)
+            underflow();
+        uint32_t flags = under ? IF_UF : 0;
+        if (value == reg(COMP0))
+            flags |= IF_COMP0;
+        if (value == reg(COMP1)) {
+            flags |= IF_COMP1;
+            for (int n = 0; n < 2; n++)
+                if (action(n) == PWM && reg(n ? REP1 : REP0))
+                    outputs[n] = true;
+        }
+        if (flags)
+            raise(flags);
+        show();
+    }
+}
+
+void LeTimer::underflow() {
+    for (int n = 0; n < 2; n++)
+        if (reg(n ? REP1 : REP0)) {
+            if (action(n) == TOGGLE)
+                outputs[n] = !outputs[n];
+            if (action(n) == PULSE)
+                outputs[n] = pulsing[n] = true;
+            if (action(n) == PWM)
+                outputs[n] = false;
+        }
+    switch (repeat_mode()) {
+    case FREE:
+        break;
+    case ONE_SHOT:
+        count_down(0);
+        running = reg(REP0) != 0;
+        break;
+    case BUFFERED:
+        count_down(0);
+        if (!reg(REP0)) {
+            if (buffered && reg(REP1)) {
+                reg(REP0) = reg(REP1);
+                reg(IF) |= IF_REP1;
+                if (reg(CTRL) & CTRL_BUFTOP)
+                    reg(COMP0) = reg(COMP1);
+                buffered = false;
+            } else
+                running = false;
+        }
+        break;
+    case DOUBLE:
+        count_down(0);
+        count_down(1);
+        running = reg(REP0) || reg(REP1);
+        break;
+    }
+    if (!running)
+        reg(STATUS) &= ~STATUS_RUNNING;
+}
+
+void LeTimer::count_down(int which) {
+    uint32_t &left = reg(which ? REP1 : REP0);
+    if (left && !--left)
+        reg(IF) |= which ? IF_REP1 : IF_REP0;
+}
+
+// -- what somebody waits for --
+
+int64_t LeTimer::until(uint32_t wanted) const {
+    if (wanted < value)
+        return (int64_t)value - wanted;
+    return wanted <= top() ? (int64_t)value + 1 + top() - wanted : FAR;
+}
+
+bool LeTimer::outputs_matter() const {
+    for (int n = 0; n < 2; n++)
+        if (action(n) && (pin(n) >= 0 || part.prs->listens(REFLEX, n)))
+            return true;
+    return false;
+}
+
+void LeTimer::plan() {
+    part.cancel(due);
+    if (!running || !ticks.runs())
+        return;
+    const uint32_t awaited = reg(IEN) & ~reg(IF);
+    int64_t next = FAR;
+    if (repeat_mode() != FREE || awaited & (IF_UF | IF_REP0 | IF_REP1) || outputs_matter())
+        next = (int64_t)value + 1;
+    if (awaited & IF_COMP0)
+        next = std::min(next, until(reg(COMP0)));
+    if (awaited & IF_COMP1 || outputs_matter())
+        next = std::min(next, until(reg(COMP1)));
+    if (pulsing[0] || pulsing[1])
+        next = 1;
+    if (next != FAR)
+        part.schedule(due, ticks.time(counted + next));
+}
+
+void LeTimer::on_due(int64_t) {
+    fold();
+    plan();
+}
+
+void LeTimer::start() {
+    if (running)
+        return;
+    running = true;
+    reg(STATUS) |= STATUS_RUNNING;
+    ticks = part.unit_rate(instance);
+    counted = ticks.edges(part.now());
+}
+
+void LeTimer::compare_matched(int compare) {
+    if (!awaits(compare))
+        return;
+    fold();
+    start();
+    plan();
+}
+
+bool LeTimer::awaits(int compare) const {
+    return reg(CTRL) & (compare ? CTRL_RTCC1TEN : CTRL_RTCC0TEN);
+}
+
+// -- clock and registers --
+
+void LeTimer::clocks_changed() {
+    LowEnergy::clocks_changed();
+    const Rate wanted = part.unit_rate(instance);
+    if (wanted.runs() != ticks.runs() || wanted.origin != ticks.origin ||
+        !wanted.same_frequency(ticks)) {
+        ticks = wanted;
+        counted = ticks.edges(part.now());
+    }
+    plan();
+}
+
+uint32_t LeTimer::busy_bit(uint32_t offset) const {
+    switch (offset) {
+    case CTRL: return SYNCBUSY_CTRL;
+    case CMD: return SYNCBUSY_CMD;
+    case COMP0: return SYNCBUSY_COMP0;
+    case COMP1: return SYNCBUSY_COMP1;
+    case REP0: return SYNCBUSY_REP0;
+    case REP1: return SYNCBUSY_REP1;
+    }
+    return 0;
+}
+
+uint32_t LeTimer::peek(uint32_t offset) const {
+    if (offset != CNT)
+        return LowEnergy::peek(offset);
+    const int64_t passed = steps();
+    if (passed <= value)
+        return (uint32_t)(value - passed);
+    return top() - (uint32_t)((passed - value - 1) % ((int64_t)top() + 1));
+}
+
+uint32_t LeTimer::read(uint32_t offset) {
+    if (steps()) {
+        fold();
+        plan();
+    }
+    return peek(offset);
+}
+
+void LeTimer::write(uint32_t offset, uint32_t written) {
+    fold();
+    LowEnergy::write(offset, written);
+    show();
+    plan();
+}
+
+void LeTimer::apply(uint32_t offset, uint32_t written) {
+    fold();
+    if (offset == CMD) {
+        if (written & CMD_CLEAR)
+            value = 0;
+        if (written & CMD_CTO0)
+            outputs[0] = false;
+        if (written & CMD_CTO1)
+            outputs[1] = false;
+        if (written & CMD_STOP) {
+            running = false;
+            reg(STATUS) &= ~STATUS_RUNNING;
+        } else if (written & CMD_START)
+            start();
+    } else {
+        LowEnergy::apply(offset, written);
+        if (offset == REP1)
+            buffered = true;
+    }
+    show();
+    plan();
+}
+
+// -- outputs --
+
+int LeTimer::pin(int output) const {
+    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
+    const uint32_t enable = output ? ROUTE_OUT1PEN : ROUTE_OUT0PEN;
+    return reg(ROUTE) & enable && location < LOCATIONS
+        ? ROUTES[route::LETIMER0_OUT0 + output][location] : -1;
+}
+
+void LeTimer::show() {
+    for (int n = 0; n < 2; n++) {
+        part.prs->set(REFLEX, n, outputs[n]);
+        if (const int to = pin(n); to >= 0)
+            part.gpio->function(to, this, true,
+                                outputs[n] != !!(reg(CTRL) & (n ? CTRL_OPOL1 : CTRL_OPOL0)));
+    }
+}
+
+}  // namespace efm32gg

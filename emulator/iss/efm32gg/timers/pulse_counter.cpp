@@ -1,0 +1,88 @@
+#include "efm32gg/timers/pulse_counter.h"
+
+#include "efm32gg/pins/gpio.h"
+#include "efm32gg/pins/prs.h"
+
+namespace efm32gg {
+
+using namespace pcnt;
+
+PulseCounter::PulseCounter(Part &part, const Instance &instance, int signals)
+    : LowEnergy(part, instance, FREEZE, SYNCBUSY, CMD), signals(signals) {}
+
+void PulseCounter::reset() { LowEnergy::reset(); }
+
+uint32_t PulseCounter::busy_bit(uint32_t offset) const {
+    switch (offset) {
+    case CTRL: return SYNCBUSY_CTRL;
+    case CMD: return SYNCBUSY_CMD;
+    case TOPB: return SYNCBUSY_TOPB;
+    }
+    return 0;
+}
+
+void PulseCounter::apply(uint32_t offset, uint32_t value) {
+    if (offset == CMD) {
+        if (value & CMD_LTOPBIM)
+            reg(TOP) = reg(TOPB);
+        if (value & CMD_LCNTIM)
+            reg(CNT) = reg(TOP);
+        return;
+    }
+    LowEnergy::apply(offset, value);
+    if (offset == TOPB)
+        reg(TOP) = reg(TOPB);
+    const uint32_t mode = take(reg(CTRL), CTRL_MODE);
+    if (mode == 3)
+        part.log_once("%s: quadrature decoding is not modelled", instance.name);
+    if (reg(CTRL) & CTRL_RSTEN)
+        reg(CNT) = 0, reg(TOP) = 0xFF;
+    if (mode && !listening) {
+        part.gpio->listen(*this);
+        listening = true;
+    }
+}
+
+int PulseCounter::pin(int signal) const {
+    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
+    return location < LOCATIONS ? ROUTES[signals + signal][location] : -1;
+}
+
+void PulseCounter::pin_changed(int port, int bit, bool level) {
+    if (port * 16 + bit == pin(0) && !(reg(INPUT) & INPUT_S0PRSEN))
+        edge(level);
+}
+
+void PulseCounter::prs_changed(int channel, bool level) {
+    if (reg(INPUT) & INPUT_S0PRSEN && (int)take(reg(INPUT), INPUT_S0PRSSEL) == channel)
+        edge(level);
+}
+
+void PulseCounter::edge(bool rising) {
+    const uint32_t control = reg(CTRL), mode = take(control, CTRL_MODE);
+    if ((mode != 1 && mode != 2) || control & CTRL_RSTEN || rising == !!(control & CTRL_EDGE) ||
+        part.mode > 3)
+        return;
+    bool down = control & CTRL_CNTDIR;
+    if (control & CTRL_S1CDIR)
+        down = !part.gpio->input(pin(1));
+    if (down != !!(reg(STATUS) & STATUS_DIR)) {
+        reg(STATUS) = down ? STATUS_DIR : 0;
+        raise(IF_DIRCNG);
+    }
+    const uint32_t counted = take(control, CTRL_CNTEV);  // both, up, down, none
+    if (counted == 3 || (counted == 1 && down) || (counted == 2 && !down))
+        return;
+    uint32_t &count = reg(CNT);
+    if (down) {
+        if (!count)
+            raise(IF_UF);
+        count = count ? count - 1 : reg(TOP);
+    } else {
+        if (count >= reg(TOP))
+            raise(IF_OF);
+        count = count >= reg(TOP) ? 0 : count + 1;
+    }
+}
+
+}  // namespace efm32gg
