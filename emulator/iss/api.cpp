@@ -1,32 +1,49 @@
+// The C interface of a machine, called by machine.py. Nothing here throws; times are picoseconds.
+//
+// A machine is a core with a part around it. A bare machine has memories only, for tests of the core.
+
 #include "api.h"
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/system/system.h"
 #include "efm32gg/part/part.h"
+#include "efm32gg/pins/gpio.h"
+#include "efm32gg/serial/i2c.h"
+#include "fpga_link.h"
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 #include <new>
 
 using armv7m::Cpu;
 using armv7m::System;
+using efm32gg::I2c;
 using efm32gg::Part;
 
-namespace {
+// Why a run ended; StopReason in outcome.py has the same order.
+enum StopReason : int32_t {
+    STOP_TIME,        // the requested time is reached
+    STOP_OUTBOX,      // there are messages in the outbox
+    STOP_ASLEEP,      // the core fell asleep
+    STOP_AWAKE,       // the core woke
+    STOP_BREAKPOINT,  // before the instruction at a breakpoint
+    STOP_WATCHPOINT,  // after the instruction that made the access
+    STOP_STEPPED,     // after one instruction
+    STOP_HALTED,      // BKPT with a debugger, at that instruction
+    STOP_LOCKED_UP,   // the core is locked up until a reset
+    STOP_FAULT,       // vector catch: at the first instruction of a handler
+};
 
-constexpr uint32_t RAM_ADDRESS = 0x20000000;
-
-// What a machine without a part has around its core: nothing, and a console.
-class BareBus : public armv7m::Bus, public armv7m::SystemListener {
-public:
+// The surroundings of a bare core: every access fails.
+struct BareBus : armv7m::Bus, armv7m::SystemListener {
     bool read(uint32_t, uint32_t, uint32_t &) override { return false; }
     bool write(uint32_t, uint32_t, uint32_t) override { return false; }
 };
 
-}  // namespace
-
 struct IssMachine {
-    // The order of making: the core knows bus and listener by reference, the part uses the core.
+    // The core holds references to bus and listener, and the part's constructor uses the core: so
+    // the part's storage is allocated first and constructed last.
     IssMachine(const efm32gg::Memories &memories, bool bare, int64_t hz)
         : hz(hz), bus(bare ? new BareBus : nullptr),
           part(bare ? nullptr : (Part *)::operator new(sizeof(Part))),
@@ -41,7 +58,7 @@ struct IssMachine {
         }
         armv7m::Region flash, ram;
         flash.size = memories.flash_size, flash.host = memories.flash, flash.writable = false;
-        ram.base = RAM_ADDRESS, ram.size = memories.ram_size, ram.host = memories.ram;
+        ram.base = Part::RAM, ram.size = memories.ram_size, ram.host = memories.ram;
         cpu.add_region(flash);
         cpu.add_region(ram);
     }
@@ -78,9 +95,7 @@ struct IssMachine {
     bool was_asleep = false;
 };
 
-namespace {
-
-StopReason reason_of(IssMachine &machine, uint32_t exits) {
+static StopReason reason_of(IssMachine &machine, uint32_t exits) {
     const bool asleep = machine.system.sleep() != armv7m::Sleep::Awake;
     const bool changed = asleep != machine.was_asleep;
     machine.was_asleep = asleep;
@@ -105,10 +120,10 @@ StopReason reason_of(IssMachine &machine, uint32_t exits) {
     return STOP_TIME;
 }
 
-}  // namespace
-
 extern "C" {
 
+// The caller owns the memories, which must outlive the machine; sizes in bytes, powers of two.
+// `analog`: volts by channel. `bare`: no part, flash at 0, RAM at 0x20000000, a core clock of `hz`.
 IssMachine *iss_new(uint8_t *flash, int64_t flash_bytes, uint8_t *ram, int64_t ram_bytes,
                     uint8_t *external, int64_t external_bytes, uint8_t *information,
                     const double *analog, int32_t bare, int64_t hz) {
@@ -132,12 +147,14 @@ void iss_reset(IssMachine *machine, int32_t cause) {
     machine->system.reset(cause & 1);
 }
 
+// Returns the StopReason, plus 256 if there are messages in the outbox; `reached` is the time.
 int32_t iss_run(IssMachine *machine, int64_t until_ps, int64_t *reached) {
     const int32_t reason = reason_of(*machine, machine->run(until_ps));
     *reached = machine->now();
     return reason | (machine->part && machine->part->outbox.count ? 256 : 0);
 }
 
+// Runs one instruction, or more while the next one lies in [low, high).
 int32_t iss_step(IssMachine *machine, int64_t until_ps, uint32_t low, uint32_t high,
                  int64_t *reached) {
     machine->cpu.steps(1, low, high);
@@ -150,20 +167,24 @@ int64_t iss_now(const IssMachine *machine) { return machine->now(); }
 int64_t iss_cycles(const IssMachine *machine) { return machine->cpu.cycles; }
 int64_t iss_instructions(const IssMachine *machine) { return (int64_t)machine->cpu.instructions; }
 
+// NEVER (INT64_MAX) if there is none.
 int64_t iss_next_event(const IssMachine *machine) {
     return machine->part ? machine->part->next_event() : efm32gg::NEVER;
 }
 
+// 0: awake, else 1 + energy mode.
 int32_t iss_asleep(const IssMachine *machine) {
     if (machine->system.sleep() == armv7m::Sleep::Awake)
         return 0;
     return machine->part ? 1 + machine->part->mode : 1;
 }
 
+// Clock of the core now.
 int64_t iss_hz(const IssMachine *machine) {
     return machine->part ? machine->part->hertz(efm32gg::Clock::HFCORE) : machine->hz;
 }
 
+// Moves up to `count` messages to `out`; returns their number.
 int64_t iss_take(IssMachine *machine, efm32gg::Outgoing *out, int64_t count) {
     if (!machine->part)
         return 0;
@@ -175,6 +196,7 @@ int64_t iss_take(IssMachine *machine, efm32gg::Outgoing *out, int64_t count) {
     return taken;
 }
 
+// Registers by number: r0..r15, then xpsr, msp, psp, primask, basepri, faultmask, control.
 uint32_t iss_register(const IssMachine *machine, int32_t number) {
     const Cpu &cpu = machine->cpu;
     switch (number) {
@@ -207,9 +229,10 @@ void iss_set_register(IssMachine *machine, int32_t number, uint32_t value) {
     }
 }
 
+// As a debugger: without side effects. Returns the number of bytes read.
 int64_t iss_peek(IssMachine *machine, uint32_t address, uint8_t *out, int64_t count) {
     for (int64_t n = 0; n < count; n++) {
-        // Registers can be read by words only.
+        // Registers of peripherals can only be read as words.
         const uint32_t at = address + (uint32_t)n;
         uint32_t value;
         if (!machine->cpu.peek(at & ~3u, 4, value))
@@ -219,6 +242,7 @@ int64_t iss_peek(IssMachine *machine, uint32_t address, uint8_t *out, int64_t co
     return count;
 }
 
+// As a debugger, into flash too. Returns the number of bytes written.
 int64_t iss_poke(IssMachine *machine, uint32_t address, const uint8_t *data, int64_t count) {
     int64_t n = 0;
     while (n < count) {
@@ -233,6 +257,7 @@ int64_t iss_poke(IssMachine *machine, uint32_t address, const uint8_t *data, int
     return n;
 }
 
+// Bus accesses of 1, 2 or 4 bytes, with side effects; false: bus fault.
 int32_t iss_load(IssMachine *machine, uint32_t address, int32_t bytes, uint32_t *value) {
     return machine->cpu.load(address, (uint32_t)bytes, *value) == armv7m::Result::Done;
 }
@@ -245,13 +270,14 @@ void iss_invalidate(IssMachine *machine, uint32_t address, int64_t count) {
     machine->cpu.invalidate(address, (uint32_t)count);
 }
 
+// Level -1 releases the pin.
 void iss_pin(IssMachine *machine, int32_t port, int32_t bit, int32_t level) {
     if (machine->part)
-        machine->part->pin(port, bit, level);
+        machine->part->gpio->drive_from_outside(port, bit, level);
 }
 
 int32_t iss_pin_level(const IssMachine *machine, int32_t port, int32_t bit) {
-    return machine->part ? machine->part->pin_level(port, bit) : 0;
+    return machine->part ? machine->part->gpio->level(port, bit) : 0;
 }
 
 void iss_uart_receive(IssMachine *machine, int32_t unit, uint32_t data, uint32_t flags) {
@@ -259,22 +285,28 @@ void iss_uart_receive(IssMachine *machine, int32_t unit, uint32_t data, uint32_t
         machine->part->uart_receive(unit, data, flags);
 }
 
+static I2c *i2c_of(IssMachine *machine, int32_t unit) {
+    return machine->part ? machine->part->i2c_unit(unit) : nullptr;
+}
+
+// `what`: 0 start, 1 write, 2 read (`byte`: whether the last one was acknowledged), 3 stop, 4 poll.
+// Returns what I2c's slave functions return; without a unit nothing is acknowledged.
 int32_t iss_i2c_slave(IssMachine *machine, int32_t unit, int32_t what, int32_t byte) {
-    Part *part = machine->part;
-    if (!part)
-        return 0;
+    I2c *slave = i2c_of(machine, unit);
+    if (!slave)
+        return what == 2 ? 0xFF : 0;
     switch (what) {
-    case 0: return part->i2c_slave_start(unit, byte);
-    case 1: return part->i2c_slave_write(unit, byte);
-    case 2: return part->i2c_slave_read(unit, byte);
-    case 3: return part->i2c_slave_stop(unit), 0;
-    default: return part->i2c_slave_poll(unit);
+    case 0: return slave->slave_start((uint32_t)byte);
+    case 1: return slave->slave_write((uint32_t)byte);
+    case 2: return slave->slave_read(byte);
+    case 3: return slave->slave_stop(), 0;
+    default: return slave->slave_poll();
     }
 }
 
 void iss_i2c_answer(IssMachine *machine, int32_t unit, int32_t acknowledged, int32_t data) {
-    if (machine->part)
-        machine->part->i2c_answer(unit, acknowledged, data);
+    if (I2c *master = i2c_of(machine, unit))
+        master->answer(acknowledged, (uint32_t)data);
 }
 
 void iss_analog_changed(IssMachine *machine) {
@@ -304,28 +336,29 @@ void iss_watchpoint(IssMachine *machine, uint32_t address, uint32_t count, int32
     machine->cpu.set_watches(all);
 }
 
+// The access that hit: pc, address, size, value, write.
 void iss_watch_hit(const IssMachine *machine, uint32_t *hit) {
     const auto &found = machine->cpu.watch_hit;
     hit[0] = found.pc, hit[1] = found.address, hit[2] = found.size, hit[3] = found.value;
     hit[4] = found.write;
 }
 
+// Whether BKPT 0xAB is a semihosting call (console, clock, exit) or an ordinary breakpoint.
 void iss_semihosting(IssMachine *machine, int32_t on) { machine->system.set_semihosting(on); }
 
+// With a debugger attached BKPT stops, and so do the exceptions in `catches` (DEMCR.VC_*).
 void iss_debugger(IssMachine *machine, int32_t attached, uint32_t catches) {
     machine->system.set_debugger(attached != 0, catches);
 }
 
+// The core executes nothing until a reset; time passes.
 void iss_hang(IssMachine *machine) {
     if (machine->part)
         machine->part->hung = true;
 }
 
+// Called during a run: it ends after the running instruction.
 void iss_stop(IssMachine *machine) { machine->cpu.stop(); }
-
-Cpu *iss_cpu(IssMachine *machine) { return &machine->cpu; }
-System *iss_system(IssMachine *machine) { return &machine->system; }
-Part *iss_part(IssMachine *machine) { return machine->part; }
 
 void iss_fpga(IssMachine *machine, const FpgaDriver *driver, const FpgaWire *wires,
               int32_t count) {
@@ -339,4 +372,8 @@ void iss_fpga_running(IssMachine *machine, uint32_t running) {
     if (machine->link)
         machine->link->set_running(running);
 }
-}
+
+}  // extern "C"
+
+Cpu *iss_cpu(IssMachine *machine) { return &machine->cpu; }
+System *iss_system(IssMachine *machine) { return &machine->system; }

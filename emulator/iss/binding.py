@@ -88,8 +88,6 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_stop": (None, (_P,)),
     "iss_fpga": (None, (_P, ctypes.POINTER(FpgaDriverRecord), ctypes.POINTER(FpgaWireRecord), _I)),
     "iss_fpga_running": (None, (_P, _U)),
-    "iss_cpu": (_P, (_P,)),
-    "iss_part": (_P, (_P,)),
 }
 
 Library = Any

@@ -1,6 +1,7 @@
 #include "fpga_link.h"
 
 #include "efm32gg/part/part.h"
+#include "efm32gg/pins/gpio.h"
 
 using efm32gg::Event;
 
@@ -87,7 +88,7 @@ void FpgaLink::tell(int64_t now) {
         seen[n] = value;
         for (int bit = 0; bit < wire.width; bit++)
             if (changed >> bit & 1)
-                part.pin(wire.port, wire.bit + bit, value >> bit & 1);
+                part.gpio->drive_from_outside(wire.port, wire.bit + bit, value >> bit & 1);
     }
 }
 

@@ -16,6 +16,7 @@ namespace efm32gg {
 struct Register {
     uint32_t offset, reset, readable, writable;
     bool action, modelled;
+    uint32_t busy;  // its bit in SYNCBUSY; 0: writes take effect at once
     const char *name;
 };
 
@@ -25,7 +26,7 @@ struct Layout {
     int32_t count;
     uint32_t size;
     bool modelled;
-    int32_t if_, ifs, ifc, ien;  // offsets, or -1
+    int32_t if_, ifs, ifc, ien, freeze, syncbusy, cmd;  // offsets, or -1
 };
 
 struct Instance {
@@ -69,13 +70,23 @@ def _namespace(layout: Layout) -> Iterator[str]:
 def _tables(layouts: list[Layout]) -> Iterator[str]:
     for layout in layouts:
         yield f"inline const Register {layout.name}_REGISTERS[] = {{"
-        yield from (f"    {_register(register)}," for register in layout.registers)
+        busy = {
+            field.name: field.mask
+            for register in layout.registers
+            if register.name == "SYNCBUSY"
+            for field in register.fields
+        }
+        yield from (
+            f"    {_register(register, busy.get(register.name, 0))},"
+            for register in layout.registers
+        )
         yield "};"
-        flags = (_offset(layout, name) for name in ("IF", "IFS", "IFC", "IEN"))
+        names = ("IF", "IFS", "IFC", "IEN", "FREEZE", "SYNCBUSY", "CMD")
+        offsets = (_offset(layout, name) for name in names)
         yield (
             f'inline const Layout {layout.name}_LAYOUT = {{"{layout.name}", '
             f"{layout.name}_REGISTERS, {len(layout.registers)}, 0x{layout.size:X}, "
-            f"{_bool(layout.modelled)}, {', '.join(map(str, flags))}}};"
+            f"{_bool(layout.modelled)}, {', '.join(map(str, offsets))}}};"
         )
     yield "namespace instance {"
     for layout in layouts:
@@ -104,11 +115,11 @@ def _routes() -> Iterator[str]:
     yield "};"
 
 
-def _register(register: Register) -> str:
+def _register(register: Register, busy: int) -> str:
     return (
         f"{{0x{register.offset:X}, 0x{register.reset:X}, 0x{register.readable:X}, "
         f"0x{register.writable:X}, {_bool(register.action)}, {_bool(register.modelled)}, "
-        f'"{register.name}"}}'
+        f'0x{busy:X}, "{register.name}"}}'
     )
 
 

@@ -14,10 +14,10 @@ using namespace adc;
 namespace {
 
 constexpr int SOURCE = 8, REFLEX = 8;
-// The device information's calibration: temperature in degrees, and what the sensor reads there
-// with the 1.25 V reference, 12 bits, above bit 4 (5.6).
+// Calibration in the device information: a temperature in degrees Celsius, and the sensor's reading
+// at it with the 1.25 V reference, 12 bits, from bit 4 on (5.6).
 constexpr uint32_t CALIBRATED_AT = 0x0FE081B2, CALIBRATED_READING = 0x0FE081BE;
-// Codes a degree with that reference (data sheet, 3.10, TGRAD_ADCTH).
+// Codes per degree with that reference (data sheet, 3.10, TGRAD_ADCTH).
 constexpr double CODES_PER_DEGREE = -6.27;
 
 enum Selected : uint32_t { TEMPERATURE = 8, VDD_THIRD, VDD, VSS, REFERENCE_HALF, DAC0, DAC1 };
@@ -29,26 +29,24 @@ constexpr int BITS[] = {12, 8, 6, 12};
 
 }  // namespace
 
-Adc::Adc(Part &part, const Instance &instance) : Peripheral(part, instance) {}
-
 void Adc::reset() {
     Peripheral::reset();
     part.cancel(converted);
     single_wanted = scanning = converting = stalled = false;
     to_scan = 0;
-    warm_until = -1;
+    warm = false;
     warm_reference = ~0u;
     follow();
 }
 
-// -- what is converted --
+// -- result of a conversion --
 
 double Adc::volts(int input) const {
     return part.memories.analog ? part.memories.analog[input] : 0;
 }
 
 double Adc::reference(uint32_t control) const {
-    switch (take(control, SINGLECTRL_REF)) {
+    switch (field(control, SINGLECTRL_REF)) {
     case V1_25: return 1.25;
     case V2_5: return 2.5;
     case SUPPLY: return volts(analog::VDD);
@@ -83,36 +81,36 @@ double Adc::input_volts(uint32_t selected, bool difference, double reference) co
 uint32_t Adc::result(uint32_t control, uint32_t selected) const {
     const bool difference = control & SINGLECTRL_DIFF;
     const double full = reference(control);
-    const double part_of = full > 0 ? input_volts(selected, difference, full) / full : 0;
-    const uint32_t resolution = take(control, SINGLECTRL_RES);
+    const double fraction = full > 0 ? input_volts(selected, difference, full) / full : 0;
+    const uint32_t resolution = field(control, SINGLECTRL_RES);
     int bits = BITS[resolution];
-    if (resolution == OVERSAMPLED)  // each doubling gives a bit, up to 16 (28.3.7.4)
-        bits = std::min(16, 13 + (int)take(reg(CTRL), CTRL_OVSRSEL));
+    if (resolution == OVERSAMPLED)  // each doubling adds a bit, up to 16 (28.3.7.4)
+        bits = std::min(16, 13 + (int)field(reg(CTRL), CTRL_OVSRSEL));
     const double scale = std::ldexp(1.0, difference ? bits - 1 : bits);
     const double lowest = difference ? -scale : 0;
-    const double clipped = std::min(std::max(std::floor(part_of * scale), lowest), scale - 1);
+    const double clipped = std::min(std::max(std::floor(fraction * scale), lowest), scale - 1);
     const int32_t code = std::isnan(clipped) ? 0 : (int32_t)clipped;
     return control & SINGLECTRL_ADJ ? (uint32_t)code << (16 - bits) : (uint32_t)code;
 }
 
-// -- how long it takes --
+// -- duration --
 
 // Reference and converter warm up in units of TIMEBASE, a microsecond (28.3.4).
 int64_t Adc::warm_up(uint32_t control) {
-    const uint32_t chosen = take(control, SINGLECTRL_REF), mode = take(reg(CTRL), CTRL_WARMUPMODE);
-    if (mode == KEEP_WARM && warm_until >= 0 && warm_reference == chosen)
+    const uint32_t chosen = field(control, SINGLECTRL_REF), mode = field(reg(CTRL), CTRL_WARMUPMODE);
+    if (mode == KEEP_WARM && warm && warm_reference == chosen)
         return 0;
     const bool bandgap = chosen == V1_25 || chosen == V2_5 || chosen == V5_DIFF;
     const int64_t units = 1 + (bandgap && mode != FAST_BANDGAP ? 4 : 0);
-    return units * (1 + (int64_t)take(reg(CTRL), CTRL_TIMEBASE));
+    return units * (1 + (int64_t)field(reg(CTRL), CTRL_TIMEBASE));
 }
 
-// Acquisition and a clock a bit and one, times the oversampling (28.3.3), in ADC clocks.
+// In ADC clocks: acquisition, one per bit, and one more; times the oversampling (28.3.3).
 int64_t Adc::cycles(uint32_t control) const {
-    const uint32_t resolution = take(control, SINGLECTRL_RES);
-    const int64_t acquired = (int64_t)1 << std::min(take(control, SINGLECTRL_AT), 8u);
+    const uint32_t resolution = field(control, SINGLECTRL_RES);
+    const int64_t acquired = (int64_t)1 << std::min(field(control, SINGLECTRL_AT), 8u);
     const int64_t times =
-        resolution == OVERSAMPLED ? (int64_t)2 << std::min(take(reg(CTRL), CTRL_OVSRSEL), 11u) : 1;
+        resolution == OVERSAMPLED ? (int64_t)2 << std::min(field(reg(CTRL), CTRL_OVSRSEL), 11u) : 1;
     return (acquired + BITS[resolution] + 1) * times;
 }
 
@@ -120,15 +118,15 @@ int64_t Adc::cycles(uint32_t control) const {
 
 void Adc::start_scan() {
     scanning = true;
-    to_scan = take(reg(SCANCTRL), SCANCTRL_INPUTMASK);
+    to_scan = field(reg(SCANCTRL), SCANCTRL_INPUTMASK);
     if (reg(SCANCTRL) & SCANCTRL_DIFF)
         to_scan &= 0xF;
     scanning = to_scan != 0;
 }
 
-// Single ones go first.
+// Starts the next conversion; single conversions have priority.
 void Adc::begin() {
-    const Rate rate = part.unit_rate(instance);
+    const Rate rate = clock_now();
     if (converting || !rate.runs() || !(single_wanted || scanning))
         return;
     single_running = single_wanted;
@@ -136,15 +134,15 @@ void Adc::begin() {
         scan_channel = __builtin_ctz(to_scan);
     const uint32_t control = reg(single_running ? SINGLECTRL : SCANCTRL);
     const int64_t length = warm_up(control) +
-                           cycles(control) * (1 + (int64_t)take(reg(CTRL), CTRL_PRESC));
-    warm_reference = take(control, SINGLECTRL_REF);
-    warm_until = part.now();
+                           cycles(control) * (1 + (int64_t)field(reg(CTRL), CTRL_PRESC));
+    warm_reference = field(control, SINGLECTRL_REF);
+    warm = true;
     converting = true;
     part.schedule(converted, part.now() + rate.span(length));
 }
 
 void Adc::on_converted(int64_t) {
-    if (!part.unit_rate(instance).runs()) {
+    if (!clock_now().runs()) {
         stalled = true;
         return;
     }
@@ -153,7 +151,7 @@ void Adc::on_converted(int64_t) {
     if (single_running) {
         if (single_wanted) {
             const uint32_t control = reg(SINGLECTRL);
-            reg(SINGLEDATA) = result(control, take(control, SINGLECTRL_INPUTSEL));
+            reg(SINGLEDATA) = result(control, field(control, SINGLECTRL_INPUTSEL));
             reg(IF) |= IF_SINGLE | (status & STATUS_SINGLEDV ? IF_SINGLEOF : 0);
             status |= STATUS_SINGLEDV;
             single_wanted = control & SINGLECTRL_REP;
@@ -163,7 +161,7 @@ void Adc::on_converted(int64_t) {
         reg(SCANDATA) = result(reg(SCANCTRL), (uint32_t)scan_channel);
         reg(IF) |= IF_SCAN | (status & STATUS_SCANDV ? IF_SCANOF : 0);
         status = (status & ~STATUS_SCANDATASRC) | STATUS_SCANDV |
-                 give((uint32_t)scan_channel, STATUS_SCANDATASRC);
+                 to_field((uint32_t)scan_channel, STATUS_SCANDATASRC);
         to_scan &= to_scan - 1;
         scanning = to_scan != 0;
         if (!scanning) {
@@ -178,7 +176,7 @@ void Adc::on_converted(int64_t) {
 }
 
 void Adc::clocks_changed() {
-    if (stalled && part.unit_rate(instance).runs()) {
+    if (stalled && clock_now().runs()) {
         stalled = false;
         part.schedule(converted, part.now());
     }
@@ -190,7 +188,7 @@ void Adc::prs_changed(int channel, bool level) {
     if (!level)
         return;
     const auto triggered = [channel](uint32_t control) {
-        return control & SINGLECTRL_PRSEN && (int)take(control, SINGLECTRL_PRSSEL) == channel;
+        return control & SINGLECTRL_PRSEN && (int)field(control, SINGLECTRL_PRSSEL) == channel;
     };
     const bool single = triggered(reg(SINGLECTRL)), scan = triggered(reg(SCANCTRL));
     if (!single && !scan)
@@ -223,8 +221,8 @@ uint32_t Adc::read(uint32_t offset) {
 
 void Adc::write(uint32_t offset, uint32_t value) {
     Peripheral::write(offset, value);
-    if (offset == CTRL && take(value, CTRL_WARMUPMODE) != KEEP_WARM)
-        warm_until = -1;
+    if (offset == CTRL && field(value, CTRL_WARMUPMODE) != KEEP_WARM)
+        warm = false;
     if (offset != CMD)
         return;
     if (value & CMD_SINGLESTOP)
@@ -240,13 +238,13 @@ void Adc::write(uint32_t offset, uint32_t value) {
 }
 
 void Adc::follow() {
-    const bool kept = take(reg(CTRL), CTRL_WARMUPMODE) == KEEP_WARM && warm_until >= 0;
-    const bool warm = converting || kept;
+    const bool kept = field(reg(CTRL), CTRL_WARMUPMODE) == KEEP_WARM && warm;
+    const bool ready = converting || kept;
     uint32_t &status = reg(STATUS);
     status &= STATUS_SINGLEDV | STATUS_SCANDV | STATUS_SCANDATASRC;
     status |= (single_wanted ? STATUS_SINGLEACT : 0) | (scanning ? STATUS_SCANACT : 0) |
-              (warm ? STATUS_WARM : 0) | (warm && single_running ? STATUS_SINGLEREFWARM : 0) |
-              (warm && !single_running ? STATUS_SCANREFWARM : 0);
+              (ready ? STATUS_WARM : 0) | (ready && single_running ? STATUS_SINGLEREFWARM : 0) |
+              (ready && !single_running ? STATUS_SCANREFWARM : 0);
     part.dma->request(SOURCE, 0, status & STATUS_SINGLEDV);
     part.dma->request(SOURCE, 1, status & STATUS_SCANDV);
     update_interrupts();

@@ -9,7 +9,7 @@ namespace efm32gg {
 
 class Adc : public Peripheral {
 public:
-    Adc(Part &part, const Instance &instance);
+    using Peripheral::Peripheral;
 
     void reset() override;
     uint32_t read(uint32_t offset) override;
@@ -20,10 +20,10 @@ public:
 
 private:
     bool single_wanted = false, scanning = false, converting = false, stalled = false;
-    bool single_running = false;   // the conversion under way is the single one
-    uint32_t to_scan = 0;          // channels of the scan that are still to be converted
+    bool single_running = false;   // the running conversion is a single one, not of a scan
+    uint32_t to_scan = 0;          // channels of the scan still to be converted
     int scan_channel = 0;
-    int64_t warm_until = -1;       // of reference and converter
+    bool warm = false;             // reference and converter, from an earlier conversion
     uint32_t warm_reference = ~0u;
     Event converted = Event::of<&Adc::on_converted>(this);
 

@@ -9,11 +9,11 @@
 
 namespace efm32gg {
 
-// CTRL, STATUS and IF have these at the same place in both.
+// These are equal in ACMP and VCMP.
 static constexpr uint32_t CTRL = acmp::CTRL, STATUS = acmp::STATUS;
 static_assert(+vcmp::CTRL == +acmp::CTRL && +vcmp::STATUS == +acmp::STATUS &&
                   +vcmp::IF == +acmp::IF,
-              "one base for both comparators");
+              "ACMP and VCMP share a base class");
 static_assert(+acmp::CTRL_EN == +vcmp::CTRL_EN && +acmp::CTRL_IRISE == +vcmp::CTRL_IRISE &&
               +acmp::CTRL_IFALL == +vcmp::CTRL_IFALL &&
               +acmp::CTRL_WARMTIME == +vcmp::CTRL_WARMTIME);
@@ -38,10 +38,6 @@ double Comparator::volts(int input) const {
     return part.memories.analog ? part.memories.analog[input] : 0;
 }
 
-bool Comparator::pending() const {
-    return reg((uint32_t)layout.if_) & reg((uint32_t)layout.ien);
-}
-
 void Comparator::write(uint32_t offset, uint32_t value) {
     const bool was = reg(CTRL) & acmp::CTRL_EN;
     Peripheral::write(offset, value);
@@ -54,22 +50,21 @@ void Comparator::write(uint32_t offset, uint32_t value) {
     }
     if (offset == CTRL && !(reg(STATUS) & ACTIVE))
         set_output(inactive_output(), false);
-    look();
+    compare();
 }
 
-// 4 to 512 cycles of HFPERCLK.
+// Takes 4 to 512 cycles of HFPERCLK.
 void Comparator::warm_up() {
-    const Rate rate = part.unit_rate(instance);
+    const Rate rate = clock_now();
     if (rate.runs())
         part.schedule(warmed,
-                      part.now() + rate.span((int64_t)4 << take(reg(CTRL), acmp::CTRL_WARMTIME)));
+                      part.now() + rate.span((int64_t)4 << field(reg(CTRL), acmp::CTRL_WARMTIME)));
 }
 
 void Comparator::on_warmed(int64_t) {
     reg(STATUS) |= ACTIVE;
     raise(acmp::IF_WARMUP);
-    // From the inactive value to the real one is an edge as any other.
-    look();
+    compare();  // a change from the inactive value counts as an edge
 }
 
 void Comparator::clocks_changed() {
@@ -77,31 +72,27 @@ void Comparator::clocks_changed() {
         warm_up();
 }
 
-void Comparator::analog_changed() { look(); }
-
-void Comparator::look() {
+void Comparator::compare() {
     if (reg(STATUS) & ACTIVE && part.mode < 4)
         set_output(above(reg(STATUS) & OUTPUT), true);
 }
 
-void Comparator::set_output(bool output, bool tell) {
+void Comparator::set_output(bool output, bool interrupts) {
     const bool before = reg(STATUS) & OUTPUT;
-    reg(STATUS) = output ? reg(STATUS) | OUTPUT : reg(STATUS) & ~OUTPUT;
-    show(output);
+    set_bits(reg(STATUS), OUTPUT, output);
+    drive_output(output);
     if (before == output)
         return;
     part.prs->set(reflex(), 0, output);
-    if (tell && reg(CTRL) & (output ? acmp::CTRL_IRISE : acmp::CTRL_IFALL))
+    if (interrupts && reg(CTRL) & (output ? acmp::CTRL_IRISE : acmp::CTRL_IFALL))
         raise(acmp::IF_EDGE);
 }
 
 // -- ACMP --
 
-Acmp::Acmp(Part &part, const Instance &instance) : Comparator(part, instance) {}
-
 bool Acmp::above(bool before) const {
     const int channels = instance.index ? analog::ACMP1_CH0 : analog::ACMP0_CH0;
-    const uint32_t selected = reg(acmp::INPUTSEL), negative = take(selected, acmp::INPUTSEL_NEGSEL);
+    const uint32_t selected = reg(acmp::INPUTSEL), negative = field(selected, acmp::INPUTSEL_NEGSEL);
     const double supply = volts(analog::VDD);
     double against = 0;
     if (negative < 8)
@@ -111,15 +102,15 @@ bool Acmp::above(bool before) const {
     else if (negative == 9)
         against = 2.5;
     else if (negative == 10)
-        against = supply * take(selected, acmp::INPUTSEL_VDDLEVEL) / 63;
-    const double step = HYSTERESIS[take(reg(CTRL), acmp::CTRL_HYSTSEL)];
-    return volts(channels + (int)take(selected, acmp::INPUTSEL_POSSEL)) >
+        against = supply * field(selected, acmp::INPUTSEL_VDDLEVEL) / 63;
+    const double step = HYSTERESIS[field(reg(CTRL), acmp::CTRL_HYSTSEL)];
+    return volts(channels + (int)field(selected, acmp::INPUTSEL_POSSEL)) >
            against + (before ? -step : step);
 }
 
-void Acmp::show(bool output) {
-    const uint32_t routed = reg(acmp::ROUTE), location = take(routed, acmp::ROUTE_LOCATION);
-    if (routed & acmp::ROUTE_ACMPPEN && location < LOCATIONS)
+void Acmp::drive_output(bool output) {
+    const uint32_t routed = reg(acmp::ROUTE), location = field(routed, acmp::ROUTE_LOCATION);
+    if (routed & acmp::ROUTE_ACMPPEN)
         part.gpio->function(ROUTES[route::ACMP0_OUT + instance.index][location], this, true,
                             output != !!(reg(CTRL) & acmp::CTRL_GPIOINV));
 }
@@ -128,10 +119,10 @@ void Acmp::update_interrupts() { line(0, pending() || (partner && partner->pendi
 
 // -- VCMP --
 
-// 1.667 V and 34 mV a step (27.3.3).
+// The level is 1.667 V and 34 mV per step (27.3.3).
 bool Vcmp::above(bool before) const {
     const double step = reg(CTRL) & vcmp::CTRL_HYSTEN ? SUPPLY_HYSTERESIS : 0;
-    const double level = 1.667 + 0.034 * take(reg(vcmp::INPUTSEL), vcmp::INPUTSEL_TRIGLEVEL);
+    const double level = 1.667 + 0.034 * field(reg(vcmp::INPUTSEL), vcmp::INPUTSEL_TRIGLEVEL);
     return volts(analog::VDD) > level + (before ? -step : step);
 }
 

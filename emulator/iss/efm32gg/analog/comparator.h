@@ -1,5 +1,5 @@
 // Comparators: ACMP of two voltages, VCMP of the supply. EFM32GG Reference Manual, chapters 26
-// and 27. They look when an input or their registers change; the response time is not modelled.
+// and 27. They compare when an input or their registers change; the response time is not modelled.
 // Not modelled: capacitive sense; DAC outputs are 0 V.
 #pragma once
 
@@ -7,7 +7,7 @@
 
 namespace efm32gg {
 
-// What both have: enable, warm-up, an output with edges.
+// Common to both: enable, warm-up, an output with edges.
 class Comparator : public Peripheral {
 public:
     using Peripheral::Peripheral;
@@ -15,14 +15,13 @@ public:
     void reset() override;
     void write(uint32_t offset, uint32_t value) override;
     void clocks_changed() override;
-    void analog_changed() override;
-    bool pending() const;
+    void analog_changed() override { compare(); }
 
 protected:
-    // Whether the positive input is above the negative one, by the output as it is now.
+    // Whether the positive input is above the negative one; `before`: the output now, for hysteresis.
     virtual bool above(bool before) const = 0;
     virtual int reflex() const = 0;
-    virtual void show(bool output) { (void)output; }
+    virtual void drive_output(bool output) { (void)output; }
     virtual uint32_t inactive_output() const = 0;
     double volts(int input) const;
 
@@ -31,13 +30,13 @@ private:
 
     void warm_up();
     void on_warmed(int64_t time);
-    void look();
-    void set_output(bool output, bool tell);
+    void compare();
+    void set_output(bool output, bool interrupts);
 };
 
 class Acmp : public Comparator {
 public:
-    Acmp(Part &part, const Instance &instance);
+    using Comparator::Comparator;
 
     Acmp *partner = nullptr;  // on the same interrupt line
 
@@ -45,7 +44,7 @@ private:
     bool above(bool before) const override;
     int reflex() const override { return 2 + instance.index; }
     uint32_t inactive_output() const override { return reg(acmp::CTRL) & acmp::CTRL_INACTVAL; }
-    void show(bool output) override;
+    void drive_output(bool output) override;
     void update_interrupts() override;
 };
 

@@ -1,4 +1,4 @@
-// The analog inputs that the outside hands in: volts, and the temperature in degrees Celsius.
+// Indices of the analog inputs: volts, and the temperature in degrees Celsius.
 #pragma once
 
 namespace efm32gg::analog {

@@ -1,4 +1,4 @@
-// The clock tree: what the CMU's registers make of the oscillators. EFM32GG Reference Manual, 11.3.1.
+// The clock tree: frequencies as the CMU's registers select them. EFM32GG Reference Manual, 11.3.1.
 #include "efm32gg/clocks/cmu.h"
 
 namespace efm32gg {
@@ -10,7 +10,7 @@ static constexpr uint32_t BANDS[8] = {1200000, 6600000, 11000000, 14000000,
                                       21000000, 28000000, 28000000, 28000000};
 static constexpr uint32_t AUX_BANDS[8] = {14000000, 11000000, 6600000, 1200000,
                                           14000000, 14000000, 28000000, 21000000};
-// A step of an RC oscillator's tuning, in thousandths of the frequency; 0x80 and 0x40 are nominal.
+// A tuning step of an RC oscillator, in thousandths of the frequency; 0x80 and 0x40 are nominal.
 static constexpr int TUNING_STEP = 3;
 
 #define HIGH(unit) {&instance::unit, HFPERCLKEN0, HFPERCLKEN0_##unit, false, -1, 0, 0},
@@ -21,7 +21,7 @@ static constexpr int TUNING_STEP = 3;
 #define LOW_B(unit) \
     {&instance::unit, HFCORECLKEN0, HFCORECLKEN0_LE, true, 2, LFBCLKEN0_##unit, LFBPRESC0_##unit},
 
-// Units behind an enable bit; all others are always on.
+// Units with an enable bit; all others are always on.
 const Cmu::Enable Cmu::UNITS[] = {
     HIGH(USART0) HIGH(USART1) HIGH(USART2) HIGH(UART0) HIGH(UART1) HIGH(TIMER0) HIGH(TIMER1)
     HIGH(TIMER2) HIGH(TIMER3) HIGH(ACMP0) HIGH(ACMP1) HIGH(I2C0) HIGH(I2C1) HIGH(GPIO) HIGH(VCMP)
@@ -39,10 +39,9 @@ const Cmu::Enable Cmu::UNITS[] = {
 #undef LOW_B
 
 bool Cmu::running(int oscillator) const {
-    if (!oscillators[oscillator].ready)
-        return false;
-    return sleeping < 2 || (sleeping == 2 && (oscillator == LFRCO || oscillator == LFXO)) ||
-           (sleeping == 4 && (oscillator == LFRCO || oscillator == LFXO));
+    const bool low_frequency = oscillator == LFRCO || oscillator == LFXO;
+    return oscillators[oscillator].ready &&
+           (sleeping < 2 || (sleeping != 3 && low_frequency));
 }
 
 uint32_t Cmu::hertz(const Cmu &cmu, int oscillator) {
@@ -51,11 +50,11 @@ uint32_t Cmu::hertz(const Cmu &cmu, int oscillator) {
     };
     switch (oscillator) {
     case HFRCO:
-        return tuned(BANDS[take(cmu.reg(HFRCOCTRL), HFRCOCTRL_BAND)],
-                     take(cmu.reg(HFRCOCTRL), HFRCOCTRL_TUNING), 0x80);
+        return tuned(BANDS[field(cmu.reg(HFRCOCTRL), HFRCOCTRL_BAND)],
+                     field(cmu.reg(HFRCOCTRL), HFRCOCTRL_TUNING), 0x80);
     case AUXHFRCO:
-        return tuned(AUX_BANDS[take(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_BAND)],
-                     take(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_TUNING), 0x80);
+        return tuned(AUX_BANDS[field(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_BAND)],
+                     field(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_TUNING), 0x80);
     case LFRCO:
         return tuned(LF_HERTZ, cmu.reg(LFRCOCTRL), 0x40);
     case HFXO:
@@ -89,14 +88,14 @@ void Cmu::rates(Rates &rates, int64_t now) const {
         return rate.runs() ? rate.divided(by, now) : rate;
     };
     const Rate source = sleeping >= 2 ? Rate() : clock_of(selected, now);
-    const Rate high = divided(source, take(control, CTRL_HFCLKDIV) + 1);
+    const Rate high = divided(source, field(control, CTRL_HFCLKDIV) + 1);
     Rate &hfcore = rates[(int)Clock::HFCORE];
-    hfcore = divided(high, power(take(core, HFCORECLKDIV_HFCORECLKDIV)));
+    hfcore = divided(high, power(field(core, HFCORECLKDIV_HFCORECLKDIV)));
     rates[(int)Clock::HFPER] = per & HFPERCLKDIV_HFPERCLKEN
-        ? divided(high, power(take(per, HFPERCLKDIV_HFPERCLKDIV))) : Rate();
+        ? divided(high, power(field(per, HFPERCLKDIV_HFPERCLKDIV))) : Rate();
     rates[(int)Clock::HFCORELE] = divided(hfcore, core & HFCORECLKDIV_HFCORECLKLEDIV ? 4 : 2);
     const uint32_t low = reg(LFCLKSEL);
-    const uint32_t a = take(low, LFCLKSEL_LFA), b = take(low, LFCLKSEL_LFB);
+    const uint32_t a = field(low, LFCLKSEL_LFA), b = field(low, LFCLKSEL_LFB);
     rates[(int)Clock::LFA] = a == 3 ? rates[(int)Clock::HFCORELE]
                                     : low_frequency(a, low & LFCLKSEL_LFAE, now);
     rates[(int)Clock::LFB] = b == 3 ? rates[(int)Clock::HFCORELE]
@@ -118,17 +117,17 @@ const Cmu::Enable &Cmu::enable_of(const Instance &instance) const {
 }
 
 bool Cmu::enabled(const Instance &instance) const {
-    // Loops poll one unit: its bit is found at once.
+    // A cache for loops that poll one unit.
     if (!last || last->base != instance.base) {
         last = &instance;
         last_enable = enable_of(instance);
     }
-    return !last_enable.mask || reg(last_enable.registers) & last_enable.mask;
+    return !last_enable.mask || reg(last_enable.offset) & last_enable.mask;
 }
 
 bool Cmu::on_slow_bus(const Instance &instance) const {
     enabled(instance);
-    return last_enable.registers == HFPERCLKEN0;
+    return last_enable.offset == HFPERCLKEN0;
 }
 
 Rate Cmu::unit_rate(const Instance &instance) const {
@@ -137,21 +136,21 @@ Rate Cmu::unit_rate(const Instance &instance) const {
         const Rate &clock = part.rate(enable.synced ? Clock::LFB : Clock::LFA);
         if (!(effective[enable.synced] & enable.enable) || !clock.runs())
             return Rate();
-        const uint32_t exponent = take(effective[enable.synced + 1], enable.prescaler);
+        const uint32_t exponent = field(effective[enable.synced + 1], enable.prescaler);
         return clock.divided((int64_t)1 << exponent, clock.origin);
     }
     if (enable.low_energy)
         return part.rate(Clock::LFA);
     if (!enabled(instance))
         return Rate();
-    return part.rate(enable.registers == HFPERCLKEN0 ? Clock::HFPER : Clock::HFCORE);
+    return part.rate(enable.offset == HFPERCLKEN0 ? Clock::HFPER : Clock::HFCORE);
 }
 
 void Cmu::check_limits() {
     const int64_t core = part.hertz(Clock::HFCORE);
     if (core > 32000000 && reg(HFCORECLKEN0) & HFCORECLKEN0_LE &&
         !(reg(CTRL) & CTRL_HFLE && reg(HFCORECLKDIV) & HFCORECLKDIV_HFCORECLKLEDIV))
-        part.log_once("CMU: above 32 MHz the low energy bus needs CTRL.HFLE and HFCORECLKLEDIV");
+        part.log_once("CMU: above 32 MHz the low-energy bus needs CTRL.HFLE and HFCORECLKLEDIV");
 }
 
 }  // namespace efm32gg

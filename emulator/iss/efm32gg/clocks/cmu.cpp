@@ -6,17 +6,16 @@ namespace efm32gg {
 
 using namespace cmu;
 
-// Start-up without the time-outs that CTRL counts: data sheet, 3.9, typical.
+// Start-up times without the time-outs of CTRL: data sheet, 3.9, typical.
 static constexpr int64_t RC_START = 600 * NANOSECOND, HFXO_START = 400 * MICROSECOND,
                          LFRCO_START = 150 * MICROSECOND, LFXO_START = 400 * MILLISECOND;
-// OSCENCMD has enable and disable bits, STATUS enabled and ready, in this order; IF has its own.
+// OSCENCMD has enable and disable bits, STATUS enabled and ready bits in the order of Oscillators;
+// these flags and select bits have their own.
 static constexpr uint32_t READY_FLAGS[] = {IF_HFRCORDY, IF_HFXORDY, IF_AUXHFRCORDY, IF_LFRCORDY,
                                            IF_LFXORDY};
 static constexpr uint32_t SELECTED[] = {STATUS_HFRCOSEL, STATUS_HFXOSEL, 0, STATUS_LFRCOSEL,
                                         STATUS_LFXOSEL};
 static constexpr uint32_t SYNC_OFFSETS[] = {LFACLKEN0, LFAPRESC0, LFBCLKEN0, LFBPRESC0};
-static constexpr uint32_t SYNC_BITS[] = {SYNCBUSY_LFACLKEN0, SYNCBUSY_LFAPRESC0,
-                                         SYNCBUSY_LFBCLKEN0, SYNCBUSY_LFBPRESC0};
 static constexpr int64_t SYNC_EDGES = 3;
 static constexpr uint32_t UNLOCK = 0x580E;
 
@@ -46,11 +45,11 @@ void Cmu::reset() {
     selected = HFRCO;
     wanted = -1;
     sleeping = 0;
-    pending = 0;
+    unsynchronised = 0;
     std::memset(effective, 0, sizeof effective);
 }
 
-// -- registers --------------------------------------------------------------------------------
+// -- registers --
 
 uint32_t Cmu::status() const {
     uint32_t bits = SELECTED[selected];
@@ -60,8 +59,6 @@ uint32_t Cmu::status() const {
            (reg(STATUS) & (STATUS_USBCHFCLKSEL | STATUS_USBCLFXOSEL | STATUS_USBCLFRCOSEL));
 }
 
-uint32_t Cmu::read(uint32_t offset) { return Cmu::peek(offset); }
-
 uint32_t Cmu::peek(uint32_t offset) const {
     switch (offset) {
     case STATUS:
@@ -69,7 +66,7 @@ uint32_t Cmu::peek(uint32_t offset) const {
     case SYNCBUSY: {
         uint32_t busy = 0;
         for (int n = 0; n < SYNCED; n++)
-            busy |= pending >> n & 1 ? SYNC_BITS[n] : 0;
+            busy |= unsynchronised >> n & 1 ? described(SYNC_OFFSETS[n])->busy : 0;
         return busy;
     }
     default:
@@ -78,14 +75,13 @@ uint32_t Cmu::peek(uint32_t offset) const {
 }
 
 bool Cmu::locked_register(uint32_t offset) const {
-    return reg(LOCK) && offset < SYNCBUSY && !(offset >= IF && offset <= IEN);
+    return reg(LOCK) && offset < LOCK && !(offset >= IF && offset <= IEN) &&
+           !(offset >= SYNCBUSY && offset < LFACLKEN0);
 }
 
 void Cmu::write(uint32_t offset, uint32_t value) {
-    if (locked_register(offset) || (reg(LOCK) && offset >= LFACLKEN0 && offset < LOCK)) {
-        part.log_once("CMU is locked: a write to its registers is lost");
-        return;
-    }
+    if (locked_register(offset))
+        return report_locked();
     switch (offset) {
     case CTRL:
     case HFCORECLKDIV:
@@ -104,9 +100,9 @@ void Cmu::write(uint32_t offset, uint32_t value) {
         command_oscillators(value);
         break;
     case CMD:
-        if (take(value, CMD_HFCLKSEL)) {
+        if (field(value, CMD_HFCLKSEL)) {
             static constexpr int ORDER[] = {-1, HFRCO, HFXO, LFRCO, LFXO, -1, -1, -1};
-            select(ORDER[take(value, CMD_HFCLKSEL)]);
+            select(ORDER[field(value, CMD_HFCLKSEL)]);
         }
         if (value & CMD_CALSTART)
             start_calibration();
@@ -120,7 +116,7 @@ void Cmu::write(uint32_t offset, uint32_t value) {
         store(offset, value);
         for (int n = 0; n < SYNCED; n++)
             if (SYNC_OFFSETS[n] == offset)
-                pending |= 1u << n;
+                unsynchronised |= 1u << n;
         synchronise();
         break;
     case FREEZE:
@@ -128,14 +124,14 @@ void Cmu::write(uint32_t offset, uint32_t value) {
         synchronise();
         break;
     case LOCK:
-        reg(LOCK) = (value & 0xFFFF) != UNLOCK;
+        lock(LOCK, value, UNLOCK);
         break;
     default:
         Peripheral::write(offset, value);
     }
 }
 
-// -- oscillators ------------------------------------------------------------------------------
+// -- oscillators --
 
 void Cmu::command_oscillators(uint32_t value) {
     for (int n = 0; n < OSCILLATORS; n++) {
@@ -158,9 +154,9 @@ void Cmu::switch_on(int number) {
                              LF_CYCLES[] = {8, 1024, 16384, 32768};
     int64_t time = RC_START;
     if (number == HFXO)
-        time = HFXO_START + HF_CYCLES[take(reg(CTRL), CTRL_HFXOTIMEOUT)] * SECOND / HFXO_HERTZ;
+        time = HFXO_START + HF_CYCLES[field(reg(CTRL), CTRL_HFXOTIMEOUT)] * SECOND / HFXO_HERTZ;
     if (number == LFXO)
-        time = LFXO_START + LF_CYCLES[take(reg(CTRL), CTRL_LFXOTIMEOUT)] * SECOND / LF_HERTZ;
+        time = LFXO_START + LF_CYCLES[field(reg(CTRL), CTRL_LFXOTIMEOUT)] * SECOND / LF_HERTZ;
     if (number == LFRCO)
         time = LFRCO_START;
     oscillators[number].enabled = true;
@@ -186,7 +182,7 @@ void Cmu::select(int number) {
     if (!one.enabled) {
         part.log_once("CMU: HFCLKSEL selects an oscillator that is off: ignored");
     } else if (!one.ready) {
-        // The core stands until the first edge comes.
+        // The core stops until the oscillator runs.
         wanted = number;
         part.stop_clock(one.started.time);
     } else {
@@ -194,8 +190,6 @@ void Cmu::select(int number) {
         check_limits();
     }
 }
-
-void Cmu::sleep(int mode) { sleeping = mode; }
 
 bool Cmu::low_frequency_on() const { return oscillators[LFRCO].enabled || oscillators[LFXO].enabled; }
 
@@ -212,14 +206,14 @@ void Cmu::wake() {
     sleeping = 0;
 }
 
-// -- synchronisation, calibration ---------------------------------------------------------------
+// -- synchronisation, calibration --
 
 void Cmu::synchronise() {
     if (reg(FREEZE) & FREEZE_REGFREEZE)
         return;
     for (int domain = 0; domain < 2; domain++) {
         const Rate &clock = part.rate(domain ? Clock::LFB : Clock::LFA);
-        if (!(pending >> 2 * domain & 3) || !clock.runs()) {
+        if (!(unsynchronised >> 2 * domain & 3) || !clock.runs()) {
             part.cancel(synchronised[domain]);
             continue;
         }
@@ -232,9 +226,9 @@ void Cmu::synchronise() {
 void Cmu::on_synchronised(int domain) {
     part.change_clocks([&] {
         for (int n = 2 * domain; n < 2 * domain + 2; n++)
-            if (pending >> n & 1)
+            if (unsynchronised >> n & 1)
                 effective[n] = reg(SYNC_OFFSETS[n]);
-        pending &= ~(3u << 2 * domain);
+        unsynchronised &= ~(3u << 2 * domain);
     });
 }
 
@@ -244,14 +238,14 @@ void Cmu::clocks_changed() {
     synchronise();
 }
 
-// Counts CALCNT + 1 periods of one clock, and those of the other meanwhile (11.3.3).
+// Counts the periods of one clock during CALCNT + 1 periods of the other (11.3.3).
 void Cmu::start_calibration() {
     static constexpr Clock UP[] = {Clock::HFXO, Clock::LFXO, Clock::HFRCO, Clock::LFRCO,
                                    Clock::AUXHFRCO},
                            DOWN[] = {Clock::HFCORE, Clock::HFXO, Clock::LFXO, Clock::HFRCO,
                                      Clock::LFRCO, Clock::AUXHFRCO};
-    const uint32_t up = take(reg(CALCTRL), CALCTRL_UPSEL);
-    const uint32_t down = take(reg(CALCTRL), CALCTRL_DOWNSEL);
+    const uint32_t up = field(reg(CALCTRL), CALCTRL_UPSEL);
+    const uint32_t down = field(reg(CALCTRL), CALCTRL_DOWNSEL);
     if (up > 4 || down > 5)
         return;
     calibration_top = reg(CALCNT);
@@ -271,9 +265,8 @@ void Cmu::on_calibrated(int64_t time) {
     reg(CALCNT) = (uint32_t)(count & 0xFFFFF);
     raise(IF_CALRDY);
     if (reg(CALCTRL) & CALCTRL_CONT) {
-        const uint32_t top = calibration_top;
         const uint32_t result = reg(CALCNT);
-        reg(CALCNT) = top;
+        reg(CALCNT) = calibration_top;
         start_calibration();
         reg(CALCNT) = result;
     }

@@ -13,19 +13,18 @@ public:
 
     void reset() override;
     void write(uint32_t offset, uint32_t value) override;
-    uint32_t read(uint32_t offset) override;
     uint32_t peek(uint32_t offset) const override;
     void clocks_changed() override;
 
-    // The clock tree as the registers have it; rates begin at `now`.
+    // The clock tree as the registers select it; rates begin at `now`.
     void rates(Rates &rates, int64_t now) const;
     Rate unit_rate(const Instance &instance) const;
     bool enabled(const Instance &instance) const;
     // Whether a unit's registers are behind HFPERCLK.
     bool on_slow_bus(const Instance &instance) const;
 
-    // Oscillators follow the energy mode; on wake-up HFRCO is the core's clock.
-    void sleep(int mode);
+    // Oscillators stop and start with the energy mode; after wake-up the core runs from HFRCO.
+    void sleep(int mode) { sleeping = mode; }
     void wake();
     bool low_frequency_on() const;
 
@@ -44,8 +43,8 @@ private:
     int selected = HFRCO;      // of HFCLK
     int wanted = -1;           // selected, but not running yet
     int sleeping = 0;
-    uint32_t effective[SYNCED] = {};   // LFACLKEN0 LFAPRESC0 LFBCLKEN0 LFBPRESC0 as they act
-    uint32_t pending = 0;              // of them, those that wait for synchronisation
+    uint32_t effective[SYNCED] = {};   // LFACLKEN0 LFAPRESC0 LFBCLKEN0 LFBPRESC0 in effect
+    uint32_t unsynchronised = 0;       // a bit for each of them that waits for synchronisation
     Event synchronised[2];             // LFA, LFB
     Event calibrated;
     uint32_t calibration_top = 0;
@@ -53,10 +52,10 @@ private:
     int64_t calibration_began = 0;
     struct Enable {
         const Instance *instance;
-        uint32_t registers, mask;      // where its enable bit is; 0: always on
+        uint32_t offset, mask;         // of its enable bit; 0: always on
         bool low_energy;
         int synced;                    // of its LF clock: index into `effective`, or -1
-        uint32_t enable, prescaler;    // masks there
+        uint32_t enable, prescaler;    // masks in `effective`
     };
     static const Enable UNITS[];
     mutable const Instance *last = nullptr;

@@ -8,7 +8,7 @@ namespace efm32gg {
 using namespace emu;
 
 static constexpr uint32_t EMU_UNLOCK = 0xADE8;
-// EM4CTRL takes 2 and 3 in turn, 2 first and last (10.3.3).
+// Writes of 2 and 3 to EM4CTRL in turn, 2 first and last (10.3.3).
 static constexpr int EM4_SEQUENCE = 9;
 
 void Emu::reset() {
@@ -28,18 +28,16 @@ int Emu::sleeping_mode(bool deep) const {
 
 void Emu::write(uint32_t offset, uint32_t value) {
     if (offset == LOCK) {
-        reg(LOCK) = (value & 0xFFFF) != EMU_UNLOCK;
+        lock(LOCK, value, EMU_UNLOCK);
         return;
     }
-    if (reg(LOCK) && offset < STATUS) {
-        part.log_once("EMU is locked: a write to its registers is lost");
-        return;
-    }
+    if (reg(LOCK) && offset < STATUS)
+        return report_locked();
     if (offset == EM4CONF && reg(EM4CONF) & EM4CONF_LOCKCONF)
         return;
     Peripheral::write(offset, value);
     if (offset == CTRL)
-        em4_written(take(value, CTRL_EM4CTRL));
+        em4_written(field(value, CTRL_EM4CTRL));
     if (offset == AUXCTRL && value & AUXCTRL_HRCCLR)
         part.rmu->clear_backup_causes();
     if (offset == MEMCTRL && value & MEMCTRL_POWERDOWN)
@@ -55,7 +53,7 @@ void Emu::em4_written(uint32_t value) {
     }
 }
 
-void Emu::wake_from_em4(uint32_t) {
+void Emu::wake_from_em4() {
     if (part.mode == 4)
         part.request_reset(rmu::RSTCAUSE_EM4RST | rmu::RSTCAUSE_EM4WURST);
 }

@@ -1,4 +1,4 @@
-// Reset management unit: why the part was reset. EFM32GG Reference Manual, chapter 9.
+// Reset management unit: causes of resets. EFM32GG Reference Manual, chapter 9.
 #pragma once
 
 #include "efm32gg/part/part.h"
@@ -18,7 +18,7 @@ public:
             reg(rmu::CTRL) = control;
     }
 
-    // Causes add up until they are cleared; power-on leaves none of the others (table 9.1).
+    // Causes accumulate until they are cleared; power-on clears the others (table 9.1).
     void caused(uint32_t cause) {
         reg(rmu::RSTCAUSE) = cause & rmu::RSTCAUSE_PORST ? (uint32_t)rmu::RSTCAUSE_PORST
                                                          : reg(rmu::RSTCAUSE) | cause;
@@ -29,12 +29,12 @@ public:
             reg(rmu::RSTCAUSE) &= BACKUP;
         Peripheral::write(offset, value);
         if (offset == rmu::CTRL && backup_domain_resets()) {
-            part.reset_cause = 0;  // no power-on
-            part.find("BURTC")->reset();
+            part.reset_cause = 0;  // not a power-on reset
+            part.peripheral_at(instance::BURTC.base)->reset();
         }
     }
 
-    // The causes that RCCLR leaves to EMU_AUXCTRL.HRCCLR.
+    // Clears the causes that EMU_AUXCTRL.HRCCLR clears, and RCCLR does not.
     void clear_backup_causes() { reg(rmu::RSTCAUSE) &= ~BACKUP; }
 
     bool lockup_resets() const { return !(reg(rmu::CTRL) & rmu::CTRL_LOCKUPRDIS); }

@@ -11,13 +11,13 @@ namespace {
 constexpr uint32_t ALL = (1u << Dma::CHANNELS) - 1;
 constexpr uint32_t ALTERNATE = 0x100;  // bytes from the primary to the alternate descriptors
 
-// Cycles: arbitration, three words of descriptor read and one written; an item read and written.
+// Cycles: arbitration with three descriptor words read and one written; an item read and written.
 constexpr int64_t ROUND = 6, ITEM = 4;
 
-// How long EM2 is left for a transfer of a unit that asks for it (t_EM20 of the data sheet).
+// Time to leave EM2 for a transfer (t_EM20 of the data sheet).
 constexpr int64_t WAKE_UP = 2 * MICROSECOND;
 
-// Of a descriptor's control word (8.4.3.3).
+// Cycle types and fields of a descriptor's control word (8.4.3.3).
 enum Cycle : uint32_t { STOP, BASIC, AUTO, PING_PONG, MEMORY, MEMORY_ALTERNATE, PERIPHERAL,
                         PERIPHERAL_ALTERNATE };
 constexpr uint32_t CYCLE = 7, COUNT = 0x3FF << 4, POWER = 0xF << 14, SOURCE_SIZE = 3 << 24,
@@ -30,8 +30,6 @@ constexpr bool single(int source) {
 }
 
 }  // namespace
-
-Dma::Dma(Part &part, const Instance &instance) : Peripheral(part, instance) {}
 
 void Dma::reset() {
     Peripheral::reset();
@@ -94,17 +92,15 @@ void Dma::write(uint32_t offset, uint32_t value) {
     consider();
 }
 
-void Dma::update_interrupts() { line(0, reg(IF) & reg(IEN)); }
-
 // -- requests --
 
 int Dma::source(int channel) const {
-    return (int)take(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_SOURCESEL);
+    return (int)field(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_SOURCESEL);
 }
 
 bool Dma::requested(int channel) const {
     const uint32_t control = reg(CH0_CTRL + 4 * (uint32_t)channel);
-    const uint32_t signal = take(control, CH0_CTRL_SIGSEL);
+    const uint32_t signal = field(control, CH0_CTRL_SIGSEL);
     const int from = source(channel);
     return from && signal < 8 && (levels[from] | pulses[from]) >> signal & 1;
 }
@@ -112,7 +108,7 @@ bool Dma::requested(int channel) const {
 bool Dma::listens(int from, int signal) const {
     for (int n = 0; n < CHANNELS; n++)
         if (enabled_channels >> n & 1 && source(n) == from &&
-            (int)take(reg(CH0_CTRL + 4 * (uint32_t)n), CH0_CTRL_SIGSEL) == signal)
+            (int)field(reg(CH0_CTRL + 4 * (uint32_t)n), CH0_CTRL_SIGSEL) == signal)
             return true;
     return false;
 }
@@ -166,7 +162,7 @@ void Dma::consider() {
     part.schedule(serve, part.now() + delay(ROUND));
 }
 
-// The round before is over, the next begins.
+// The previous round is over, the next begins.
 void Dma::on_serve(int64_t time) {
     if (done) {
         reg(IF) |= done;
@@ -197,7 +193,7 @@ int64_t Dma::round(int channel) {
     continued &= ~bit;
     if (by_unit)
         pulses[source(channel)] &=
-            (uint8_t)~(1 << take(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_SIGSEL));
+            (uint8_t)~(1 << field(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_SIGSEL));
     int64_t wait = 0;
     uint32_t from_end = 0, to_end = 0, control = 0;
     if (!part.load(at, 4, from_end, wait) || !part.load(at + 4, 4, to_end, wait) ||
@@ -210,15 +206,15 @@ int64_t Dma::round(int channel) {
         enabled_channels &= ~bit;
         return ROUND;
     }
-    const uint32_t left = take(control, COUNT) + 1;
-    uint32_t count = 1u << std::min(take(control, POWER), 10u);
+    const uint32_t left = field(control, COUNT) + 1;
+    uint32_t count = 1u << std::min(field(control, POWER), 10u);
     if (by_unit && single(source(channel)) && !(bursts & bit) && cycle <= PING_PONG &&
         cycle != AUTO)
         count = 1;
     count = std::min(count, left);
-    const int size = 1 << take(control, SOURCE_SIZE);
-    const int from_step = (int)take(control, SOURCE_STEP);
-    const int to_step = (int)take(control, TARGET_STEP);
+    const int size = 1 << field(control, SOURCE_SIZE);
+    const int from_step = (int)field(control, SOURCE_STEP);
+    const int to_step = (int)field(control, TARGET_STEP);
     for (uint32_t n = 0; n < count; n++) {
         const uint32_t back = left - 1 - n;
         // Four words at a time go to the same alternate descriptor.
@@ -233,7 +229,7 @@ int64_t Dma::round(int channel) {
     }
     const uint32_t rest = left - count;
     control &= ~(COUNT | (rest ? 0 : CYCLE));
-    control |= give(rest ? rest - 1 : 0, COUNT);
+    control |= to_field(rest ? rest - 1 : 0, COUNT);
     if (!part.store(at + 8, 4, control, wait))
         error(channel);
     switch (cycle) {
@@ -254,7 +250,7 @@ int64_t Dma::round(int channel) {
         }
         break;
     case MEMORY:
-    case PERIPHERAL:  // four words make the alternate descriptor, which comes next
+    case PERIPHERAL:  // four words are the alternate descriptor, which is used next
         alternates |= bit;
         if (cycle == MEMORY || by_unit)
             continued |= bit;

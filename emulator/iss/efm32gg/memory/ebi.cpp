@@ -9,7 +9,7 @@ namespace efm32gg {
 
 using namespace ebi;
 
-// How many lines upward a bank's registers are from those of bank 0 (14.5).
+// Offset of a bank's registers from those of bank 0 (14.5).
 static constexpr uint32_t BANK_REGISTERS[] = {0, 0x14, 0x24, 0x34};
 
 void Ebi::reset() {
@@ -24,8 +24,6 @@ uint32_t Ebi::peek(uint32_t offset) const {
     return Peripheral::peek(offset);
 }
 
-uint32_t Ebi::read(uint32_t offset) { return Ebi::peek(offset); }
-
 void Ebi::write(uint32_t offset, uint32_t value) {
     Peripheral::write(offset, value);
     set_up();
@@ -37,7 +35,7 @@ void Ebi::write(uint32_t offset, uint32_t value) {
         part.log_once("EBI: ARDY is not modelled: the bus is always ready");
 }
 
-// Banks are 64 MB, with the alternative map 256 MB; in the code space 32 or 64 MB (14.3.8).
+// Banks have 64 MB, with the alternative map 256 MB; in the code space 32 or 64 MB (14.3.8).
 int Ebi::bank_of(uint32_t address, uint32_t &offset) const {
     if (address < BASE) {
         offset = address & 0x01FFFFFF;
@@ -57,23 +55,22 @@ uint32_t Ebi::timing(uint32_t offset, int bank) const {
     return reg(offset + (reg(CTRL) & CTRL_ITS ? BANK_REGISTERS[bank] : 0));
 }
 
-// One transaction, in cycles of HFCORECLK (14.3.2): multiplexed modes latch the address first; a
-// strobe and the address set-up take a cycle at least. Half-cycle options move edges only.
+// Cycles of HFCORECLK per transaction (14.3.2): multiplexed modes latch the address first; a strobe
+// and the address set-up take at least one cycle. Half-cycle options move edges only.
 int64_t Ebi::cycles(int bank, bool write) const {
     const uint32_t address = timing(ADDRTIMING, bank), mode = bank_mode(bank);
     const uint32_t times = timing(write ? WRTIMING : RDTIMING, bank);
-    int64_t count = take(times, RDTIMING_RDSETUP) + std::max(1u, take(times, RDTIMING_RDSTRB)) +
-                    take(times, RDTIMING_RDHOLD);
+    int64_t count = field(times, RDTIMING_RDSETUP) + std::max(1u, field(times, RDTIMING_RDSTRB)) +
+                    field(times, RDTIMING_RDHOLD);
     if (mode == D16A16ALE || mode == D8A24ALE)
-        count += std::max(1u, take(address, ADDRTIMING_ADDRSETUP)) +
-                 take(address, ADDRTIMING_ADDRHOLD);
+        count += std::max(1u, field(address, ADDRTIMING_ADDRSETUP)) +
+                 field(address, ADDRTIMING_ADDRHOLD);
     return count + !(reg(CTRL) >> 12 & 1u << bank);
 }
 
-// Mask of the address lines that leave the part.
 uint32_t Ebi::reach(int bank) const {
     static constexpr uint32_t LINES[] = {8, 17, 24, 1};
-    const uint32_t mode = bank_mode(bank), upper = take(reg(ROUTE), ROUTE_APEN);
+    const uint32_t mode = bank_mode(bank), upper = field(reg(ROUTE), ROUTE_APEN);
     const uint32_t lines = std::max(LINES[mode], upper + (mode == D16 || mode == D16A16ALE));
     return (1u << std::min(lines, 28u)) - 1;
 }
@@ -101,7 +98,7 @@ bool Ebi::report(int bank) {
     return false;
 }
 
-// A whole access in memory, of a constant size: detection reads whole pictures by bytes.
+// An access to memory with a constant size, for speed: firmware reads whole images bytewise.
 template <class Word> static uint32_t move(uint8_t *cell, uint32_t value, bool write) {
     Word word = (Word)value;
     if (write)

@@ -12,7 +12,6 @@ public:
     using Peripheral::Peripheral;
 
     void reset() override;
-    uint32_t read(uint32_t offset) override;
     uint32_t peek(uint32_t offset) const override;
     void write(uint32_t offset, uint32_t value) override;
     void clocks_changed() override { set_up(); }
@@ -22,23 +21,23 @@ public:
                (address >= CODE_BASE && address < 0x20000000);
     }
 
-    // An access of 1, 2 or 4 bytes: one or more transactions. False is a bus fault.
+    // Accesses 1, 2 or 4 bytes in one or more transactions. False is a bus fault.
     bool access(uint32_t address, int size, uint32_t &value, bool write, int64_t &wait);
     bool peek(uint32_t address, int size, uint32_t &value) const;
 
 private:
     enum Mode : uint32_t { D8A8, D16A16ALE, D8A24ALE, D16 };
 
-    // What registers make of a bank.
+    // A bank as configured by the registers.
     struct Bank {
         bool enabled, connected, memory, buffered;
-        int bytes;                             // of a transaction
-        int64_t read_cycles, write_cycles;     // of a transaction
-        uint32_t reach;                        // mask of the address lines that leave the part
+        int bytes;                             // per transaction
+        int64_t read_cycles, write_cycles;     // per transaction
+        uint32_t reach;                        // mask of the address lines that have pins
     };
 
     Bank banks[4] = {};
-    int64_t busy_until = 0;    // cycle in which the write buffer is empty again
+    int64_t busy_until = 0;    // cycle at which the write buffer is empty again
 
     void set_up();
     bool report(int bank);

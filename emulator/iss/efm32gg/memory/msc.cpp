@@ -19,8 +19,7 @@ static constexpr uint32_t WAIT_STATES[] = {0, 1, 0, 1, 2, 2, 2, 2};
 static constexpr uint32_t NO_TAG = 0xFFFFFFFF;
 
 Msc::Msc(Part &part, const Instance &instance)
-    : Peripheral(part, instance), wear(part.memories.flash_size / Part::PAGE_SIZE),
-      done(Event::of<&Msc::on_done>(this)) {
+    : Peripheral(part, instance), wear(part.memories.flash_size / Part::PAGE_SIZE) {
     std::fill(std::begin(missing), std::end(missing), NO_TAG);
     invalidate_cache();
 }
@@ -36,14 +35,14 @@ void Msc::reset() {
     set_up_reads();
 }
 
-// -- reading ----------------------------------------------------------------------------------
+// -- reading --
 
 void Msc::invalidate_cache() { std::fill(std::begin(cache), std::end(cache), NO_TAG); }
 
-// The core asks fetch() for words that are not in `lines`: with the cache off that is all but the
-// latest, and while hits are counted all of them.
+// The core calls fetch() for words that are not in `lines`: with the cache off all but the latest
+// word, and while hits are counted all words.
 void Msc::set_up_reads() {
-    wait_states = WAIT_STATES[take(reg(READCTRL), READCTRL_MODE)];
+    wait_states = WAIT_STATES[field(reg(READCTRL), READCTRL_MODE)];
     lines.shift = 2;
     lines.tags = counting() ? missing : cache;
     lines.mask = reg(READCTRL) & READCTRL_IFCDIS ? 0 : CACHE_WORDS - 1;
@@ -56,8 +55,6 @@ void Msc::set_up_reads() {
     part.cpu.regions_changed();
 }
 
-void Msc::clocks_set() { check_wait_states(); }
-
 void Msc::check_wait_states() {
     const int64_t core = part.hertz(Clock::HFCORE);
     if (wait_states < 2 && core > FASTEST[wait_states])
@@ -65,9 +62,9 @@ void Msc::check_wait_states() {
                       (int)FASTEST[wait_states]);
 }
 
-// The array gives a word each 1 + wait_states cycles. The core's prefetch unit asks for the next
-// word as soon as it has the one before; behind a hit that is assumed to be a cycle ago, and two
-// with PREFETCH, by which the controller looks ahead as well.
+// The array reads a word in 1 + wait_states cycles. The core's prefetch unit requests the next word
+// as soon as it has the previous one; after a hit that is assumed to be one cycle ago, or two with
+// PREFETCH, with which the controller reads ahead as well.
 uint32_t Msc::fetch(uint32_t at, bool sequential) {
     const uint32_t tag = at >> 2, slot = tag & lines.mask;
     const bool caching = !(reg(READCTRL) & READCTRL_IFCDIS);
@@ -80,13 +77,13 @@ uint32_t Msc::fetch(uint32_t at, bool sequential) {
     if (counting() && caching)
         misses++;
     const int64_t now = part.cpu.cycles;
-    int64_t asked = now;
+    int64_t requested = now;
     if (sequential) {
         const int64_t ahead = reg(READCTRL) & READCTRL_PREFETCH ? 2 : 1;
-        asked = tag == array_tag + 1 ? array_free + 1 : now - ahead;
+        requested = tag == array_tag + 1 ? array_free + 1 : now - ahead;
     }
     array_tag = tag;
-    array_free = std::max(asked + (int64_t)wait_states, now - 1);
+    array_free = std::max(requested + (int64_t)wait_states, now - 1);
     return (uint32_t)std::clamp<int64_t>(array_free - now, 0, wait_states);
 }
 
@@ -97,9 +94,7 @@ int64_t Msc::read_wait(uint32_t at) {
     return wait_states;
 }
 
-// -- registers --------------------------------------------------------------------------------
-
-uint32_t Msc::read(uint32_t offset) { return Msc::peek(offset); }
+// -- registers --
 
 uint32_t Msc::peek(uint32_t offset) const {
     switch (offset) {
@@ -111,16 +106,14 @@ uint32_t Msc::peek(uint32_t offset) const {
 
 void Msc::write(uint32_t offset, uint32_t value) {
     if (reg(LOCK) && (offset == CTRL || offset == READCTRL || offset == WRITECMD ||
-                      offset == TIMEBASE)) {
-        part.log_once("MSC is locked: a write to its registers is lost");
-        return;
-    }
+                      offset == TIMEBASE))
+        return report_locked();
     switch (offset) {
     case LOCK:
-        reg(LOCK) = (value & 0xFFFF) != MSC_UNLOCK;
+        lock(LOCK, value, MSC_UNLOCK);
         break;
     case MASSLOCK:
-        reg(MASSLOCK) = (value & 0xFFFF) != MASS_UNLOCK;
+        lock(MASSLOCK, value, MASS_UNLOCK);
         break;
     case READCTRL:
         store(offset, value);
@@ -166,7 +159,7 @@ void Msc::write(uint32_t offset, uint32_t value) {
     }
 }
 
-// -- programming ------------------------------------------------------------------------------
+// -- programming --
 
 void Msc::command(uint32_t value) {
     if (value & WRITECMD_CLEARWDATA) {
@@ -211,7 +204,7 @@ uint8_t *Msc::page(uint32_t at) {
     return part.memory_at(at, left);
 }
 
-// Lock bits: a word has 32 pages, 0 locks; word 126 is the user data page (7.3.5).
+// Lock bits: one word for 32 pages, 0 locks; word 126 is for the user data page (7.3.5).
 bool Msc::page_locked(uint32_t at) const {
     const uint32_t number = at / Part::PAGE_SIZE;
     uint32_t left, word;
@@ -268,7 +261,7 @@ void Msc::busy(int64_t time) {
     part.schedule(done, part.now() + time);
 }
 
-// While it is written the flash does not answer: the core's accesses come to read_wait.
+// Flash that is being written does not answer: the core's accesses then go through read_wait.
 void Msc::set_readable(bool readable) {
     for (armv7m::Region &region : part.cpu.regions)
         if (region.host == part.memories.flash)

@@ -14,41 +14,38 @@ public:
     Msc(Part &part, const Instance &instance);
 
     void reset() override;
-    uint32_t read(uint32_t offset) override;
     uint32_t peek(uint32_t offset) const override;
     void write(uint32_t offset, uint32_t value) override;
 
-    // The core's clock is another: wait states are checked against it.
-    void clocks_set();
+    // Reports a core clock that is too fast for the wait states.
+    void check_wait_states();
 
-    // Cycles that the fetch of a word costs; those that the cache has are not asked for.
+    // Cycles that the fetch of a word costs. Not called for words in the cache.
     uint32_t fetch(uint32_t address, bool sequential);
     // Wait states of a data access to flash or information; stalls the core while flash is busy.
     int64_t read_wait(uint32_t address);
     bool ignores_bus_writes() const { return reg(msc::CTRL) & msc::CTRL_BUSFAULT; }
 
-    // Erasures by page of the flash since the part was made.
-    std::vector<uint32_t> wear;
-
 private:
     armv7m::FetchLines lines{};
     uint32_t cache[CACHE_WORDS], missing[CACHE_WORDS];
     uint32_t wait_states = 0;
-    int64_t array_free = 0;          // cycle in which the flash array ends its read
-    uint32_t array_tag = 0;          // of the word that it read
+    int64_t array_free = 0;          // cycle at which the flash array ends its last read
+    uint32_t array_tag = 0;          // of the word read
     uint32_t hits = 0, misses = 0;
 
-    uint32_t address = 0;            // of the write that comes next
+    std::vector<uint32_t> wear;      // erasures by page since the part was created
+
+    uint32_t address = 0;            // of the next write
     bool data_loaded = false;        // WDATA has a word
-    bool sequence = false;           // WRITETRIG: words follow by themselves
-    bool triggered = false;          // the loaded word goes as soon as the array is free
+    bool sequence = false;           // WRITETRIG: each word is written when loaded
+    bool triggered = false;          // the loaded word is written as soon as the array is free
     bool erasing = false;
-    Event done;
+    Event done = Event::of<&Msc::on_done>(this);
 
     bool counting() const { return reg(msc::STATUS) & msc::STATUS_PCRUNNING; }
     void invalidate_cache();
     void set_up_reads();
-    void check_wait_states();
     void command(uint32_t value);
     void load_address();
     bool page_locked(uint32_t at) const;

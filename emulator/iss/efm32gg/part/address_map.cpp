@@ -11,8 +11,8 @@
 
 namespace efm32gg {
 
-// The bridge to the peripheral bus takes this long when the peripherals' clock is the core's; a
-// write goes on behind it (chapter 5.2.3).
+// Cycles of the bridge to the peripheral bus when peripherals run at the core's clock; a write
+// completes in the background (chapter 5.2.3).
 static constexpr int64_t READ_WAIT = 2, WRITE_WAIT = 1;
 
 void Part::set_bus_waits() {
@@ -39,22 +39,21 @@ bool Part::access_allowed(const Peripheral &unit) {
 }
 
 uint8_t *Part::memory_at(uint32_t address, uint32_t &left) {
-    const auto within = [&](uint32_t base, uint32_t size, uint8_t *host) -> uint8_t * {
-        left = size - (address - base);
-        return host && address - base < size ? host + (address - base) : nullptr;
-    };
-    uint8_t *found = within(0, memories.flash_size, memories.flash);
-    if (!found)
-        found = within(RAM, memories.ram_size, memories.ram);
-    if (!found)
-        found = within(RAM_CODE, memories.ram_size, memories.ram);
-    if (!found)
-        found = within(USER_PAGE, PAGE_SIZE, information);
-    if (!found)
-        found = within(LOCK_PAGE, PAGE_SIZE, information + PAGE_SIZE);
-    if (!found)
-        found = within(INFORMATION, PAGE_SIZE, information + 2 * PAGE_SIZE);
-    return found;
+    const struct {
+        uint32_t base, size;
+        uint8_t *host;
+    } blocks[] = {{0, memories.flash_size, memories.flash},
+                  {RAM, memories.ram_size, memories.ram},
+                  {RAM_CODE, memories.ram_size, memories.ram},
+                  {USER_PAGE, PAGE_SIZE, information},
+                  {LOCK_PAGE, PAGE_SIZE, information + PAGE_SIZE},
+                  {INFORMATION, PAGE_SIZE, information + 2 * PAGE_SIZE}};
+    for (const auto &block : blocks)
+        if (block.host && address - block.base < block.size) {
+            left = block.size - (address - block.base);
+            return block.host + (address - block.base);
+        }
+    return nullptr;
 }
 
 static bool writable_memory(uint32_t address) { return address >= Part::RAM_CODE; }
@@ -62,8 +61,8 @@ static bool writable_memory(uint32_t address) { return address >= Part::RAM_CODE
 bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
     uint32_t left;
     value = 0;
-    if (address >= Ebi::BASE)
-        return ebi->covers(address) && ebi->access(address, size, value, false, wait);
+    if (ebi->covers(address))
+        return ebi->access(address, size, value, false, wait);
     if (const uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
         if (left < (uint32_t)size)
             return false;
@@ -81,15 +80,13 @@ bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
             value &= (1u << 8 * size) - 1;
         return true;
     }
-    if (ebi->covers(address))
-        return ebi->access(address, size, value, false, wait);
     return false;
 }
 
 bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
     uint32_t left;
-    if (address >= Ebi::BASE)
-        return ebi->covers(address) && ebi->access(address, size, value, true, wait);
+    if (ebi->covers(address))
+        return ebi->access(address, size, value, true, wait);
     if (uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
         if (!writable_memory(address))
             return msc->ignores_bus_writes();
@@ -111,8 +108,6 @@ bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
         unit->write(offset, value);
         return true;
     }
-    if (ebi->covers(address))
-        return ebi->access(address, size, value, true, wait);
     return false;
 }
 

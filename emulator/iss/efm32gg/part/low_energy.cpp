@@ -1,65 +1,129 @@
 #include "efm32gg/part/low_energy.h"
 
-namespace efm32gg {
+#include <algorithm>
+#include <utility>
 
-LowEnergy::LowEnergy(Part &part, const Instance &instance, uint32_t freeze, uint32_t synchronizing,
-                     uint32_t command)
-    : Peripheral(part, instance), freeze(freeze), synchronizing(synchronizing), commands(command) {}
+namespace efm32gg {
 
 void LowEnergy::reset() {
     Peripheral::reset();
-    part.cancel(arrived);
-    late_count = 0;
+    part.cancel(synchronized);
+    count = 0;
 }
 
 void LowEnergy::write(uint32_t offset, uint32_t value) {
-    const uint32_t bit = busy_bit(offset);
-    if (!bit) {
-        const bool was_frozen = reg(freeze) & 1;
+    const Register *written = described(offset);
+    if (!written || !written->busy) {
+        const bool was_frozen = frozen();
         Peripheral::write(offset, value);
-        if (offset == freeze && was_frozen && !(value & 1))
+        if ((int32_t)offset == layout.freeze && was_frozen && !(value & 1))
             start();
         return;
     }
-    reg(synchronizing) |= bit;
-    const bool at_once = immediate() && !(reg(freeze) & 1);
-    int place = 0;
-    while (place < late_count && late[place].offset != offset)
+    reg((uint32_t)layout.syncbusy) |= written->busy;
+    const bool at_once = immediate() && !frozen();
+    Write *place = waiting;
+    while (place < waiting + count && place->offset != offset)
         place++;
-    if (place == MOST)
+    if (place == waiting + MOST)
         return;
-    if (place == late_count)
-        late[late_count++] = {offset, 0, false};
-    // Of values the last one counts.
-    const bool gathers = offset == commands && !late[place].applied;
-    late[place] = {offset, gathers ? both(late[place].value, value) : value, at_once};
+    if (place == waiting + count) {
+        *place = {offset, 0, false};
+        count++;
+    }
+    // A newer value replaces the older one; commands are merged.
+    const bool merges = (int32_t)offset == layout.cmd && !place->applied;
+    *place = {offset, merges ? merge_commands(place->value, value) : value, at_once};
     if (at_once)
         apply(offset, value);
     start();
 }
 
-// Two to three clocks later.
+// A write takes two to three clocks.
 void LowEnergy::start() {
     const Rate rate = synchronizer();
-    if (late_count && !arrived.pending() && !(reg(freeze) & 1) && rate.runs())
-        part.schedule(arrived, rate.time(rate.edges(part.now()) + 3));
+    if (count && !synchronized.pending() && !frozen() && rate.runs())
+        part.schedule(synchronized, rate.time(rate.edges(part.now()) + 3));
 }
 
-void LowEnergy::on_arrived(int64_t) {
-    const int count = late_count;
-    Late done[MOST];
-    for (int n = 0; n < count; n++)
-        done[n] = late[n];
-    late_count = 0;
-    reg(synchronizing) = 0;
-    for (int n = 0; n < count; n++)
+void LowEnergy::on_synchronized(int64_t) {
+    Write done[MOST];
+    const int number = std::exchange(count, 0);
+    std::copy(waiting, waiting + number, done);
+    reg((uint32_t)layout.syncbusy) = 0;
+    for (int n = 0; n < number; n++)
         if (!done[n].applied)
             apply(done[n].offset, done[n].value);
 }
 
 void LowEnergy::clocks_changed() {
-    part.cancel(arrived);
+    part.cancel(synchronized);
     start();
+}
+
+// -- counters --
+
+int64_t LowEnergyCounter::ticks() const {
+    return counts() && rate.runs() ? rate.edges(part.now()) - counted : 0;
+}
+
+void LowEnergyCounter::fold() {
+    const int64_t passed = ticks();
+    if (passed <= 0)
+        return;
+    counted += passed;
+    pass(passed);
+}
+
+void LowEnergyCounter::plan() {
+    part.cancel(due);
+    if (!counts() || !rate.runs())
+        return;
+    const int64_t next = next_effect();
+    if (next != FAR)
+        part.schedule(due, rate.time(counted + next));
+}
+
+void LowEnergyCounter::on_due(int64_t) {
+    fold();
+    plan();
+}
+
+void LowEnergyCounter::clear_count() {
+    part.cancel(due);
+    value = 0;
+    rate = Rate();
+    counted = 0;
+}
+
+void LowEnergyCounter::restart_clock() {
+    rate = clock();
+    counted = rate.edges(part.now());
+}
+
+void LowEnergyCounter::follow_clock() {
+    const Rate wanted = clock();
+    if (wanted.runs() != rate.runs() || wanted.origin != rate.origin ||
+        !wanted.same_frequency(rate))
+        restart_clock();
+}
+
+void LowEnergyCounter::clocks_changed() {
+    LowEnergy::clocks_changed();
+    follow_clock();
+    plan();
+}
+
+uint32_t LowEnergyCounter::peek(uint32_t offset) const {
+    return offset == count_register ? after(ticks()) : LowEnergy::peek(offset);
+}
+
+uint32_t LowEnergyCounter::read(uint32_t offset) {
+    if (ticks()) {
+        fold();
+        plan();
+    }
+    return peek(offset);
 }
 
 }  // namespace efm32gg

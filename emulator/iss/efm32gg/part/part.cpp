@@ -2,13 +2,8 @@
 
 #include "armv7m/core/cpu.h"
 #include "efm32gg/clocks/cmu.h"
-#include "efm32gg/clocks/emu.h"
 #include "efm32gg/clocks/rmu.h"
-#include "efm32gg/memory/ebi.h"
 #include "efm32gg/memory/msc.h"
-#include "efm32gg/pins/gpio.h"
-#include "efm32gg/pins/prs.h"
-#include "efm32gg/timers/wdog.h"
 
 #include <algorithm>
 #include <cstdarg>
@@ -32,20 +27,7 @@ Part::Part(armv7m::Cpu &cpu, const Memories &memories)
         const uint32_t at = 2 * PAGE_SIZE + instance::DEVINFO.base - INFORMATION + word.offset;
         std::memcpy(information + at, &word.reset, 4);
     }
-    owned.reserve(64);
-    cmu = add(new Cmu(*this, instance::CMU));
-    emu = add(new Emu(*this, instance::EMU));
-    rmu = add(new Rmu(*this, instance::RMU));
-    msc = add(new Msc(*this, instance::MSC));
-    gpio = add(new Gpio(*this, instance::GPIO));
-    ebi = add(new Ebi(*this, instance::EBI));
-    prs = add(new Prs(*this, instance::PRS));
-    add(new Wdog(*this, instance::WDOG));
-    add_interfaces(*this);
-    for (const Instance *one : INSTANCES)
-        if (one->base >= PERIPHERALS && !peripheral_at(one->base))
-            add(new Unmodelled(*this, *one));
-
+    add_units();
     armv7m::Region flash, ram;
     flash.size = memories.flash_size, flash.host = memories.flash, flash.writable = false;
     ram.size = memories.ram_size, ram.host = memories.ram, ram.base = RAM;
@@ -66,13 +48,6 @@ void Part::place(Peripheral &unit) {
         slots[first + n] = &unit;
 }
 
-Peripheral *Part::find(const char *name) const {
-    for (auto &one : owned)
-        if (std::strcmp(one->instance.name, name) == 0)
-            return one.get();
-    return nullptr;
-}
-
 // -- clocks -----------------------------------------------------------------------------------
 
 void Part::clocks_set() {
@@ -85,7 +60,7 @@ void Part::clocks_set() {
     if (!starting && !cycle_time.same_frequency(rate(Clock::HFCORE)))
         rebase(now());
     set_bus_waits();
-    msc->clocks_set();
+    msc->check_wait_states();
 }
 
 Rate Part::unit_rate(const Instance &instance) const { return cmu->unit_rate(instance); }
@@ -106,7 +81,7 @@ void Part::reset(uint32_t cause) {
     perform_reset();
 }
 
-// What a reset costs before the first instruction: data sheet, 3.6, t_RESET.
+// Time from a reset to the first instruction: data sheet, 3.6, t_RESET.
 static constexpr int64_t START_UP = 163 * MICROSECOND;
 
 void Part::perform_reset() {
@@ -126,14 +101,14 @@ void Part::perform_reset() {
     std::copy(std::begin(wanted), std::end(wanted), std::begin(rates));
     rebase(time);
     set_bus_waits();
-    msc->clocks_set();
+    msc->check_wait_states();
     each([](Peripheral &one) { one.clocks_changed(); });
     cpu.reset();
     cpu.system->reset((reset_cause & cold) != 0);
     stop_clock(time + START_UP);
-    Outgoing &said = send(Kind::RESET, 0, reset_cause);
+    Outgoing &message = send(Kind::RESET, 0, reset_cause);
     if (reset_cause & rmu::RSTCAUSE_WDOGRST)
-        std::snprintf(said.text, sizeof said.text, "the watchdog has bitten");
+        std::snprintf(message.text, sizeof message.text, "watchdog reset");
 }
 
 void Part::reset_requested() { request_reset(rmu::RSTCAUSE_SYSREQRST); }
@@ -165,9 +140,6 @@ void Part::log_once(const char *format, ...) {
         std::memcpy(send(Kind::LOG, 0, 0, 0, false).text, text, sizeof text);
 }
 
-void Part::pin(int port, int bit, int level) { gpio->outside_drives(port, bit, level); }
-bool Part::pin_level(int port, int bit) const { return gpio->level(port, bit); }
-
 void Part::analog_changed() {
     each([](Peripheral &one) { one.analog_changed(); });
 }
@@ -190,7 +162,7 @@ void Part::semihosting_write(int handle, const uint8_t *text, int length) {
 
 void Part::semihosting_exit(uint32_t code) {
     std::snprintf(send(Kind::FAULT, 0, code).text, sizeof Outgoing::text,
-                  "the program has ended by semihosting, code %u", (unsigned)code);
+                  "the program exited by semihosting with code %u", (unsigned)code);
 }
 
 }  // namespace efm32gg

@@ -2,8 +2,8 @@
 //
 // EFM32GG Reference Manual, chapters 5 (memory and bus system), 9-11 (RMU, EMU, CMU).
 //
-// Time is in picoseconds. The core counts cycles of HFCORECLK; `cycle_time` maps one to the other,
-// exactly, and starts anew whenever that clock changes or stands.
+// Time is in picoseconds. The core counts cycles of HFCORECLK; `cycle_time` converts one to the
+// other exactly and restarts whenever that clock changes or stops.
 #pragma once
 
 #include "armv7m/memory/bus.h"
@@ -29,18 +29,20 @@ class Gpio;
 class Ebi;
 class Prs;
 class I2c;
-struct Interfaces;
+class Usart;
+class Leuart;
+class Timer;
 
 enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFXO, LFRCO, ULFRCO };
 constexpr int CLOCKS = 11;
 using Rates = Rate[CLOCKS];
 
-// Buffers belong to the caller. `information` is three pages: user data, lock bits, and the device
-// information, which the part fills in; the part has its own when it is null.
+// The caller owns the buffers. `information` has three pages: user data, lock bits, and the device
+// information, which the part fills in; if it is null the part allocates its own.
 struct Memories {
     uint8_t *flash, *ram, *information, *external;
     uint32_t flash_size, ram_size, external_size;
-    const double *analog;  // volts and degrees; indices: analog/inputs.h
+    const double *analog;  // volts and degrees Celsius; indices: analog/inputs.h
 };
 
 class Part : public armv7m::Bus, public armv7m::SystemListener {
@@ -53,7 +55,7 @@ public:
     // Bits of `exits` beside armv7m::Exit.
     enum : uint32_t { ExitAsleep = 1u << 16, ExitAwake = 1u << 17, ExitOutbox = 1u << 18 };
 
-    // The core's system must be set by then.
+    // Cpu::system must already be set.
     Part(armv7m::Cpu &cpu, const Memories &memories);
     ~Part() override;
     static armv7m::SystemParameters system_parameters();
@@ -65,45 +67,45 @@ public:
 
     // -- time --
     int64_t now() const;
-    void schedule(Event &event, int64_t time);  // the core's deadline follows
+    void schedule(Event &event, int64_t time);  // lowers the core's deadline if needed
     void cancel(Event &event) { events.remove(event); }
     int64_t next_event() const;
 
-    // Runs up to `until`, or until the core falls asleep, awakes, stops, or something is in the
-    // outbox that asks for it; `exits` says which.
+    // Runs up to `until`, or until the core falls asleep, wakes or stops, or a message in the
+    // outbox requests a stop; `exits` has the reasons.
     int64_t run(int64_t until);
     uint32_t exits = 0;
 
     // -- clocks --
     const Rate &rate(Clock clock) const { return rates[(int)clock]; }
     int64_t hertz(Clock clock) const { return rate(clock).whole_hertz(); }
-    // The clock that counts in a unit: HFPERCLK with its enable bit, LFA or LFB behind its
-    // prescaler, HFCORECLK; it stands when the unit is not enabled.
+    // The unit's clock: HFPERCLK with its enable bit, LFA or LFB behind its prescaler, or
+    // HFCORECLK. It is stopped when the unit is not enabled.
     Rate unit_rate(const Instance &instance) const;
-    // Whether the unit's registers can be reached.
+    // Whether the unit's registers can be accessed.
     bool enabled(const Instance &instance) const;
-    // `set` changes what rates derive from; everybody is told before and after.
+    // `set` changes the inputs of the clock tree; all peripherals are notified before and after.
     template <class Set> void change_clocks(Set set) {
         each([](Peripheral &one) { one.clocks_changing(); });
         set();
         clocks_set();
         each([](Peripheral &one) { one.clocks_changed(); });
     }
-    // The core's clock stands until then (start-up of its oscillator), or the core waits for the
-    // flash.
+    // Stops the core's clock until `until` (oscillator start-up).
     void stop_clock(int64_t until);
+    // Makes the core wait for the flash.
     void stall(int64_t until);
 
     // -- interrupts, resets, sleep --
     void irq(int number, bool level);
     void reset(uint32_t cause);          // from outside: bits of rmu::RSTCAUSE
     void request_reset(uint32_t cause);  // from within: after the running instruction
-    uint32_t reset_cause = 0;            // of the reset that is being made
-    int mode = 0;                        // energy mode: 0 awake
+    uint32_t reset_cause = 0;            // of the reset in progress
+    int mode = 0;                        // energy mode, 0: awake
     void enter_em4();
-    bool hung = false;                   // a fault: no instructions until a reset; time passes
+    bool hung = false;                   // injected fault: no instructions until a reset
 
-    // -- the bus, also for DMA: false is a bus fault; `wait` grows by wait states --
+    // -- the bus, also for DMA: false is a bus fault; `wait` grows by the wait states --
     bool load(uint32_t address, int size, uint32_t &value, int64_t &wait);
     bool store(uint32_t address, int size, uint32_t value, int64_t &wait);
     bool read(uint32_t address, uint32_t size, uint32_t &value) override;
@@ -111,27 +113,21 @@ public:
     uint32_t fetch(uint32_t address, bool sequential) override;
     bool fetch_halfword(uint32_t address, uint32_t &value) override;
     bool peek(uint32_t address, uint32_t size, uint32_t &value) override;
-    // Flash, RAM or information at `address`, and how many bytes are left there.
+    // Flash, RAM or information at `address`; `left`: number of bytes from there to its end.
     uint8_t *memory_at(uint32_t address, uint32_t &left);
     Peripheral *peripheral_at(uint32_t address) const;
-    Peripheral *find(const char *name) const;
 
     // -- outside --
     Outgoing &send(Kind kind, int unit, int64_t value, int64_t extra = 0, bool stop = true);
-    // Each text once.
+    // Reports each text once.
     void log_once(const char *format, ...) __attribute__((format(printf, 2, 3)));
-    void pin(int port, int bit, int level);  // driven from outside; -1: no longer
-    bool pin_level(int port, int bit) const;
     void analog_changed();
+    // `flags`: bit 0 framing error, bit 1 parity error; from bit 8 the line's bit rate, 0: unknown.
     void uart_receive(int unit, uint32_t data, uint32_t flags);
-    int i2c_slave_start(int unit, int address_byte);
-    int i2c_slave_write(int unit, int byte);
-    int i2c_slave_read(int unit, bool acknowledged);
-    int i2c_slave_stop(int unit);
-    int i2c_slave_poll(int unit);
-    void i2c_answer(int unit, int acknowledged, int data);
+    // The I2C unit by number or by the pin of its SDA; null if none is routed there.
+    I2c *i2c_unit(int unit) const;
 
-    // What the core's system says.
+    // -- armv7m::SystemListener --
     void reset_requested() override;
     void locked_up() override;
     void itm(int port, uint32_t value, int bytes) override;
@@ -139,7 +135,7 @@ public:
     void semihosting_exit(uint32_t code) override;
     void unmodelled(const char *what) override { log_once("%s is not modelled", what); }
 
-    // -- peripherals others talk to --
+    // -- peripherals that others access --
     Cmu *cmu = nullptr;
     Dma *dma = nullptr;
     Emu *emu = nullptr;
@@ -148,8 +144,10 @@ public:
     Gpio *gpio = nullptr;
     Ebi *ebi = nullptr;
     Prs *prs = nullptr;
-    std::shared_ptr<Interfaces> interfaces;  // those that the outside talks to
-    I2c *i2c_unit(int unit) const;
+    std::vector<Usart *> usarts;
+    std::vector<Leuart *> leuarts;
+    std::vector<I2c *> i2cs;
+    std::vector<Timer *> timers;
 
     // Takes ownership of a peripheral.
     template <class Unit> Unit *add(Unit *unit) {
@@ -169,10 +167,10 @@ private:
     Rates rates;
     Rate cycle_time;
     int64_t base_cycle = 0;
-    int64_t standing_until = 0;    // the core's clock stands; NEVER: until it awakes
-    int64_t stalled_until = 0;     // the core waits for the flash
-    int64_t standing_now = 0;      // time while the clock stands
-    int64_t owed_cycles = 0;       // made while it stood, to be spent when it runs
+    int64_t standing_until = 0;    // end of the core clock's stop; NEVER: until it wakes
+    int64_t stalled_until = 0;     // end of the wait for the flash
+    int64_t standing_now = 0;      // current time while the clock is stopped
+    int64_t owed_cycles = 0;       // cycles counted during the stop, to be spent when it runs
     bool standing = true, stop_wanted = false, asleep = false, locked = false;
     uint32_t wanted_reset = 0;
     int slow_ratio = 1;            // HFCORECLK to HFPERCLK
@@ -182,13 +180,14 @@ private:
     std::unordered_set<std::string> logged;
     uint8_t *information;
 
+    void add_units();
     void place(Peripheral &unit);
     void clocks_set();
     void rebase(int64_t time);
     void advance(int64_t time);
     void perform_due();
     int64_t cycle_at(int64_t time) const;
-    bool fall_asleep();
+    void fall_asleep();
     void wake(int64_t before);
     bool wait_for_wake(int64_t until);
     void perform_reset();
@@ -196,8 +195,5 @@ private:
     int64_t bus_wait(const Peripheral &unit, bool write) const;
     void set_bus_waits();
 };
-
-// Makes the units of units.cpp: serial, counting, analog, DMA.
-void add_interfaces(Part &part);
 
 }  // namespace efm32gg

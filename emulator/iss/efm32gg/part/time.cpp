@@ -2,9 +2,7 @@
 #include "armv7m/core/cpu.h"
 #include "efm32gg/clocks/cmu.h"
 #include "efm32gg/clocks/emu.h"
-#include "efm32gg/clocks/rmu.h"
 #include "efm32gg/part/part.h"
-#include "efm32gg/pins/gpio.h"
 
 #include <algorithm>
 #include <utility>
@@ -34,7 +32,7 @@ void Part::schedule(Event &event, int64_t time) {
         cpu.lower_deadline(cycle_at(time));
 }
 
-// From `time` on, cycles are of the core's present clock.
+// From `time` on, cycles are counted at the core's present clock.
 void Part::rebase(int64_t time) {
     const Rate &clock = rate(Clock::HFCORE);
     base_cycle = cpu.cycles - std::exchange(owed_cycles, 0);
@@ -43,7 +41,7 @@ void Part::rebase(int64_t time) {
     standing_until = NEVER;
     cycle_time = clock;
     cycle_time.origin = time;
-    // A deadline was in cycles of the clock before.
+    // The deadline was in cycles of the previous clock.
     cpu.set_deadline(cpu.cycles);
 }
 
@@ -110,9 +108,11 @@ int64_t Part::run(int64_t until) {
             }
             exits = ended & ~(uint32_t)(armv7m::ExitDeadline | armv7m::ExitStop |
                                         armv7m::ExitSleep);
-            if (ended & armv7m::ExitSleep && fall_asleep())
+            if (ended & armv7m::ExitSleep) {
+                fall_asleep();
                 exits |= ExitAsleep;
-            // A lock-up is seen as it is, before the reset that it leads to.
+            }
+            // Report a lock-up before the reset that it causes.
             if (exits && (!wanted_reset || exits & armv7m::ExitLockup))
                 break;
             if (cpu.system->stopped_by() != armv7m::System::DebugStop::None)
@@ -122,28 +122,23 @@ int64_t Part::run(int64_t until) {
     return now();
 }
 
-// True when the run ends: the core is asleep now.
-bool Part::fall_asleep() {
+void Part::fall_asleep() {
     mode = emu->sleeping_mode(cpu.system->deep_sleep());
     asleep = true;
-    const int entered = mode;
     change_clocks([this] { cmu->sleep(mode); });
-    each([entered](Peripheral &one) { one.energy_mode(entered); });
     send(Kind::SLEEP, 0, mode, 0, false);
-    return true;
 }
 
-// How long it takes until the first instruction after EM2 or EM3; data sheet, t_EM20.
+// Time from EM2 or EM3 to the first instruction; data sheet, t_EM20.
 static constexpr int64_t WAKE_UP = 2 * MICROSECOND;
 
-// `before`: the core's cycles before it went on.
+// `before`: Cpu::cycles before System::service() woke it.
 void Part::wake(int64_t before) {
     const int64_t time = now();
     const bool deep = mode > 1;
     asleep = false;
     mode = 0;
     change_clocks([this] { cmu->wake(); });
-    each([](Peripheral &one) { one.energy_mode(0); });
     if (deep) {
         owed_cycles = cpu.cycles - before;
         standing = true;
@@ -153,7 +148,7 @@ void Part::wake(int64_t before) {
     send(Kind::SLEEP, 0, 0, 0, false);
 }
 
-// True when the run ends: the core is awake again.
+// Returns true when the run ends: the core woke, or nothing will ever happen.
 bool Part::wait_for_wake(int64_t until) {
     if (mode < 4) {
         const int64_t before = cpu.cycles;

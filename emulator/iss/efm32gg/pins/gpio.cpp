@@ -10,7 +10,7 @@ using namespace gpio;
 // Modes of a pin (32.3.1).
 enum PinMode : uint32_t {
     DISABLED, INPUT, INPUTPULL, INPUTPULLFILTER, PUSHPULL, PUSHPULLDRIVE, WIREDOR, WIREDORPULLDOWN,
-    WIREDAND  // and all above it; odd ones from 0xA on pull up with those beside them
+    WIREDAND  // and all modes above it, of which 0xA, 0xB, 0xE and 0xF pull up
 };
 static constexpr uint32_t GPIO_UNLOCK = 0xA534;
 static constexpr uint32_t PORT_SIZE = 0x24;
@@ -76,26 +76,20 @@ bool Gpio::locked(uint32_t offset) const {
 
 void Gpio::write(uint32_t offset, uint32_t value) {
     if (offset == LOCK) {
-        reg(LOCK) = (value & 0xFFFF) != GPIO_UNLOCK;
-        return;
-    }
-    if (locked(offset)) {
-        part.log_once("GPIO is locked: a write to its registers is lost");
-        return;
-    }
-    if (offset < PORTS * PORT_SIZE) {
+        lock(LOCK, value, GPIO_UNLOCK);
+    } else if (locked(offset)) {
+        report_locked();
+    } else if (offset < PORTS * PORT_SIZE) {
         write_port((int)(offset / PORT_SIZE), offset % PORT_SIZE, value);
-        return;
-    }
-    if (offset == CMD) {
+    } else if (offset == CMD) {
         if (value & CMD_EM4WUCLR)
             reg(EM4WUCAUSE) = 0;
-        return;
+    } else {
+        Peripheral::write(offset, value);
     }
-    Peripheral::write(offset, value);
 }
 
-// A pin that PINLOCKN locks keeps its mode and its output until a reset (32.3.1.4).
+// A pin locked by PINLOCKN keeps its mode and output until a reset (32.3.1.4).
 void Gpio::write_port(int port, uint32_t offset, uint32_t value) {
     const uint32_t free = reg(at(port, PA_PINLOCKN));
     uint32_t &out = reg(at(port, PA_DOUT));
@@ -142,22 +136,27 @@ void Gpio::function(int pin, const Peripheral *owner, bool driven, bool level) {
     if (!driven && owners[pin] != owner)
         return;
     owners[pin] = driven ? owner : nullptr;
-    one.functions = driven ? one.functions | mask : one.functions & ~mask;
-    one.function_levels = level ? one.function_levels | mask : one.function_levels & ~mask;
+    set_bits(one.functions, mask, driven);
+    set_bits(one.function_levels, mask, level);
     refresh(pin / PINS, mask);
 }
 
-void Gpio::outside_drives(int port, int bit, int level) {
+void Gpio::release(int signal, const Peripheral *owner) {
+    for (const int pin : ROUTES[signal])
+        function(pin, owner, false, false);
+}
+
+void Gpio::drive_from_outside(int port, int bit, int level) {
     if (port < 0 || port >= PORTS || bit < 0 || bit >= PINS)
         return;
     Port &one = ports[port];
     const uint32_t mask = 1u << bit;
-    one.outside = level < 0 ? one.outside & ~mask : one.outside | mask;
-    one.outside_levels = level > 0 ? one.outside_levels | mask : one.outside_levels & ~mask;
+    set_bits(one.outside, mask, level >= 0);
+    set_bits(one.outside_levels, mask, level > 0);
     refresh(port, mask);
 }
 
-// Levels of these pins follow their modes, outputs and the outside.
+// Updates the levels of these pins from their modes, outputs and the outside.
 void Gpio::refresh(int port, uint32_t pins) {
     Port &one = ports[port];
     const uint32_t dout = reg(at(port, PA_DOUT));
@@ -165,20 +164,20 @@ void Gpio::refresh(int port, uint32_t pins) {
     uint32_t seen = levels[port] & ~pins;
     for (uint32_t rest = pins; rest; rest &= rest - 1) {
         const uint32_t mask = rest & -rest;
-        const uint32_t kind = mode(port, __builtin_ctz(mask));
+        const uint32_t pin_mode = mode(port, __builtin_ctz(mask));
         const bool set = (one.functions & mask ? one.function_levels : dout) & mask;
-        const bool drives = kind == PUSHPULL || kind == PUSHPULLDRIVE ||
-                            ((kind == WIREDOR || kind == WIREDORPULLDOWN) && set) ||
-                            (kind >= WIREDAND && !set);
+        const bool drives = pin_mode == PUSHPULL || pin_mode == PUSHPULLDRIVE ||
+                            ((pin_mode == WIREDOR || pin_mode == WIREDORPULLDOWN) && set) ||
+                            (pin_mode >= WIREDAND && !set);
         bool level;
         if (drives)
             level = set;
         else if (one.outside & mask)
             level = one.outside_levels & mask;
-        else if (kind == INPUTPULL || kind == INPUTPULLFILTER || kind == DISABLED)
+        else if (pin_mode == INPUTPULL || pin_mode == INPUTPULLFILTER || pin_mode == DISABLED)
             level = dout & mask;
         else
-            level = kind == 0xA || kind == 0xB || kind >= 0xE;    // pulled up; others float low
+            level = pin_mode == 0xA || pin_mode == 0xB || pin_mode >= 0xE;  // pull-up; else low
         if (drives) {
             driven |= mask;
             out |= level ? mask : 0;
@@ -196,7 +195,7 @@ void Gpio::refresh(int port, uint32_t pins) {
             const int bit = __builtin_ctz(rest);
             part.send(Kind::PIN, port * PINS + bit,
                       driven >> bit & 1 ? (int64_t)(out >> bit & 1) : -1,
-                      take(reg(at(port, PA_CTRL)), PA_CTRL_DRIVEMODE));
+                      field(reg(at(port, PA_CTRL)), PA_CTRL_DRIVEMODE));
         }
     }
     set_levels(port, seen);
@@ -239,7 +238,7 @@ void Gpio::check_em4(int port, int bit, bool level) {
         if (EM4_PINS[n] == port * PINS + bit && reg(EM4WUEN) >> n & 1 &&
             (reg(EM4WUPOL) >> n & 1) == (uint32_t)level) {
             reg(EM4WUCAUSE) |= 1u << n;
-            part.emu->wake_from_em4(1u << n);
+            part.emu->wake_from_em4();
         }
     }
 }

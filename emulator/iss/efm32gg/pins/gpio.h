@@ -1,4 +1,4 @@
-// Pins: modes, levels, interrupts of pins. EFM32GG Reference Manual, chapter 32.
+// Port pins: modes, levels, interrupts. EFM32GG Reference Manual, chapter 32.
 #pragma once
 
 #include "efm32gg/part/part.h"
@@ -16,32 +16,34 @@ public:
     uint32_t peek(uint32_t offset) const override;
     void write(uint32_t offset, uint32_t value) override;
 
-    // A peripheral drives a pin (port * 16 + bit; -1 is no pin), or lets go of it. `owner` is who;
-    // two of them on a pin are reported, and the later one wins.
+    // Peripheral `owner` drives a pin (port * 16 + bit; -1 is no pin), or releases it. A second
+    // driver of a pin is reported and takes it over.
     void function(int pin, const Peripheral *owner, bool driven, bool level);
+    // Releases all locations of a signal (route::Signal).
+    void release(int signal, const Peripheral *owner);
 
-    // The level at a pin now, whoever drives it.
+    // The level at a pin now, whatever drives it.
     bool level(int port, int bit) const { return levels[port] >> bit & 1; }
     bool input(int pin) const { return pin >= 0 && level(pin / PINS, pin % PINS); }
-    // Whether a pin's mode lets it be read, or driven.
-    bool senses(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) != 0; }
-    bool drives(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) >= 4; }
+    // `pin` if its mode allows it to be read, or driven; else -1.
+    int readable(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) != 0 ? pin : -1; }
+    int drivable(int pin) const { return pin >= 0 && mode(pin / PINS, pin % PINS) >= 4 ? pin : -1; }
 
-    // Tells `unit` of every change of a pin, by Peripheral::pin_changed.
+    // Calls Peripheral::pin_changed of `unit` for every change of a pin.
     void listen(Peripheral &unit) { listeners.push_back(&unit); }
 
-    // From outside the part; -1 lets go.
-    void outside_drives(int port, int bit, int level);
+    // Drives a pin from outside the part; level -1 releases it.
+    void drive_from_outside(int port, int bit, int level);
 
 protected:
     void update_interrupts() override;
 
 private:
     struct Port {
-        uint32_t functions = 0, function_levels = 0;    // pins that peripherals drive, and how
-        uint32_t outside = 0, outside_levels = 0;
-        uint32_t driven = 0, driven_levels = 0;         // what the part drives
-        uint32_t enabled = 0;                           // pins whose mode lets them be read
+        uint32_t functions = 0, function_levels = 0;    // pins that peripherals drive
+        uint32_t outside = 0, outside_levels = 0;       // pins driven from outside
+        uint32_t driven = 0, driven_levels = 0;         // pins that the part drives
+        uint32_t enabled = 0;                           // pins whose mode allows reading
     };
 
     Port ports[PORTS];

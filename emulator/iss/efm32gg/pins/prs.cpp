@@ -16,8 +16,8 @@ void Prs::reset() {
 
 bool Prs::selects(int channel, int source, int signal) const {
     const uint32_t control = reg(CH0_CTRL + 4 * (uint32_t)channel);
-    return (int)take(control, CH0_CTRL_SOURCESEL) == source &&
-           (int)take(control, CH0_CTRL_SIGSEL) == signal;
+    return (int)field(control, CH0_CTRL_SOURCESEL) == source &&
+           (int)field(control, CH0_CTRL_SIGSEL) == signal;
 }
 
 bool Prs::listens(int source, int signal) const {
@@ -27,11 +27,11 @@ bool Prs::listens(int source, int signal) const {
     return false;
 }
 
-// What a channel's edge detector sees; SWLEVEL inverts (13.3.2).
+// The input of a channel's edge detector; SWLEVEL inverts it (13.3.2).
 bool Prs::input(int channel) const {
     const uint32_t control = reg(CH0_CTRL + 4 * (uint32_t)channel);
-    const uint32_t source = take(control, CH0_CTRL_SOURCESEL);
-    const bool signal = source && signals[source] >> take(control, CH0_CTRL_SIGSEL) & 1;
+    const uint32_t source = field(control, CH0_CTRL_SOURCESEL);
+    const bool signal = source && signals[source] >> field(control, CH0_CTRL_SIGSEL) & 1;
     return signal != (reg(SWLEVEL) >> channel & 1);
 }
 
@@ -51,22 +51,16 @@ void Prs::set(int source, int signal, bool level) {
 }
 
 void Prs::pulse(int source, int signal) {
-    for (int channel = 0; channel < CHANNELS; channel++) {
-        if (selects(channel, source, signal)) {
-            tell(channel, true);
-            tell(channel, false);
-        }
-    }
+    for (int channel = 0; channel < CHANNELS; channel++)
+        if (selects(channel, source, signal))
+            output_pulse(channel);
 }
 
 void Prs::write(uint32_t offset, uint32_t value) {
     if (offset == SWPULSE) {
-        for (int channel = 0; channel < CHANNELS; channel++) {
-            if (value >> channel & 1) {
-                tell(channel, true);
-                tell(channel, false);
-            }
-        }
+        for (int channel = 0; channel < CHANNELS; channel++)
+            if (value >> channel & 1)
+                output_pulse(channel);
         return;
     }
     uint32_t before = 0;
@@ -81,21 +75,23 @@ void Prs::update(int channel, bool was) {
     const bool is = input(channel);
     if (is == was)
         return;
-    const uint32_t detect = take(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_EDSEL);
-    if (detect == 0) {
-        tell(channel, is);
-    } else if (detect & (is ? 1 : 2)) {
-        tell(channel, true);
-        tell(channel, false);
-    }
+    const uint32_t detect = field(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_EDSEL);
+    if (detect == 0)
+        output(channel, is);
+    else if (detect & (is ? 1 : 2))
+        output_pulse(channel);
 }
 
-void Prs::tell(int channel, bool level) {
-    levels = (levels & ~(1u << channel)) | (uint32_t)level << channel;
-    const int routes[] = {route::PRS_CH0, route::PRS_CH1, route::PRS_CH2, route::PRS_CH3};
+void Prs::output_pulse(int channel) {
+    output(channel, true);
+    output(channel, false);
+}
+
+void Prs::output(int channel, bool level) {
+    set_bits(levels, 1u << channel, level);
     if (channel < 4 && reg(ROUTE) >> channel & 1)
-        part.gpio->function(ROUTES[routes[channel]][take(reg(ROUTE), ROUTE_LOCATION)], this, true,
-                            level);
+        part.gpio->function(ROUTES[route::PRS_CH0 + channel][field(reg(ROUTE), ROUTE_LOCATION)],
+                            this, true, level);
     part.each([=](Peripheral &one) { one.prs_changed(channel, level); });
 }
 

@@ -1,4 +1,4 @@
-// The short queues of the serial interfaces: a buffer of N entries, the oldest first.
+// Buffer of a serial interface: N entries, the oldest first.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,8 @@ public:
     uint32_t front(int index = 0) const { return index < count ? entries[index] : 0; }
     void clear() { count = 0; }
     void push(uint32_t entry) { entries[count++] = entry; }
+    // Replaces the newest entry.
+    void replace_last(uint32_t entry) { entries[count - 1] = entry; }
 
     uint32_t pop() {
         const uint32_t entry = front();

@@ -1,5 +1,5 @@
-// When characters are on the wire: those back to back share one beginning, so that rounding to
-// picoseconds does not add up.
+// Times of characters on the wire: back-to-back characters are timed from a common start, so that
+// rounding to picoseconds does not accumulate.
 #pragma once
 
 #include "efm32gg/part/rate.h"
@@ -10,10 +10,10 @@ class FrameTiming {
 public:
     int64_t begin = 0, end = 0;  // of the latest frame
 
-    // A frame of `units`, `per_clock` of which are a period of `clock`; it begins at the end of
-    // the one before when it is `behind` that, else at the first edge from `now` on.
-    void append(const Rate &clock, int64_t units, int64_t per_clock, bool behind, int64_t now) {
-        if (!behind || rate.origin != clock.origin || !rate.same_frequency(clock)) {
+    // Adds a frame of `units`, with `per_clock` units per period of `clock`. It begins at the end of
+    // the previous one if it `follows` that, else at the first edge at or after `now`.
+    void append(const Rate &clock, int64_t units, int64_t per_clock, bool follows, int64_t now) {
+        if (!follows || rate.origin != clock.origin || !rate.same_frequency(clock)) {
             rate = clock;
             start = clock.time(clock.edge_at_or_after(now));
             passed = 0;

@@ -18,9 +18,6 @@ constexpr int LOW_CYCLES[] = {0, 40, 80, 160, 320, 1024, 1024, 1024};  // CTRL_C
 
 }  // namespace
 
-I2c::I2c(Part &part, const Instance &instance, int source, int signals)
-    : Peripheral(part, instance), source(source), signals(signals) {}
-
 void I2c::reset() {
     Peripheral::reset();
     for (Event *event : {&bits, &idle_timeout, &low_timeout})
@@ -39,11 +36,10 @@ void I2c::reset() {
 
 int I2c::data_pin() const {
     constexpr uint32_t both = ROUTE_SDAPEN | ROUTE_SCLPEN;
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
-    if ((reg(ROUTE) & both) != both || location >= LOCATIONS || ROUTES[signals][location] < 0)
-        return -1;
+    const uint32_t location = field(reg(ROUTE), ROUTE_LOCATION);
     const int data = ROUTES[signals][location], clock = ROUTES[signals + 1][location];
-    return part.gpio->senses(data) && part.gpio->senses(clock) ? data : -1;
+    const bool routed = (reg(ROUTE) & both) == both && part.gpio->readable(clock) >= 0;
+    return routed ? part.gpio->readable(data) : -1;
 }
 
 bool I2c::usable() const {
@@ -58,8 +54,8 @@ int I2c::unit() const {
 // Periods of SCL: (Nlow + Nhigh) * (CLKDIV + 1) + 4 cycles of HFPERCLK each (16.3.3).
 int64_t I2c::bit(int64_t count) const {
     const int64_t cycles =
-        HIGH_AND_LOW[take(reg(CTRL), CTRL_CLHR)] * ((int64_t)reg(CLKDIV) + 1) + 4;
-    return part.unit_rate(instance).span(cycles * count);
+        HIGH_AND_LOW[field(reg(CTRL), CTRL_CLHR)] * ((int64_t)reg(CLKDIV) + 1) + 4;
+    return clock_now().span(cycles * count);
 }
 
 // -- registers --
@@ -80,9 +76,7 @@ uint32_t I2c::read(uint32_t offset) {
     const uint32_t data = received;
     receive_full = false;
     deliver();
-    proceed();
-    proceed_slave();
-    follow();
+    proceed_all();
     return data;
 }
 
@@ -99,7 +93,7 @@ void I2c::write(uint32_t offset, uint32_t value) {
         const bool enabled = reg(CTRL) & CTRL_EN;
         Peripheral::write(offset, value);
         if (offset == CTRL && !(reg(CTRL) & CTRL_EN) && enabled) {
-            end_master();  // disabled: the bus is let go
+            end_master();  // disabling releases the bus
             slave = Slave::IDLE;
             shift_full = false;
             busy = true;
@@ -107,9 +101,7 @@ void I2c::write(uint32_t offset, uint32_t value) {
         if (offset == CTRL)
             watch_idle();
     }
-    proceed();
-    proceed_slave();
-    follow();
+    proceed_all();
 }
 
 void I2c::command(uint32_t value) {
@@ -117,7 +109,7 @@ void I2c::command(uint32_t value) {
         transmit_full = false;
     if (value & CMD_CLEARPC)
         reg(STATUS) &= ~(STATUS_PSTART | STATUS_PSTOP | STATUS_PACK | STATUS_PNACK | STATUS_PCONT);
-    // The pending bits have the order of the commands.
+    // The pending bits are in the order of the commands.
     reg(STATUS) |= value & (CMD_START | CMD_STOP | CMD_ACK | CMD_NACK | CMD_CONT);
     if (value & CMD_ABORT) {
         end_master();
@@ -128,9 +120,7 @@ void I2c::command(uint32_t value) {
         if (slave_answer == WAITING)
             release(0);
     }
-    proceed();
-    proceed_slave();
-    follow();
+    proceed_all();
 }
 
 bool I2c::take_pending(uint32_t command) {
@@ -139,37 +129,38 @@ bool I2c::take_pending(uint32_t command) {
     return was;
 }
 
-void I2c::clocks_changed() {
+void I2c::proceed_all() {
     proceed();
     proceed_slave();
     follow();
 }
 
-// -- the bus held, idle, or low for too long --
+// -- time-outs: the bus held, idle, or low for too long --
 
 void I2c::hold(bool on) {
     if (on && !holding) {
         reg(IF) |= IF_BUSHOLD;
         watch_low();
-    } else if (!on && holding)
+    } else if (!on && holding) {
         part.cancel(low_timeout);
+    }
     holding = on;
 }
 
 void I2c::watch_low() {
-    const int cycles = LOW_CYCLES[take(reg(CTRL), CTRL_CLTO)];
-    const Rate rate = part.unit_rate(instance);
+    const int cycles = LOW_CYCLES[field(reg(CTRL), CTRL_CLTO)];
+    const Rate rate = clock_now();
     if (cycles && rate.runs())
         part.schedule(low_timeout, part.now() + rate.span(cycles * ((int64_t)reg(CLKDIV) + 1)));
 }
 
 void I2c::on_low_timeout(int64_t) { raise(IF_CLTO); }
 
-// Busy after enabling though nothing moves: BITO finds that out (16.3.11).
+// After enabling the bus counts as busy; BITO detects that it is idle (16.3.11).
 void I2c::watch_idle() {
     part.cancel(idle_timeout);
-    const int cycles = IDLE_CYCLES[take(reg(CTRL), CTRL_BITO)];
-    const Rate rate = part.unit_rate(instance);
+    const int cycles = IDLE_CYCLES[field(reg(CTRL), CTRL_BITO)];
+    const Rate rate = clock_now();
     if (cycles && busy && master == Master::IDLE && slave == Slave::IDLE &&
         reg(CTRL) & CTRL_EN && rate.runs())
         part.schedule(idle_timeout, part.now() + rate.span(cycles * ((int64_t)reg(CLKDIV) + 1)));
@@ -184,8 +175,7 @@ void I2c::on_idle_timeout(int64_t) {
     follow();
 }
 
-// -- what the registers show --
-
+// Updates STATE, flags, requests and interrupts.
 void I2c::follow() {
     uint32_t phase = IDLE;
     bool transmitter = false, nacked = false;
@@ -241,12 +231,12 @@ void I2c::follow() {
         phase = WAIT;
     reg(STATE) = (busy ? STATE_BUSY : 0) | (master != Master::IDLE ? STATE_MASTER : 0) |
                  (transmitter ? STATE_TRANSMITTER : 0) | (nacked ? STATE_NACKED : 0) |
-                 (holding ? STATE_BUSHOLD : 0) | give(phase, STATE_STATE);
+                 (holding ? STATE_BUSHOLD : 0) | to_field(phase, STATE_STATE);
     uint32_t &status = reg(STATUS), &flags = reg(IF);
-    put(status, STATUS_TXBL, !transmit_full);
-    put(flags, IF_TXBL, !transmit_full);
-    put(status, STATUS_RXDATAV, receive_full);
-    put(flags, IF_RXDATAV, receive_full);
+    set_bits(status, STATUS_TXBL, !transmit_full);
+    set_bits(flags, IF_TXBL, !transmit_full);
+    set_bits(status, STATUS_RXDATAV, receive_full);
+    set_bits(flags, IF_RXDATAV, receive_full);
     part.dma->request(source, 0, receive_full);
     part.dma->request(source, 1, !transmit_full);
     update_interrupts();

@@ -1,8 +1,8 @@
 // I2C, master and slave. EFM32GG Reference Manual, chapter 16.
 //
-// As master it tells the outside of each start, byte and stop, and the bus stands until
-// `answer` says what came back. As slave it is asked by the slave_ functions; WAITING means that
-// it holds the clock low until firmware has served it, and the answer follows by the outbox.
+// As master it sends a message for each start, byte and stop, and holds the bus until `answer`
+// delivers the reply. As slave it is called by the slave_ functions; WAITING means that it holds the
+// clock low until firmware has served it, and the answer follows by the outbox.
 #pragma once
 
 #include "efm32gg/part/part.h"
@@ -14,27 +14,28 @@ public:
     static constexpr int WAITING = -1;
     static constexpr int ARBITRATION_LOST = -1, BUS_ERROR = -2;
 
-    // `source`: of its DMA requests; `signals`: its SDA, the SCL follows.
-    I2c(Part &part, const Instance &instance, int source, int signals);
+    // `source`: of its DMA requests; `signals`: of its SDA pin, the SCL pin's follows.
+    I2c(Part &part, const Instance &instance, int source, int signals)
+        : Peripheral(part, instance), source(source), signals(signals) {}
 
     void reset() override;
     uint32_t read(uint32_t offset) override;
     void write(uint32_t offset, uint32_t value) override;
     uint32_t peek(uint32_t offset) const override;
-    void clocks_changed() override;
+    void clocks_changed() override { proceed_all(); }
 
-    // What the bus made of the master's start, byte or read; `acknowledged` may be one of the
-    // errors above.
+    // Reply to the master's start, byte or read; `acknowledged` may be one of the errors above.
     void answer(int acknowledged, uint32_t data);
 
-    // A transfer of another master: 1 acknowledged, 0 not; a byte for read; or WAITING.
+    // A transfer by another master. They return 1 if acknowledged, else 0; a read returns the byte;
+    // or WAITING.
     int slave_start(uint32_t address);
     int slave_write(uint32_t byte);
     int slave_read(bool acknowledged);
     void slave_stop();
     int slave_poll() const { return slave_answer; }
 
-    // The port pin of its SDA, where both lines are routed; -1: none.
+    // The port pin of its SDA if both lines are routed; else -1.
     int data_pin() const;
 
 private:
@@ -45,11 +46,11 @@ private:
     const int source, signals;
     Master master = Master::IDLE;
     Slave slave = Slave::IDLE;
-    bool busy = true;          // someone has the bus
-    bool to_read = false;      // the master's transfer
+    bool busy = true;          // the bus is in use
+    bool to_read = false;      // direction of the master's transfer
     bool addressing = false;   // the byte in the shift register is an address
-    bool refused = false;      // what the master's last byte met
-    bool first_read = false;   // no byte of the slave's has gone yet
+    bool refused = false;      // the last byte was not acknowledged
+    bool first_read = false;   // the slave has not sent a byte yet
     bool transmit_full = false, receive_full = false, shift_full = false, holding = false;
     uint8_t transmit = 0, received = 0, shift = 0;
     int slave_answer = 0;
@@ -58,11 +59,12 @@ private:
     Event low_timeout = Event::of<&I2c::on_low_timeout>(this);
 
     bool usable() const;
-    int unit() const;    // as the outbox has it: number and SDA pin
+    int unit() const;    // number and SDA pin, as in messages
     int64_t bit(int64_t count) const;
     void after(int64_t bit_count, Master next);
     void command(uint32_t value);
     bool take_pending(uint32_t command);
+    void proceed_all();
     void proceed();
     void begin();
     void send_byte();

@@ -1,4 +1,4 @@
-// The master of I2C: from START to STOP, as commands and data allow. Chapter 16.3.5.
+// The I2C master: from START to STOP, as commands and data allow. Chapter 16.3.5.
 #include "efm32gg/serial/i2c.h"
 
 namespace efm32gg {
@@ -11,9 +11,9 @@ void I2c::after(int64_t bit_count, Master next) {
     part.schedule(bits, part.now() + bit(bit_count));
 }
 
-// Goes on from where the bus is held, as far as commands and data allow (16.3.5).
+// Continues from a held bus as far as commands and data allow (16.3.5).
 void I2c::proceed() {
-    if (!usable() || !part.unit_rate(instance).runs())
+    if (!usable() || !clock_now().runs())
         return;
     if (master != Master::IDLE && bits.pending())
         return;
@@ -54,20 +54,18 @@ void I2c::proceed() {
         else if (take_pending(STATUS_PCONT)) {
             master = Master::ACKED;
             proceed();
-        } else
+        } else {
             hold(true);
+        }
         return;
     case Master::RECEIVED:
         deliver();
         if (shift_full)
             return hold(true);
-        if (take_pending(STATUS_PNACK)) {
-            refused = true;
+        refused = take_pending(STATUS_PNACK);
+        if (refused || take_pending(STATUS_PACK) || reg(CTRL) & CTRL_AUTOACK)
             after(1, Master::ACKNOWLEDGING);
-        } else if (take_pending(STATUS_PACK) || reg(CTRL) & CTRL_AUTOACK) {
-            refused = false;
-            after(1, Master::ACKNOWLEDGING);
-        } else
+        else
             hold(true);
         return;
     default:
@@ -162,7 +160,7 @@ void I2c::answer(int acknowledged, uint32_t data) {
     follow();
 }
 
-// The master lets the bus go at once.
+// Releases the bus at once.
 void I2c::end_master() {
     if (master != Master::IDLE)
         part.send(Kind::I2C_STOP, unit(), 0);

@@ -1,4 +1,4 @@
-// The slave of I2C: asked by the bus, answering when firmware has served it. Chapter 16.3.6.
+// The I2C slave: called by the bus, answers when firmware has served it. Chapter 16.3.6.
 #include "efm32gg/serial/i2c.h"
 
 namespace efm32gg {
@@ -76,7 +76,7 @@ void I2c::slave_stop() {
     follow();
 }
 
-// What was received goes into the buffer when there is room.
+// Moves the received byte into the buffer if there is room.
 void I2c::deliver() {
     if (!shift_full || receive_full)
         return;
@@ -85,9 +85,9 @@ void I2c::deliver() {
     shift_full = false;
 }
 
-// Whether what was received is acknowledged: by command, or by itself with AUTOACK.
+// Whether the received byte is acknowledged: by command, or automatically with AUTOACK.
 int I2c::decide() {
-    if (!part.unit_rate(instance).runs())  // asleep; the interrupt wakes it
+    if (!clock_now().runs())  // asleep; the interrupt wakes it
         return WAITING;
     const bool wanted = reg(STATUS) & (STATUS_PACK | STATUS_PNACK) || reg(CTRL) & CTRL_AUTOACK;
     if (shift_full || !wanted) {
@@ -108,7 +108,7 @@ int I2c::decide() {
 }
 
 int I2c::load() {
-    if (!transmit_full || !part.unit_rate(instance).runs()) {
+    if (!transmit_full || !clock_now().runs()) {
         hold(true);
         return WAITING;
     }
@@ -123,16 +123,15 @@ int I2c::load() {
 void I2c::proceed_slave() {
     if (slave_answer != WAITING)
         return;
-    int now = WAITING;
+    int answer = 0;
     if (slave == Slave::ADDRESS || slave == Slave::WRITTEN) {
         deliver();
-        now = decide();
-    } else if (slave == Slave::LOAD)
-        now = load();
-    else
-        now = 0;
-    if (now != WAITING)
-        release(now);
+        answer = decide();
+    } else if (slave == Slave::LOAD) {
+        answer = load();
+    }
+    if (answer != WAITING)
+        release(answer);
 }
 
 void I2c::release(int answer) {

@@ -7,10 +7,6 @@ namespace efm32gg {
 
 using namespace leuart;
 
-Leuart::Leuart(Part &part, const Instance &instance, int unit, int source, int signals)
-    : LowEnergy(part, instance, FREEZE, SYNCBUSY, CMD), unit(unit), source(source),
-      signals(signals) {}
-
 void Leuart::reset() {
     LowEnergy::reset();
     part.cancel(sent);
@@ -20,36 +16,17 @@ void Leuart::reset() {
     follow();
 }
 
-int Leuart::pin(int signal, uint32_t enable) const {
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
-    return reg(ROUTE) & enable && location < LOCATIONS ? ROUTES[signal][location] : -1;
-}
-
 int Leuart::transmit_pin() const {
-    const int at = pin(signals, ROUTE_TXPEN);
-    return at >= 0 && part.gpio->drives(at) ? at : -1;
+    const int location = (int)field(reg(ROUTE), ROUTE_LOCATION);
+    return reg(ROUTE) & ROUTE_TXPEN ? part.gpio->drivable(ROUTES[signals][location]) : -1;
 }
 
 int Leuart::receive_pin() const {
-    const int at = pin(signals + 1, ROUTE_RXPEN);
-    return at >= 0 && part.gpio->senses(at) ? at : -1;
+    const int location = (int)field(reg(ROUTE), ROUTE_LOCATION);
+    return reg(ROUTE) & ROUTE_RXPEN ? part.gpio->readable(ROUTES[signals + 1][location]) : -1;
 }
 
 // -- registers --
-
-uint32_t Leuart::busy_bit(uint32_t offset) const {
-    switch (offset) {
-    case CTRL: return SYNCBUSY_CTRL;
-    case CMD: return SYNCBUSY_CMD;
-    case CLKDIV: return SYNCBUSY_CLKDIV;
-    case STARTFRAME: return SYNCBUSY_STARTFRAME;
-    case SIGFRAME: return SYNCBUSY_SIGFRAME;
-    case TXDATAX: return SYNCBUSY_TXDATAX;
-    case TXDATA: return SYNCBUSY_TXDATA;
-    case PULSECTRL: return SYNCBUSY_PULSECTRL;
-    }
-    return 0;
-}
 
 uint32_t Leuart::peek(uint32_t offset) const {
     switch (offset) {
@@ -74,7 +51,7 @@ uint32_t Leuart::read(uint32_t offset) {
 
 void Leuart::write(uint32_t offset, uint32_t value) {
     if (offset == TXDATA || offset == TXDATAX) {
-        // The buffer takes it now; the shift register when it is synchronized.
+        // It enters the buffer now, and the shift register once it is synchronised.
         const uint32_t eighth = reg(CTRL) & CTRL_BIT8DV ? 0x100 : 0;
         if (transmit_buffer.full()) {
             raise(IF_TXOF);
@@ -97,23 +74,17 @@ void Leuart::apply(uint32_t offset, uint32_t value) {
     follow();
 }
 
-// Enabling and disabling are neighbours in CMD: the newer one counts.
-uint32_t Leuart::both(uint32_t older, uint32_t newer) const {
+// Bits that enable and disable the same thing are neighbours in CMD; the newer command wins.
+uint32_t Leuart::merge_commands(uint32_t older, uint32_t newer) const {
     const uint32_t pairs = newer & 0x3F;
     return (older & ~((pairs & 0x15) << 1 | (pairs & 0x2A) >> 1)) | newer;
 }
 
 void Leuart::command(uint32_t value) {
     uint32_t &status = reg(STATUS);
-    const auto change = [&](uint32_t on, uint32_t off, uint32_t bit) {
-        if (value & off)
-            status &= ~bit;
-        else if (value & on)
-            status |= bit;
-    };
-    change(CMD_RXEN, CMD_RXDIS, STATUS_RXENS);
-    change(CMD_TXEN, CMD_TXDIS, STATUS_TXENS);
-    change(CMD_RXBLOCKEN, CMD_RXBLOCKDIS, STATUS_RXBLOCK);
+    command_bit(status, STATUS_RXENS, value, CMD_RXEN, CMD_RXDIS);
+    command_bit(status, STATUS_TXENS, value, CMD_TXEN, CMD_TXDIS);
+    command_bit(status, STATUS_RXBLOCK, value, CMD_RXBLOCKEN, CMD_RXBLOCKDIS);
     if (value & CMD_CLEARTX)
         transmit_buffer.clear();
     if (value & CMD_CLEARRX)
@@ -121,30 +92,31 @@ void Leuart::command(uint32_t value) {
     start();
 }
 
-// -- transmitter: a bit is 1 + CLKDIV / 256 clocks (19.3.3), so a unit is 1/256 clock --
+// -- transmitter: a bit takes 1 + CLKDIV / 256 clocks (19.3.3), so durations are in 1/256 clock --
 
-void Leuart::start(bool behind_another) {
+void Leuart::start(bool follows) {
     constexpr uint32_t waiting = SYNCBUSY_TXDATA | SYNCBUSY_TXDATAX;
-    const Rate rate = part.unit_rate(instance);
+    const Rate rate = clock_now();
     if (shifting || transmit_buffer.empty() || !(reg(STATUS) & STATUS_TXENS) || !rate.runs() ||
         reg(SYNCBUSY) & waiting)
         return;
     const uint32_t frame = transmit_buffer.pop();
-    const int64_t halves = take(reg(CTRL), CTRL_STOPBITS) ? 2 : 1;
-    const bool parity = take(reg(CTRL), CTRL_PARITY) & 2;
+    const int64_t halves = field(reg(CTRL), CTRL_STOPBITS) ? 2 : 1;
+    const bool parity = field(reg(CTRL), CTRL_PARITY) & 2;
     const int64_t units = (1 + data_bits() + parity + halves) * (256 + (int64_t)reg(CLKDIV));
-    timing.append(rate, units, 256, behind_another, part.now());
+    timing.append(rate, units, 256, follows, part.now());
     shifting = true;
     shifted = frame;
     const int64_t data = frame & ((1u << data_bits()) - 1);
     if (const int to = transmit_pin(); to >= 0)
-        part.send(Kind::UART, unit | to << 8, frame & TXDATAX_TXBREAK ? 0x10000 : data,
+        part.send(Kind::UART, (FIRST_UNIT + instance.index) | to << 8,
+                  frame & TXDATAX_TXBREAK ? 0x10000 : data,
                   timing.end - timing.begin).time = timing.begin;
     part.schedule(sent, timing.end);
 }
 
 void Leuart::on_sent(int64_t) {
-    if (!part.unit_rate(instance).runs()) {
+    if (!clock_now().runs()) {
         stalled = true;
         return;
     }
@@ -166,7 +138,7 @@ void Leuart::on_sent(int64_t) {
 
 void Leuart::clocks_changed() {
     LowEnergy::clocks_changed();
-    if (stalled && part.unit_rate(instance).runs()) {
+    if (stalled && clock_now().runs()) {
         stalled = false;
         part.schedule(sent, part.now());
     }
@@ -177,7 +149,7 @@ void Leuart::clocks_changed() {
 // -- receiver --
 
 void Leuart::receive(uint32_t data, bool framing_error, bool parity_error, uint32_t rate) {
-    const Rate clock = part.unit_rate(instance);
+    const Rate clock = clock_now();
     if (!clock.runs() || !(reg(STATUS) & STATUS_RXENS) || reg(CTRL) & CTRL_LOOPBK ||
         receive_pin() < 0)
         return;
@@ -214,22 +186,20 @@ void Leuart::accept(uint32_t frame) {
     if (!(status & STATUS_RXBLOCK) || address) {
         if (receive_buffer.full()) {
             flags |= IF_RXOF;
-            const uint32_t first = receive_buffer.pop(), second = receive_buffer.pop();
-            receive_buffer.clear();
-            receive_buffer.push(first);
-            receive_buffer.push(second);
+            receive_buffer.replace_last(frame);
+        } else {
+            receive_buffer.push(frame);
         }
-        receive_buffer.push(frame);
     }
     reg(IF) |= flags;
 }
 
 void Leuart::follow() {
     uint32_t &status = reg(STATUS), &flags = reg(IF);
-    put(status, STATUS_TXBL, transmit_buffer.empty());
-    put(flags, IF_TXBL, transmit_buffer.empty());
-    put(status, STATUS_RXDATAV, !receive_buffer.empty());
-    put(flags, IF_RXDATAV, !receive_buffer.empty());
+    set_bits(status, STATUS_TXBL, transmit_buffer.empty());
+    set_bits(flags, IF_TXBL, transmit_buffer.empty());
+    set_bits(status, STATUS_RXDATAV, !receive_buffer.empty());
+    set_bits(flags, IF_RXDATAV, !receive_buffer.empty());
     const bool stopped = reg(CTRL) & CTRL_ERRSDMA && flags & (IF_FERR | IF_PERR);
     Dma &dma = *part.dma;
     dma.wakes(source, reg(CTRL) & (CTRL_RXDMAWU | CTRL_TXDMAWU));

@@ -1,4 +1,4 @@
-// LEUART. EFM32GG Reference Manual, chapter 19. Works down to EM2.
+// LEUART, which works down to EM2. EFM32GG Reference Manual, chapter 19.
 #pragma once
 
 #include "efm32gg/part/low_energy.h"
@@ -9,8 +9,11 @@ namespace efm32gg {
 
 class Leuart : public LowEnergy {
 public:
-    // As of Usart: number outside, DMA source, pins.
-    Leuart(Part &part, const Instance &instance, int unit, int source, int signals);
+    static constexpr int FIRST_UNIT = 5;  // number of LEUART0 in messages
+
+    // `source`: of its DMA requests; `signals`: of its TX pin, the RX pin's follows.
+    Leuart(Part &part, const Instance &instance, int source, int signals)
+        : LowEnergy(part, instance), source(source), signals(signals) {}
 
     void reset() override;
     uint32_t read(uint32_t offset) override;
@@ -23,21 +26,19 @@ public:
     int receive_pin() const;
 
 private:
-    const int unit, source, signals;
+    const int source, signals;
     FrameQueue<1> transmit_buffer;
-    FrameQueue<3> receive_buffer;  // with the shift register behind two entries
+    FrameQueue<3> receive_buffer;  // two entries and the shift register
     bool shifting = false, stalled = false;
     uint32_t shifted = 0;
     FrameTiming timing;
     Event sent = Event::of<&Leuart::on_sent>(this);
 
-    uint32_t busy_bit(uint32_t offset) const override;
     void apply(uint32_t offset, uint32_t value) override;
-    uint32_t both(uint32_t older, uint32_t newer) const override;
+    uint32_t merge_commands(uint32_t older, uint32_t newer) const override;
     int data_bits() const { return reg(leuart::CTRL) & leuart::CTRL_DATABITS ? 9 : 8; }
-    int pin(int signal, uint32_t enable) const;
     void command(uint32_t value);
-    void start(bool behind_another = false);
+    void start(bool follows = false);
     void on_sent(int64_t time);
     void accept(uint32_t frame);
     void follow();

@@ -10,12 +10,10 @@ using namespace usart;
 
 namespace {
 
-// Of an entry in a buffer: its data bits, and what TXDATAX and RXDATAX have beside them.
-constexpr uint32_t DATA = 0x1FF;
-
-// Bits of a duration are counted in units of 1/512 HFPERCLK cycle and half bits, so every frame
-// is a whole number of them.
+// Durations are counted in units of 1/512 HFPERCLK cycle, so that half a bit is a whole number.
 constexpr int64_t UNITS = 512;
+// Control bits of TXDATAX beside the data.
+constexpr uint32_t CONTROLS = 0xF800;
 
 constexpr uint32_t RX_FLAGS = IF_RXDATAV | IF_RXFULL | IF_RXOF | IF_RXUF | IF_PERR | IF_FERR |
                               IF_MPAF | IF_SSM;
@@ -23,9 +21,6 @@ constexpr uint32_t RX_FLAGS = IF_RXDATAV | IF_RXFULL | IF_RXOF | IF_RXUF | IF_PE
 constexpr int OVERSAMPLING[] = {16, 8, 6, 4};
 
 }  // namespace
-
-Usart::Usart(Part &part, const Instance &instance, const Place &place)
-    : Peripheral(part, instance), place(place) {}
 
 void Usart::reset() {
     Peripheral::reset();
@@ -37,39 +32,33 @@ void Usart::reset() {
 }
 
 int Usart::data_bits() const {
-    const int code = (int)take(reg(FRAME), FRAME_DATABITS);
+    const int code = (int)field(reg(FRAME), FRAME_DATABITS);
     return code >= 1 && code <= 13 ? code + 3 : 8;
 }
 
-// Half a bit, in units: oversampling times (1 + CLKDIV / 256) cycles are a bit (17.3.2.3); of the
-// synchronous clock, two times (17.3.3.1).
+// Half a bit, in units: a bit takes oversampling * (1 + CLKDIV / 256) cycles (17.3.2.3), or twice
+// the factor in synchronous mode (17.3.3.1).
 int64_t Usart::bit_units() const {
     const int64_t divided = 256 + reg(CLKDIV);
-    return synchronous() ? 2 * divided : OVERSAMPLING[take(reg(CTRL), CTRL_OVS)] * divided;
+    return synchronous() ? 2 * divided : OVERSAMPLING[field(reg(CTRL), CTRL_OVS)] * divided;
 }
 
 int64_t Usart::frame_units() const {
     if (synchronous())
         return 2 * data_bits() * bit_units();
-    const bool parity = take(reg(FRAME), FRAME_PARITY) & 2;
-    const int64_t stop_halves = 1 + take(reg(FRAME), FRAME_STOPBITS);
+    const bool parity = field(reg(FRAME), FRAME_PARITY) & 2;
+    const int64_t stop_halves = 1 + field(reg(FRAME), FRAME_STOPBITS);
     return (2 * (1 + data_bits() + parity) + stop_halves) * bit_units();
 }
 
 int Usart::transmit_pin() const {
-    if (!(reg(ROUTE) & ROUTE_TXPEN))
-        return -1;
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
-    const int pin = location < LOCATIONS ? ROUTES[place.signals][location] : -1;
-    return pin >= 0 && part.gpio->drives(pin) ? pin : -1;
+    const int location = (int)field(reg(ROUTE), ROUTE_LOCATION);
+    return reg(ROUTE) & ROUTE_TXPEN ? part.gpio->drivable(ROUTES[signals][location]) : -1;
 }
 
 int Usart::receive_pin() const {
-    if (!(reg(ROUTE) & ROUTE_RXPEN))
-        return -1;
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
-    const int pin = location < LOCATIONS ? ROUTES[place.signals + 1][location] : -1;
-    return pin >= 0 && part.gpio->senses(pin) ? pin : -1;
+    const int location = (int)field(reg(ROUTE), ROUTE_LOCATION);
+    return reg(ROUTE) & ROUTE_RXPEN ? part.gpio->readable(ROUTES[signals + 1][location]) : -1;
 }
 
 // -- registers --
@@ -134,17 +123,11 @@ void Usart::write(uint32_t offset, uint32_t value) {
 
 void Usart::command(uint32_t value) {
     uint32_t &status = reg(STATUS);
-    const auto change = [&](uint32_t on, uint32_t off, uint32_t bit) {
-        if (value & off)
-            status &= ~bit;
-        else if (value & on)
-            status |= bit;
-    };
-    change(CMD_RXEN, CMD_RXDIS, STATUS_RXENS);
-    change(CMD_TXEN, CMD_TXDIS, STATUS_TXENS);
-    change(CMD_MASTEREN, CMD_MASTERDIS, STATUS_MASTER);
-    change(CMD_RXBLOCKEN, CMD_RXBLOCKDIS, STATUS_RXBLOCK);
-    change(CMD_TXTRIEN, CMD_TXTRIDIS, STATUS_TXTRI);
+    command_bit(status, STATUS_RXENS, value, CMD_RXEN, CMD_RXDIS);
+    command_bit(status, STATUS_TXENS, value, CMD_TXEN, CMD_TXDIS);
+    command_bit(status, STATUS_MASTER, value, CMD_MASTEREN, CMD_MASTERDIS);
+    command_bit(status, STATUS_RXBLOCK, value, CMD_RXBLOCKEN, CMD_RXBLOCKDIS);
+    command_bit(status, STATUS_TXTRI, value, CMD_TXTRIEN, CMD_TXTRIDIS);
     if (value & CMD_CLEARTX)
         transmit_buffer.clear();
     if (value & CMD_CLEARRX)
@@ -164,7 +147,7 @@ void Usart::enqueue(uint32_t frame) {
     follow();
 }
 
-void Usart::start(bool behind_another) {
+void Usart::start(bool follows) {
     if (shifting || transmit_buffer.empty() || !(reg(STATUS) & STATUS_TXENS))
         return;
     if (synchronous() && !(reg(STATUS) & STATUS_MASTER))
@@ -172,37 +155,34 @@ void Usart::start(bool behind_another) {
     const int bits = data_bits();
     if (bits > 9 && transmit_buffer.size() < 2)
         return;
-    const Rate rate = part.unit_rate(instance);
+    const Rate rate = clock_now();
     if (!rate.runs())
         return;
     const uint32_t frame = transmit_buffer.pop();
-    shifted = frame & DATA;
+    uint32_t data = frame & TXDATAX_TXDATAX;
     if (bits > 9)
-        shifted = (frame & 0xFF) | (transmit_buffer.pop() & 0xFF) << 8;
-    const uint32_t controls = frame & 0xF800;
+        data = (frame & 0xFF) | (transmit_buffer.pop() & 0xFF) << 8;
+    data &= (1u << bits) - 1;
+    shifted = data | (frame & CONTROLS);
     shifting = true;
-    timing.append(rate, frame_units(), UNITS, behind_another, part.now());
-    const uint32_t sent_bits = shifted & ((1u << bits) - 1);
+    timing.append(rate, frame_units(), UNITS, follows, part.now());
     const int to = transmit_pin();
-    const bool driven = to >= 0 && !(reg(STATUS) & STATUS_TXTRI);
-    const bool breaks = controls & TXDATAX_TXBREAK && !synchronous();
-    if (driven)
-        part.send(synchronous() ? Kind::SPI : Kind::UART, place.unit | to << 8,
-                  breaks ? 0x10000 : sent_bits, timing.end - timing.begin).time = timing.begin;
-    shifted = sent_bits | controls;
+    if (to >= 0 && !(reg(STATUS) & STATUS_TXTRI)) {
+        const bool breaks = frame & TXDATAX_TXBREAK && !synchronous();
+        part.send(synchronous() ? Kind::SPI : Kind::UART, instance.index | to << 8,
+                  breaks ? 0x10000 : data, timing.end - timing.begin).time = timing.begin;
+    }
     part.schedule(sent, timing.end);
 }
 
-void Usart::on_sent(int64_t time) {
-    const Rate rate = part.unit_rate(instance);
-    if (!rate.runs()) {  // asleep or without clock: it is over when that is back
+void Usart::on_sent(int64_t) {
+    if (!clock_now().runs()) {  // asleep or without clock: continues when that is back
         stalled = true;
         return;
     }
-    (void)time;
     shifting = false;
     uint32_t &status = reg(STATUS);
-    const uint32_t data = shifted & ~(data_bits() > 9 ? 0u : 0xF800u);
+    const uint32_t data = shifted & ~(data_bits() > 9 ? 0 : CONTROLS);
     if (synchronous()) {
         if (status & STATUS_RXENS)
             accept(reg(CTRL) & CTRL_LOOPBK ? data : (1u << data_bits()) - 1);
@@ -221,14 +201,14 @@ void Usart::on_sent(int64_t time) {
     if (transmit_buffer.empty()) {
         status |= STATUS_TXC;
         reg(IF) |= IF_TXC;
-        part.prs->pulse(place.reflex, 1);
+        part.prs->pulse(reflex, 1);
     }
     start(true);
     follow();
 }
 
 void Usart::clocks_changed() {
-    if (stalled && part.unit_rate(instance).runs()) {
+    if (stalled && clock_now().runs()) {
         stalled = false;
         part.schedule(sent, part.now());
     }
@@ -239,7 +219,7 @@ void Usart::clocks_changed() {
 // -- receiver --
 
 void Usart::receive(uint32_t data, bool framing_error, bool parity_error, uint32_t rate) {
-    const Rate clock = part.unit_rate(instance);
+    const Rate clock = clock_now();
     if (!clock.runs() || !(reg(STATUS) & STATUS_RXENS) || synchronous() ||
         reg(CTRL) & CTRL_LOOPBK || receive_pin() < 0)
         return;
@@ -275,17 +255,15 @@ void Usart::accept(uint32_t frame) {
         for (int n = 0; n < entries; n++) {
             const uint32_t entry = entries == 1 ? frame : frame >> 8 * n & 0xFF;
             if (receive_buffer.full()) {
-                flags |= IF_RXOF;  // what waits in the shift register is lost
-                FrameQueue<3> kept = receive_buffer;
-                receive_buffer.clear();
-                receive_buffer.push(kept.pop());
-                receive_buffer.push(kept.pop());
+                flags |= IF_RXOF;  // the entry in the shift register is lost
+                receive_buffer.replace_last(entry);
+            } else {
+                receive_buffer.push(entry);
             }
-            receive_buffer.push(entry);
             if (receive_buffer.size() == 2)
                 flags |= IF_RXFULL;
         }
-        part.prs->pulse(place.reflex, 2);
+        part.prs->pulse(reflex, 2);
     }
     reg(IF) |= flags;
 }
@@ -300,28 +278,26 @@ uint32_t Usart::take_received() {
     return entry;
 }
 
-// -- flags that follow the buffers --
-
+// Updates flags, requests and interrupts from the buffers.
 void Usart::follow() {
     uint32_t &status = reg(STATUS), &flags = reg(IF);
     const bool room = reg(CTRL) & CTRL_TXBIL ? !transmit_buffer.full() : transmit_buffer.empty();
-    put(status, STATUS_TXBL, room);
-    put(flags, IF_TXBL, room);
-    put(status, STATUS_RXDATAV, !receive_buffer.empty());
-    put(flags, IF_RXDATAV, !receive_buffer.empty());
-    put(status, STATUS_RXFULL, receive_buffer.size() >= 2);
+    set_bits(status, STATUS_TXBL, room);
+    set_bits(flags, IF_TXBL, room);
+    set_bits(status, STATUS_RXDATAV, !receive_buffer.empty());
+    set_bits(flags, IF_RXDATAV, !receive_buffer.empty());
+    set_bits(status, STATUS_RXFULL, receive_buffer.size() >= 2);
     const bool stopped = reg(CTRL) & CTRL_ERRSDMA && flags & (IF_FERR | IF_PERR);
     Dma &dma = *part.dma;
-    dma.request(place.source, 0, !receive_buffer.empty() && !stopped);
-    dma.request(place.source, 1, room);
-    dma.request(place.source, 2, transmit_buffer.empty() && !shifting);
+    dma.request(source, 0, !receive_buffer.empty() && !stopped);
+    dma.request(source, 1, room);
+    dma.request(source, 2, transmit_buffer.empty() && !shifting);
     update_interrupts();
 }
 
 void Usart::update_interrupts() {
-    const uint32_t pending = reg(IF) & reg(IEN);
-    line(0, pending & RX_FLAGS);
-    line(1, pending & ~RX_FLAGS);
+    line(0, pending() & RX_FLAGS);
+    line(1, pending() & ~RX_FLAGS);
 }
 
 }  // namespace efm32gg

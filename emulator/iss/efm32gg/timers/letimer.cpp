@@ -18,44 +18,25 @@ constexpr int REFLEX = 52;
 
 }  // namespace
 
-LeTimer::LeTimer(Part &part, const Instance &instance)
-    : LowEnergy(part, instance, FREEZE, SYNCBUSY, CMD) {}
-
 void LeTimer::reset() {
     LowEnergy::reset();
-    part.cancel(due);
-    value = 0;
-    counted = 0;
-    ticks = Rate();
+    clear_count();
     running = buffered = false;
-    for (int n = 0; n < 2; n++)
+    for (int n = 0; n < 2; n++) {
         outputs[n] = pulsing[n] = false;
-    for (int n = 0; n < 2; n++)
-        for (int location = 0; location < LOCATIONS; location++)
-            part.gpio->function(ROUTES[route::LETIMER0_OUT0 + n][location], this, false, false);
+        part.gpio->release(route::LETIMER0_OUT0 + n, this);
+    }
 }
 
 uint32_t LeTimer::top() const { return reg(CTRL) & CTRL_COMP0TOP ? reg(COMP0) : LAST; }
 
 uint32_t LeTimer::action(int output) const {
-    return take(reg(CTRL), output ? CTRL_UFOA1 : CTRL_UFOA0);
-}
-
-int64_t LeTimer::steps() const {
-    return running && ticks.runs() ? ticks.edges(part.now()) - counted : 0;
-}
-
-// -- time passes --
-
-void LeTimer::fold() {
-    const int64_t passed = steps();
-    counted += passed;
-    pass(passed);
+    return field(reg(CTRL), output ? CTRL_UFOA1 : CTRL_UFOA0);
 }
 
 void LeTimer::pass(int64_t passed) {
     while (passed > 0 && running) {
-        // Free running and unseen: whole turns but the last two change nothing.
+        // Free running without outputs: whole turns but the last two change nothing.
         const int64_t turn = (int64_t)top() + 1;
         if (repeat_mode() == FREE && value <= top() && passed > 4 * turn && !outputs_matter())
             passed = passed % turn + 2 * turn;
@@ -84,7 +65,7 @@ void LeTimer::pass(int64_t passed) {
         }
         if (flags)
             raise(flags);
-        show();
+        show_outputs();
     }
 }
 
@@ -114,8 +95,9 @@ void LeTimer::underflow() {
                 if (reg(CTRL) & CTRL_BUFTOP)
                     reg(COMP0) = reg(COMP1);
                 buffered = false;
-            } else
+            } else {
                 running = false;
+            }
         }
         break;
     case DOUBLE:
@@ -134,8 +116,6 @@ void LeTimer::count_down(int which) {
         reg(IF) |= which ? IF_REP1 : IF_REP0;
 }
 
-// -- what somebody waits for --
-
 int64_t LeTimer::until(uint32_t wanted) const {
     if (wanted < value)
         return (int64_t)value - wanted;
@@ -149,10 +129,9 @@ bool LeTimer::outputs_matter() const {
     return false;
 }
 
-void LeTimer::plan() {
-    part.cancel(due);
-    if (!running || !ticks.runs())
-        return;
+int64_t LeTimer::next_effect() const {
+    if (pulsing[0] || pulsing[1])
+        return 1;
     const uint32_t awaited = reg(IEN) & ~reg(IF);
     int64_t next = FAR;
     if (repeat_mode() != FREE || awaited & (IF_UF | IF_REP0 | IF_REP1) || outputs_matter())
@@ -161,15 +140,7 @@ void LeTimer::plan() {
         next = std::min(next, until(reg(COMP0)));
     if (awaited & IF_COMP1 || outputs_matter())
         next = std::min(next, until(reg(COMP1)));
-    if (pulsing[0] || pulsing[1])
-        next = 1;
-    if (next != FAR)
-        part.schedule(due, ticks.time(counted + next));
-}
-
-void LeTimer::on_due(int64_t) {
-    fold();
-    plan();
+    return next;
 }
 
 void LeTimer::start() {
@@ -177,8 +148,12 @@ void LeTimer::start() {
         return;
     running = true;
     reg(STATUS) |= STATUS_RUNNING;
-    ticks = part.unit_rate(instance);
-    counted = ticks.edges(part.now());
+    restart_clock();
+}
+
+void LeTimer::stop() {
+    running = false;
+    reg(STATUS) &= ~STATUS_RUNNING;
 }
 
 void LeTimer::compare_matched(int compare) {
@@ -193,52 +168,16 @@ bool LeTimer::awaits(int compare) const {
     return reg(CTRL) & (compare ? CTRL_RTCC1TEN : CTRL_RTCC0TEN);
 }
 
-// -- clock and registers --
-
-void LeTimer::clocks_changed() {
-    LowEnergy::clocks_changed();
-    const Rate wanted = part.unit_rate(instance);
-    if (wanted.runs() != ticks.runs() || wanted.origin != ticks.origin ||
-        !wanted.same_frequency(ticks)) {
-        ticks = wanted;
-        counted = ticks.edges(part.now());
-    }
-    plan();
-}
-
-uint32_t LeTimer::busy_bit(uint32_t offset) const {
-    switch (offset) {
-    case CTRL: return SYNCBUSY_CTRL;
-    case CMD: return SYNCBUSY_CMD;
-    case COMP0: return SYNCBUSY_COMP0;
-    case COMP1: return SYNCBUSY_COMP1;
-    case REP0: return SYNCBUSY_REP0;
-    case REP1: return SYNCBUSY_REP1;
-    }
-    return 0;
-}
-
-uint32_t LeTimer::peek(uint32_t offset) const {
-    if (offset != CNT)
-        return LowEnergy::peek(offset);
-    const int64_t passed = steps();
-    if (passed <= value)
-        return (uint32_t)(value - passed);
-    return top() - (uint32_t)((passed - value - 1) % ((int64_t)top() + 1));
-}
-
-uint32_t LeTimer::read(uint32_t offset) {
-    if (steps()) {
-        fold();
-        plan();
-    }
-    return peek(offset);
+uint32_t LeTimer::after(int64_t ticks) const {
+    if (ticks <= value)
+        return (uint32_t)(value - ticks);
+    return top() - (uint32_t)((ticks - value - 1) % ((int64_t)top() + 1));
 }
 
 void LeTimer::write(uint32_t offset, uint32_t written) {
     fold();
     LowEnergy::write(offset, written);
-    show();
+    show_outputs();
     plan();
 }
 
@@ -251,30 +190,28 @@ void LeTimer::apply(uint32_t offset, uint32_t written) {
             outputs[0] = false;
         if (written & CMD_CTO1)
             outputs[1] = false;
-        if (written & CMD_STOP) {
-            running = false;
-            reg(STATUS) &= ~STATUS_RUNNING;
-        } else if (written & CMD_START)
+        if (written & CMD_STOP)
+            stop();
+        else if (written & CMD_START)
             start();
     } else {
         LowEnergy::apply(offset, written);
         if (offset == REP1)
             buffered = true;
     }
-    show();
+    show_outputs();
     plan();
 }
 
 // -- outputs --
 
 int LeTimer::pin(int output) const {
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
     const uint32_t enable = output ? ROUTE_OUT1PEN : ROUTE_OUT0PEN;
-    return reg(ROUTE) & enable && location < LOCATIONS
-        ? ROUTES[route::LETIMER0_OUT0 + output][location] : -1;
+    return reg(ROUTE) & enable
+        ? ROUTES[route::LETIMER0_OUT0 + output][field(reg(ROUTE), ROUTE_LOCATION)] : -1;
 }
 
-void LeTimer::show() {
+void LeTimer::show_outputs() {
     for (int n = 0; n < 2; n++) {
         part.prs->set(REFLEX, n, outputs[n]);
         if (const int to = pin(n); to >= 0)

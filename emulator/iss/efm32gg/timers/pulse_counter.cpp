@@ -7,20 +7,6 @@ namespace efm32gg {
 
 using namespace pcnt;
 
-PulseCounter::PulseCounter(Part &part, const Instance &instance, int signals)
-    : LowEnergy(part, instance, FREEZE, SYNCBUSY, CMD), signals(signals) {}
-
-void PulseCounter::reset() { LowEnergy::reset(); }
-
-uint32_t PulseCounter::busy_bit(uint32_t offset) const {
-    switch (offset) {
-    case CTRL: return SYNCBUSY_CTRL;
-    case CMD: return SYNCBUSY_CMD;
-    case TOPB: return SYNCBUSY_TOPB;
-    }
-    return 0;
-}
-
 void PulseCounter::apply(uint32_t offset, uint32_t value) {
     if (offset == CMD) {
         if (value & CMD_LTOPBIM)
@@ -32,7 +18,7 @@ void PulseCounter::apply(uint32_t offset, uint32_t value) {
     LowEnergy::apply(offset, value);
     if (offset == TOPB)
         reg(TOP) = reg(TOPB);
-    const uint32_t mode = take(reg(CTRL), CTRL_MODE);
+    const uint32_t mode = field(reg(CTRL), CTRL_MODE);
     if (mode == 3)
         part.log_once("%s: quadrature decoding is not modelled", instance.name);
     if (reg(CTRL) & CTRL_RSTEN)
@@ -44,8 +30,7 @@ void PulseCounter::apply(uint32_t offset, uint32_t value) {
 }
 
 int PulseCounter::pin(int signal) const {
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
-    return location < LOCATIONS ? ROUTES[signals + signal][location] : -1;
+    return ROUTES[signals + signal][field(reg(ROUTE), ROUTE_LOCATION)];
 }
 
 void PulseCounter::pin_changed(int port, int bit, bool level) {
@@ -54,12 +39,12 @@ void PulseCounter::pin_changed(int port, int bit, bool level) {
 }
 
 void PulseCounter::prs_changed(int channel, bool level) {
-    if (reg(INPUT) & INPUT_S0PRSEN && (int)take(reg(INPUT), INPUT_S0PRSSEL) == channel)
+    if (reg(INPUT) & INPUT_S0PRSEN && (int)field(reg(INPUT), INPUT_S0PRSSEL) == channel)
         edge(level);
 }
 
 void PulseCounter::edge(bool rising) {
-    const uint32_t control = reg(CTRL), mode = take(control, CTRL_MODE);
+    const uint32_t control = reg(CTRL), mode = field(control, CTRL_MODE);
     if ((mode != 1 && mode != 2) || control & CTRL_RSTEN || rising == !!(control & CTRL_EDGE) ||
         part.mode > 3)
         return;
@@ -70,7 +55,7 @@ void PulseCounter::edge(bool rising) {
         reg(STATUS) = down ? STATUS_DIR : 0;
         raise(IF_DIRCNG);
     }
-    const uint32_t counted = take(control, CTRL_CNTEV);  // both, up, down, none
+    const uint32_t counted = field(control, CTRL_CNTEV);  // both, up, down, none
     if (counted == 3 || (counted == 1 && down) || (counted == 2 && !down))
         return;
     uint32_t &count = reg(CNT);

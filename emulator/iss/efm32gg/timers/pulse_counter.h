@@ -1,4 +1,4 @@
-// PCNT: counts edges at its first input, with the direction of CTRL or of its second input.
+// PCNT: counts edges at its first input, in the direction given by CTRL or by its second input.
 // EFM32GG Reference Manual, chapter 24. Not modelled: quadrature, filter, auxiliary counter.
 #pragma once
 
@@ -8,9 +8,10 @@ namespace efm32gg {
 
 class PulseCounter : public LowEnergy {
 public:
-    PulseCounter(Part &part, const Instance &instance, int signals);
+    // `signals`: route::Signal of its first input; the second one follows.
+    PulseCounter(Part &part, const Instance &instance, int signals)
+        : LowEnergy(part, instance), signals(signals) {}
 
-    void reset() override;
     void pin_changed(int port, int bit, bool level) override;
     void prs_changed(int channel, bool level) override;
 
@@ -18,7 +19,6 @@ private:
     const int signals;
     bool listening = false;
 
-    uint32_t busy_bit(uint32_t offset) const override;
     void apply(uint32_t offset, uint32_t value) override;
     int pin(int signal) const;
     void edge(bool rising);

@@ -10,11 +10,6 @@ namespace efm32gg {
 
 using namespace timer;
 
-Timer::Timer(Part &part, const Instance &instance, int source, int reflex, int signals)
-    : Peripheral(part, instance), source(source), reflex(reflex), signals(signals) {}
-
-void Timer::connect(Timer *const (&all)[4]) { timers = all; }
-
 void Timer::reset() {
     Peripheral::reset();
     part.cancel(due);
@@ -25,33 +20,29 @@ void Timer::reset() {
     for (int n = 0; n < CHANNELS; n++) {
         buffered[n] = outputs[n] = skipped[n] = inputs[n] = false;
         captured[n] = 0;
-        if (part.gpio)
-            for (int location = 0; location < LOCATIONS; location++)
-                part.gpio->function(ROUTES[signals + n][location], this, false, false);
+        part.gpio->release(signals + n, this);
     }
 }
-
-// -- the counter as arithmetic --
 
 // Ticks until the next overflow or underflow, at least 1. Counting up and down turns at the top
 // and at 0: the tick after it is the overflow or underflow.
 int64_t Timer::until_wrap(const Count &from) const {
     const int64_t top = reg(TOP), value = from.value;
-    if (mode() == DOWN || (mode() == UP_DOWN && from.down))
+    if (counts_down(from))
         return value + 1;
     return (value > top ? LAST : top) - value + 1;
 }
 
-// Ticks until the counter has `value`, within the way to the next wrap; FAR when not there.
+// Ticks until the counter reaches `value` before the next wrap; FAR if it does not.
 int64_t Timer::until_value(const Count &from, uint32_t value) const {
-    const bool down = mode() == DOWN || (mode() == UP_DOWN && from.down);
-    const int64_t way = down ? (int64_t)from.value - value : (int64_t)value - from.value;
-    return way > 0 && way < until_wrap(from) ? way : FAR;
+    const int64_t distance = counts_down(from) ? (int64_t)from.value - value
+                                               : (int64_t)value - from.value;
+    return distance > 0 && distance < until_wrap(from) ? distance : FAR;
 }
 
-// `steps` is not beyond the next wrap.
+// `steps` may reach the next wrap, but not pass it.
 Timer::Count Timer::after(Count from, int64_t steps) const {
-    const bool down = mode() == DOWN || (mode() == UP_DOWN && from.down);
+    const bool down = counts_down(from);
     if (steps < until_wrap(from))
         return {(uint32_t)(down ? from.value - steps : from.value + steps), down};
     const uint32_t top = reg(TOP);
@@ -66,35 +57,28 @@ Timer::Count Timer::after(Count from, int64_t steps) const {
 }
 
 int64_t Timer::pending_ticks() const {
-    if (!running || !ticks.runs() || take(reg(CTRL), CTRL_CLKSEL) != PRESCALED)
+    if (!running || !ticks.runs() || field(reg(CTRL), CTRL_CLKSEL) != PRESCALED)
         return 0;
     return ticks.edges(part.now()) - counted;
 }
 
-Timer::Count Timer::current() const {
-    Count now = count;
-    int64_t steps = pending_ticks();
-    if (steps > 0 && !(reg(CTRL) & CTRL_OSMEN)) {  // whole turns change nothing
-        const int64_t first = until_wrap(now);
-        if (steps >= first) {
-            now = after(now, first);
-            steps -= first;
-            const int64_t period = mode() == UP_DOWN ? 2 * (int64_t)std::max(1u, reg(TOP))
-                                                     : (int64_t)reg(TOP) + 1;
-            steps %= period;
-        }
+// Any number of steps; whole turns after the next wrap change nothing.
+Timer::Count Timer::far_after(Count from, int64_t steps) const {
+    const int64_t first = until_wrap(from);
+    if (steps >= first) {
+        from = after(from, first);
+        const int64_t top = reg(TOP);
+        steps = (steps - first) % (mode() == UP_DOWN ? 2 * std::max<int64_t>(1, top) : top + 1);
     }
     while (steps > 0) {
-        const int64_t part_way = std::min(steps, until_wrap(now));
-        now = after(now, part_way);
+        const int64_t part_way = std::min(steps, until_wrap(from));
+        from = after(from, part_way);
         steps -= part_way;
     }
-    return now;
+    return from;
 }
 
-// -- time passes --
-
-// Brings the counter and its flags up to now.
+// Updates the counter and its flags to now.
 void Timer::fold() {
     const int64_t steps = pending_ticks();
     counted += steps;
@@ -103,10 +87,10 @@ void Timer::fold() {
 
 void Timer::pass(int64_t steps) {
     while (steps > 0 && running) {
-        // Nobody waits for what comes next: flags after several whole turns are those after two.
+        // Without effects, several whole turns set the same flags as two.
         const int64_t turn = until_wrap(count) + 2 * ((int64_t)reg(TOP) + 1);
         if (steps > 4 * turn && !watched_wrap()) {
-            skip(steps - 2 * turn);
+            count = far_after(count, steps - 2 * turn);
             steps = 2 * turn;
         }
         int64_t next = std::min(steps, until_wrap(count));
@@ -124,21 +108,6 @@ void Timer::pass(int64_t steps) {
                 (wraps || count.value != before.value))
                 matched(n);
         show_outputs();
-    }
-}
-
-void Timer::skip(int64_t steps) {
-    const int64_t first = until_wrap(count);
-    if (steps < first)
-        return (void)(count = after(count, steps));
-    count = after(count, first);
-    const int64_t period =
-        mode() == UP_DOWN ? 2 * (int64_t)std::max(1u, reg(TOP)) : (int64_t)reg(TOP) + 1;
-    steps = (steps - first) % period;
-    while (steps > 0) {
-        const int64_t part_way = std::min(steps, until_wrap(count));
-        count = after(count, part_way);
-        steps -= part_way;
     }
 }
 
@@ -161,15 +130,19 @@ void Timer::wrapped() {
             buffered[n] = false;
         }
         if (cc_mode(n) == COMPARE)
-            act(n, take(reg(cc(n, CC0_CTRL)), under ? CC0_CTRL_CUFOA : CC0_CTRL_COFOA));
+            act(n, field(reg(cc(n, CC0_CTRL)), under ? CC0_CTRL_CUFOA : CC0_CTRL_COFOA));
     }
     if (reg(CTRL) & CTRL_OSMEN)
         stop();
     update_interrupts();
-    if (timers)
-        for (int n = 0; n < 3; n++)
-            if (timers[n] == this)
-                timers[n + 1]->step();
+    if (Timer *next = next_timer())
+        next->step();
+}
+
+// The timer that this one can clock; null for the last one.
+Timer *Timer::next_timer() const {
+    const size_t next = (size_t)instance.index + 1;
+    return next < part.timers.size() ? part.timers[next] : nullptr;
 }
 
 void Timer::matched(int n) {
@@ -177,20 +150,14 @@ void Timer::matched(int n) {
     part.prs->pulse(reflex, 2 + n);
     part.dma->pulse(source, 1 + n);
     if (cc_mode(n) == COMPARE)
-        act(n, take(reg(cc(n, CC0_CTRL)), CC0_CTRL_CMOA));
+        act(n, field(reg(cc(n, CC0_CTRL)), CC0_CTRL_CMOA));
     update_interrupts();
 }
 
-// -- what somebody waits for --
-
 bool Timer::watched_wrap() const {
-    const bool cascade = timers && [this] {
-        for (int n = 0; n < 3; n++)
-            if (timers[n] == this)
-                return timers[n + 1]->running &&
-                       take(timers[n + 1]->reg(CTRL), CTRL_CLKSEL) == CASCADE;
-        return false;
-    }();
+    const Timer *next = next_timer();
+    const bool cascade =
+        next && next->running && field(next->reg(CTRL), CTRL_CLKSEL) == CASCADE;
     if (cascade || buffered_top || reg(CTRL) & CTRL_OSMEN || part.dma->listens(source, 0) ||
         part.prs->listens(reflex, 0) || part.prs->listens(reflex, 1))
         return true;
@@ -210,16 +177,16 @@ bool Timer::watched(int n) const {
 
 void Timer::plan() {
     part.cancel(due);
-    if (!running || !ticks.runs() || take(reg(CTRL), CTRL_CLKSEL) != PRESCALED)
+    if (!running || !ticks.runs() || field(reg(CTRL), CTRL_CLKSEL) != PRESCALED)
         return;
     const int64_t wrap = until_wrap(count);
     int64_t next = watched_wrap() ? wrap : FAR;
     for (int n = 0; n < CHANNELS; n++)
         if (watched(n)) {
             const uint32_t value = reg(cc(n, CC0_CCV));
-            const int64_t way = until_value(count, value);
-            // Behind the next wrap: look again there.
-            next = std::min(next, way == FAR ? wrap : way);
+            const int64_t distance = until_value(count, value);
+            // Beyond the next wrap: plan again there.
+            next = std::min(next, distance == FAR ? wrap : distance);
         }
     if (next != FAR)
         part.schedule(due, ticks.time(counted + next));
@@ -232,23 +199,22 @@ void Timer::on_due(int64_t) {
 
 // -- clock, start and stop --
 
-// The prescaler begins anew.
-void Timer::restart_clock() {
-    const Rate rate = part.unit_rate(instance);
-    counted = 0;
-    ticks = Rate();
-    if (rate.runs()) {
-        const int64_t origin = rate.time(rate.edge_at_or_after(part.now()));
-        ticks = rate.divided((int64_t)1 << std::min(take(reg(CTRL), CTRL_PRESC), 10u), origin);
-    }
+Rate Timer::prescaled(const Rate &rate, int64_t origin) const {
+    return rate.divided((int64_t)1 << std::min(field(reg(CTRL), CTRL_PRESC), 10u), origin);
 }
 
-void Timer::clocks_changing() { fold(); }
+// Restarts the prescaler.
+void Timer::restart_clock() {
+    const Rate rate = clock_now();
+    counted = 0;
+    ticks = Rate();
+    if (rate.runs())
+        ticks = prescaled(rate, rate.time(rate.edge_at_or_after(part.now())));
+}
 
 void Timer::clocks_changed() {
-    const Rate rate = part.unit_rate(instance);
-    const Rate wanted = rate.runs()
-        ? rate.divided((int64_t)1 << std::min(take(reg(CTRL), CTRL_PRESC), 10u), 0) : Rate();
+    const Rate rate = clock_now();
+    const Rate wanted = rate.runs() ? prescaled(rate, 0) : Rate();
     if (ticks.runs() != wanted.runs() || !ticks.same_frequency(wanted))
         restart_clock();
     plan();
@@ -262,12 +228,9 @@ void Timer::start() {
     count.down = mode() == DOWN || (mode() == UP_DOWN && count.down);
 }
 
-void Timer::stop() { running = false; }
-
-// One count by a cascade or by CC1's edge.
+// Counts one overflow of the timer below it.
 void Timer::step() {
-    const uint32_t selected = take(reg(CTRL), CTRL_CLKSEL);
-    if (running && selected == CASCADE)
+    if (running && field(reg(CTRL), CTRL_CLKSEL) == CASCADE)
         pass(1);
 }
 

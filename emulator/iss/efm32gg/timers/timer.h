@@ -1,7 +1,7 @@
 // TIMER. EFM32GG Reference Manual, chapter 20.
 //
-// The counter is computed when it is looked at. Events are scheduled for what somebody waits for:
-// an interrupt, a pin, DMA, reflexes, a cascade, a buffered value.
+// The counter is computed when it is accessed. Events are scheduled only for ticks with an effect:
+// on an interrupt, a pin, DMA, PRS, a cascaded timer, a buffered value.
 // Not modelled: quadrature decoding, dead time insertion, input filters.
 #pragma once
 
@@ -11,20 +11,18 @@ namespace efm32gg {
 
 class Timer : public Peripheral {
 public:
-    // `source`: of its DMA requests; `reflex`: of its PRS signals; `signals`: its CC0 pin.
-    Timer(Part &part, const Instance &instance, int source, int reflex, int signals);
+    // `source`: of its DMA requests; `reflex`: of its PRS signals; `signals`: of its CC0 pin.
+    Timer(Part &part, const Instance &instance, int source, int reflex, int signals)
+        : Peripheral(part, instance), source(source), reflex(reflex), signals(signals) {}
 
     void reset() override;
     uint32_t read(uint32_t offset) override;
     uint32_t peek(uint32_t offset) const override;
     void write(uint32_t offset, uint32_t value) override;
-    void clocks_changing() override;
+    void clocks_changing() override { fold(); }
     void clocks_changed() override;
     void pin_changed(int port, int bit, bool level) override;
     void prs_changed(int channel, bool level) override;
-
-    // The timer below and above it, for cascades; and all, for CTRL_SYNC.
-    void connect(Timer *const (&all)[4]);
 
 private:
     static constexpr int CHANNELS = 3;
@@ -43,12 +41,11 @@ private:
     };
 
     const int source, reflex, signals;
-    Timer *const *timers = nullptr;
     Rate ticks;               // the prescaled clock, edge 0 at the start
-    int64_t counted = 0;      // its edges that are in `count`
+    int64_t counted = 0;      // edges of `ticks` that `count` includes
     Count count = {};
     bool listening = false;   // to pins
-    bool within_edge = false; // what an edge does may come back as an edge
+    bool within_edge = false; // the effect of an edge may cause another edge
     bool running = false, buffered_top = false, inputs[CHANNELS] = {};
     bool buffered[CHANNELS] = {}, outputs[CHANNELS] = {}, skipped[CHANNELS] = {};
     int captured[CHANNELS] = {};
@@ -56,18 +53,23 @@ private:
 
     uint32_t cc(int n, uint32_t offset) const { return offset + 0x10 * (uint32_t)n; }
     uint32_t cc_mode(int n) const {
-        return take(reg(cc(n, timer::CC0_CTRL)), timer::CC0_CTRL_MODE);
+        return field(reg(cc(n, timer::CC0_CTRL)), timer::CC0_CTRL_MODE);
     }
-    uint32_t mode() const { return take(reg(timer::CTRL), timer::CTRL_MODE); }
-    bool compares(int n) const { return cc_mode(n) >= 2; }
+    uint32_t mode() const { return field(reg(timer::CTRL), timer::CTRL_MODE); }
+    bool compares(int n) const { return cc_mode(n) >= COMPARE; }
+    bool counts_down(const Count &from) const {
+        return mode() == DOWN || (mode() == UP_DOWN && from.down);
+    }
+    Rate prescaled(const Rate &rate, int64_t origin) const;
+    Timer *next_timer() const;
     int64_t until_wrap(const Count &from) const;
     int64_t until_value(const Count &from, uint32_t value) const;
     Count after(Count from, int64_t steps) const;
-    Count current() const;
+    Count far_after(Count from, int64_t steps) const;
+    Count current() const { return far_after(count, pending_ticks()); }
     int64_t pending_ticks() const;
     void fold();
     void pass(int64_t steps);
-    void skip(int64_t steps);
     void wrapped();
     void matched(int n);
     bool watched(int n) const;
@@ -76,7 +78,7 @@ private:
     void on_due(int64_t time);
     void restart_clock();
     void start();
-    void stop();
+    void stop() { running = false; }
     void step();
     void edge(int n, bool rising);
     void capture(int n);

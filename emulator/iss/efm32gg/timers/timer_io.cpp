@@ -54,11 +54,11 @@ void Timer::write(uint32_t offset, uint32_t value) {
             stop();
         } else if (value & CMD_START) {
             start();
-            if (timers && reg(CTRL) & CTRL_SYNC)
-                for (int n = 0; n < 4; n++)
-                    if (timers[n] != this && timers[n]->reg(CTRL) & CTRL_SYNC) {
-                        timers[n]->start();
-                        timers[n]->plan();
+            if (reg(CTRL) & CTRL_SYNC)
+                for (Timer *other : part.timers)
+                    if (other != this && other->reg(CTRL) & CTRL_SYNC) {
+                        other->start();
+                        other->plan();
                     }
         }
         break;
@@ -85,7 +85,7 @@ void Timer::write(uint32_t offset, uint32_t value) {
         buffered_top = false;
         break;
     case DTLOCK:
-        reg(DTLOCK) = (value & DTLOCK_LOCKKEY) != UNLOCK;
+        lock(DTLOCK, value, UNLOCK);
         break;
     default:
         Peripheral::write(offset, value);
@@ -98,17 +98,16 @@ void Timer::write(uint32_t offset, uint32_t value) {
                 captured[n] = 0;
                 outputs[n] = cc_mode(n) == COMPARE && value & CC0_CTRL_COIST;
                 inputs[n] = value & CC0_CTRL_INSEL
-                                ? part.prs->level((int)take(value, CC0_CTRL_PRSSEL))
+                                ? part.prs->level((int)field(value, CC0_CTRL_PRSSEL))
                                 : part.gpio->input(pin(n));
             }
         }
         if (offset == ROUTE)
             for (int n = 0; n < CHANNELS; n++)
-                for (int location = 0; location < LOCATIONS; location++)
-                    part.gpio->function(ROUTES[signals + n][location], this, false, false);
+                part.gpio->release(signals + n, this);
     }
     const uint32_t starts = CTRL_RISEA | CTRL_FALLA;
-    if (!listening && ((offset == CTRL && (value & starts || take(value, CTRL_CLKSEL))) ||
+    if (!listening && ((offset == CTRL && (value & starts || field(value, CTRL_CLKSEL))) ||
                        cc_mode(0) == CAPTURE || cc_mode(1) == CAPTURE || cc_mode(2) == CAPTURE)) {
         part.gpio->listen(*this);
         listening = true;
@@ -120,9 +119,8 @@ void Timer::write(uint32_t offset, uint32_t value) {
 // -- outputs --
 
 int Timer::pin(int n) const {
-    const uint32_t location = take(reg(ROUTE), ROUTE_LOCATION);
-    const bool routed = reg(ROUTE) & ROUTE_CC0PEN << n && location < LOCATIONS;
-    return routed ? ROUTES[signals + n][location] : -1;
+    const bool routed = reg(ROUTE) & ROUTE_CC0PEN << n;
+    return routed ? ROUTES[signals + n][field(reg(ROUTE), ROUTE_LOCATION)] : -1;
 }
 
 void Timer::act(int n, uint32_t action) {
@@ -158,7 +156,7 @@ void Timer::pin_changed(int port, int bit, bool level) {
 void Timer::prs_changed(int channel, bool level) {
     for (int n = 0; n < CHANNELS; n++) {
         const uint32_t control = reg(cc(n, CC0_CTRL));
-        if (control & CC0_CTRL_INSEL && (int)take(control, CC0_CTRL_PRSSEL) == channel &&
+        if (control & CC0_CTRL_INSEL && (int)field(control, CC0_CTRL_PRSSEL) == channel &&
             inputs[n] != level)
             edge(n, level);
     }
@@ -166,14 +164,14 @@ void Timer::prs_changed(int channel, bool level) {
 
 void Timer::edge(int n, bool rising) {
     inputs[n] = rising;
-    if (!part.unit_rate(instance).runs() || within_edge)
+    if (!clock_now().runs() || within_edge)
         return;
     within_edge = true;
     fold();
-    const uint32_t control = reg(cc(n, CC0_CTRL)), which = take(control, CC0_CTRL_ICEDGE);
+    const uint32_t control = reg(cc(n, CC0_CTRL)), which = field(control, CC0_CTRL_ICEDGE);
     const bool wanted = which == 2 || (which == 0 && rising) || (which == 1 && !rising);
     if (n == 0) {
-        const uint32_t action = take(reg(CTRL), rising ? CTRL_RISEA : CTRL_FALLA);
+        const uint32_t action = field(reg(CTRL), rising ? CTRL_RISEA : CTRL_FALLA);
         if (action == RELOAD)
             count.value = mode() == DOWN ? reg(TOP) : 0;
         if (action == START || action == RELOAD)
@@ -181,7 +179,7 @@ void Timer::edge(int n, bool rising) {
         if (action == STOP)
             stop();
     }
-    if (n == 1 && running && wanted && take(reg(CTRL), CTRL_CLKSEL) == CHANNEL_1)
+    if (n == 1 && running && wanted && field(reg(CTRL), CTRL_CLKSEL) == CHANNEL_1)
         pass(1);
     if (wanted && cc_mode(n) == CAPTURE)
         capture(n);
@@ -198,11 +196,11 @@ void Timer::capture(int n) {
         reg(IF) |= IF_ICBOF0 << n;
     else
         captured[n]++;
-    const uint32_t events = take(reg(cc(n, CC0_CTRL)), CC0_CTRL_ICEVCTRL);
+    const uint32_t events = field(reg(cc(n, CC0_CTRL)), CC0_CTRL_ICEVCTRL);
     skipped[n] = !skipped[n];
-    const bool told = events == 0 || (events == 1 && !skipped[n]) || (events == 2 && inputs[n]) ||
-                      (events == 3 && !inputs[n]);
-    if (!told)
+    const bool signals_event = events == 0 || (events == 1 && !skipped[n]) ||
+                               (events == 2 && inputs[n]) || (events == 3 && !inputs[n]);
+    if (!signals_event)
         return;
     reg(IF) |= IF_CC0 << n;
     part.prs->pulse(reflex, 2 + n);

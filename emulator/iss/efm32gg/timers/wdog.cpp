@@ -4,12 +4,12 @@ namespace efm32gg {
 
 using namespace wdog;
 
-// How many edges a written register needs to reach the counter's clock.
-static constexpr int64_t WDOG_SYNC_EDGES = 3;
+// Clock edges until a written register takes effect.
+static constexpr int64_t SYNC_EDGES = 3;
 
 void Wdog::reset() {
     Peripheral::reset();
-    part.cancel(bite);
+    part.cancel(timeout);
     part.cancel(synchronised);
     effective = reg(CTRL);
     clearing = false;
@@ -19,7 +19,7 @@ void Wdog::reset() {
 
 Rate Wdog::source(uint32_t control) const {
     static constexpr Clock CHOICE[] = {Clock::ULFRCO, Clock::LFRCO, Clock::LFXO, Clock::LFXO};
-    return part.rate(CHOICE[take(control, CTRL_CLKSEL)]);
+    return part.rate(CHOICE[field(control, CTRL_CLKSEL)]);
 }
 
 void Wdog::write(uint32_t offset, uint32_t value) {
@@ -34,9 +34,13 @@ void Wdog::write(uint32_t offset, uint32_t value) {
     } else {
         return;
     }
+    synchronise();
+}
+
+void Wdog::synchronise() {
     const Rate rate = source(reg(CTRL));
-    if (!synchronised.pending() && rate.runs())
-        part.schedule(synchronised, rate.time(rate.edges(part.now()) + WDOG_SYNC_EDGES));
+    if (reg(SYNCBUSY) && !synchronised.pending() && rate.runs())
+        part.schedule(synchronised, rate.time(rate.edges(part.now()) + SYNC_EDGES));
 }
 
 void Wdog::on_synchronised(int64_t) {
@@ -50,7 +54,7 @@ void Wdog::on_synchronised(int64_t) {
     restart();
 }
 
-// Whole periods of the clock are kept over changes of it and over sleep.
+// Whole periods of the clock are kept over clock changes and sleep.
 void Wdog::clocks_changing() {
     if (!clock.runs())
         return;
@@ -61,9 +65,7 @@ void Wdog::clocks_changing() {
 
 void Wdog::clocks_changed() {
     restart();
-    const Rate rate = source(reg(CTRL));
-    if (reg(SYNCBUSY) && !synchronised.pending() && rate.runs())
-        part.schedule(synchronised, rate.time(rate.edges(part.now()) + WDOG_SYNC_EDGES));
+    synchronise();
 }
 
 void Wdog::restart() {
@@ -71,11 +73,11 @@ void Wdog::restart() {
                         (part.mode == 3 && !(effective & CTRL_EM3RUN)) || part.mode == 4;
     clock = effective & CTRL_EN && !sleeps ? source(effective) : Rate();
     since = part.now();
-    part.cancel(bite);
+    part.cancel(timeout);
     if (clock.runs())
-        part.schedule(bite, clock.time(clock.edges(since) + period() - counted));
+        part.schedule(timeout, clock.time(clock.edges(since) + period() - counted));
 }
 
-void Wdog::on_bite(int64_t) { part.request_reset(rmu::RSTCAUSE_WDOGRST); }
+void Wdog::on_timeout(int64_t) { part.request_reset(rmu::RSTCAUSE_WDOGRST); }
 
 }  // namespace efm32gg
