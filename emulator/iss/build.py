@@ -10,6 +10,7 @@ from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.cxx import cxx_header
 
 FOLDER = Path(__file__).parent
+LOOP = FOLDER / "armv7m" / "execute" / "loop.cpp"
 
 
 def sources() -> list[Path]:
@@ -31,8 +32,8 @@ def _compile(
 ) -> Path:
     (scratch / "registers.h").write_text(header)
     units = [file for file in files if file.suffix == ".cpp"]
-    # Each peripheral imports the names of its own registers, so each file is compiled by itself.
-    apart = [file for file in units if FOLDER / "efm32gg" in file.parents]
+    # Peripherals import the names of their registers, and the loop defines many macros.
+    apart = [file for file in units if FOLDER / "efm32gg" in file.parents or file == LOOP]
     unity = scratch / "simulator.cpp"
     unity.write_text("".join(f'#include "{file}"\n' for file in units if file not in apart))
     return compile_library(

@@ -114,7 +114,7 @@ HANDLE(MSR) {
     NEXT(2);
 }
 
-// Those that hand over to System with r[15] behind the instruction.
+// Instructions that call System with r[15] behind them.
 #define HAND_OVER(call) \
     do { \
         now += 1; \

@@ -12,35 +12,33 @@
         nz = result; \
         NEXT(1); \
     } while (0)
-#define TEST_NZ(expression) \
-    do { \
-        nz = (uint32_t)(expression); \
-        NEXT(1); \
-    } while (0)
-#define CONSTANT_CARRY() \
-    do { \
-        if (op->shift) carry = (uint8_t)(op->value >> 31); \
-    } while (0)
 #define SHIFTED_M(carry_out) shifted(r[op->m], op->a, op->shift, carry_out)
 
-#define LOGIC(name, expression) \
-    HANDLE(name##_I) { const uint32_t a = r[op->n], b = op->value; (void)a; RESULT(expression); } \
-    HANDLE(name##_R) { const uint32_t a = r[op->n], b = r[op->m]; (void)a; RESULT(expression); } \
+// The three operand forms of an instruction: the statements use operands `a` and `b`.
+#define FORM(name, operand, ...) \
+    HANDLE(name) { \
+        [[maybe_unused]] const uint32_t a = r[op->n]; \
+        const uint32_t b = (operand); \
+        __VA_ARGS__; \
+    }
+#define FORMS(name, ...) \
+    FORM(name##_I, op->value, __VA_ARGS__) \
+    FORM(name##_R, r[op->m], __VA_ARGS__) \
     HANDLE(name##_X) { \
         uint8_t unused = carry; \
-        const uint32_t a = r[op->n], b = SHIFTED_M(unused); (void)a; \
-        RESULT(expression); \
-    } \
-    HANDLE(name##S_I) { \
-        const uint32_t a = r[op->n], b = op->value; (void)a; \
-        CONSTANT_CARRY(); \
-        RESULT_NZ(expression); \
-    } \
-    HANDLE(name##S_R) { const uint32_t a = r[op->n], b = r[op->m]; (void)a; RESULT_NZ(expression); } \
-    HANDLE(name##S_X) { \
-        const uint32_t a = r[op->n], b = SHIFTED_M(carry); (void)a; \
-        RESULT_NZ(expression); \
+        [[maybe_unused]] const uint32_t a = r[op->n]; \
+        const uint32_t b = SHIFTED_M(unused); \
+        __VA_ARGS__; \
     }
+// Likewise, where the operand sets the carry.
+#define FORMS_WITH_CARRY(name, ...) \
+    FORM(name##_I, constant_with_carry(*op, carry), __VA_ARGS__) \
+    FORM(name##_R, r[op->m], __VA_ARGS__) \
+    FORM(name##_X, SHIFTED_M(carry), __VA_ARGS__)
+
+#define LOGIC(name, expression) \
+    FORMS(name, RESULT(expression)) \
+    FORMS_WITH_CARRY(name##S, RESULT_NZ(expression))
 
 LOGIC(AND, a & b)
 LOGIC(BIC, a & ~b)
@@ -51,13 +49,10 @@ LOGIC(MOV, b)
 LOGIC(MVN, ~b)
 
 #define TEST(name, expression) \
-    HANDLE(name##_I) { \
-        const uint32_t a = r[op->n], b = op->value; \
-        CONSTANT_CARRY(); \
-        TEST_NZ(expression); \
-    } \
-    HANDLE(name##_R) { const uint32_t a = r[op->n], b = r[op->m]; TEST_NZ(expression); } \
-    HANDLE(name##_X) { const uint32_t a = r[op->n], b = SHIFTED_M(carry); TEST_NZ(expression); }
+    FORMS_WITH_CARRY(name, { \
+        nz = (uint32_t)(expression); \
+        NEXT(1); \
+    })
 
 TEST(TST, a & b)
 TEST(TEQ, a ^ b)
@@ -70,67 +65,26 @@ TEST(TEQ, a ^ b)
     carry = (uint8_t)(sum >> 32); \
     overflow = (uint8_t)(((first ^ total) & (second ^ total)) >> 31); \
     nz = total
-
+#define COMPARE(name, x, y, carry_in) \
+    FORMS(name, { \
+        SUM_FLAGS(x, y, carry_in); \
+        NEXT(1); \
+    })
 #define ARITHMETIC(name, x, y, carry_in) \
-    HANDLE(name##_I) { \
-        const uint32_t a = r[op->n], b = op->value; \
-        RESULT((x) + (y) + (carry_in)); \
-    } \
-    HANDLE(name##_R) { \
-        const uint32_t a = r[op->n], b = r[op->m]; \
-        RESULT((x) + (y) + (carry_in)); \
-    } \
-    HANDLE(name##_X) { \
-        uint8_t unused = carry; \
-        const uint32_t a = r[op->n], b = SHIFTED_M(unused); \
-        RESULT((x) + (y) + (carry_in)); \
-    } \
-    HANDLE(name##S_I) { \
-        const uint32_t a = r[op->n], b = op->value; \
+    FORMS(name, RESULT((x) + (y) + (carry_in))) \
+    FORMS(name##S, { \
         SUM_FLAGS(x, y, carry_in); \
         r[op->d] = total; \
         NEXT(1); \
-    } \
-    HANDLE(name##S_R) { \
-        const uint32_t a = r[op->n], b = r[op->m]; \
-        SUM_FLAGS(x, y, carry_in); \
-        r[op->d] = total; \
-        NEXT(1); \
-    } \
-    HANDLE(name##S_X) { \
-        uint8_t unused = carry; \
-        const uint32_t a = r[op->n], b = SHIFTED_M(unused); \
-        SUM_FLAGS(x, y, carry_in); \
-        r[op->d] = total; \
-        NEXT(1); \
-    }
+    })
 
 ARITHMETIC(ADD, a, b, 0u)
 ARITHMETIC(ADC, a, b, (uint32_t)carry)
 ARITHMETIC(SUB, a, ~b, 1u)
 ARITHMETIC(SBC, a, ~b, (uint32_t)carry)
 ARITHMETIC(RSB, ~a, b, 1u)
-
-#define COMPARE(name, y, carry_in) \
-    HANDLE(name##_I) { \
-        const uint32_t a = r[op->n], b = op->value; \
-        SUM_FLAGS(a, y, carry_in); \
-        NEXT(1); \
-    } \
-    HANDLE(name##_R) { \
-        const uint32_t a = r[op->n], b = r[op->m]; \
-        SUM_FLAGS(a, y, carry_in); \
-        NEXT(1); \
-    } \
-    HANDLE(name##_X) { \
-        uint8_t unused = carry; \
-        const uint32_t a = r[op->n], b = SHIFTED_M(unused); \
-        SUM_FLAGS(a, y, carry_in); \
-        NEXT(1); \
-    }
-
-COMPARE(CMN, b, 0u)
-COMPARE(CMP, ~b, 1u)
+COMPARE(CMN, a, b, 0u)
+COMPARE(CMP, a, ~b, 1u)
 
 #define SHIFT(name, type) \
     HANDLE(name##_I) { \
@@ -150,39 +104,31 @@ SHIFT(ASR, 2)
 SHIFT(ROR, 3)
 
 // Results in SP: its two low bits stay 0 (B1.4.1). Flags are of the whole sum.
+#define ADD_TO_SP(y, carry_in, sets_flags) \
+    do { \
+        if (sets_flags) { \
+            SUM_FLAGS(r[13], y, carry_in); \
+            r[13] = total & ~3u; \
+        } else { \
+            r[13] = (r[13] + (y) + (carry_in)) & ~3u; \
+        } \
+        NEXT(1); \
+    } while (0)
 HANDLE(ADD_SP_I) {
     const uint32_t b = op->m ? ~op->value : op->value;
-    if (op->a) {
-        SUM_FLAGS(r[13], b, (uint32_t)op->m);
-        r[13] = total & ~3u;
-    } else {
-        r[13] = (r[13] + b + op->m) & ~3u;
-    }
-    NEXT(1);
+    ADD_TO_SP(b, (uint32_t)op->m, op->a);
 }
 HANDLE(ADD_SP_X) {
     uint8_t unused = carry;
     const uint32_t b = SHIFTED_M(unused);
-    if (op->list) {
-        SUM_FLAGS(r[13], b, 0u);
-        r[13] = total & ~3u;
-    } else {
-        r[13] = (r[13] + b) & ~3u;
-    }
-    NEXT(1);
+    ADD_TO_SP(b, 0u, op->list);
 }
 HANDLE(SUB_SP_X) {
     uint8_t unused = carry;
     const uint32_t b = SHIFTED_M(unused);
-    if (op->list) {
-        SUM_FLAGS(r[13], ~b, 1u);
-        r[13] = total & ~3u;
-    } else {
-        r[13] = (r[13] - b) & ~3u;
-    }
-    NEXT(1);
+    ADD_TO_SP(~b, 1u, op->list);
 }
-// Where SP or PC is the result, or PC is read.
+// SP or PC is the result, or PC is read.
 HANDLE(ADD_HIGH) {
     const uint32_t pc = PC;
     r[15] = pc + 4;

@@ -1,9 +1,9 @@
-// The loop that runs instructions: one label an operation, reached by computed goto.
+// The loop that runs instructions: one label per operation, reached by computed goto.
 //
 // The state that every instruction needs is in local variables: `op`, and `now` for Cpu::cycles. It
-// is put back (`sync`) before anybody else is called. Instructions in an IT block go through another
-// table of labels, all of which lead to one place that looks at the condition; so the others pay
-// nothing for IT. Mode 1 tells a tracer and counts steps, mode 2 charges fetches and asks the MPU.
+// is written back (SYNC) before anything else is called. Instructions in an IT block go through a
+// second table of labels, all of which lead to the code that checks the condition; so the others have
+// no cost for IT. Mode 1 calls a tracer and counts steps, mode 2 charges fetches and checks the MPU.
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/decode/codes.h"
@@ -59,6 +59,12 @@ static inline uint32_t shifted_by_register(uint32_t value, uint32_t type, uint32
     return shifted(value, type, amount, carry);
 }
 
+// A constant operand; if its carry is defined, that is bit 31.
+static inline uint32_t constant_with_carry(const Operation &op, uint8_t &carry) {
+    if (op.shift) carry = (uint8_t)(op.value >> 31);
+    return op.value;
+}
+
 static inline uint32_t rotated(uint32_t value, uint32_t amount) {
     return amount ? value >> amount | value << (32 - amount) : value;
 }
@@ -78,7 +84,7 @@ bool Cpu::condition(uint32_t number) const {
     return holds != (bool)(number & 1);
 }
 
-// Tells System that `op` failed, with the IT state before it. False: it is to be completed.
+// Reports the failure of `op` to System, with the IT state before it. False: `op` completes.
 bool Cpu::abandon(const Operation *op, Fault kind, uint32_t address) {
     const uint8_t after = it;
     if (op == it_operation) it = it_before;
@@ -122,12 +128,12 @@ template <int Mode> void Cpu::loop() {
     int64_t now = cycles;
     uint64_t count = 0;
     uint32_t target = 0;
-    // What a tracer is told when the instruction is over.
+    // For the tracer's report at the end of the instruction.
     bool running = false;
     uint32_t traced_pc = 0;
     int64_t traced_since = 0;
     it_operation = nullptr;
-    // Where the MPU alone wants to hear of fetches, no line is at hand.
+    // If only the MPU checks fetches, every fetch misses.
     static constexpr uint32_t NO_TAG[1] = {NOWHERE};
     const uint32_t *const tags = lines ? lines->tags : NO_TAG;
     const uint32_t shift = lines ? lines->shift : 2, mask = lines ? lines->mask : 0;
@@ -147,7 +153,7 @@ template <int Mode> void Cpu::loop() {
         count++; \
         DISPATCH(); \
     } while (0)
-// To another address of code; `refill` as in cycles.h.
+// Continues at another address; `refill` as in cycles.h.
 #define GO(address, refill) \
     do { \
         target = (address); \
@@ -163,9 +169,9 @@ template <int Mode> void Cpu::loop() {
         now -= op->stall;    /* the refill hides it */ \
         DISPATCH(); \
     } while (0)
-// What everybody who is called may look at.
+// Makes the state visible to callees.
 #define SYNC() (r[15] = PC, cycles = now)
-// An instruction ended; for tracers and steps.
+// An instruction ended: calls the tracer and counts a step.
 #define REPORT(next) \
     do { \
         if (TRACED && running) { \
@@ -182,7 +188,7 @@ template <int Mode> void Cpu::loop() {
         goto failed; \
     } while (0)
 
-    // An operation that starts the loop may not be decoded yet: its label sees to that.
+    // The first operation may not be decoded yet: the label UNDECODED decodes it.
     DISPATCH();
 
 between:
@@ -228,7 +234,7 @@ in_it:
     }
     HANDLE(BREAK) {
         const uint32_t pc = PC;
-        if (!breakpoint_at(pc) || resume_at == pc) {    // of an alias, or not again
+        if (!breakpoint_at(pc) || resume_at == pc) {    // of an alias, or passed already
             resume_at = NOWHERE;
             goto aside_here;
         }
@@ -244,7 +250,7 @@ in_it:
 #include "armv7m/execute/memory.h"
 #include "armv7m/execute/control.h"
 
-aside_here:    // one instruction that can not run in place
+aside_here:    // one instruction that cannot run in place
     SYNC();
     instructions += count;
     if (run_aside(r[15]))
@@ -263,7 +269,7 @@ far:
     instructions += count;
     return;
 
-failed:    // System or run() has set r[15]
+failed:    // System or run() set r[15]
     attention_requested = true;
     instructions += count;
     return;
@@ -272,42 +278,6 @@ leave:
     SYNC();
     instructions += count;
 }
-
-// All files of the simulator are compiled as one.
-#undef ARITHMETIC
-#undef BRANCH_IF
-#undef COMPARE
-#undef CONSTANT_CARRY
-#undef DISPATCH
-#undef FAIL
-#undef GO
-#undef HANDLE
-#undef HAND_OVER
-#undef KEEP_SP
-#undef LAST_LOAD_FEEDS
-#undef LIKELY
-#undef LOAD
-#undef LOGIC
-#undef NEXT
-#undef NOT_BEHIND
-#undef NO_REGISTER
-#undef PC
-#undef READ
-#undef REPORT
-#undef RESULT
-#undef RESULT_NZ
-#undef SATURATION_OPERAND
-#undef SHIFT
-#undef SHIFTED_M
-#undef STORE
-#undef SUM_FLAGS
-#undef SYNC
-#undef TEST
-#undef TEST_NZ
-#undef UNLIKELY
-#undef WAIT_FOR_BUS
-#undef WAIT_FOR_STORE
-#undef WRITE
 
 template void Cpu::loop<0>();
 template void Cpu::loop<1>();

@@ -1,7 +1,7 @@
 // Loads and stores (ARMv7-M ARM A4.6, A4.7; cycles in cycles.h). Part of Cpu::loop.
 
-// The start of a load: it waits for its address, and for a store that is still on the bus. A single
-// store only waits until its data can follow that store's.
+// Start of a load: it waits for its address, and for a store that is still on the bus. A single store
+// waits only until its data can follow that store's.
 #define WAIT_FOR_BUS() \
     do { \
         now += op->stall; \
@@ -15,10 +15,23 @@
 #define LAST_LOAD_FEEDS(base_register, index_register) \
     ((base_register) == loaded || (index_register) == loaded)
 #define NO_REGISTER 16u
-#define NOT_BEHIND ((uint32_t)loaded)    // a load with write-back overlaps with none before it
+#define NO_OVERLAP ((uint32_t)loaded)    // a load with write-back does not overlap a load before it
 #define KEEP_SP(number, value) ((number) == 13 ? (value) & ~3u : (value))
+#define LOAD_OR_FAIL(address, bytes, value, privilege) \
+    do { \
+        const Result result = load((address), (bytes), (value), (privilege)); \
+        if (UNLIKELY(result != Result::Done)) { \
+            abandon(op, result, false); \
+            goto failed; \
+        } \
+    } while (0)
+#define STORE_OR_FAIL(address, bytes, value, privilege) \
+    do { \
+        const Result result = store((address), (bytes), (value), (privilege)); \
+        if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed; \
+    } while (0)
 
-// Reads `value` of `type` from `address`; afterwards `now` is behind the load.
+// Reads `value` of `type` from `address`; afterwards `now` is the end of the load.
 #define READ(type, address, index_register) \
     uint32_t value; \
     WAIT_FOR_BUS(); \
@@ -34,18 +47,14 @@
             now += 2 - behind + page.read_wait; \
         } else { \
             r[15] = PC, cycles = now + 1 - behind; \
-            const Result result = load((address), bytes, value, privileged()); \
-            if (UNLIKELY(result != Result::Done)) { \
-                abandon(op, result, false); \
-                goto failed; \
-            } \
+            LOAD_OR_FAIL(address, bytes, value, privileged()); \
             value = (uint32_t)(type)value; \
             now = cycles + 1; \
         } \
         load_end = now; \
     }
 
-// Writes the low bytes of `value`; `extra`: whether it takes a cycle more.
+// Writes the low bytes of `value`; `extra`: whether it takes one cycle more.
 #define WRITE(type, address, value, extra) \
     WAIT_FOR_STORE(); \
     { \
@@ -69,39 +78,21 @@
         now += 1 + late; \
     }
 
-#define LOAD(name, type) \
-    HANDLE(name##_O) { \
-        const uint32_t address = r[op->n] + op->value; \
-        READ(type, address, NO_REGISTER) \
-        r[op->d] = value, loaded = op->d; \
-        NEXT(0); \
-    } \
-    HANDLE(name##_M) { \
-        const uint32_t address = r[op->n] + (r[op->m] << op->shift); \
-        READ(type, address, op->m) \
-        r[op->d] = value, loaded = op->d; \
-        NEXT(0); \
-    } \
-    HANDLE(name##_P) { \
-        const uint32_t address = r[op->n] + op->value; \
-        READ(type, address, NOT_BEHIND) \
-        r[op->n] = KEEP_SP(op->n, address); \
-        r[op->d] = value, loaded = op->d; \
-        NEXT(0); \
-    } \
-    HANDLE(name##_Q) { \
-        const uint32_t address = r[op->n]; \
-        READ(type, address, NOT_BEHIND) \
-        r[op->n] = KEEP_SP(op->n, address + op->value); \
-        r[op->d] = value, loaded = op->d; \
-        NEXT(0); \
-    } \
-    HANDLE(name##_L) { \
-        const uint32_t address = ((PC + 4) & ~3u) + op->value; \
-        READ(type, address, NO_REGISTER) \
+#define LOAD_FORM(name, type, from, index_register, write_back) \
+    HANDLE(name) { \
+        const uint32_t address = (from); \
+        READ(type, address, index_register) \
+        write_back; \
         r[op->d] = value, loaded = op->d; \
         NEXT(0); \
     }
+#define BASE_IS(value) r[op->n] = KEEP_SP(op->n, value)
+#define LOAD(name, type) \
+    LOAD_FORM(name##_O, type, r[op->n] + op->value, NO_REGISTER, ) \
+    LOAD_FORM(name##_M, type, r[op->n] + (r[op->m] << op->shift), op->m, ) \
+    LOAD_FORM(name##_P, type, r[op->n] + op->value, NO_OVERLAP, BASE_IS(address)) \
+    LOAD_FORM(name##_Q, type, r[op->n], NO_OVERLAP, BASE_IS(address + op->value)) \
+    LOAD_FORM(name##_L, type, ((PC + 4) & ~3u) + op->value, NO_REGISTER, )
 
 LOAD(LDR, uint32_t)
 LOAD(LDRH, uint16_t)
@@ -109,42 +100,31 @@ LOAD(LDRB, uint8_t)
 LOAD(LDRSH, int16_t)
 LOAD(LDRSB, int8_t)
 
-#define STORE(name, type) \
-    HANDLE(name##_O) { \
-        const uint32_t address = r[op->n] + op->value; \
-        WRITE(type, address, r[op->d], 0) \
-        NEXT(0); \
-    } \
-    HANDLE(name##_M) { \
-        const uint32_t address = r[op->n] + (r[op->m] << op->shift); \
-        WRITE(type, address, r[op->d], now != load_end) \
-        NEXT(0); \
-    } \
-    HANDLE(name##_P) { \
-        const uint32_t address = r[op->n] + op->value; \
-        WRITE(type, address, r[op->d], now == load_end) \
-        r[op->n] = KEEP_SP(op->n, address); \
-        NEXT(0); \
-    } \
-    HANDLE(name##_Q) { \
-        const uint32_t address = r[op->n]; \
-        WRITE(type, address, r[op->d], now == load_end) \
-        r[op->n] = KEEP_SP(op->n, address + op->value); \
+#define STORE_FORM(name, type, to, extra, write_back) \
+    HANDLE(name) { \
+        const uint32_t address = (to); \
+        WRITE(type, address, r[op->d], extra) \
+        write_back; \
         NEXT(0); \
     }
+#define STORE(name, type) \
+    STORE_FORM(name##_O, type, r[op->n] + op->value, 0, ) \
+    STORE_FORM(name##_M, type, r[op->n] + (r[op->m] << op->shift), now != load_end, ) \
+    STORE_FORM(name##_P, type, r[op->n] + op->value, now == load_end, BASE_IS(address)) \
+    STORE_FORM(name##_Q, type, r[op->n], now == load_end, BASE_IS(address + op->value))
 
 STORE(STR, uint32_t)
 STORE(STRH, uint16_t)
 STORE(STRB, uint8_t)
 
-// A word into SP or PC. In handler mode an EXC_RETURN value leaves the exception.
+// Loads a word into SP or PC. In handler mode an EXC_RETURN value returns from the exception.
 HANDLE(LDR_WIDE) {
     uint32_t address = op->a == 4 ? ((PC + 4) & ~3u) + op->value : r[op->n];
     if (op->a == 0 || op->a == 2) address += op->value;
     if (op->a == 1) address += r[op->m] << op->shift;
     READ(uint32_t, address, NO_REGISTER)
-    if (op->a == 2) r[op->n] = KEEP_SP(op->n, address);
-    if (op->a == 3) r[op->n] = KEEP_SP(op->n, address + op->value);
+    if (op->a == 2) BASE_IS(address);
+    if (op->a == 3) BASE_IS(address + op->value);
     if (op->d == 13) {
         r[13] = value & ~3u, loaded = 13;
         NEXT(0);
@@ -160,11 +140,7 @@ HANDLE(LOAD_USER) {
     uint32_t value;
     WAIT_FOR_BUS();
     r[15] = PC, cycles = now + 1;
-    const Result result = load(address, op->a, value, false);
-    if (UNLIKELY(result != Result::Done)) {
-        abandon(op, result, false);
-        goto failed;
-    }
+    LOAD_OR_FAIL(address, op->a, value, false);
     if (op->m) value = op->a == 1 ? (uint32_t)(int8_t)value : (uint32_t)(int16_t)value;
     r[op->d] = value, loaded = op->d;
     now = load_end = cycles + 1;
@@ -181,8 +157,8 @@ HANDLE(STORE_USER) {
     NEXT(1);
 }
 
-// LDM, POP: all registers are written at the end, so that a fault leaves them alone. (The part
-// restarts an LDM that an interrupt would split; here the interrupt waits for its end.)
+// LDM, POP: all registers are written at the end, so that a fault changes none. (The processor
+// restarts an LDM that is interrupted; here the interrupt waits for its end.)
 HANDLE(LDM) {
     uint32_t contents[16], list = op->list;
     const uint32_t registers = (uint32_t)__builtin_popcount(list);
@@ -201,16 +177,12 @@ HANDLE(LDM) {
     } else {
         r[15] = PC, cycles = now + 1;
         for (uint32_t i = 0; i < registers; i++) {
-            const Result result = load(address + 4 * i, 4, contents[i], privileged());
-            if (UNLIKELY(result != Result::Done)) {
-                abandon(op, result, false);
-                goto failed;
-            }
+            LOAD_OR_FAIL(address + 4 * i, 4, contents[i], privileged());
             cycles++;
         }
         now = cycles;
     }
-    if (op->m) r[op->n] = KEEP_SP(op->n, end);
+    if (op->m) BASE_IS(end);
     const uint32_t *next = contents;
     for (list &= 0x7FFF; list; list &= list - 1) r[__builtin_ctz(list)] = *next++;
     if (op->list & 0x8000) {
@@ -241,13 +213,12 @@ HANDLE(STM) {
     } else {
         r[15] = PC, cycles = now + 1;
         for (uint32_t i = 0; i < registers; i++) {
-            const Result result = store(address + 4 * i, 4, contents[i], privileged());
-            if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+            STORE_OR_FAIL(address + 4 * i, 4, contents[i], privileged());
             cycles++;
         }
         now = cycles;
     }
-    if (op->m) r[op->n] = KEEP_SP(op->n, end);
+    if (op->m) BASE_IS(end);
     NEXT(0);
 }
 
@@ -266,7 +237,7 @@ HANDLE(LDRD) {
         goto failed;
     }
     now = cycles + 1;
-    if (op->m) r[op->n] = KEEP_SP(op->n, start + op->value);
+    if (op->m) BASE_IS(start + op->value);
     r[op->d] = low, r[op->a] = high;
     NEXT(0);
 }
@@ -276,18 +247,16 @@ HANDLE(STRD) {
     if (UNLIKELY(address & 3)) FAIL(Fault::Unaligned);
     WAIT_FOR_BUS();
     r[15] = PC, cycles = now + 1;
-    Result result = store(address, 4, r[op->d], privileged());
-    if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+    STORE_OR_FAIL(address, 4, r[op->d], privileged());
     cycles++;
-    result = store(address + 4, 4, r[op->a], privileged());
-    if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+    STORE_OR_FAIL(address + 4, 4, r[op->a], privileged());
     now = cycles + 1;
-    if (op->m) r[op->n] = KEEP_SP(op->n, start + op->value);
+    if (op->m) BASE_IS(start + op->value);
     NEXT(0);
 }
 
-// Exclusives. The part's monitor tags no address (TRM 2.3): any store exclusive after a load
-// exclusive succeeds, unless CLREX or an exception came between.
+// Exclusives. The monitor stores no address (TRM 2.3): any store exclusive after a load exclusive
+// succeeds, unless CLREX or an exception came between.
 HANDLE(LDREX) {
     const uint32_t address = r[op->n] + op->value, bytes = op->shift;
     uint32_t value;
@@ -295,11 +264,7 @@ HANDLE(LDREX) {
     WAIT_FOR_BUS();
     const bool behind = now == load_end && op->n != loaded;
     r[15] = PC, cycles = now + 1 - behind;
-    const Result result = load(address, bytes, value, privileged());
-    if (UNLIKELY(result != Result::Done)) {
-        abandon(op, result, false);
-        goto failed;
-    }
+    LOAD_OR_FAIL(address, bytes, value, privileged());
     exclusive = true;
     r[op->d] = value, loaded = op->d;
     now = load_end = cycles + 1;
@@ -314,8 +279,7 @@ HANDLE(STREX) {
     r[15] = PC, cycles = now + 1 - behind;
     if (exclusive) {
         const uint32_t content = bytes == 4 ? r[op->d] : r[op->d] & ((1u << 8 * bytes) - 1);
-        const Result result = store(address, bytes, content, privileged());
-        if (UNLIKELY(result != Result::Done) && abandon(op, result, true)) goto failed;
+        STORE_OR_FAIL(address, bytes, content, privileged());
     }
     r[op->m] = !exclusive, loaded = op->m;
     exclusive = false;

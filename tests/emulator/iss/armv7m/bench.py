@@ -5,7 +5,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
-from cubestack.emulator.iss.build import FOLDER
+from cubestack.emulator.iss.build import FOLDER, LOOP
 from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import Compiler, compile_library
 
@@ -73,8 +73,8 @@ def _library() -> ctypes.CDLL:
 
     def build(sources: list[Path], compiler: Compiler, scratch: Path, log: Path) -> Path:
         unity = scratch / "bench.cpp"
-        unity.write_text("".join(f'#include "{file}"\n' for file in sources))
-        return compile_library(compiler, scratch / "bench.so", log, [f"-I{FOLDER}", unity])
+        unity.write_text("".join(f'#include "{file}"\n' for file in sources if file != LOOP))
+        return compile_library(compiler, scratch / "bench.so", log, [f"-I{FOLDER}", unity, LOOP])
 
     recipe = cache.recipe("the core's bench", "bench", files, partial(build, [*core, here]))
     library = ctypes.CDLL(str(cache.library_of(recipe)))
