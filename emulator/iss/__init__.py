@@ -1,1 +1,1 @@
-"""Instruction-set simulator: runs an unmodified image of a microcontroller on the board."""
+"""Instruction-set simulator: runs unmodified firmware images of a microcontroller."""

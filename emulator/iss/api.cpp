@@ -219,9 +219,9 @@ void iss_set_register(IssMachine *machine, int32_t number, uint32_t value) {
     case 16: cpu.set_xpsr(value); break;
     case 17: cpu.set_main_sp(value); break;
     case 18: cpu.set_process_sp(value); break;
-    case 19: cpu.primask = value & 1, machine->system.boost_changed(); break;
-    case 20: cpu.basepri = (uint8_t)value, machine->system.boost_changed(); break;
-    case 21: cpu.faultmask = value & 1, machine->system.boost_changed(); break;
+    case 19: cpu.primask = value & 1, machine->system.priority_changed(); break;
+    case 20: cpu.basepri = (uint8_t)value, machine->system.priority_changed(); break;
+    case 21: cpu.faultmask = value & 1, machine->system.priority_changed(); break;
     case 22: cpu.set_control(value & 3); break;
     default:
         if (number >= 0 && number < 16)

@@ -1,6 +1,7 @@
-"""The functions of api.h as ctypes knows them."""
+"""Declarations of the functions of api.cpp for ctypes."""
 
 import ctypes
+from functools import cache
 from typing import Any
 
 from cubestack.emulator.iss.build import simulator_library
@@ -91,25 +92,22 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 
 Library = Any
-"""The loaded library; its functions are those of api.h."""
+"""The loaded library with the functions of api.cpp."""
 
 
-class _Loader:
-    """Loads the library when the first machine is made."""
-
-    def __init__(self) -> None:
-        self._loaded: Library | None = None
-
-    def get(self) -> Library:
-        """The library; CompilerError when it can not be built."""
-        if self._loaded is None:
-            library = ctypes.CDLL(str(simulator_library()))
-            for name, (result, arguments) in _FUNCTIONS.items():
-                function = getattr(library, name)
-                function.restype, function.argtypes = result, arguments
-            self._loaded = library
-        return self._loaded
+Functions = dict[str, tuple[Any, tuple[Any, ...]]]
+"""Result and argument types by name."""
 
 
-LIBRARY = _Loader()
-"""The one library of this process."""
+def declare(library: Library, functions: Functions) -> None:
+    for name, (result, arguments) in functions.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+
+
+@cache
+def simulator() -> Library:
+    """The library of this process; CompilerError when it cannot be built."""
+    library = ctypes.CDLL(str(simulator_library()))
+    declare(library, _FUNCTIONS)
+    return library

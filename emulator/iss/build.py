@@ -1,4 +1,4 @@
-"""Builds the simulator's library: all its C++ files in one call of the compiler."""
+"""Builds the simulator's library from all its C++ files, in one call of the compiler."""
 
 from collections.abc import Iterable
 from functools import lru_cache, partial
@@ -14,7 +14,6 @@ LOOP = FOLDER / "armv7m" / "execute" / "loop.cpp"
 
 
 def sources() -> list[Path]:
-    """Every C++ file and header of the core, the part and what goes with them."""
     return sorted([*FOLDER.rglob("*.cpp"), *FOLDER.rglob("*.h")])
 
 

@@ -1,12 +1,11 @@
-"""Functions of a loaded program, called from outside, and the cycles that they take.
+"""Calls functions of a loaded program and measures their cycles.
 
-For measuring compiled code: the program has no main, each call begins and ends at the machine's
-present state. Arguments follow the Procedure Call Standard for the Arm Architecture (IHI 0042):
-integers and addresses in r0 to r3.
+The program needs no main; each call starts from the machine's present state. Arguments follow the
+Procedure Call Standard for the Arm Architecture (IHI 0042): integers and addresses in r0 to r3.
 """
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from io import BytesIO
 
 from elftools.elf.elffile import ELFFile
@@ -17,7 +16,7 @@ from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.iss.outcome import StopReason
 
 LONGEST_PS = 100_000_000_000_000
-"""A call that takes longer than 100 s is an error."""
+"""Time-out of a call: 100 s."""
 
 THUMB_STATE = 1 << 24
 
@@ -27,9 +26,9 @@ class CallError(RuntimeError):
 
 
 def symbols_of(image: Image) -> dict[str, int]:
-    """Address of each function and variable by name; of an image made of an ELF file."""
+    """Addresses of functions and variables; ValueError if the image is not from an ELF file."""
     if image.elf is None:
-        raise ValueError("functions have names in ELF files only")
+        raise ValueError("only ELF files contain function names")
     table = ELFFile(BytesIO(image.elf)).get_section_by_name(".symtab")
     if not isinstance(table, SymbolTableSection):
         return {}
@@ -50,9 +49,9 @@ class Calls:
     def __init__(
         self, machine: Machine, image: Image, returned: str = "returned", failed: str = "failed"
     ) -> None:
-        """Load the program and run its start up to function ``returned``, where calls end too.
+        """Load the program and run its start-up code to function ``returned``, where calls end too.
 
-        Faults lead to function ``failed``.
+        Faults end in function ``failed``.
         """
         self.machine, self.symbols = machine, symbols_of(image)
         self._end = self.symbols[returned]
@@ -69,10 +68,10 @@ class Calls:
         *arguments: int,
         marks: Mapping[str, Callable[[int, int], None]] | None = None,
     ) -> int:
-        """Call a function; returns the cycles until it is back.
+        """Call a function; returns the cycles until it returns.
 
-        ``marks``: functions by name, each with what to tell when it is entered: its first argument,
-        and the cycles since the start of the machine.
+        ``marks``: callbacks by function name, called at each entry with the function's first
+        argument and the machine's cycles. Raises CallError.
         """
         machine = self.machine
         for number, argument in enumerate(arguments):
@@ -82,20 +81,19 @@ class Calls:
         machine.set_register("xpsr", THUMB_STATE)
         machine.set_register("pc", self.symbols[name])
         before = machine.cycles
-        self._run({self.symbols[mark]: tell for mark, tell in (marks or {}).items()})
+        self._run({self.symbols[name]: call for name, call in (marks or {}).items()})
         return machine.cycles - before
 
     def floats(self, name: str, count: int) -> tuple[float, ...]:
-        """Single-precision values of a variable."""
+        """Read a variable as single-precision values."""
         return struct.unpack(f"<{count}f", self.machine.peek(self.symbols[name], 4 * count))
 
     def put(self, name: str, data: bytes) -> None:
-        """Write a variable."""
         self.machine.poke(self.symbols[name], data)
 
     def _run(self, marks: Mapping[int, Callable[[int, int], None]]) -> None:
         machine = self.machine
-        _add(machine, marks)
+        machine.breakpoints |= set(marks)
         try:
             while True:
                 stop = machine.run(machine.now_ps + LONGEST_PS)
@@ -103,18 +101,12 @@ class Calls:
                 if stop.reason is StopReason.OUTBOX:
                     list(machine.outbox())
                 elif stop.reason is not StopReason.BREAKPOINT:
-                    raise CallError(f"{stop.reason.name.lower()} at {place:#x} ends a call")
+                    raise CallError(f"the call ended at {place:#x}: {stop.reason.name.lower()}")
                 elif place == self._end:
                     return
                 elif place in marks:
                     marks[place](machine.register("r0"), machine.cycles)
                 else:
-                    raise CallError("a call ends with a fault")
+                    raise CallError("the call ended with a fault")
         finally:
-            for address in marks:
-                machine.breakpoints.discard(address)
-
-
-def _add(machine: Machine, addresses: Iterable[int]) -> None:
-    for address in addresses:
-        machine.breakpoints.add(address)
+            machine.breakpoints -= set(marks)

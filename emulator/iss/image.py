@@ -12,19 +12,19 @@ from pathlib import Path
 from elftools.elf.elffile import ELFFile
 
 VECTORS = 8
-"""Bytes of the vector table that a start needs: stack pointer and reset vector."""
+"""Bytes of the vector table that are checked: stack pointer and reset vector."""
 
 _BASE = re.compile(r"(.+)@(0[xX][0-9a-fA-F]+|\d+)")
 _HASH = re.compile(r"(.+)#([0-9a-f]{8,64})")
 
 
 class ImageError(ValueError):
-    """A file is no program for this machine; one line says why."""
+    """The file is not a program for this machine; the message is one line."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """Where a program has to be, and where its stack may be."""
+    """Address ranges of a machine."""
 
     flash_base: int = 0
     flash_bytes: int = 1 << 20
@@ -32,7 +32,7 @@ class Memory:
     ram_bytes: int = 128 << 10
 
     def holds(self, address: int, count: int) -> bool:
-        """Whether the flash has all these bytes."""
+        """Whether all these bytes are in the flash."""
         start = address - self.flash_base
         return start >= 0 and start + count <= self.flash_bytes
 
@@ -42,10 +42,10 @@ class Image:
     """A program.
 
     Attributes:
-        segments: (address, bytes) that go into the flash, by address.
-        path: of the file; None for one that was made here.
-        elf: the file's bytes where it is an ELF file, for symbols.
-        hash: SHA-256 of what goes into the flash, in hexadecimal.
+        segments: (address, bytes) for the flash, sorted by address.
+        path: of the file; None if it is not from a file.
+        elf: contents of the file if it is an ELF file, for symbols.
+        hash: SHA-256 of the segments, in hexadecimal.
     """
 
     segments: tuple[tuple[int, bytes], ...]
@@ -54,7 +54,6 @@ class Image:
     hash: str = field(init=False)
 
     def __post_init__(self) -> None:
-        """Compute the hash."""
         digest = sha256()
         for address, data in self.segments:
             digest.update(address.to_bytes(8, "little") + len(data).to_bytes(8, "little") + data)
@@ -62,12 +61,12 @@ class Image:
 
     @property
     def mark(self) -> str:
-        """What ``load_image`` takes behind a file's name, to check that it is this program."""
+        """Suffix for a file name with which ``load_image`` checks that it is this program."""
         return f"#{self.hash[:16]}"
 
     @property
     def size(self) -> int:
-        """Bytes of it."""
+        """Number of bytes."""
         return sum(len(data) for _, data in self.segments)
 
 
@@ -75,12 +74,12 @@ def load_image(name: str | Path, memory: Memory | None = None) -> Image:
     """Read a program: ELF, Intel HEX (``.hex``, ``.ihx``), or any other file as plain bytes.
 
     Args:
-        name: of the file; ``FILE@0xADDRESS`` says where plain bytes belong, by default the flash's
-            start; ``#HASH`` behind that is how the program's hash begins, to be checked.
+        name: path; ``FILE@0xADDRESS`` sets the address of plain bytes, by default the start of the
+            flash; an optional ``#HASH`` is compared with the start of the program's hash.
         memory: of the machine.
 
     Raises:
-        ImageError: it can not be read, or is no program for the machine.
+        ImageError: the file cannot be read, or is not a program for the machine.
     """
     memory = memory or Memory()
     text, wanted = str(name), ""
@@ -98,19 +97,19 @@ def load_image(name: str | Path, memory: Memory | None = None) -> Image:
     elif data.lstrip().startswith(b":") and path.suffix.lower() in (".hex", ".ihx", ".ihex"):
         image = Image(_hex_segments(path, data), path)
     elif path.suffix.lower() in (".elf", ".axf", ".out"):
-        raise ImageError(f"{path} is no ELF file: it begins with {data[:4]!r}")
+        raise ImageError(f"{path} is not an ELF file: it begins with {data[:4]!r}")
     elif path.suffix.lower() in (".hex", ".ihx", ".ihex"):
-        raise ImageError(f"{path} is no Intel HEX file: its first record has no colon")
+        raise ImageError(f"{path} is not an Intel HEX file: its first record has no colon")
     else:
         image = Image(((base, data),), path)
     check_image(image, memory)
     if not image.hash.startswith(wanted):
-        raise ImageError(f"{path} has the hash {image.hash[:16]}, not {wanted} as asked for")
+        raise ImageError(f"{path} has the hash {image.hash[:16]}, not the requested {wanted}")
     return image
 
 
 def check_image(image: Image, memory: Memory) -> None:
-    """Refuse a program that does not fit or can not start: ImageError."""
+    """Raise ImageError for a program that does not fit or has no vector table."""
     name = image.path or "the image"
     for address, data in image.segments:
         if not memory.holds(address, len(data)):
@@ -130,7 +129,7 @@ def check_image(image: Image, memory: Memory) -> None:
 
 
 def _bytes_at(image: Image, address: int, count: int) -> bytes | None:
-    """What the image has there; None where it does not begin, what it leaves out is erased."""
+    """Bytes of the image, 0xFF where it has none; None if it has none of them."""
     found = bytearray(b"\xff" * count)
     any_there = False
     for start, data in image.segments:
@@ -157,9 +156,9 @@ def _elf_segments(path: Path, data: bytes) -> tuple[tuple[int, bytes], ...]:
                 "not for ARM with 32"
             )
         if not file.little_endian:
-            raise ImageError(f"{path} is big-endian: this core is little-endian")
+            raise ImageError(f"{path} is big-endian: the core is little-endian")
         if header["e_type"] != "ET_EXEC":
-            raise ImageError(f"{path} is not linked to an executable: {header['e_type']}")
+            raise ImageError(f"{path} is not an executable, but {header['e_type']}")
         segments = [
             (int(segment["p_paddr"]), bytes(segment.data()))
             for segment in file.iter_segments("PT_LOAD")
@@ -167,7 +166,7 @@ def _elf_segments(path: Path, data: bytes) -> tuple[tuple[int, bytes], ...]:
         ]
     except ImageError:
         raise
-    except Exception as error:  # the reader's parser raises what it likes on damaged files
+    except Exception as error:  # elftools raises various exceptions for damaged files
         raise ImageError(f"{path} is a damaged ELF file: {error or type(error).__name__}") from None
     if not segments:
         raise ImageError(f"{path} has nothing to load: no segment with bytes")
@@ -186,7 +185,7 @@ def _hex_segments(path: Path, text: bytes) -> tuple[tuple[int, bytes], ...]:
         except ValueError:
             record = b""
         if line[0] != ":" or len(record) < 5 or len(record) != 5 + record[0]:
-            raise ImageError(f"{path}, line {number}: no Intel HEX record")
+            raise ImageError(f"{path}, line {number}: not an Intel HEX record")
         if sum(record) & 0xFF:
             raise ImageError(f"{path}, line {number}: wrong checksum")
         offset, kind, data = int.from_bytes(record[1:3], "big"), record[3], record[4:-1]
@@ -200,8 +199,8 @@ def _hex_segments(path: Path, text: bytes) -> tuple[tuple[int, bytes], ...]:
             break
         elif kind in (2, 4):
             base = int.from_bytes(data, "big") << (4 if kind == 2 else 16)
-        elif kind not in (3, 5):  # those two say where to start: a core does so by its vectors
-            raise ImageError(f"{path}, line {number}: record type {kind:02X} is not known")
+        elif kind not in (3, 5):  # 3 and 5 are start addresses; the core uses its vector table
+            raise ImageError(f"{path}, line {number}: unknown record type {kind:02X}")
     if not segments:
         raise ImageError(f"{path} has no data records")
     return tuple(sorted((address, bytes(data)) for address, data in segments))

@@ -1,8 +1,7 @@
 """A machine: core, part and memories in C++, through ctypes. Times are integer picoseconds.
 
-It runs by itself up to a time, and returns sooner when something is for the outside: that is in
-the outbox then. Inputs come between two runs. A machine never calls Python while it runs, but for
-an FPGA without compiled driver.
+A run ends at the requested time, or earlier when the outbox has messages. Inputs are set between two
+runs. A running machine never calls Python, except for an FPGA without a compiled driver.
 """
 
 import ctypes
@@ -11,11 +10,11 @@ from collections.abc import Iterator, MutableSet
 import numpy as np
 
 from cubestack.emulator.iss.binding import (
-    LIBRARY,
     FpgaDriverRecord,
     FpgaWireRecord,
     Library,
     OutgoingRecord,
+    simulator,
 )
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.iss.outcome import Kind, Outgoing, Stop, StopReason, Watch, WatchHit
@@ -23,7 +22,7 @@ from cubestack.emulator.iss.outcome import Kind, Outgoing, Stop, StopReason, Wat
 FLASH_BASE = 0x0000_0000
 RAM_BASE = 0x2000_0000
 EXTERNAL_BASE = 0x8000_0000
-"""Of the external bus' first bank, in which code can not run."""
+"""First bank of the external bus; code cannot run there."""
 
 FLASH_BYTES = 1 << 20
 RAM_BYTES = 128 << 10
@@ -31,15 +30,19 @@ INFORMATION_BYTES = 3 * 4096
 """User page, lock bits, device information."""
 
 ANALOG_INPUTS = 32
-"""Volts by channel; the part says which is which."""
+"""Number of channels; efm32gg/analog/inputs.h lists them."""
 
 NEVER = (1 << 63) - 1
-"""A time that does not come."""
+"""The latest time that can be represented."""
 
 _SPECIAL = ("xpsr", "msp", "psp", "primask", "basepri", "faultmask", "control")
 
 REGISTERS = (*(f"r{n}" for n in range(13)), "sp", "lr", "pc", *_SPECIAL)
 """Names of the core's registers, in the order of their numbers."""
+
+_NUMBERS = {name: number for number, name in enumerate(REGISTERS)} | {
+    f"r{n}": n for n in range(16)
+}  # fmt: skip
 
 _REASONS = tuple(StopReason)
 
@@ -48,9 +51,9 @@ class Machine:
     """One microcontroller.
 
     Attributes:
-        flash, ram, external: its memories, live; after a change of code, call ``invalidate``.
-        analog: volts at each analog input, live; after a change, call ``analog_changed``.
-        image: what was loaded last.
+        flash, ram, external: its memories, shared; call ``invalidate`` after changing code.
+        analog: volts at each analog input, shared; call ``analog_changed`` after a change.
+        image: the program loaded last.
         breakpoints: addresses; a run stops before the instruction there.
     """
 
@@ -63,14 +66,14 @@ class Machine:
         bare_hz: int | None = None,
         library: Library | None = None,
     ) -> None:
-        """Make a machine in reset; sizes are powers of two.
+        """Create a machine in reset; sizes are powers of two.
 
-        ``bare_hz`` makes one without a part: memories and a core at that clock.
+        ``bare_hz``: without a part, only memories and a core at that clock.
 
         Raises:
-            CompilerError: the library is not there and can not be built.
+            CompilerError: the library is missing and cannot be built.
         """
-        self._library = library if library is not None else LIBRARY.get()
+        self._library = library if library is not None else simulator()
         self.flash = np.full(flash_bytes, 0xFF, np.uint8)
         self.ram = np.zeros(ram_bytes, np.uint8)
         self.external = np.zeros(external_bytes, np.uint8)
@@ -91,27 +94,25 @@ class Machine:
         self._watches: set[Watch] = set()
 
     def close(self) -> None:
-        """Release the machine."""
         if self._handle is not None:
             self._library.iss_delete(self._handle)
             self._handle = None
 
     def __del__(self) -> None:
-        """Release the machine."""
         if getattr(self, "_handle", None) is not None:
             self.close()
 
     @property
     def handle(self) -> int:
-        """Of the C++ machine; without this check a closed one would end the process."""
+        """Pointer to the C++ machine; RuntimeError once it is closed."""
         if self._handle is None:
-            raise RuntimeError("the machine is closed: make a new one")
+            raise RuntimeError("the machine is closed; create a new one")
         return self._handle
 
     # Programs and running
 
     def load(self, image: Image) -> None:
-        """Put a program into the flash, which is erased before; ``reset`` starts it."""
+        """Erase the flash and write a program to it; ``reset`` starts it."""
         self.flash[:] = 0xFF
         for address, data in image.segments:
             start = address - FLASH_BASE
@@ -120,67 +121,66 @@ class Machine:
         self.invalidate(FLASH_BASE, self.flash.size)
 
     def reset(self, cause: int = 1) -> None:
-        """Reset now; ``cause`` are the bits of the part's register for it, 1 is power-on."""
+        """Reset now; ``cause``: bits of RMU_RSTCAUSE, 1 is power-on."""
         self._library.iss_reset(self.handle, cause)
 
     def run(self, until_ps: int) -> Stop:
-        """Run up to a time, or to what the outside must know of.
+        """Run up to a time, or to a message that requires a stop.
 
-        An asleep machine stands at the next thing that happens, or at ``until_ps``.
+        An asleep machine advances to its next event, or to ``until_ps``.
         """
-        answer = self._library.iss_run(self.handle, until_ps, self._reached)
-        return Stop(_REASONS[answer & 0xFF], self._reached.value, answer > 0xFF)
+        return self._stop(self._library.iss_run(self.handle, until_ps, self._reached))
 
     def step(self, until_ps: int = NEVER, within: tuple[int, int] = (0, 0)) -> Stop:
         """Execute one instruction, or more while the next one is ``within`` [low, high)."""
-        answer = self._library.iss_step(self.handle, until_ps, *within, self._reached)
+        return self._stop(self._library.iss_step(self.handle, until_ps, *within, self._reached))
+
+    def _stop(self, answer: int) -> Stop:
         return Stop(_REASONS[answer & 0xFF], self._reached.value, answer > 0xFF)
 
     def hang(self) -> None:
-        """The core executes nothing from now on, until a reset."""
+        """Stop the core until a reset; time passes."""
         self._library.iss_hang(self.handle)
 
     def stop(self) -> None:
-        """Called while it runs, from a callback: the run ends after this instruction."""
+        """End the run after the current instruction; for callbacks during a run."""
         self._library.iss_stop(self.handle)
 
     @property
     def now_ps(self) -> int:
-        """Its time."""
         return int(self._library.iss_now(self.handle))
 
     @property
     def cycles(self) -> int:
-        """Core cycles since the start."""
+        """Core cycles since creation."""
         return int(self._library.iss_cycles(self.handle))
 
     @property
     def instructions(self) -> int:
-        """Instructions executed since the start."""
+        """Instructions executed since creation."""
         return int(self._library.iss_instructions(self.handle))
 
     @property
     def hz(self) -> int:
-        """Clock of the core now."""
+        """Present clock of the core."""
         return int(self._library.iss_hz(self.handle))
 
     @property
     def next_event_ps(self) -> int:
-        """When something happens in a machine that sleeps; ``NEVER`` for nothing."""
+        """Time of the next event of a sleeping machine; ``NEVER`` if there is none."""
         return int(self._library.iss_next_event(self.handle))
 
     @property
     def energy_mode(self) -> int:
-        """The part's, 0 to 4."""
+        """0 to 4."""
         return max(0, int(self._library.iss_asleep(self.handle)) - 1)
 
     @property
     def asleep(self) -> bool:
-        """Whether the core sleeps."""
         return bool(self._library.iss_asleep(self.handle))
 
     def outbox(self) -> Iterator[Outgoing]:
-        """Take what is for the outside, in the order of time."""
+        """Remove and yield the messages, in the order of time."""
         while count := self._library.iss_take(self.handle, self._outgoing, len(self._outgoing)):
             for one in self._outgoing[:count]:
                 text = one.text.decode("utf-8", "replace")
@@ -189,108 +189,105 @@ class Machine:
     # Registers and memory
 
     def register(self, name: str) -> int:
-        """A register of the core, by one of ``REGISTERS``; KeyError for none."""
+        """A core register by its name in ``REGISTERS``; KeyError for others."""
         return int(self._library.iss_register(self.handle, _NUMBERS[name]))
 
     def set_register(self, name: str, value: int) -> None:
-        """Change a register of the core; "pc" goes on there."""
+        """Set a core register by its name in ``REGISTERS``."""
         self._library.iss_set_register(self.handle, _NUMBERS[name], value & 0xFFFF_FFFF)
 
     def registers(self) -> dict[str, int]:
-        """All of them."""
         return {name: self.register(name) for name in REGISTERS}
 
     def peek(self, address: int, count: int) -> bytes:
-        """Bytes as a debugger sees them, with no side effect; fewer where there is no memory."""
+        """Read memory without side effects; returns fewer bytes at the end of a memory."""
         buffer = (ctypes.c_uint8 * count)()
         done = self._library.iss_peek(self.handle, address, buffer, count)
         return bytes(buffer[:done])
 
     def poke(self, address: int, data: bytes) -> int:
-        """Write bytes as a debugger does, into flash too; returns how many there was room for."""
+        """Write memory as a debugger, flash too; returns the number of bytes written."""
         buffer = (ctypes.c_uint8 * len(data)).from_buffer_copy(data)
         return int(self._library.iss_poke(self.handle, address, buffer, len(data)))
 
     def read(self, address: int, size: int = 4) -> int | None:
-        """Access of the bus with its side effects; None for a bus fault."""
+        """Bus access with side effects; None for a bus fault."""
         value = ctypes.c_uint32()
         if not self._library.iss_load(self.handle, address, size, value):
             return None
         return value.value
 
     def write(self, address: int, value: int, size: int = 4) -> bool:
-        """Access of the bus with its side effects; False for a bus fault."""
+        """Bus access with side effects; False for a bus fault."""
         return bool(self._library.iss_store(self.handle, address, size, value))
 
     def invalidate(self, address: int, count: int) -> None:
-        """Bytes of memory were changed from outside: forget what was decoded of them."""
+        """Discard decoded instructions of memory that was changed from outside."""
         self._library.iss_invalidate(self.handle, address, count)
 
     # Inputs
 
     def pin(self, port: int, bit: int, level: int) -> None:
-        """Drive a port pin from outside, from now on."""
+        """Drive a port pin from outside; level -1 releases it."""
         self._library.iss_pin(self.handle, port, bit, level)
 
     def pin_level(self, port: int, bit: int) -> int:
-        """Level of a port pin now."""
         return int(self._library.iss_pin_level(self.handle, port, bit))
 
     def uart_receive(self, unit: int, data: int, flags: int = 0) -> None:
-        """A character's stop bit is over; ``flags``: 1 framing error, 2 parity error."""
+        """Deliver a character at the end of its stop bit; flags: 1 framing error, 2 parity error."""
         self._library.iss_uart_receive(self.handle, unit, data, flags)
 
     def i2c_slave_start(self, unit: int, address_byte: int) -> int | None:
-        """A (repeated) start with that address byte.
+        """Send a (repeated) start with that address byte.
 
-        1 acknowledged, 0 not; None: the clock is stretched, run on and ask ``i2c_slave_poll``.
+        Returns 1 if acknowledged, else 0; None while the clock is stretched: run on and call
+        ``i2c_slave_poll``.
         """
         return self._slave(unit, 0, address_byte)
 
     def i2c_slave_write(self, unit: int, byte: int) -> int | None:
-        """A byte for the slave; answers as ``i2c_slave_start``."""
+        """Write a byte to the slave; returns as ``i2c_slave_start``."""
         return self._slave(unit, 1, byte)
 
     def i2c_slave_read(self, unit: int, acknowledged: bool = True) -> int | None:
-        """The next byte of the slave; None as above. ``acknowledged``: was the byte before it."""
+        """Read a byte; None as above. ``acknowledged``: whether the previous byte was."""
         return self._slave(unit, 2, int(acknowledged))
 
     def i2c_slave_stop(self, unit: int) -> None:
-        """The transfer is over."""
         self._slave(unit, 3, 0)
 
     def i2c_slave_poll(self, unit: int) -> int | None:
-        """Answer to the latest call above that was None."""
+        """Answer to the latest call that returned None."""
         return self._slave(unit, 4, 0)
 
     def i2c_answer(self, unit: int, acknowledged: bool, data: int = 0) -> None:
-        """What the bus made of the master's start, byte or read that was in the outbox."""
+        """Answer a start, byte or read message of the master."""
         self._library.iss_i2c_answer(self.handle, unit, acknowledged, data)
 
     def analog_changed(self) -> None:
-        """Voltages in ``analog`` are others now: comparators look at them."""
+        """Re-evaluate the comparators after a change of ``analog``."""
         self._library.iss_analog_changed(self.handle)
 
     # The FPGA at its pins
 
     def couple(self, driver: FpgaDriverRecord, wires: ctypes.Array[FpgaWireRecord]) -> None:
-        """Lead port pins to an FPGA; see fpga_link.h."""
-        self._coupled = driver, wires  # its callbacks are kept alive
+        """Connect port pins to an FPGA; see fpga_link.h."""
+        self._coupled = driver, wires  # keeps the callbacks alive
         self._library.iss_fpga(self.handle, driver, wires, len(wires))
 
     def fpga_running(self, running: int) -> None:
-        """Which cameras run at the FPGA, one bit each."""
+        """Set the running cameras of the FPGA, one bit each."""
         self._library.iss_fpga_running(self.handle, running)
 
     # Debugging
 
     @property
     def watchpoints(self) -> frozenset[Watch]:
-        """Ranges whose accesses stop a run."""
         return frozenset(self._watches)
 
     def watch(self, watch: Watch, on: bool = True) -> None:
-        """Add a watchpoint, or take it away."""
+        """Add or remove a watchpoint."""
         kind = {"r": 1, "w": 2, "a": 3}[watch.kind]
         if on != (watch in self._watches):
             self._library.iss_watchpoint(self.handle, watch.address, watch.length, kind, on)
@@ -298,17 +295,17 @@ class Machine:
 
     @property
     def watch_hit(self) -> WatchHit:
-        """The access that ended the last run at a watchpoint."""
+        """The access at which the last run stopped."""
         found = (ctypes.c_uint32 * 5)()
         self._library.iss_watch_hit(self.handle, found)
         return WatchHit(found[0], found[1], found[2], found[3], bool(found[4]))
 
     def attach_debugger(self, attached: bool, catches: int = 0) -> None:
-        """A debugger is there: BKPT stops a run, and so do exceptions of ``catches`` (DEMCR)."""
+        """With a debugger, BKPT and the exceptions in ``catches`` (DEMCR.VC_*) stop a run."""
         self._library.iss_debugger(self.handle, attached, catches)
 
     def semihosting(self, on: bool) -> None:
-        """Whether BKPT 0xAB is a call: console, clock and exit; else it is a fault."""
+        """Whether BKPT 0xAB is a call (console, clock, exit), not a fault."""
         self._library.iss_semihosting(self.handle, on)
 
     def _slave(self, unit: int, what: int, byte: int) -> int | None:
@@ -317,31 +314,25 @@ class Machine:
 
 
 class Breakpoints(MutableSet[int]):
-    """Addresses at which a machine stops."""
+    """Addresses at which a machine stops before executing."""
 
     def __init__(self, machine: Machine) -> None:
-        """None at first."""
         self._machine = machine
         self._addresses: set[int] = set()
 
     def __contains__(self, address: object) -> bool:
-        """Whether there is one."""
         return address in self._addresses
 
     def __iter__(self) -> Iterator[int]:
-        """All of them."""
         return iter(sorted(self._addresses))
 
     def __len__(self) -> int:
-        """How many."""
         return len(self._addresses)
 
     def add(self, value: int) -> None:
-        """Stop before the instruction there."""
         self._set(value & ~1, True)
 
     def discard(self, value: int) -> None:
-        """Stop there no longer."""
         self._set(value & ~1, False)
 
     def _set(self, address: int, on: bool) -> None:
@@ -349,8 +340,3 @@ class Breakpoints(MutableSet[int]):
             library = self._machine._library
             library.iss_breakpoint(self._machine.handle, address, on)
             (self._addresses.add if on else self._addresses.discard)(address)
-
-
-_NUMBERS = {name: number for number, name in enumerate(REGISTERS)} | {
-    f"r{n}": n for n in range(16)
-}  # fmt: skip

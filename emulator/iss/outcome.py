@@ -1,11 +1,11 @@
-"""What comes of a run of a machine: why it ended, what left it, and which access stopped it."""
+"""Results of a machine's run: why it ended, its messages, and the access that stopped it."""
 
 from enum import IntEnum
 from typing import NamedTuple
 
 
 class StopReason(IntEnum):
-    """Why a run ended; the order is that of api.h."""
+    """Why a run ended; numbers as in api.cpp."""
 
     TIME = 0
     OUTBOX = 1
@@ -23,9 +23,9 @@ class Stop(NamedTuple):
     """End of a run.
 
     Attributes:
-        reason: of it.
-        now_ps: time that the machine has reached.
-        sends: whether there is something in the outbox, whatever the reason.
+        reason: why it ended.
+        now_ps: time of the machine.
+        sends: whether there are messages in the outbox.
     """
 
     reason: StopReason
@@ -34,7 +34,7 @@ class Stop(NamedTuple):
 
 
 class Kind(IntEnum):
-    """What leaves a machine; the order, and what the values mean, are those of outbox.h."""
+    """Kinds of messages; numbers and values as in outbox.h."""
 
     PIN = 0
     UART = 1
@@ -55,15 +55,15 @@ class Kind(IntEnum):
 
 
 class Outgoing(NamedTuple):
-    """Something for the outside.
+    """A message from the machine.
 
     Attributes:
-        kind: of it.
-        unit: which port pin, peripheral or stimulus port.
+        kind: meaning of the other attributes.
+        unit: port pin, peripheral or stimulus port.
         value: level, byte or address.
-        extra: what else there is to know, by kind.
-        time_ps: when it happened.
-        text: of the kinds that are text.
+        extra: further value, by kind.
+        time_ps: time of the event.
+        text: of text messages.
     """
 
     kind: Kind
@@ -83,7 +83,7 @@ class Watch(NamedTuple):
 
 
 class WatchHit(NamedTuple):
-    """An access that a watchpoint saw, and the instruction that made it."""
+    """An access to a watched range, and the instruction that made it."""
 
     pc: int
     address: int

@@ -196,7 +196,7 @@ def test_recording_tells_the_firmware_and_replay_checks_it(
 BAD = {
     "empty.elf": (b"", "is empty"),
     "none.bin": (b"\xff" * 100, "has no vector table"),
-    "text.hex": (b"hello", "is no Intel HEX file"),
+    "text.hex": (b"hello", "is not an Intel HEX file"),
 }
 
 

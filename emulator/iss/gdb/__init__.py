@@ -1,1 +1,1 @@
-"""GDB's remote serial protocol: packets, and a session that acts on a target. Knows no socket."""
+"""GDB's remote serial protocol, independent of sockets: packets, and a session on a target."""

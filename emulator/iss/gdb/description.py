@@ -1,4 +1,4 @@
-"""XML that tells GDB what the target is: features org.gnu.gdb.arm.m-profile and m-system.
+"""XML description of the target for GDB: features org.gnu.gdb.arm.m-profile and m-system.
 
 GDB manual, appendices "Target Descriptions" and "Memory Map Format".
 """
@@ -9,12 +9,12 @@ from cubestack.emulator.iss.gdb.target import MemoryRegion
 
 CORE = (*(f"r{number}" for number in range(13)), "sp", "lr", "pc")
 XPSR_NUMBER = 25
-"""GDB's own number of the status register; those before it were of another coprocessor."""
+"""GDB's number of the status register; 16 to 24 belonged to the FPA coprocessor."""
 
 SYSTEM = ("msp", "psp", "primask", "basepri", "faultmask", "control")
 
 REGISTERS = dict(enumerate(CORE)) | dict(enumerate(("xpsr", *SYSTEM), start=XPSR_NUMBER))
-"""Names by number; in the order in which a packet carries them all."""
+"""Names by number, in the order of the packet that carries all registers."""
 
 TYPES = {"sp": "data_ptr", "pc": "code_ptr", "msp": "data_ptr", "psp": "data_ptr"}
 
@@ -40,7 +40,6 @@ TARGET_XML = (
 
 
 def memory_map(regions: Iterable[MemoryRegion]) -> str:
-    """The memory map of ``regions``."""
     lines = []
     for region in regions:
         head = f'<memory type="{region.kind}" start="{region.start:#x}" length="{region.length:#x}"'

@@ -1,8 +1,8 @@
 """Packets of GDB's remote serial protocol on a byte stream.
 
 GDB manual, appendix "GDB Remote Serial Protocol", Overview: ``$data#checksum``, acknowledged by
-``+`` or asked for again by ``-`` until both sides agree to leave that out. ``}`` escapes a byte,
-which follows with bit 5 turned over. A byte 3 between packets asks the target to stop.
+``+`` or rejected by ``-`` until both sides agree to omit that. ``}`` escapes a byte, which follows
+with bit 5 inverted. A byte 3 between packets stops the target.
 """
 
 from collections.abc import Iterator
@@ -12,38 +12,36 @@ INTERRUPT = 0x03
 ESCAPE = ord("}")
 ESCAPED_BIT = 0x20
 RESERVED = b"#$}*"
-"""Bytes that stand for something else in a packet: ``*`` in answers only, where it repeats."""
+"""Bytes that must be escaped; ``*`` starts a repetition, in answers only."""
 
 LARGEST = 0x4000
-"""Bytes of a packet's data, as the session announces; longer ones are dropped."""
+"""Bytes of a packet's data, as the session announces; longer packets are dropped."""
 
 
 def escape(data: bytes) -> bytes:
-    """``data`` as it may stand in a packet."""
     return b"".join(
         bytes([ESCAPE, byte ^ ESCAPED_BIT]) if byte in RESERVED else bytes([byte]) for byte in data
     )
 
 
 def unescape(data: bytes) -> bytes:
-    """What ``escape`` was given."""
     head, *parts = data.split(bytes([ESCAPE]))
     return head + b"".join(bytes([part[0] ^ ESCAPED_BIT]) + part[1:] for part in parts if part)
 
 
 def framed(data: bytes) -> bytes:
-    """A packet of data that is escaped where it has to be."""
+    """Packet of already escaped data."""
     return b"$%b#%02x" % (data, sum(data) & 0xFF)
 
 
 @dataclass
 class Deframer:
-    """Cuts what a client sends into packets and interrupts.
+    """Splits a client's bytes into packets and interrupts.
 
     Attributes:
         acknowledging: whether packets are acknowledged.
-        replies: acknowledgements to be sent; the owner takes them.
-        again: whether the client has asked for the last packet again; the owner clears it.
+        replies: acknowledgements to send; the owner clears them.
+        again: whether the client requests the last packet again; the owner clears it.
     """
 
     acknowledging: bool = True
@@ -52,7 +50,7 @@ class Deframer:
     _unread: bytearray = field(default_factory=bytearray)
 
     def feed(self, data: bytes) -> Iterator[bytes | None]:
-        """Data of each packet that is complete now, as it was sent; None for an interrupt."""
+        """Data of each complete packet, still escaped; None for an interrupt."""
         self._unread += data
         while self._unread:
             first = self._unread[0]
@@ -62,11 +60,11 @@ class Deframer:
                     if len(self._unread) > LARGEST + 4:
                         self._unread.clear()
                     return
-                body, told = bytes(self._unread[1:end]), bytes(self._unread[end + 1 : end + 3])
+                body, checksum = bytes(self._unread[1:end]), bytes(self._unread[end + 1 : end + 3])
                 del self._unread[: end + 3]
                 if not self.acknowledging:
                     yield body
-                elif told.lower() == b"%02x" % (sum(body) & 0xFF):
+                elif checksum.lower() == b"%02x" % (sum(body) & 0xFF):
                     self.replies += b"+"
                     yield body
                 else:

@@ -1,22 +1,22 @@
-"""What a debugger's session acts on."""
+"""The target of a debugger's session."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 SIGINT, SIGILL, SIGTRAP, SIGBUS, SIGSEGV = 2, 4, 5, 10, 11
-"""Signals by the numbers of GDB (include/gdb/signals.def), which are no system's."""
+"""Signals by GDB's own numbers (include/gdb/signals.def)."""
 
 WatchKind = Literal["write", "read", "access"]
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Why the target stands.
+    """Why the target is halted.
 
     Attributes:
         signal: one of the above.
         watch: kind and address of the watchpoint that was hit.
-        breakpoint: whether it stands at a breakpoint.
+        breakpoint: whether it halted at a breakpoint.
     """
 
     signal: int = SIGTRAP
@@ -26,13 +26,13 @@ class Stop:
 
 @dataclass(frozen=True)
 class MemoryRegion:
-    """A line of the memory map.
+    """A region of the memory map.
 
     Attributes:
-        kind: flash is written by the flash commands of the protocol, so by ``load``.
+        kind: flash is written by the protocol's flash commands, as by ``load``.
         start: first address.
         length: in bytes.
-        block: bytes that are erased together, of flash.
+        block: size of an erase block of flash, in bytes.
     """
 
     kind: Literal["ram", "rom", "flash"]
@@ -42,55 +42,55 @@ class MemoryRegion:
 
 
 class Target(Protocol):
-    """A processor with its memories. All but ``halted`` and ``halt`` are used while it stands."""
+    """A processor and its memories. Except ``halted`` and ``halt`` all require that it is halted."""
 
     @property
     def registers(self) -> dict[int, str]:
-        """Names of its registers by number, as the description numbers them."""
+        """Names of its registers by the numbers of the description."""
 
     @property
     def regions(self) -> tuple[MemoryRegion, ...]:
-        """Its memory map."""
+        """The memory map."""
 
     @property
     def halted(self) -> Stop | None:
-        """Why it stands; None while it runs."""
+        """Why it is halted; None while it runs."""
 
     def attach(self) -> None:
-        """A client has come: halt."""
+        """Halt for a new client."""
 
     def detach(self) -> None:
-        """The client has gone: remove all breakpoints and watchpoints, and run."""
+        """Remove all breakpoints and watchpoints, and run: the client has gone."""
 
     def halt(self) -> None:
-        """Stand before the next instruction."""
+        """Halt before the next instruction."""
 
     def resume(self) -> None:
         """Run."""
 
     def step(self, low: int, high: int) -> None:
-        """Run one instruction, and on while the next one is in ``low``..``high`` - 1."""
+        """Run one instruction, or more while the next one is in ``low``..``high`` - 1."""
 
     def register(self, name: str) -> int:
-        """Value of a register."""
+        """Read a register."""
 
     def set_register(self, name: str, value: int) -> None:
-        """Change a register."""
+        """Write a register."""
 
     def read(self, address: int, count: int) -> bytes:
-        """Bytes of memory without side effects, as many as there are from ``address`` on."""
+        """Read memory without side effects; fewer bytes at the end of a memory."""
 
     def write(self, address: int, data: bytes) -> bool:
-        """Change memory, flash too; False where nothing can be written."""
+        """Write memory, flash too; False if it cannot be written."""
 
     def set_breakpoint(self, address: int, on: bool) -> None:
-        """Stand before the instruction there."""
+        """Halt before the instruction there."""
 
     def set_watchpoint(self, address: int, count: int, kind: WatchKind, on: bool) -> None:
-        """Stand after an access to these bytes."""
+        """Halt after an access to these bytes."""
 
     def restart(self) -> None:
-        """Reset, and stand before the first instruction."""
+        """Reset, and halt before the first instruction."""
 
     def monitor(self, command: str) -> str:
-        """What a ``monitor`` command answers; ValueError for one that makes no sense."""
+        """Output of a ``monitor`` command; ValueError if it is invalid."""

@@ -1,10 +1,9 @@
-"""The functions of api.cpp in this folder as ctypes knows them."""
+"""Declarations of this folder's api.cpp for ctypes."""
 
 import ctypes
 from functools import cache
-from typing import Any
 
-from cubestack.emulator.iss.binding import LIBRARY, Library
+from cubestack.emulator.iss.binding import Functions, Library, declare, simulator
 
 
 class RangeRecord(ctypes.Structure):
@@ -43,7 +42,7 @@ class ChangeRecord(ctypes.Structure):
 
 
 _P, _I, _L = ctypes.c_void_p, ctypes.c_int32, ctypes.POINTER(ctypes.c_int64)
-_FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+_FUNCTIONS: Functions = {
     "insight_new": (_P, (_P, ctypes.POINTER(RangeRecord), _I)),
     "insight_trace": (None, (_P, _I)),
     "insight_delete": (None, (_P, _P)),
@@ -58,8 +57,6 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 @cache
 def insight_library() -> Library:
     """The simulator's library with these functions declared."""
-    library = LIBRARY.get()
-    for name, (result, arguments) in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
+    library = simulator()
+    declare(library, _FUNCTIONS)
     return library

@@ -78,11 +78,11 @@ def test_upper_addresses_of_hex_files(tmp_path):
 
 BAD = {
     "empty.elf": (b"", "is empty"),
-    "text.elf": (b"not an ELF", "is no ELF file: it begins with b'not '"),
+    "text.elf": (b"not an ELF", "is not an ELF file: it begins with b'not '"),
     "x86.elf": (elf([(0, VECTORS)], machine=62), "is for x64 with 32 bits, not for ARM with 32"),
     "wide.elf": (elf([], machine=183, bits=2), "is for AArch64 with 64 bits, not for ARM with 32"),
-    "big.elf": (elf([(0, VECTORS)], order=2), "is big-endian: this core is little-endian"),
-    "object.elf": (elf([(0, VECTORS)], kind=1), "is not linked to an executable: ET_REL"),
+    "big.elf": (elf([(0, VECTORS)], order=2), "is big-endian: the core is little-endian"),
+    "object.elf": (elf([(0, VECTORS)], kind=1), "is not an executable, but ET_REL"),
     "nothing.elf": (elf([]), "has nothing to load: no segment with bytes"),
     "cut.elf": (elf([(0, VECTORS)])[:60], "is a damaged ELF file: "),
     "beyond.elf": (
@@ -94,10 +94,10 @@ BAD = {
     "erased.bin": (b"\xff" * 64, "no vector table: stack pointer 0xffffffff, reset vector 0xffff"),
     "zeros.bin": (bytes(64), "no vector table: stack pointer 0x00000000, reset vector 0x00000000"),
     "long.bin": (VECTORS + bytes(1 << 20), "beyond the flash"),
-    "text.hex": (b"hello", "is no Intel HEX file"),
+    "text.hex": (b"hello", "is not an Intel HEX file"),
     "sum.hex": (b":0100000001FF\n", "line 1: wrong checksum"),
-    "short.hex": (hex_record(0, 0, VECTORS).encode() + b":0400\n", "line 2: no Intel HEX record"),
-    "kind.hex": (hex_record(7, 0, b"").encode(), "line 1: record type 07 is not known"),
+    "short.hex": (hex_record(0, 0, VECTORS).encode() + b":0400\n", "line 2: not an Intel HEX record"),
+    "kind.hex": (hex_record(7, 0, b"").encode(), "line 1: unknown record type 07"),
     "none.hex": (hex_record(1, 0, b"").encode(), "has no data records"),
 }
 

@@ -107,7 +107,7 @@ def test_firmware_is_sent_and_runs(desk: Desk, served: Serving) -> None:
             400,
             "an address of plain bytes is like @0x0",
         ),
-        ({"files": {"firmware": {"name": "a.elf", "content": "AAAA"}}}, 502, "is no ELF file"),
+        ({"files": {"firmware": {"name": "a.elf", "content": "AAAA"}}}, 502, "is not an ELF file"),
     ],
 )
 def test_what_can_not_be_started_is_one_line_and_the_old_one_runs(

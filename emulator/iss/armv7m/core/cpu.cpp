@@ -1,4 +1,4 @@
-// The outer loop, reset, and what a debugger sets.
+// The outer loop, reset, breakpoints.
 
 #include "armv7m/core/cpu.h"
 

@@ -7,10 +7,10 @@
 // it stopped. It calls System::service before the first instruction, when System::next_cycle() is
 // reached and after attention(). During a call to Bus, System or Tracer all public members are
 // current, and r[15] is the address of the running instruction; for System::svc, wfi and wfe it is
-// the next one's, and whatever the callee then writes to r[15] is where execution goes on. In
-// exception_return and service r[15] is the callee's to set. Anybody called may call stop(),
-// attention(), set_deadline() and invalidate(): they act after the running instruction. Nothing
-// throws, and nothing is allocated while the loop runs.
+// the address of the next one, and execution continues at whatever the callee writes to r[15]. In
+// exception_return and service the callee sets r[15]. Callees may call stop(), attention(),
+// set_deadline() and invalidate(), which take effect after the running instruction. Nothing throws,
+// and nothing is allocated while the loop runs.
 
 #pragma once
 
@@ -31,26 +31,26 @@ enum class Fault : uint8_t;    // system.h
 // How an access ended.
 enum class Result : uint8_t { Done, BusError, Violation, Unaligned };
 
-// Why run() returned, as bits: several can come together.
+// Why run() returned; several bits may be set.
 enum Exit : uint32_t {
     ExitDeadline = 1,       // cycles >= deadline
-    ExitStop = 2,           // somebody asked by stop()
-    ExitSleep = 4,          // asleep (System::sleep), since now or still
+    ExitStop = 2,           // stop() was called
+    ExitSleep = 4,          // asleep (System::sleep)
     ExitLockup = 8,         // System::locked_up
     ExitBreakpoint = 16,    // r[15] has a breakpoint; it was not executed
     ExitWatchpoint = 32,    // the instruction before r[15] hit one: see watch_hit
-    ExitStep = 64,          // steps() are done
+    ExitStep = 64,          // the instructions of steps() are executed
 };
 
-// Hears of everything while it is set (Cpu::set_tracer).
+// Observes execution while it is set (Cpu::set_tracer).
 class Tracer {
 public:
     virtual ~Tracer() = default;
-    // An instruction was executed, or skipped by its condition. An exception's entry is not part
-    // of it.
+    // An instruction was executed, or skipped by its condition. `before` and `after` are cycles
+    // without the entry of an exception.
     virtual void instruction(uint32_t pc, uint32_t next, int64_t before, int64_t after,
                              Cpu &cpu) = 0;
-    // Said by System; `returns_to` is what was stacked.
+    // Called by System; `returns_to`: the stacked address.
     virtual void exception_entry(int number, uint32_t returns_to, Cpu &cpu) = 0;
     virtual void exception_return(uint32_t exc_return, Cpu &cpu) = 0;
 };
@@ -66,22 +66,22 @@ public:
     Cpu(const Cpu &) = delete;
 
     Bus &bus;
-    System *system = nullptr;          // set before anything is run
+    System *system = nullptr;          // must be set before run()
 
-    // Registers. r[13] is the stack pointer in use; the other one is in `other_sp`.
+    // Registers. r[13] is the stack pointer in use; `other_sp` is the other one.
     uint32_t r[16] = {};
     uint32_t other_sp = 0;
     uint64_t nz = 0;                   // Z: the low word is 0. N: any bit from 31 upwards
     uint8_t carry = 0, overflow = 0, saturated = 0;
     uint8_t it = 0;                    // ITSTATE as in EPSR, 0 outside of a block
-    uint8_t thumb = 1;                 // EPSR.T; 0 makes the next instruction an InvalidState fault
+    uint8_t thumb = 1;                 // EPSR.T; 0: the next instruction faults (InvalidState)
     uint16_t ipsr = 0;                 // number of the active exception
     uint8_t primask = 0, faultmask = 0, basepri = 0;
-    uint8_t control = 0;               // bit 0: nPRIV, bit 1: SPSEL. Change it by set_control
+    uint8_t control = 0;               // bit 0: nPRIV, bit 1: SPSEL; changed by set_control
 
-    // Time, and what ends the loop.
+    // Time and the end of the loop.
     int64_t cycles = 0;
-    int64_t deadline = 0;              // by set_deadline
+    int64_t deadline = 0;              // changed by set_deadline
     bool exclusive = false;            // the local monitor; exception entry and return clear it
 
     // Flags.
@@ -109,7 +109,7 @@ public:
 
     bool handler_mode() const { return ipsr != 0; }
     bool privileged() const { return ipsr != 0 || !(control & 1); }
-    // Stack pointers by name, whichever is in use. The two low bits stay 0.
+    // The stack pointers, whichever is in use. Their two low bits stay 0.
     bool process_stack_in_use() const { return control & 2; }
     uint32_t main_sp() const { return control & 2 ? other_sp : r[13]; }
     uint32_t process_sp() const { return control & 2 ? r[13] : other_sp; }
@@ -117,48 +117,43 @@ public:
     void set_process_sp(uint32_t value) { (control & 2 ? r[13] : other_sp) = value & ~3u; }
     void set_control(uint8_t value);   // switches r[13] when SPSEL changes
 
-    // Registers as after a reset except those that the vector table gives (System reads it).
+    // Sets the registers to their reset values, except those that System reads from the vector table.
     void reset();
 
-    // Time and stopping, from outside or from within a call.
+    // Deadline and stopping, from outside or from a callee.
     void set_deadline(int64_t cycle) { deadline = cycle, update_limit(); }
     void lower_deadline(int64_t cycle) { if (cycle < deadline) set_deadline(cycle); }
     void stop() { stop_requested = true, limit = INT64_MIN; }
     void attention() { attention_requested = true, limit = INT64_MIN; }
 
-    // Runs; returns Exit bits. A breakpoint at the first instruction does not stop it again.
+    // Returns Exit bits. A breakpoint at which the last run stopped does not stop this one again.
     uint32_t run();
     // The next run() ends after `count` instructions with ExitStep; those whose successor lies in
     // [low, high) are not counted.
     void steps(int64_t count, uint32_t low = 0, uint32_t high = 0);
 
-    // The MPU was switched on or off, or its regions changed: to be called by System. While
-    // mpu.enabled() every access and each fetch from another 32 bytes asks mpu.allows().
-    void protection_changed() { regions_changed(); }
-
-    // Memory. Regions may be changed at any time (waits, writable, host); call regions_changed()
-    // after that.
+    // Memory. Call regions_changed() after changing a region (waits, writable, host) or the MPU. While
+    // mpu.enabled() every access and each fetch from another 32 bytes checks mpu.allows().
     std::vector<Region> regions;
     void add_region(const Region &region) { regions.push_back(region), regions_changed(); }
     void regions_changed();
-    // Code at these addresses of a region was changed from outside, not by the core's stores.
+    // Call it after code in a region was changed other than by the core's stores.
     void invalidate(uint32_t address, uint32_t size);
 
-    // Accesses for System (stacking, vectors), with protection, watchpoints, waits; no fault is
-    // taken. Unaligned ones are split.
+    // Accesses for System (stacking, vectors), with protection, watchpoints and waits. They raise no
+    // fault. Unaligned ones are split.
     Result load(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged = true);
     Result store(uint32_t address, uint32_t size, uint32_t value, bool as_privileged = true);
-    // Accesses for a debugger: no time, no effect on peripherals; poke into a read-only region
-    // works and invalidates.
+    // Accesses for a debugger: they take no time, and peeks have no side effects; poke also writes
+    // read-only regions.
     bool peek(uint32_t address, uint32_t size, uint32_t &value);
     bool poke(uint32_t address, uint32_t size, uint32_t value);
 
-    // Debugging; no cost where there is none.
+    // Debugging; without break- and watchpoints it costs nothing.
     void set_breakpoint(uint32_t address);
     void clear_breakpoint(uint32_t address);
     void set_watches(const std::vector<Watch> &list) { watches = list, regions_changed(); }
     bool breakpoint_at(uint32_t address) const;
-    void skip_breakpoint() { stopped_at = r[15]; }    // of the first instruction of the next run()
     void set_tracer(Tracer *listener) { tracer = listener; }
     Tracer *tracer = nullptr;
     struct {
@@ -170,17 +165,17 @@ public:
 private:
     static constexpr uint32_t NOWHERE = 1;    // an address that no instruction has
 
-    // One megabyte of the address space. A limit of 0 leads to the slow way.
+    // One megabyte of the address space. With a limit of 0 accesses take the slow path.
     struct Page {
         uint8_t *host = nullptr;
-        uint8_t *marks = nullptr;      // one for 64 bytes: code was decoded there
+        uint8_t *marks = nullptr;      // one per 64 bytes: code was decoded there
         uint32_t read_limit = 0, write_limit = 0;    // bytes from the page's start
         uint8_t read_wait = 0, write_wait = 0;
     };
     struct FreeCode {
         void operator()(Operation *operations) const;
     };
-    // The decoded operations of one piece of host memory.
+    // The decoded operations of a block of host memory.
     struct Code {
         uint8_t *host;
         uint32_t size;
@@ -195,7 +190,8 @@ private:
     void note_watch(uint32_t address, uint32_t size, uint32_t value, bool write);
     Result access(uint32_t address, uint32_t size, uint32_t &value, bool write, bool privileged);
     Result access_bit(uint32_t address, uint32_t size, uint32_t &value, bool write);
-    Result load_unwatched(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged);
+    Result access_pieces(uint32_t address, uint32_t size, uint32_t &value, bool write,
+                         bool as_privileged);
 
     // Code (memory/fetch.cpp).
     bool find_code(uint32_t pc);
@@ -229,17 +225,17 @@ private:
     int64_t steps_left = 0;
     uint32_t step_low = 0, step_high = 0;
 
-    // Where the loop is: operations[0] is at code_base.
+    // The code that the loop executes: operations[0] is at code_base.
     Operation *operations = nullptr;
     uint32_t code_base = 0, code_size = 0;
     Operation aside[3] = {};           // an instruction outside of all regions, or with a breakpoint
     const FetchLines *lines = nullptr;
-    bool guarded = false;              // the MPU is asked about fetches
-    bool fetch_costs = false;          // either of both
+    bool guarded = false;              // the MPU checks fetches
+    bool fetch_costs = false;          // `lines` or `guarded`
     uint32_t fetched = NOWHERE;        // the line, or block, of the last fetch
     Fault fetch_fault = {};            // why find_code found nothing
     bool aside_ready = false;          // aside[0] is to run next
-    // A branch left the loop; to a half-word that is not at a word.
+    // A branch left the loop; ArrivingOdd: to the second half-word of a word.
     enum : uint8_t { NotArriving, Arriving, ArrivingOdd } arriving = NotArriving;
 
     // Pipeline (cycles.h).

@@ -37,7 +37,7 @@ void Cpu::write_special(uint32_t number, uint32_t mask, uint32_t value) {
         if (priority != 0 && (priority < basepri || basepri == 0)) basepri = priority;
         break;
     case 19:
-        // It can always be cleared, as by CPSIE; only NMI and HardFault can not set it.
+        // It can always be cleared, as by CPSIE; only NMI and HardFault cannot set it.
         if (!(value & 1) || system->execution_priority() > -1) faultmask = value & 1;
         break;
     case 20:    // SPSEL can only be changed in thread mode
@@ -45,7 +45,7 @@ void Cpu::write_special(uint32_t number, uint32_t mask, uint32_t value) {
         break;
     default: break;
     }
-    system->boost_changed();
+    system->priority_changed();
 }
 
 void Cpu::change_masks(uint32_t value) {
@@ -53,7 +53,7 @@ void Cpu::change_masks(uint32_t value) {
     const uint8_t on = value >> 4 & 1;
     if (value & 2) primask = on;
     if (value & 1 && (!on || system->execution_priority() > -1)) faultmask = on;
-    system->boost_changed();
+    system->priority_changed();
 }
 
 }  // namespace armv7m

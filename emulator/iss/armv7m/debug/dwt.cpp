@@ -5,7 +5,7 @@ namespace armv7m {
 void Dwt::reset() {
     control = base = 0;
     traced = false;
-    sleep = exception = {};
+    sleep = exception = 0;
     for (auto &each : comparator) each = {0, 0, 0};
 }
 
@@ -19,8 +19,8 @@ uint32_t Dwt::read(uint32_t offset, int64_t now) const {
     switch (offset) {
     case CTRL: return (uint32_t)comparators << 28 | control;
     case CYCCNT: return counts() ? base + (uint32_t)now : base;
-    case EXCCNT: return exception.value;
-    case SLEEPCNT: return sleep.value;
+    case EXCCNT: return exception;
+    case SLEEPCNT: return sleep;
     }
     const uint32_t index = (offset - COMPARATORS) / 16;
     if (offset < COMPARATORS || index >= (uint32_t)comparators) return 0;
@@ -36,16 +36,16 @@ void Dwt::write(uint32_t offset, uint32_t value, int64_t now) {
     switch (offset) {
     case CTRL: {
         const uint32_t cycles = read(CYCCNT, now);
-        const uint32_t enabled = ~control & value;    // a counter begins at 0, C1.8.7
-        if (enabled >> 18 & 1) exception.value = 0;
-        if (enabled >> 19 & 1) sleep.value = 0;
+        const uint32_t enabled = ~control & value;    // a counter starts at 0, C1.8.7
+        if (enabled >> 18 & 1) exception = 0;
+        if (enabled >> 19 & 1) sleep = 0;
         control = value & 0x007F1FFF;
         write(CYCCNT, cycles, now);
         return;
     }
     case CYCCNT: base = counts() ? value - (uint32_t)now : value; return;
-    case EXCCNT: exception.value = (uint8_t)value; return;
-    case SLEEPCNT: sleep.value = (uint8_t)value; return;
+    case EXCCNT: exception = (uint8_t)value; return;
+    case SLEEPCNT: sleep = (uint8_t)value; return;
     }
     const uint32_t index = (offset - COMPARATORS) / 16;
     if (offset < COMPARATORS || index >= (uint32_t)comparators) return;

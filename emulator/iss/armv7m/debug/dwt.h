@@ -1,6 +1,5 @@
-// Data watchpoint and trace unit: the cycle counter, the counters of sleep and of exception
-// overhead, and the comparators as plain registers; ARMv7-M Architecture Reference Manual C1.8.
-// CPICNT, LSUCNT and FOLDCNT stay 0: the core does not tell where a cycle went.
+// Data watchpoint and trace unit: the counters of cycles, sleep and exception overhead; the comparators
+// are plain registers. ARMv7-M Architecture Reference Manual C1.8. CPICNT, LSUCNT and FOLDCNT stay 0.
 
 #pragma once
 
@@ -12,9 +11,9 @@ class Dwt {
 public:
     explicit Dwt(int comparators) : comparators(comparators) {}
     void reset();
-    void set_trace_enabled(bool enabled, int64_t now);    // DEMCR.TRCENA: without it all stand
-    void count_sleep(int64_t cycles) { sleep.count(cycles, control >> 19 & running()); }
-    void count_exception(int64_t cycles) { exception.count(cycles, control >> 18 & running()); }
+    void set_trace_enabled(bool enabled, int64_t now);    // DEMCR.TRCENA: without it all counters stop
+    void count_sleep(int64_t cycles) { count(sleep, 19, cycles); }
+    void count_exception(int64_t cycles) { count(exception, 18, cycles); }
 
     uint32_t read(uint32_t offset, int64_t now) const;    // offset from 0xE0001000
     void write(uint32_t offset, uint32_t value, int64_t now);
@@ -23,21 +22,16 @@ private:
     enum : uint32_t { CTRL = 0x0, CYCCNT = 0x4, CPICNT = 0x8, EXCCNT = 0xC, SLEEPCNT = 0x10,
                       LSUCNT = 0x14, FOLDCNT = 0x18, COMPARATORS = 0x20 };
 
-    struct Counter {
-        uint8_t value = 0;
-        void count(int64_t cycles, uint32_t enabled) {
-            if (enabled & 1) value = (uint8_t)(value + cycles);
-        }
-    };
-
-    uint32_t running() const { return traced; }
+    void count(uint8_t &counter, int enable_bit, int64_t cycles) {
+        if (traced && control >> enable_bit & 1) counter = (uint8_t)(counter + cycles);
+    }
     bool counts() const { return traced && (control & 1); }
 
     int comparators;
     bool traced = false;
     uint32_t control = 0;
-    uint32_t base = 0;        // CYCCNT, less the cycle it was set at while it counts
-    Counter sleep, exception;
+    uint32_t base = 0;        // CYCCNT; while it counts, minus the cycle at which it was set
+    uint8_t sleep = 0, exception = 0;
     struct { uint32_t value, mask, function; } comparator[16] = {};
 };
 

@@ -1,5 +1,5 @@
-// Instrumentation trace macrocell: its stimulus ports carry printf; ARMv7-M Architecture Reference
-// Manual C1.7. A port is always ready: what is written leaves at once.
+// Instrumentation trace macrocell, whose stimulus ports carry printf. ARMv7-M Architecture Reference
+// Manual C1.7. A port is always ready.
 
 #pragma once
 
@@ -10,11 +10,11 @@ namespace armv7m {
 class Itm {
 public:
     void reset();
-    // As a trace probe leaves it: unlocked, on, all ports on. Programs that print but leave the
-    // set-up to the probe are heard then.
+    // Sets it up as a trace probe does: unlocked, on, all ports on. For programs that leave this to
+    // the probe.
     void enable_all();
 
-    // Whether what is written to a port is heard.
+    // Whether writes to a port are forwarded.
     bool enabled(uint32_t port) const { return (control & 1) && (ports >> port & 1); }
     bool user_may_write(uint32_t port) const { return !(privilege >> (port / 8) & 1); }
 

@@ -1,6 +1,6 @@
-// Semihosting: BKPT 0xAB as a call to the host, for printf and exit of programs made with
-// newlib's rdimon. Operations and parameter blocks: "Semihosting for AArch32 and AArch64", Arm
-// 100863. Files other than the console do not exist.
+// Semihosting: BKPT 0xAB calls the host, for printf and exit of programs built with newlib's rdimon.
+// Operations and parameter blocks: "Semihosting for AArch32 and AArch64", Arm 100863. The console is
+// the only file.
 
 #include "armv7m/system/system.h"
 
@@ -19,9 +19,9 @@ enum : uint32_t {
 };
 constexpr uint32_t FAILED = ~0u, EXIT_BY_APPLICATION = 0x20026;
 constexpr uint32_t STDIN = 1, STDOUT = 2, STDERR = 3;    // handles
-constexpr uint32_t LONGEST = 4096;                       // characters taken of one call
+constexpr uint32_t LONGEST = 4096;                       // characters per call
 
-// A program's memory as the debugger sees it: no side effects on peripherals.
+// The program's memory, read without side effects.
 struct ProgramMemory {
     Cpu &cpu;
 
@@ -36,7 +36,7 @@ struct ProgramMemory {
         value = (uint8_t)wide;
         return good;
     }
-    // Copies until `length` or a zero byte, if `to_zero`; how many there were.
+    // Copies up to `length` bytes, with `to_zero` up to a zero byte; returns their number.
     int text(uint32_t address, uint32_t length, bool to_zero, uint8_t (&buffer)[LONGEST]) const {
         uint32_t count = 0;
         for (; count < length && count < LONGEST; count++)
@@ -54,7 +54,7 @@ void System::semihost() {
     uint32_t result = 0;
     switch (cpu.r[0]) {
     case SYS_OPEN: {
-        // ":tt" is the console: read is input, written output, appended to error output.
+        // ":tt" is the console: opened for reading stdin, for writing stdout, for appending stderr.
         const bool console = memory.text(memory.word(block), 4, true, buffer) == 3 &&
                              buffer[0] == ':' && buffer[1] == 't' && buffer[2] == 't';
         const uint32_t mode = memory.word(block + 4);
@@ -100,7 +100,7 @@ void System::semihost() {
         cpu.poke(block + 4, 4, 0);
         break;
     case SYS_HEAPINFO:
-        // All zero: the program takes its linker script's values.
+        // All zero: the program uses the values of its linker script.
         for (uint32_t n = 0; n < 4; n++) cpu.poke(memory.word(block) + 4 * n, 4, 0);
         break;
     case SYS_EXIT:

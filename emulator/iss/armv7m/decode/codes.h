@@ -1,4 +1,4 @@
-// The handlers that decoded operations name. Operation's fields by family, after the code:
+// The handlers of decoded operations. Operation's fields by family:
 //   data processing   d = result, n = first operand, then value (I: constant; its carry, if any, is
 //                     bit 31 and `shift` is 1), m (R: register), m with a = type, shift = amount
 //                     (X: shifted by a constant) or a = register with the amount (LSL_V, ...)
@@ -26,7 +26,7 @@ namespace armv7m {
 #define ARMV7M_SIX(X, op) ARMV7M_THREE(X, op) X(op##S_I) X(op##S_R) X(op##S_X)
 #define ARMV7M_FOUR(X, op) X(op##_O) X(op##_M) X(op##_P) X(op##_Q)
 
-// All codes, in the order of their numbers. The first three are no instructions.
+// All codes, in the order of their numbers. The first three are markers, not instructions.
 #define ARMV7M_CODES(X) \
     X(UNDECODED) X(BREAK) X(REGION_END) \
     ARMV7M_SIX(X, AND) ARMV7M_SIX(X, BIC) ARMV7M_SIX(X, ORR) ARMV7M_SIX(X, ORN) \
@@ -58,6 +58,6 @@ enum Code : uint16_t {
 
 static_assert(CODE_COUNT <= 256, "Operation::in_it is a byte");
 
-constexpr uint16_t LAST_MARKER = C_REGION_END;    // up to here: no instruction
+constexpr uint16_t LAST_MARKER = C_REGION_END;
 
 }  // namespace armv7m

@@ -16,7 +16,7 @@ Operation make(uint32_t code, uint32_t d = 0, uint32_t n = 0, uint32_t m = 0, ui
     return op;
 }
 
-// Flags are set outside of an IT block only.
+// Sets flags only outside an IT block.
 Operation flagged(uint32_t outside, uint32_t inside, uint32_t d, uint32_t n, uint32_t m = 0,
                   uint32_t value = 0) {
     Operation op = make(outside, d, n, m, value);
@@ -35,21 +35,16 @@ Operation outside_it(Operation op) {
 Operation shift_add_move_compare(uint32_t half) {
     const uint32_t d = half & 7, n = half >> 3 & 7, m = half >> 6 & 7;
     const uint32_t constant = half & 0xFF, r = half >> 8 & 7, amount = half >> 6 & 31;
-    Operation op = {};
+    const auto shift = [&](uint32_t outside, uint32_t inside) {
+        Operation op = flagged(outside, inside, d, 0, n);
+        op.shift = (uint8_t)(amount ? amount : 32);
+        return op;
+    };
     switch (half >> 11) {
     case 0:
-        if (amount == 0) return flagged(C_MOVS_R, C_MOV_R, d, 0, n);
-        op = flagged(C_LSLS_I, C_LSL_I, d, 0, n);
-        op.shift = (uint8_t)amount;
-        return op;
-    case 1:
-        op = flagged(C_LSRS_I, C_LSR_I, d, 0, n);
-        op.shift = (uint8_t)(amount ? amount : 32);
-        return op;
-    case 2:
-        op = flagged(C_ASRS_I, C_ASR_I, d, 0, n);
-        op.shift = (uint8_t)(amount ? amount : 32);
-        return op;
+        return amount ? shift(C_LSLS_I, C_LSL_I) : flagged(C_MOVS_R, C_MOV_R, d, 0, n);
+    case 1: return shift(C_LSRS_I, C_LSR_I);
+    case 2: return shift(C_ASRS_I, C_ASR_I);
     case 3:
         switch (half >> 9 & 3) {
         case 0: return flagged(C_ADDS_R, C_ADD_R, d, n, m);
@@ -66,16 +61,20 @@ Operation shift_add_move_compare(uint32_t half) {
 
 Operation data_processing(uint32_t half) {
     const uint32_t d = half & 7, m = half >> 3 & 7;
-    Operation op = {};
+    const auto shift = [&](uint32_t outside, uint32_t inside) {
+        Operation op = flagged(outside, inside, d, 0, d);
+        op.a = (uint8_t)m;
+        return op;
+    };
     switch (half >> 6 & 15) {
     case 0: return flagged(C_ANDS_R, C_AND_R, d, d, m);
     case 1: return flagged(C_EORS_R, C_EOR_R, d, d, m);
-    case 2: op = flagged(C_LSLS_V, C_LSL_V, d, 0, d); op.a = (uint8_t)m; return op;
-    case 3: op = flagged(C_LSRS_V, C_LSR_V, d, 0, d); op.a = (uint8_t)m; return op;
-    case 4: op = flagged(C_ASRS_V, C_ASR_V, d, 0, d); op.a = (uint8_t)m; return op;
+    case 2: return shift(C_LSLS_V, C_LSL_V);
+    case 3: return shift(C_LSRS_V, C_LSR_V);
+    case 4: return shift(C_ASRS_V, C_ASR_V);
     case 5: return flagged(C_ADCS_R, C_ADC_R, d, d, m);
     case 6: return flagged(C_SBCS_R, C_SBC_R, d, d, m);
-    case 7: op = flagged(C_RORS_V, C_ROR_V, d, 0, d); op.a = (uint8_t)m; return op;
+    case 7: return shift(C_RORS_V, C_ROR_V);
     case 8: return make(C_TST_R, 0, d, m);
     case 9: return flagged(C_RSBS_I, C_RSB_I, d, m);
     case 10: return make(C_CMP_R, 0, d, m);
@@ -94,7 +93,7 @@ Operation high_registers(uint32_t half) {
         if (d == 15 && m == 15) return undefined();
         if (d >= 13 || m == 15) return make(C_ADD_HIGH, d, d, m);
         return make(C_ADD_R, d, d, m);
-    case 1:    // both low is UNPREDICTABLE; it compares
+    case 1:    // two low registers are UNPREDICTABLE; it compares
         return d == 15 || m == 15 ? undefined() : make(C_CMP_R, 0, d, m);
     case 2:
         if (d >= 13 || m == 15) return make(C_MOV_HIGH, d, 0, m);
@@ -182,10 +181,8 @@ Operation multiple(uint32_t half) {
 Operation decode_16(uint32_t half) {
     using namespace narrow;
     const uint32_t r = half >> 8 & 7;
+    if (half >> 14 == 0) return shift_add_move_compare(half);
     switch (half >> 10) {
-    case 0: case 1: case 2: case 3: case 4: case 5: case 6: case 7:
-    case 8: case 9: case 10: case 11: case 12: case 13: case 14: case 15:
-        return shift_add_move_compare(half);
     case 16: return data_processing(half);
     case 17: return high_registers(half);
     case 18: case 19: return make(C_LDR_L, r, 15, 0, (half & 0xFF) << 2);

@@ -1,4 +1,4 @@
-// A decoded instruction, as the cache of decoded code holds it.
+// A decoded instruction in the cache of decoded code.
 
 #pragma once
 
@@ -6,11 +6,11 @@
 
 namespace armv7m {
 
-// codes.h says what the fields mean; all zero is "not decoded yet".
+// codes.h defines the fields; all zero means "not decoded yet".
 struct Operation {
     uint16_t code;          // its handler
     uint8_t in_it;          // its handler in an IT block, where most 16-bit instructions set no flags
-    uint8_t stall;          // 1: the instruction in front computes the address that it needs
+    uint8_t stall;          // 1: the preceding instruction computes its address
     uint8_t d, n, m, a;
     uint32_t value;
     uint8_t halves;         // its length in half-words
@@ -18,6 +18,6 @@ struct Operation {
     uint16_t list;
 };
 
-static_assert(sizeof(Operation) == 16, "the loop finds the address by it");
+static_assert(sizeof(Operation) == 16, "the loop computes addresses from it");
 
 }  // namespace armv7m

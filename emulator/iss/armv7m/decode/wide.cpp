@@ -1,4 +1,4 @@
-// 32-bit instructions but loads and stores (ARMv7-M ARM A5.3).
+// 32-bit instructions except loads and stores (ARMv7-M ARM A5.3).
 
 #include "armv7m/decode/codes.h"
 #include "armv7m/decode/wide.h"
@@ -9,7 +9,7 @@ namespace broad {
 
 constexpr uint32_t SET_FLAGS = 3;    // from op_I to opS_I, in the order of codes.h
 
-// Whether a register may not be there: SP and PC are UNPREDICTABLE in most places.
+// SP and PC, which are UNPREDICTABLE in most places.
 bool bad(uint32_t r) { return r == 13 || r == 15; }
 
 // ThumbExpandImm_C (A5.3.2); `rotated`: the carry becomes bit 31.
@@ -33,8 +33,8 @@ uint32_t field_12(uint32_t first, uint32_t second) {
     return (first << 1 & 0x800) | (second >> 4 & 0x700) | (second & 0xFF);
 }
 
-// What data processing instructions with constants and registers share: `form` 0 constant, 1
-// register, 2 shifted register. Returns false for what is not an instruction.
+// Sets the code of a data-processing instruction; `form`: 0 constant, 1 register, 2 shifted register.
+// False: not an instruction.
 bool choose(Operation &op, uint32_t number, bool flags, uint32_t form) {
     static const uint16_t codes[16] = {
         C_AND_I, C_BIC_I, C_ORR_I, C_ORN_I, C_EOR_I, 0, 0, 0, C_ADD_I, 0, C_ADC_I, C_SBC_I, 0,
@@ -56,8 +56,8 @@ bool choose(Operation &op, uint32_t number, bool flags, uint32_t form) {
         op.code = (uint16_t)(code + form);
         return true;
     } else if ((number == 8 || number == 13) && op.n == 13) {
-        // ADD and SUB know SP; it may be the result, too (a shift of more than 3 is then
-        // UNPREDICTABLE and performed).
+        // ADD and SUB accept SP, also as the result (a shift of more than 3 is then UNPREDICTABLE,
+        // and performed).
         if (op.d == 13) {
             if (form == 0) {
                 op.code = C_ADD_SP_I, op.a = flags, op.m = number == 13;

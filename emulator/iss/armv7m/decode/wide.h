@@ -1,4 +1,4 @@
-// Shared by the files of the decoder.
+// Helpers of the 32-bit decoder.
 
 #pragma once
 

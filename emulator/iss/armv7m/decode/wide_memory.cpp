@@ -129,15 +129,15 @@ static uint32_t half_at(const uint8_t *code, uint32_t offset) {
     return code[offset] | (uint32_t)code[offset + 1] << 8;
 }
 
-// Where the instruction in front begins can be told from the half-words that look like the first
-// of two: they alternate with second ones, from the last one that does not look so.
+// Finds where the preceding instruction begins: in a run of half-words that look like the first half of
+// a 32-bit instruction, first and second halves alternate.
 uint8_t address_stall(const Operation &op, const uint8_t *code, uint32_t offset) {
     if (op.code < C_LDR_O || op.code > C_STREX || offset < 2) return 0;
     if (op.code >= C_LDR_L && op.code <= C_LDRSB_L) return 0;
     uint32_t run = 0;
     while (offset >= 4 + 2 * run && run < 16 && is_wide(half_at(code, offset - 4 - 2 * run))) run++;
     const uint32_t last = half_at(code, offset - 2);
-    if (!(run & 1) && is_wide(last)) return 0;    // no instruction ends here: data
+    if (!(run & 1) && is_wide(last)) return 0;    // data: no instruction ends here
     const Operation front = run & 1 ? decode_32(half_at(code, offset - 4), last) : decode_16(last);
     const bool indexed = op.code >= C_LDR_O && op.code <= C_STRB_Q && (op.code - C_LDR_O) % 4 == 1;
     return computes(front, op.n) || (indexed && computes(front, op.m));

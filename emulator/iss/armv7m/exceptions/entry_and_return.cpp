@@ -10,11 +10,11 @@ namespace armv7m {
 
 namespace {
 
-// Entry: 12 cycles to the handler's first instruction, of which stacking hides the vector fetch up
-// to the second half; an exception that arrives in the first half is late, and is taken instead.
+// Entry: 12 cycles to the handler's first instruction; the vector is fetched in the second half. An
+// exception of higher priority that arrives in the first half is taken instead (late arrival).
 constexpr int64_t STACKING_CYCLES = 6, VECTOR_CYCLES = 6;
 constexpr int64_t TAIL_CHAIN_CYCLES = 6;
-// Return: 10 cycles. Until the frame has been read a new exception chains instead.
+// Return: 10 cycles. An exception that arrives while the frame is read is tail-chained.
 constexpr int64_t UNSTACKING_CYCLES = 4, RESUME_CYCLES = 6;
 
 constexpr uint32_t RETURN_TO_HANDLER = 0xFFFFFFF1u, RETURN_TO_MAIN = 0xFFFFFFF9u,
@@ -54,7 +54,7 @@ void System::enter() {
     if (cpu.tracer && !lockup) cpu.tracer->exception_entry(cpu.ipsr, returns_to, cpu);
 }
 
-// PushStack(). An access that fails ends it; its fault competes with the exception being entered.
+// PushStack(). Ends at an access that fails; its fault competes with the exception being entered.
 bool System::push_frame(uint32_t &exc_return) {
     exc_return = cpu.handler_mode()              ? RETURN_TO_HANDLER
                  : cpu.process_stack_in_use() ? RETURN_TO_PROCESS
@@ -82,7 +82,7 @@ bool System::push_frame(uint32_t &exc_return) {
 bool System::fetch_vector(int number, uint32_t &vector) {
     const uint32_t address = vtor + 4 * (uint32_t)number;
     const Result result = cpu.load(address, 4, vector);
-    // The MPU does not guard vectors, B3.5.1.
+    // The MPU does not protect vectors, B3.5.1.
     return result == Result::Done || (result == Result::Violation && cpu.peek(address, 4, vector));
 }
 
@@ -111,7 +111,7 @@ void System::take(uint32_t exc_return) {
     event = true;
     if (number >= HARD_FAULT && number <= USAGE_FAULT) note_fault(number, exc_return);
     priority_changed();
-    // DEMCR.VC_*, C1.6.5: by exception; INTERR and the UsageFault kinds are taken together.
+    // DEMCR.VC_*, C1.6.5, by exception; INTERR and the kinds of UsageFault are not told apart.
     const uint32_t catching = number == HARD_FAULT    ? 1u << 10
                               : number == MEM_MANAGE  ? 1u << 4
                               : number == BUS_FAULT   ? 1u << 8
@@ -132,7 +132,7 @@ void System::deactivate(int number) {
     if (number >= FIRST_INTERRUPT && nvic.repend(number) && (scr & SCR_SEVONPEND)) event = true;
 }
 
-// From one handler to the next, the frame left where it is.
+// Tail-chaining: the next handler runs on the same frame.
 void System::chain(uint32_t exc_return) {
     const int64_t begin = cpu.cycles;
     cpu.cycles += TAIL_CHAIN_CYCLES;

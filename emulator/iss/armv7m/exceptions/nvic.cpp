@@ -9,14 +9,13 @@ Nvic::Nvic(int interrupts, int priority_bits)
 }
 
 void Nvic::reset() {
-    const ExceptionSet levels = lines;    // the lines are the peripherals', not ours
     enable = pend = act = {};
     for (int16_t &each : priorities) each = 0;
     priorities[RESET] = -3, priorities[NMI] = -2, priorities[HARD_FAULT] = -1;
     for (int number = NMI; number < FIRST_INTERRUPT; number++)
         enable.set(number, number <= HARD_FAULT || number == SVCALL || number >= PEND_SV);
     for (int number = FIRST_INTERRUPT; number < exceptions; number++)
-        if (levels.has(number)) pend.set(number, true);
+        if (lines.has(number)) pend.set(number, true);    // the lines keep their levels
     set_grouping(0);    // finds first and active, too
 }
 

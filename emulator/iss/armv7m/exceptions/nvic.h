@@ -1,6 +1,6 @@
-// Which exceptions are enabled, pending and active, and at which priority: exception numbers 1 to
-// 15 (system) and from 16 on (external interrupts). ARMv7-M Architecture Reference Manual B1.5.4
-// (priorities), B3.4 (NVIC).
+// Enabled, pending and active exceptions and their priorities: exception numbers 1 to 15 (system) and
+// from 16 on (external interrupts). ARMv7-M Architecture Reference Manual B1.5.4 (priorities), B3.4
+// (NVIC).
 
 #pragma once
 
@@ -46,15 +46,15 @@ public:
     void set_priority(int number, uint32_t value);
     void set_grouping(uint32_t prigroup);
 
-    // The level of an interrupt's line. A rising edge pends it; so does the end of its handler
-    // while the line is high, and an attempt to clear its pending bit. True if it was pended.
+    // The level of an interrupt's line. A rising edge pends the interrupt; so does the end of its
+    // handler while the line is high, and clearing its pending bit then. True if it was pended.
     bool set_line(int number, bool level);
     bool repend(int number);
 
-    // The part of a priority that preempts.
+    // The preempting part of a priority.
     int group(int priority) const { return priority < 0 ? priority : priority & ~subpriority_mask; }
 
-    // Enabled pending exception of the highest priority, the lowest number among equals; 0: none.
+    // Enabled pending exception of the highest priority, of equal ones the lowest number; 0: none.
     int first_pending() const { return first; }
     // Group priority of the most urgent active exception; THREAD_PRIORITY if none is active.
     int active_priority() const { return active_group; }
@@ -69,7 +69,7 @@ public:
 private:
     void find_first();
     void find_active();
-    // 32 interrupts' bits of a set, and their part of it.
+    // The bits of 32 interrupts in a set.
     uint32_t interrupts(const ExceptionSet &set, uint32_t index) const;
 
     int exceptions;

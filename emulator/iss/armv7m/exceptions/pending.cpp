@@ -1,4 +1,4 @@
-// What pends, and with which priority: ARMv7-M Architecture Reference Manual B1.5.4 (priorities),
+// Pending exceptions and priorities: ARMv7-M Architecture Reference Manual B1.5.4 (priorities),
 // B1.5.11 (derived exceptions), B1.5.14 (faults), B1.5.15 (lock-up).
 
 #include "armv7m/system/system.h"
@@ -47,18 +47,10 @@ bool System::escalates(int number) const {
     return !nvic.enabled(number) || nvic.group(nvic.priority(number)) >= execution_priority();
 }
 
-void System::boost_changed() { priority_changed(); }
-
 void System::priority_changed() {
     if (mpu.set_negative_priority(cpu.faultmask || nvic.active_priority() < 0))
-        cpu.protection_changed();
+        cpu.regions_changed();
     if (takeable()) cpu.attention();
-}
-
-ExceptionState System::exception(int number) const {
-    if (number < 1 || number >= nvic.count()) return {number, 0, false, false, false};
-    return {number, nvic.priority(number), nvic.enabled(number), nvic.pending(number),
-            nvic.active(number)};
 }
 
 // --- pending ----------------------------------------------------------------------------------
@@ -87,8 +79,8 @@ void System::pend_interrupt(int interrupt) {
 
 void System::pend_nmi() { pend(NMI); }
 
-// What the running instruction causes: it must be taken now, by HardFault if not by itself. A
-// derived fault, of stacking, does not lock up: the handler that was due runs.
+// An exception caused by the running instruction must be taken now, else it escalates to HardFault. A
+// derived fault (of stacking) does not lock up: the handler that was due runs.
 void System::pend_synchronous(int number, bool derived) {
     if (!escalates(number)) {
         pend(number);
@@ -165,7 +157,7 @@ void System::lock_up() {
 
 void System::note_fault(int number, uint32_t exc_return) {
     const uint32_t frame = exc_return & 4 ? cpu.process_sp() : cpu.main_sp();
-    // A lock-up in a handler: its frame is that of the fault before.
+    // A lock-up in a handler reports the frame of the preceding fault.
     const uint32_t shown = number           ? (frame_stacked ? frame : 0)
                            : cpu.ipsr != 0 ? record.frame
                                            : 0;

@@ -1,5 +1,5 @@
-// Accesses to memory that the loop does not do by itself: everything but aligned ones to plain
-// memory with nobody watching. Also what a debugger does to memory.
+// The slow path of memory accesses: everything but aligned accesses to plain memory without
+// watchpoints. Also the accesses of a debugger.
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/decode/codes.h"
@@ -30,8 +30,8 @@ void Cpu::FreeCode::operator()(Operation *operations) const { std::free(operatio
 Cpu::Code *Cpu::code_of(const Region &region) {
     for (Code &code : codes)
         if (code.host == region.host && code.size >= region.size) return &code;
-    // Zero pages of the host until something is decoded; two operations behind the end, so that
-    // even a 32-bit instruction in the last half-word runs into a marker.
+    // calloc: untouched pages take no memory. Two markers behind the end stop even a 32-bit
+    // instruction in the last half-word.
     const size_t count = region.size / 2 + 2;
     auto *operations = (Operation *)std::calloc(count, sizeof(Operation));
     const size_t blocks = (region.size >> MARK_SHIFT) + 1;
@@ -47,7 +47,7 @@ void Cpu::regions_changed() {
     const bool guarded = system != nullptr && system->mpu.enabled();
     for (const Region &region : regions) {
         const Code *code = code_of(region);
-        if (region.base % PAGE != 0) continue;    // found by find_region
+        if (region.base % PAGE != 0) continue;    // accesses go through find_region
         for (uint32_t offset = 0; offset < region.size; offset += PAGE) {
             const uint32_t address = region.base + offset;
             Page &page = pages[address / PAGE];
@@ -115,7 +115,7 @@ void Cpu::note_watch(uint32_t address, uint32_t size, uint32_t value, bool write
     }
 }
 
-// An aligned access; `value` is what is written, or becomes what is read.
+// An aligned access; writes `value` or sets it.
 Result Cpu::access(uint32_t address, uint32_t size, uint32_t &value, bool write, bool privileged) {
     fault_address = address;
     if (in_private_bus(address)) {
@@ -140,13 +140,13 @@ Result Cpu::access(uint32_t address, uint32_t size, uint32_t &value, bool write,
         cycles += write ? region->write_wait : region->read_wait;
         return Result::Done;
     }
-    // The machine is told nothing of the order of bytes: host and target are little-endian.
+    // Host and target are both little-endian.
     const bool done = write ? bus.write(address, size, value) : bus.read(address, size, value);
     return done ? Result::Done : Result::BusError;
 }
 
-// Through a bit-band alias (B3.1; TRM 4.3): a store reads, changes the bit and writes. The access
-// below has the same size, at an address that is aligned to it.
+// Access through a bit-band alias (B3.1; TRM 4.3): a store reads, changes the bit and writes. The
+// access below it has the same size and is aligned.
 Result Cpu::access_bit(uint32_t address, uint32_t size, uint32_t &value, bool write) {
     const uint32_t byte = bit_band_byte(address), target = byte & ~(size - 1);
     const uint32_t bit = (address >> 2 & 7) + 8 * (byte - target);
@@ -163,50 +163,33 @@ Result Cpu::access_bit(uint32_t address, uint32_t size, uint32_t &value, bool wr
     return access(target, size, content, true, privilege);
 }
 
-// Unaligned accesses are several, of one or two bytes (TRM 3.3.2); the trap comes first.
 Result Cpu::load(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged) {
-    if (!watches.empty()) {
-        Result result = load_unwatched(address, size, value, as_privileged);
-        if (result == Result::Done) note_watch(address, size, value, false);
-        return result;
-    }
-    return load_unwatched(address, size, value, as_privileged);
+    const Result result = access_pieces(address, size, value, false, as_privileged);
+    if (result == Result::Done && !watches.empty()) note_watch(address, size, value, false);
+    return result;
 }
 
-static uint32_t piece_at(uint32_t address, uint32_t left) {
-    return address & 1 || left < 2 ? 1 : 2;
+Result Cpu::store(uint32_t address, uint32_t size, uint32_t value, bool as_privileged) {
+    if (!watches.empty()) note_watch(address, size, value, true);
+    return access_pieces(address, size, value, true, as_privileged);
 }
 
-Result Cpu::load_unwatched(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged) {
-    if (!(address & (size - 1))) return access(address, size, value, false, as_privileged);
+// Splits an unaligned access into accesses of one or two bytes (TRM 3.3.2), unless it traps.
+Result Cpu::access_pieces(uint32_t address, uint32_t size, uint32_t &value, bool write,
+                          bool as_privileged) {
+    if (!(address & (size - 1))) return access(address, size, value, write, as_privileged);
     if (system->unaligned_trap()) return Result::Unaligned;
     uint32_t assembled = 0, done = 0;
     while (done < size) {
-        const uint32_t piece = piece_at(address + done, size - done);
-        uint32_t part = 0;
-        const Result result = access(address + done, piece, part, false, as_privileged);
+        const uint32_t piece = (address + done) & 1 || size - done < 2 ? 1 : 2;
+        uint32_t part = write ? value >> 8 * done & (piece == 1 ? 0xFF : 0xFFFF) : 0;
+        const Result result = access(address + done, piece, part, write, as_privileged);
         if (result != Result::Done) return result;
         assembled |= part << 8 * done;
         done += piece;
         if (done < size) cycles++;
     }
-    value = assembled;
-    return Result::Done;
-}
-
-Result Cpu::store(uint32_t address, uint32_t size, uint32_t value, bool as_privileged) {
-    if (!watches.empty()) note_watch(address, size, value, true);
-    if (!(address & (size - 1))) return access(address, size, value, true, as_privileged);
-    if (system->unaligned_trap()) return Result::Unaligned;
-    uint32_t done = 0;
-    while (done < size) {
-        const uint32_t piece = piece_at(address + done, size - done);
-        uint32_t part = value >> 8 * done & (piece == 1 ? 0xFF : 0xFFFF);
-        const Result result = access(address + done, piece, part, true, as_privileged);
-        if (result != Result::Done) return result;
-        done += piece;
-        if (done < size) cycles++;
-    }
+    if (!write) value = assembled;
     return Result::Done;
 }
 

@@ -1,4 +1,4 @@
-// Where code comes from: regions with their decoded operations, or single instructions aside.
+// Finds and decodes code: in regions with decoded operations, or single instructions elsewhere.
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/decode/codes.h"
@@ -9,7 +9,7 @@
 
 namespace armv7m {
 
-// Prepares the loop for code at `pc`. False: fetch_failed() tells why there is none.
+// Prepares the loop for code at `pc`. False: call fetch_failed().
 bool Cpu::find_code(uint32_t pc) {
     lines = nullptr;
     guarded = system->mpu.enabled();
@@ -28,7 +28,7 @@ bool Cpu::find_code(uint32_t pc) {
     return true;
 }
 
-// Decodes one instruction for itself, with markers behind it, so that the loop comes back.
+// Decodes a single instruction, followed by markers at which the loop returns.
 bool Cpu::run_aside(uint32_t pc) {
     const Region *region = find_region(pc, 2);
     uint32_t first, second = 0;
@@ -37,7 +37,7 @@ bool Cpu::run_aside(uint32_t pc) {
     if (is_wide(first) && !fetch_half(pc + 2, second)) return false;
     aside[0] = is_wide(first) ? decode_32(first, second) : decode_16(first);
     aside[1].code = aside[1].in_it = aside[2].code = aside[2].in_it = C_REGION_END;
-    if (region != nullptr) {    // it takes as long as in its place
+    if (region != nullptr) {    // same timing as in place
         const uint32_t offset = pc - region->base;
         aside[0].stall = address_stall(aside[0], region->host, offset);
         if (aside[0].code == C_IT)
@@ -61,8 +61,8 @@ void Cpu::fetch_failed() {
     attention_requested = true;
 }
 
-// Fills in the operation at `pc`, which lies in the current region. False: its second half does
-// not; it has to run aside.
+// Decodes the operation at `pc` in the current region. False: its second half lies outside; it must
+// run aside.
 bool Cpu::decode_at(uint32_t pc, Operation *op) {
     const uint32_t offset = pc - code_base;
     for (const Code &code : codes) {
@@ -79,8 +79,8 @@ bool Cpu::decode_at(uint32_t pc, Operation *op) {
     return false;
 }
 
-// What the loop does at a branch's target, where it had to be left for it: a 32-bit instruction
-// across two words costs one cycle more, and the refill hides a stall.
+// Does the loop's work at the target of a branch that left the loop: a 32-bit instruction across two
+// words costs one cycle more, and the refill hides a stall.
 void Cpu::arrive() {
     const bool odd = arriving == ArrivingOdd;
     if (arriving == NotArriving) return;
@@ -91,7 +91,7 @@ void Cpu::arrive() {
     cycles -= op->stall;
 }
 
-// Charges the fetch of an instruction, and asks the MPU. False: it may not be fetched.
+// Charges the fetch of an instruction and checks the MPU. False: it may not be fetched.
 bool Cpu::fetch_cost(uint32_t pc, uint32_t halves) {
     const uint32_t last = pc + 2 * halves - 2;
     if (guarded) {

@@ -40,7 +40,7 @@ void Mpu::reset() {
 }
 
 void Mpu::forget() {
-    for (uint32_t n = 0; n < LINES; n++) lines[n] = {n + 1, 0};    // a tag no address there has
+    for (uint32_t n = 0; n < LINES; n++) lines[n] = {n + 1, 0};    // a tag that no address there has
 }
 
 bool Mpu::set_negative_priority(bool now) {

@@ -15,11 +15,11 @@ public:
     explicit Mpu(int regions) : regions(regions) {}
     void reset();
 
-    // Whether anything is to be asked now; test this first. Off at a negative execution priority
-    // unless HFNMIENA is set.
+    // Whether it checks accesses now; test this first. Off at a negative execution priority unless
+    // HFNMIENA is set.
     bool enabled() const { return active; }
 
-    // The private peripheral bus is not protected by it and must not be asked for.
+    // Not for the private peripheral bus, which is not protected.
     bool allows(uint32_t address, Access access, bool privileged) const;
 
     // Execute-never by the default memory map, with or without an MPU (B3.1): peripherals,
@@ -28,10 +28,10 @@ public:
         return address >= 0xA0000000u || (address >> 29) == 2;
     }
 
-    // True if the answer of enabled() or allows() may have changed.
-    bool set_negative_priority(bool negative);
     uint32_t read(uint32_t offset) const;    // offset from 0xE000ED90
+    // These return true if the result of enabled() or allows() may have changed.
     bool write(uint32_t offset, uint32_t value);
+    bool set_negative_priority(bool negative);
 
 private:
     enum : uint32_t { TYPE = 0x0, CTRL = 0x4, RNR = 0x8, RBAR = 0xC, RASR = 0x10,
@@ -44,7 +44,7 @@ private:
     uint8_t rights(uint32_t address) const;
     void forget();
 
-    // Answers found before, by 32 bytes, the smallest region or subregion there is.
+    // Cached rights by 32 bytes, the size of the smallest region or subregion.
     static constexpr uint32_t LINES = 256;
     struct Line { uint32_t tag; uint8_t rights; };
 

@@ -1,5 +1,5 @@
 // The private peripheral bus: system control space (ARMv7-M Architecture Reference Manual B3.2),
-// and behind it ITM, DWT and FPB (C1). Values of the ID registers: Cortex-M3 Technical Reference
+// ITM, DWT and FPB (C1). Values of the ID registers: Cortex-M3 Technical Reference
 // Manual, chapter 4.
 
 #include "armv7m/system/system.h"
@@ -34,7 +34,7 @@ constexpr uint32_t FEATURES[] = {
     0x00000000, 0x01101110, 0x02111000, 0x21112231, 0x01111110, 0x01310132,
 };
 
-// Where a SHCSR bit is: active and pending ones by exception, B3.2.13.
+// Bits of SHCSR by exception, B3.2.13.
 struct HandlerBit { int exception, bit; };
 constexpr HandlerBit ACTIVE_BITS[] = {{MEM_MANAGE, 0}, {BUS_FAULT, 1}, {USAGE_FAULT, 3},
                                       {SVCALL, 7}, {DEBUG_MONITOR, 8}, {PEND_SV, 10}, {SYSTICK, 11}};
@@ -50,7 +50,7 @@ constexpr bool within(uint32_t offset, uint32_t begin, uint32_t end) {
 
 // --- accesses ---------------------------------------------------------------------------------
 
-// Unprivileged code: stimulus ports as TPR allows, and STIR if CCR.USERSETMPEND.
+// Whether unprivileged code may access it: stimulus ports as TPR allows, STIR if CCR.USERSETMPEND.
 bool System::user_may(uint32_t address, bool write) const {
     if (address < ITM_BASE + 0x80) return itm.user_may_write((address - ITM_BASE) / 4);
     return write && address == SCS_BASE + SCS_STIR && (ccr & CCR_USERSETMPEND);
@@ -93,7 +93,7 @@ bool System::read_word(uint32_t address, bool look, uint32_t &value) {
         return true;
     }
     if (address < FPB_BASE) {
-        // PCSR, the one register there that is the core's.
+        // PCSR is the one register there that belongs to the core.
         value = address == DWT_BASE + 0x1C ? cpu.r[15] : dwt.read(address - DWT_BASE, cpu.cycles);
         return true;
     }
@@ -111,7 +111,7 @@ bool System::read_word(uint32_t address, bool look, uint32_t &value) {
     const uint32_t offset = address - SCS_BASE;
     if (address < SCS_BASE || offset >= 0x1000) return false;
     if (within(offset, SCS_SYSTICK, SCS_SYSTICK + 0x10)) {
-        if (systick.advance(cpu.cycles) ) pend(SYSTICK);
+        if (systick.advance(cpu.cycles)) pend(SYSTICK);
         value = look ? systick.peek(offset - SCS_SYSTICK, cpu.cycles)
                      : systick.read(offset - SCS_SYSTICK, cpu.cycles);
     } else if (within(offset, SCS_NVIC, SCS_SCB)) {
@@ -140,7 +140,7 @@ bool System::read_word(uint32_t address, bool look, uint32_t &value) {
 
 bool System::write_word(uint32_t address, uint32_t value, uint32_t lanes) {
     const uint32_t offset = address - SCS_BASE;
-    // Priorities and CFSR are written in bytes too, everything else in words only (B3.1.1).
+    // Priorities and CFSR can be written in bytes, everything else only in words (B3.1.1).
     const bool in_bytes = within(offset, SCS_IPR, SCS_SCB) ||
                           within(offset, SCS_SCB + SCB_SHPR, SCS_SCB + SCB_SHCSR) ||
                           offset == SCS_SCB + SCB_CFSR;
@@ -179,7 +179,7 @@ bool System::write_word(uint32_t address, uint32_t value, uint32_t lanes) {
             event = true;
         if (nvic.first_pending() != before) priority_changed();
     } else if (within(offset, SCS_MPU, SCS_MPU + 0x2C)) {
-        if (mpu.write(offset - SCS_MPU, value)) cpu.protection_changed();
+        if (mpu.write(offset - SCS_MPU, value)) cpu.regions_changed();
     } else if (within(offset, SCS_SCB, SCS_MPU)) {
         write_scb(offset - SCS_SCB, value, lanes);
     } else {

@@ -29,7 +29,7 @@ void System::reset(bool power_on) {
     event = lockup = false;
     actlr = vtor = prigroup = scr = cfsr = hfsr = mmfar = bfar = 0;
     ccr = CCR_STKALIGN;
-    if (protected_before) cpu.protection_changed();
+    if (protected_before) cpu.regions_changed();
     uint32_t stack = 0, start = 0;
     if (!fetch_vector(0, stack) || !fetch_vector(RESET, start)) {
         hfsr |= VECTTBL;
@@ -61,7 +61,7 @@ bool System::wakes() const {
 void System::fall_asleep(Sleep how) {
     sleeping = how;
     asleep_since = cpu.cycles;
-    cpu.attention();    // service() wakes it at once if there is a reason to
+    cpu.attention();    // service() may wake it at once
 }
 
 void System::wfi() { fall_asleep(Sleep::Wfi); }
@@ -77,12 +77,6 @@ void System::wfe() {
 void System::sev() {
     event = true;
     if (wakes()) cpu.attention();
-}
-
-void System::set_systick_reference(int64_t cycles, int64_t ticks) {
-    if (systick.advance(cpu.cycles)) pend(SYSTICK);
-    systick.set_reference(cycles, ticks, cpu.cycles);
-    cpu.attention();
 }
 
 void System::set_debugger(bool attached, uint32_t catches) {

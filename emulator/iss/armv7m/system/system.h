@@ -1,15 +1,14 @@
-// Everything of an ARMv7-M processor that is not instruction execution: exceptions, NVIC, system
-// control block, SysTick, MPU, DWT, ITM, debug registers, semihosting. Knows no part: what differs
-// between parts is in SystemParameters.
+// The parts of an ARMv7-M processor beside instruction execution: exceptions, NVIC, system control
+// block, SysTick, MPU, DWT, ITM, debug registers, semihosting. Differences between parts are in
+// SystemParameters.
 //
 // Source: ARMv7-M Architecture Reference Manual (DDI 0403E), B1.5 (exception model), B3 (system
-// address map), C1 (debug); Cortex-M3 Technical Reference Manual r2p1 (DDI 0337) for what the
-// architecture leaves open and for cycles.
+// address map), C1 (debug); Cortex-M3 Technical Reference Manual r2p1 (DDI 0337) for implementation
+// choices and cycles.
 //
 // How the instruction loop and the system work together:
-//  - An exception that becomes takeable calls cpu.attention(), which ends the inner loop after
-//    the running instruction. The outer loop then calls service(), which takes at most one
-//    exception, and goes on.
+//  - An exception that can be taken calls cpu.attention(), which ends the inner loop after the
+//    running instruction. The outer loop then calls service(), which takes at most one exception.
 //  - An instruction that cannot complete calls fault() and leaves the program counter on itself;
 //    SVC calls svc() with the program counter behind itself. Both end in service().
 //  - SysTick wraps at next_cycle(): the inner loop must not run beyond it.
@@ -35,14 +34,14 @@ struct SystemParameters {
     int mpu_regions = 8;                 // 0: no MPU
     int comparators = 4;                 // of the DWT
     uint32_t systick_calibration = 0xC0000000u;    // SYST_CALIB as it reads: NOREF, SKEW
-    // So many core cycles are so many ticks of SysTick's reference clock. 0: there is no
-    // reference, CLKSOURCE reads 1.
+    // Core cycles and ticks of SysTick's reference clock in the same time. 0: no reference clock,
+    // CLKSOURCE reads 1.
     int64_t reference_cycles = 0, reference_ticks = 1;
-    bool semihosting = false;            // BKPT 0xAB is a call, not a fault; set_semihosting
-    bool trace_probe = true;             // the ITM is on after reset, as a probe would leave it
+    bool semihosting = false;            // BKPT 0xAB is a call, not a fault; see set_semihosting
+    bool trace_probe = true;             // the ITM is on after reset, as a trace probe leaves it
 };
 
-// What stops an instruction. B1.5.14.
+// Causes that stop an instruction. B1.5.14.
 enum class Fault : uint8_t {
     Undefined,        // UsageFault UNDEFINSTR
     InvalidState,     // UsageFault INVSTATE: T bit clear, or ICI/IT bits where none may be
@@ -60,37 +59,30 @@ enum class Fault : uint8_t {
 
 enum class Sleep : uint8_t { Awake, Wfi, Wfe, OnExit };
 
-// What the system says to the part around it. The part's implementation must not call back into
-// the instruction loop; it may ask the core to stop.
+// Callbacks to the part around the system. They must not call the instruction loop; they may stop it.
 class SystemListener {
 public:
     virtual ~SystemListener() = default;
     virtual void reset_requested() {}                              // AIRCR.SYSRESETREQ, VECTRESET
     virtual void locked_up() {}                                    // until a reset (or an NMI)
-    // In the middle of an exception's entry or return: whatever is due up to cpu.cycles happens
-    // now, so that a late interrupt is seen.
+    // In the middle of an exception's entry or return: perform all events up to cpu.cycles, so that a
+    // late interrupt is seen.
     virtual void catch_up() {}
     virtual int64_t time_ps() { return 0; }
     virtual void itm(int port, uint32_t value, int bytes) { (void)port, (void)value, (void)bytes; }
     virtual void semihosting_write(int handle, const uint8_t *text, int length) {
         (void)handle, (void)text, (void)length;
     }
-    virtual int semihosting_read() { return -1; }                  // a character of the console
-    virtual void semihosting_exit(uint32_t code) { (void)code; }   // the program has ended
-    virtual void unmodelled(const char *what) { (void)what; }      // to be logged once
+    virtual int semihosting_read() { return -1; }                  // a character; -1: end of input
+    virtual void semihosting_exit(uint32_t code) { (void)code; }   // the program ended
+    virtual void unmodelled(const char *what) { (void)what; }
 };
 
-// One exception number's line in a fault report or a debugger.
-struct ExceptionState {
-    int number, priority;
-    bool enabled, pending, active;
-};
-
-// The last fault (or lock-up, then `exception` is 0), for a report. `pc` is the instruction it is
-// laid to; `frame` is where the stack frame begins, 0 if stacking failed: r0-r3, r12, lr, pc, xPSR.
+// The last fault (or lock-up, then `exception` is 0), for a report. `pc`: the faulting instruction;
+// `frame`: start of the stack frame (r0-r3, r12, lr, pc, xPSR), 0 if stacking failed.
 struct FaultRecord {
     uint32_t exception, cfsr, hfsr, dfsr, mmfar, bfar, pc, frame, exc_return;
-    uint32_t count;    // of all since power-on
+    uint32_t count;    // of faults since power-on
     int64_t cycle;
 };
 
@@ -98,40 +90,38 @@ class System {
 public:
     System(Cpu &cpu, const SystemParameters &parameters, SystemListener &listener);
 
-    // The core and the system as after a reset; SP and PC come from the vector table at 0. A
-    // power-on reset also clears the debug registers.
+    // Resets core and system; SP and PC are read from the vector table at 0. A power-on reset also
+    // clears the debug registers.
     void reset(bool power_on);
 
     // --- for the instruction loop -------------------------------------------------------------
 
-    // Brings SysTick up to now, takes the pending exception of the highest priority if it may
-    // be taken, wakes a sleeping processor. To be called whenever the inner loop ends.
+    // Updates SysTick, wakes a sleeping processor, and takes the pending exception of the highest
+    // priority if possible. Called whenever the inner loop ends.
     void service();
 
-    // The cycle at which the system itself changes something next; INT64_MAX if never.
+    // The cycle of the system's next own event; INT64_MAX if none.
     int64_t next_cycle() const { return systick.next_wrap(); }
 
-    // An instruction failed. True: it is abandoned, the program counter must be left on it.
-    // False: it goes on (a store through the write buffer; its fault comes later).
+    // An instruction failed. True: it is abandoned, the program counter stays on it. False: it
+    // completes (a store through the write buffer; its fault comes later).
     bool fault(Fault kind, uint32_t address = 0);
 
     void svc();                                    // the program counter is behind the SVC
-    bool bkpt(uint32_t immediate);                 // true: done (semihosting), go on behind it
-    static bool is_exc_return(uint32_t value) { return value >= 0xF0000000u; }
+    bool bkpt(uint32_t immediate);                 // true: done (semihosting), continue behind it
     void exception_return(uint32_t exc_return);    // written to PC in Handler mode
     void wfi();
     void wfe();
     void sev();
-    void boost_changed();                          // PRIMASK, FAULTMASK or BASEPRI written
+    void priority_changed();                       // PRIMASK, FAULTMASK or BASEPRI written
 
     bool divide_trap() const { return (ccr & CCR_DIV_0_TRP) != 0; }
     bool unaligned_trap() const { return (ccr & CCR_UNALIGN_TRP) != 0; }
 
-    // Private peripheral bus, 0xE0000000 to 0xE00FFFFF; size 1, 2 or 4. False: no such register
-    // for this access, which is a bus fault. The caller has checked nothing.
+    // Private peripheral bus, 0xE0000000 to 0xE00FFFFF; size 1, 2 or 4. False: bus fault.
     bool read(uint32_t address, int size, uint32_t &value);
     bool write(uint32_t address, int size, uint32_t value);
-    uint32_t peek(uint32_t address);               // the debugger's read of a word: no effect
+    uint32_t peek(uint32_t address);               // a debugger's read of a word: no side effects
 
     // --- for the part -------------------------------------------------------------------------
 
@@ -142,12 +132,11 @@ public:
     bool deep_sleep() const { return (scr & SCR_SLEEPDEEP) != 0; }
     bool wakes() const;                            // asleep, but service() will wake it
     bool locked_up() const { return lockup; }
-    void set_systick_reference(int64_t cycles, int64_t ticks);
 
     // --- for debuggers and reports ------------------------------------------------------------
 
-    // A halting debugger is there: DHCSR.C_DEBUGEN reads 1, BKPT and the exceptions chosen in
-    // `catches` (as DEMCR.VC_*) stop the core and leave the reason in stopped_by().
+    // With a debugger attached DHCSR.C_DEBUGEN reads 1, and BKPT and the exceptions selected in
+    // `catches` (as DEMCR.VC_*) stop the core; stopped_by() has the reason.
     void set_debugger(bool attached, uint32_t catches = 0);
     enum class DebugStop : uint8_t { None, Breakpoint, VectorCatch };
     DebugStop stopped_by() const { return debug_stop; }
@@ -155,9 +144,7 @@ public:
     void clear_debug_stop() { debug_stop = DebugStop::None; }
 
     int execution_priority() const;                // lower is more urgent; 256: Thread
-    ExceptionState exception(int number) const;
     const FaultRecord &last_fault() const { return record; }
-    uint32_t vector_table() const { return vtor; }
 
     const SystemParameters parameters;
     Nvic nvic;
@@ -181,7 +168,6 @@ private:
     bool escalates(int number) const;
     bool takeable() const;
     int boosted_priority(bool with_primask) const;
-    void priority_changed();
     void lock_up();
     void note_fault(int number, uint32_t exc_return);
 

@@ -42,17 +42,12 @@ bool SysTick::advance(int64_t now) {
     const int64_t zero = next_zero();
     if (zero == INT64_MAX || tick(now) < zero) return false;
     count_flag = true;
-    // From the last zero that has passed.
+    // Count on from the last zero.
     const int64_t period = (int64_t)reload + 1;
     base_tick = zero + (reload ? (tick(now) - zero) / period * period : 0);
     base_value = 0;
     find_wrap();
     return (control & TICKINT) != 0;
-}
-
-void SysTick::set_base(int64_t now) {
-    base_value = value(now);
-    base_tick = tick(now);
 }
 
 uint32_t SysTick::peek(uint32_t offset, int64_t now) const {
@@ -71,23 +66,17 @@ uint32_t SysTick::read(uint32_t offset, int64_t now) {
 }
 
 void SysTick::write(uint32_t offset, uint32_t value, int64_t now) {
-    set_base(now);
+    base_value = this->value(now);
+    base_tick = tick(now);
     if (offset == CSR) {
         control = value & (ENABLE | TICKINT | CLKSOURCE);
-        base_tick = tick(now);    // of the clock now chosen
+        base_tick = tick(now);    // of the clock now selected
     } else if (offset == RVR) {
         reload = value & 0xFFFFFF;
     } else if (offset == CVR) {
         base_value = 0;    // whatever is written; no exception
         count_flag = false;
     }
-    find_wrap();
-}
-
-void SysTick::set_reference(int64_t cycles, int64_t ticks, int64_t now) {
-    set_base(now);
-    reference_cycles = cycles, reference_ticks = ticks;
-    base_tick = tick(now);
     find_wrap();
 }
 

@@ -65,7 +65,7 @@ CASES = {
     stack_overflow: ("HardFault", "has the stack run over?"),
     divide_by_zero: ("HardFault", "divided by zero"),
     lock_up: ("lock-up", "no such instruction"),
-    watchdog: ("the watchdog has bitten",),
+    watchdog: ("watchdog reset",),
     interrupts_off: (),
     reserved_registers: (),
 }

@@ -168,9 +168,9 @@ void bench_set(Bench *bench, int32_t which, uint32_t value) {
     case 17: cpu.set_main_sp(value); break;
     case 18: cpu.set_process_sp(value); break;
     case 19: cpu.set_control((uint8_t)value); break;
-    case 20: cpu.primask = (uint8_t)value; bench->system.boost_changed(); break;
-    case 21: cpu.faultmask = (uint8_t)value; bench->system.boost_changed(); break;
-    case 22: cpu.basepri = (uint8_t)value; bench->system.boost_changed(); break;
+    case 20: cpu.primask = (uint8_t)value; bench->system.priority_changed(); break;
+    case 21: cpu.faultmask = (uint8_t)value; bench->system.priority_changed(); break;
+    case 22: cpu.basepri = (uint8_t)value; bench->system.priority_changed(); break;
     default: cpu.r[which] = value;
     }
 }
