@@ -1,6 +1,7 @@
 // The C interface of a machine, called by machine.py. Nothing here throws; times are picoseconds.
 //
-// A machine is a core with a part around it. A bare machine has memories only, for tests of the core.
+// A machine is a core with a part around it. A bare machine has memories only, for tests of the
+// core.
 
 #include "api.h"
 

@@ -3,11 +3,9 @@
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/gpio.h"
 
-using efm32gg::Event;
-
 namespace {
 
-constexpr int32_t TIME_REACHED = 0;  // of the driver's outcomes
+constexpr int32_t TIME_REACHED = 0;  // an outcome of the driver's burst
 
 uint32_t mask_of(const FpgaWire &wire) { return (1u << wire.width) - 1; }
 
@@ -15,13 +13,12 @@ uint32_t mask_of(const FpgaWire &wire) { return (1u << wire.width) - 1; }
 
 FpgaLink::FpgaLink(efm32gg::Part &part, const FpgaDriver &fpga, const FpgaWire *given,
                    int32_t count)
-    : part(part), fpga(fpga), wires(given, given + count), driven(count), seen(count),
-      looking(Event::of<&FpgaLink::look>(this)) {
+    : part(part), fpga(fpga), wires(given, given + count), driven(count), reported(count) {
     for (const FpgaWire &wire : wires)
         (wire.input ? part_inputs : part_outputs)[wire.port] |= mask_of(wire) << wire.bit;
 }
 
-FpgaLink::~FpgaLink() { part.cancel(looking); }
+FpgaLink::~FpgaLink() { part.cancel(polling); }
 
 uint32_t FpgaLink::input_levels(int port, int64_t now) {
     advance(now);
@@ -57,15 +54,15 @@ bool FpgaLink::bus_access(int bank, uint32_t address, uint8_t &value, bool write
 
 void FpgaLink::set_running(uint32_t mask) {
     running = mask;
-    watch(part.now());
-    tell(part.now());
+    schedule_poll(part.now());
+    report(part.now());
 }
 
 uint32_t FpgaLink::level(const FpgaWire &wire, int64_t now) {
     return compiled() ? fpga.get(fpga.driver, wire.pin) : fpga.slow_get(wire.pin, now);
 }
 
-// Makes the clocks of the cameras that run. An engine that is not compiled does so when asked.
+// Makes the clocks of running cameras. Engines that are not compiled do so themselves.
 void FpgaLink::advance(int64_t now) {
     if (!running || !compiled())
         return;
@@ -74,33 +71,33 @@ void FpgaLink::advance(int64_t now) {
     const int32_t outcome = fpga.burst(fpga.driver, now, running, &reached, &camera);
     if (outcome != TIME_REACHED)
         running = fpga.attend(reached, outcome, camera, now);
-    tell(now);
+    report(now);
 }
 
-// Tells the part's pin interrupts what became of the pins that alert.
-void FpgaLink::tell(int64_t now) {
+// Reports changes of pins with `alert` to the part's pin interrupts.
+void FpgaLink::report(int64_t now) {
     for (std::size_t n = 0; n < wires.size(); n++) {
         const FpgaWire &wire = wires[n];
         if (!wire.alert)
             continue;
         const uint32_t value = level(wire, now) & mask_of(wire);
-        const uint32_t changed = value ^ seen[n];
-        seen[n] = value;
+        const uint32_t changed = value ^ reported[n];
+        reported[n] = value;
         for (int bit = 0; bit < wire.width; bit++)
             if (changed >> bit & 1)
                 part.gpio->drive_from_outside(wire.port, wire.bit + bit, value >> bit & 1);
     }
 }
 
-void FpgaLink::look(int64_t now) {
+void FpgaLink::poll(int64_t now) {
     advance(now);
-    tell(now);
-    watch(now);
+    report(now);
+    schedule_poll(now);
 }
 
-void FpgaLink::watch(int64_t now) {
+void FpgaLink::schedule_poll(int64_t now) {
     if (running)
-        part.schedule(looking, now + LOOK);
+        part.schedule(polling, now + POLL_INTERVAL);
     else
-        part.cancel(looking);
+        part.cancel(polling);
 }

@@ -1,11 +1,11 @@
-// Leads port pins of a part to an FPGA, so that a loop over pins calls nobody outside.
+// Connects port pins of a part to an FPGA, so that a loop over pins makes no callbacks.
 //
 // With a compiled design, `set`, `get` and `burst` are functions of its driver (driver.cpp of the
-// compiled engine). While no camera runs, time passes for the FPGA by itself. While one runs, its
-// clocks are made up to a pin's access first; a burst that ends for another reason than time is
-// handed to `attend`, which brings everything to `now` and tells who runs from then on.
+// compiled engine). While no camera runs, the FPGA needs no clocks. While one runs, an access to a
+// pin first makes the clocks up to that time; if a burst ends for another reason than time,
+// `attend` handles it, advances everything to `now` and returns the cameras that then run.
 //
-// Any other FPGA is reached through `slow_get` and `slow_set`, which advance it by themselves.
+// Any other FPGA is accessed through `slow_get` and `slow_set`, which advance it themselves.
 
 #pragma once
 
@@ -29,8 +29,8 @@ struct FpgaDriver {
     int32_t (*slow_external)(int32_t bank, uint32_t address, int32_t value, int64_t now);
 };
 
-// `width` bits from `bit` of `port` are those of the FPGA's pin number `pin`. Those the FPGA drives
-// are inputs of the part; those of `alert` raise the part's pin interrupts, too.
+// `width` bits from `bit` of `port` are connected to the FPGA's pin number `pin`. `input`: the FPGA
+// drives them; `alert`: they also raise the part's pin interrupts.
 struct FpgaWire {
     int32_t port, bit, width, pin;
     int32_t input, alert;
@@ -43,8 +43,8 @@ class Part;
 
 class FpgaLink : public efm32gg::AttachedCircuit {
 public:
-    // How late a pin that changes by itself is seen by pin interrupts.
-    static constexpr int64_t LOOK = efm32gg::MICROSECOND;
+    // Delay of pin interrupts after a change of a pin.
+    static constexpr int64_t POLL_INTERVAL = efm32gg::MICROSECOND;
 
     FpgaLink(efm32gg::Part &part, const FpgaDriver &fpga, const FpgaWire *wires, int32_t count);
     ~FpgaLink();
@@ -53,22 +53,22 @@ public:
     void outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) override;
     bool bus_access(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) override;
 
-    // Cameras that run, one bit each, as the engine has it.
+    // Running cameras, one bit each.
     void set_running(uint32_t mask);
 
 private:
     efm32gg::Part &part;
     const FpgaDriver fpga;
     std::vector<FpgaWire> wires;
-    std::vector<uint32_t> driven;    // by wire: what the FPGA's pin has
-    std::vector<uint32_t> seen;      // by wire: what the part was told
+    std::vector<uint32_t> driven;    // by wire: level of the FPGA's pin
+    std::vector<uint32_t> reported;  // by wire: level last reported to the part
     uint32_t running = 0;
-    efm32gg::Event looking;
+    efm32gg::Event polling = efm32gg::Event::of<&FpgaLink::poll>(this);
 
     bool compiled() const { return fpga.driver != nullptr; }
     uint32_t level(const FpgaWire &wire, int64_t now);
     void advance(int64_t now);
-    void tell(int64_t now);
-    void look(int64_t now);
-    void watch(int64_t now);
+    void report(int64_t now);
+    void poll(int64_t now);
+    void schedule_poll(int64_t now);
 };

@@ -1,7 +1,7 @@
 """A machine: core, part and memories in C++, through ctypes. Times are integer picoseconds.
 
-A run ends at the requested time, or earlier when the outbox has messages. Inputs are set between two
-runs. A running machine never calls Python, except for an FPGA without a compiled driver.
+A run ends at the requested time, or earlier when the outbox has messages. Inputs are set between
+two runs. A running machine never calls Python, except for an FPGA without a compiled driver.
 """
 
 import ctypes
@@ -235,7 +235,7 @@ class Machine:
         return int(self._library.iss_pin_level(self.handle, port, bit))
 
     def uart_receive(self, unit: int, data: int, flags: int = 0) -> None:
-        """Deliver a character at the end of its stop bit; flags: 1 framing error, 2 parity error."""
+        """Deliver a complete character; ``flags``: 1 framing error, 2 parity error."""
         self._library.iss_uart_receive(self.handle, unit, data, flags)
 
     def i2c_slave_start(self, unit: int, address_byte: int) -> int | None:

@@ -1,7 +1,7 @@
-"""A client's session: packets in, answers out, on a target. Knows no socket.
+"""A GDB client's session on a target: packets in, answers out.
 
-GDB manual, appendix "GDB Remote Serial Protocol". One thread, all stops; breakpoints of both kinds
-are the simulator's own, so there are as many as one wants and none changes memory.
+GDB manual, appendix "GDB Remote Serial Protocol". One thread, all-stop mode. Breakpoints of both
+kinds belong to the simulator, so their number is unlimited and none changes memory.
 """
 
 from collections.abc import Callable
@@ -25,15 +25,14 @@ WORD = 4
 
 
 class Session:
-    """One client on one target, which it halts when it comes.
+    """One client on one target, which it halts at the start.
 
     Attributes:
-        output: bytes to be sent; the owner takes them.
-        ended: whether the client has said good-bye.
+        output: bytes to send; the owner clears them.
+        ended: whether the client has detached or killed the target.
     """
 
     def __init__(self, target: Target) -> None:
-        """Halt ``target`` and act on it."""
         self.output = bytearray()
         self.ended = False
         self._target = target
@@ -44,27 +43,27 @@ class Session:
         target.attach()
 
     def receive(self, data: bytes) -> None:
-        """Act on what the client sent."""
+        """Handle bytes from the client."""
         for body in self._packets.feed(data):
             self._flush()
             if body is None:
                 self._target.halt()
             elif not self.ended:
-                self._answer(self._performed(body))
+                self._answer(self._perform(body))
         if self._packets.again:
             self._packets.again = False
             self.output += self._last
         self._flush()
 
     def look(self) -> None:
-        """Tell the client when the target has stopped."""
+        """Notify the client if the target has halted."""
         stop = self._target.halted
         if self._awaiting and stop is not None:
             self._awaiting = False
             self._answer(self._reason(stop))
 
     def close(self) -> None:
-        """The client has gone: nothing of it is left, and the target runs."""
+        """Detach from the target, which then runs."""
         if not self.ended:
             self.ended = True
             self._target.detach()
@@ -78,24 +77,16 @@ class Session:
             self._last = packets.framed(data)
             self.output += self._last
 
-    def _performed(self, body: bytes) -> bytes | None:
-        """What a packet is answered with; None where that comes later, or never."""
+    def _perform(self, body: bytes) -> bytes | None:
+        """Answer to a packet; None if it comes later or never."""
         for head, act in ((b"X", self._write_binary), (b"vFlashWrite:", self._flash_write)):
             if body.startswith(head):
                 where, _, data = body[len(head) :].partition(b":")
-                act_on = partial(act, where.decode("latin-1"), packets.unescape(data))
-                return self._tried(act_on)
+                return _or_error(partial(act, where.decode("latin-1"), packets.unescape(data)))
         command = _COMMANDS.get(chr(body[0]) if body else "")
         if command is None:
             return UNKNOWN
-        return self._tried(partial(command, self, body[1:].decode("latin-1")))
-
-    def _tried(self, act: Callable[[], bytes | None]) -> bytes | None:
-        """What ``act`` gives; an error where the packet makes no sense."""
-        try:
-            return act()
-        except (ValueError, LookupError, OverflowError):
-            return ERROR
+        return _or_error(partial(command, self, body[1:].decode("latin-1")))
 
     # --- state ----------------------------------------------------------------------------------
 
@@ -113,7 +104,7 @@ class Session:
 
     def _ask(self, _text: str) -> bytes | None:
         stop = self._target.halted
-        if stop is None:  # it is asked to stop, and does so as soon as it can
+        if stop is None:  # it has been asked to halt, and will
             self._awaiting = True
             return None
         return self._reason(stop)
@@ -152,30 +143,32 @@ class Session:
     def _write_memory(self, text: str) -> bytes:
         where, _, data = text.partition(":")
         address, count = _pair(where)
-        return self._written(address, count, bytes.fromhex(data))
+        return self._write(address, count, bytes.fromhex(data))
 
     def _write_binary(self, where: str, data: bytes) -> bytes:
-        return self._written(*_pair(where), data)
+        return self._write(*_pair(where), data)
 
-    def _written(self, address: int, count: int, data: bytes) -> bytes:
+    def _write(self, address: int, count: int, data: bytes) -> bytes:
         if len(data) != count:
             return ERROR
         return OK if not data or self._target.write(address, data) else ERROR
 
     # --- running --------------------------------------------------------------------------------
 
-    def _continue(self, text: str) -> None:
+    def _jump(self, text: str) -> None:
         if text:
             self._target.set_register("pc", int(text, 16))
+
+    def _continue(self, text: str) -> None:
+        self._jump(text)
         self._awaiting = True
         self._target.resume()
 
     def _step(self, text: str) -> None:
-        if text:
-            self._target.set_register("pc", int(text, 16))
-        self._stepped(0, 0)
+        self._jump(text)
+        self._step_range(0, 0)
 
-    def _stepped(self, low: int, high: int) -> None:
+    def _step_range(self, low: int, high: int) -> None:
         self._awaiting = True
         self._target.step(low, high)
 
@@ -193,10 +186,10 @@ class Session:
         if text == "Cont?":
             return b"vCont;c;C;s;S;r"
         if text.startswith("Cont;"):
-            return self._resumed(text.split(";")[1])
+            return self._resume(text.split(";")[1])
         if text.startswith("FlashErase:"):
             address, count = _pair(text.partition(":")[2])
-            return OK if self._erased(address, count) else ERROR
+            return OK if self._erase(address, count) else ERROR
         if text == "FlashDone":
             done = [self._target.write(address, data) for address, data in self._flashed.items()]
             self._flashed.clear()
@@ -210,20 +203,20 @@ class Session:
             return OK
         return UNKNOWN
 
-    def _resumed(self, action: str) -> bytes | None:
+    def _resume(self, action: str) -> bytes | None:
         word = action.partition(":")[0]  # without the thread
         match word[:1]:
             case "c" | "C":
                 self._continue("")
             case "s" | "S":
-                self._stepped(0, 0)
+                self._step_range(0, 0)
             case "r":
-                self._stepped(*_pair(word[1:]))
+                self._step_range(*_pair(word[1:]))
             case _:
                 return ERROR
         return None
 
-    def _erased(self, address: int, count: int) -> bool:
+    def _erase(self, address: int, count: int) -> bool:
         inside = any(
             region.kind == "flash"
             and region.start <= address <= address + count <= region.start + region.length
@@ -283,21 +276,29 @@ class Session:
 
     def _monitor(self, command: str) -> bytes:
         try:
-            said = self._target.monitor(command)
+            output = self._target.monitor(command)
         except (ValueError, TypeError) as error:
-            said = str(error)
-        text = said.rstrip("\n") + "\n" if said else ""
+            output = str(error)
+        text = output.rstrip("\n") + "\n" if output else ""
         return text.encode("utf-8").hex().encode() or OK
 
     def _set(self, text: str) -> bytes:
         if text != "StartNoAckMode":
             return UNKNOWN
-        self._packets.acknowledging = False  # the packet itself has been acknowledged
+        self._packets.acknowledging = False  # this packet is already acknowledged
         return OK
 
 
+def _or_error(act: Callable[[], bytes | None]) -> bytes | None:
+    """Result of ``act``, or an error answer for an invalid packet."""
+    try:
+        return act()
+    except (ValueError, LookupError, OverflowError):
+        return ERROR
+
+
 def _pair(text: str) -> tuple[int, int]:
-    """Two hexadecimal numbers with a comma between."""
+    """Two hexadecimal numbers separated by a comma."""
     first, second = text.split(",")
     return int(first, 16), int(second, 16)
 
@@ -312,7 +313,7 @@ _COMMANDS: dict[str, Callable[[Session, str], bytes | None]] = {
     "m": Session._read_memory,
     "M": Session._write_memory,
     "c": Session._continue,
-    "C": lambda session, text: session._continue(text.partition(";")[2]),  # signals: no use
+    "C": lambda session, text: session._continue(text.partition(";")[2]),  # ignores the signal
     "s": Session._step,
     "S": lambda session, text: session._step(text.partition(";")[2]),
     "Z": lambda session, text: session._point(text, True),

@@ -42,7 +42,7 @@ class MemoryRegion:
 
 
 class Target(Protocol):
-    """A processor and its memories. Except ``halted`` and ``halt`` all require that it is halted."""
+    """A processor and its memories. All but ``halted`` and ``halt`` require that it is halted."""
 
     @property
     def registers(self) -> dict[int, str]:

@@ -1,1 +1,1 @@
-"""What a firmware does, in its own names: symbols, profile, coverage, stack and fault reports."""
+"""Insight into firmware, with its symbols: profile, coverage, stack and fault reports."""

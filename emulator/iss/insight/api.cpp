@@ -1,4 +1,4 @@
-// The C face of Insight: what profile.py calls.
+// The C interface of Insight, called by observer.py and fault_report.py.
 
 #include "api.h"
 
@@ -9,49 +9,49 @@ using insight::Insight;
 
 extern "C" {
 
-// Begins to look at a machine; `count` ranges of code.
+// Starts to observe a machine; `count`: number of code ranges.
 Insight *insight_new(IssMachine *machine, const insight::CodeRange *ranges, int32_t count) {
-    Insight *made = new Insight([](void *owner) { return iss_now((IssMachine *)owner); }, machine);
+    auto *observer = new Insight([](void *owner) { return iss_now((IssMachine *)owner); }, machine);
     for (int32_t n = 0; n < count && n < 2; n++)
-        made->set_range(n, ranges[n]);
-    iss_cpu(machine)->set_tracer(made);
-    return made;
+        observer->set_range(n, ranges[n]);
+    iss_cpu(machine)->set_tracer(observer);
+    return observer;
 }
 
-// Ends that; the counters are complete then. The machine may be gone: null.
-void insight_delete(IssMachine *machine, Insight *made) {
-    if (machine && iss_cpu(machine)->tracer == made)
+// Ends the observation. `machine` is null if it no longer exists.
+void insight_delete(IssMachine *machine, Insight *observer) {
+    if (machine && iss_cpu(machine)->tracer == observer)
         iss_cpu(machine)->set_tracer(nullptr);
-    delete made;
+    delete observer;
 }
 
-// Whether changes are taken note of.
-void insight_trace(Insight *made, int32_t on) { made->trace_changes(on != 0); }
+// Whether changes are recorded.
+void insight_trace(Insight *observer, int32_t on) { observer->trace_changes(on != 0); }
 
-// Ends open calls as of now.
-void insight_finish(Insight *made) { made->finish(); }
+// Closes open calls.
+void insight_finish(Insight *observer) { observer->finish(); }
 
-// Copies the edges that there are to `out`, at most `most`; returns how many.
-int32_t insight_edges(const Insight *made, insight::Edge *out, int32_t most) {
+// Copies at most `most` edges to `out`; returns their number.
+int32_t insight_edges(const Insight *observer, insight::Edge *out, int32_t most) {
     int32_t found = 0;
-    for (const insight::Edge &edge : made->edges)
+    for (const insight::Edge &edge : observer->edges)
         if (edge.count && found < most)
             out[found++] = edge;
     return found;
 }
 
-// Moves the changes so far to `out`, which has room for all of them; returns how many.
-int32_t insight_changes(Insight *made, insight::Change *out) {
-    const int32_t count = (int32_t)made->change_count;
-    std::copy(made->changes, made->changes + count, out);
-    made->change_count = 0;
+// Moves all changes to `out`, which must have room for CHANGES; returns their number.
+int32_t insight_changes(Insight *observer, insight::Change *out) {
+    const int32_t count = (int32_t)observer->change_count;
+    std::copy(observer->changes, observer->changes + count, out);
+    observer->change_count = 0;
     return count;
 }
 
-// Lowest stack pointers so far (main, process), cycles asleep, edges that there was no room for.
-void insight_figures(const Insight *made, int64_t *out) {
-    out[0] = made->lowest_sp[0], out[1] = made->lowest_sp[1];
-    out[2] = made->idle, out[3] = (int64_t)made->edges_lost;
+// Lowest stack pointers (main, process), cycles asleep, number of edges lost.
+void insight_figures(const Insight *observer, int64_t *out) {
+    out[0] = observer->lowest_sp[0], out[1] = observer->lowest_sp[1];
+    out[2] = observer->idle, out[3] = (int64_t)observer->edges_lost;
 }
 
 // The last fault: exception, CFSR, HFSR, DFSR, MMFAR, BFAR, address of the instruction, of the

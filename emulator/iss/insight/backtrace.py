@@ -1,7 +1,7 @@
-"""Who called whom, from registers and stack: by call frame information, else by what looks right.
+"""Backtrace from registers and stack, by call frame information or else by a stack scan.
 
-Where nothing says how a function's frame is laid out, the next return address is searched for on
-the stack: a word that points behind a call in the program. Such a frame is marked.
+A stack scan searches for the next return address: a word that points behind a call in the program.
+Frames found that way are marked.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,25 +10,25 @@ from typing import Any, NamedTuple
 from cubestack.emulator.iss.insight.symbols import Symbols
 
 SP, LR, PC, PSP = 13, 14, 15, 18
-"""Numbers of registers: those of DWARF for the Arm architecture (IHI 0040), and one of our own."""
+"""Register numbers of DWARF for the Arm architecture (IHI 0040); PSP is our own."""
 
 DEEPEST = 24
 SCANNED_WORDS = 256
-"""Of the stack, that are searched for a return address."""
+"""Stack words that are searched for a return address."""
 
 FRAME_WORDS = 8
-"""Of an exception's stack frame: r0-r3, r12, lr, pc, xpsr. ARMv7-M ARM, B1.5.6."""
+"""Words of an exception frame: r0-r3, r12, lr, pc, xpsr. ARMv7-M ARM, B1.5.6."""
 
 PSR_ALIGNED = 1 << 9
-"""Of the stacked xPSR: a word was left free to align the frame."""
+"""Bit of the stacked xPSR: a word was skipped to align the frame."""
 
 EXC_RETURNS = (0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFFD)
-"""What LR is at the entry of an exception. ARMv7-M ARM, table B1-8."""
+"""Values of LR at exception entry. ARMv7-M ARM, table B1-8."""
 
 INTERRUPTED = "interrupted"
 
 Read = Callable[[int, int], bytes]
-"""Reads (address, count) of memory; fewer bytes where there is none."""
+"""Reads memory at (address, count); returns fewer bytes at the end of a memory."""
 
 
 class Frame(NamedTuple):
@@ -36,8 +36,8 @@ class Frame(NamedTuple):
 
     Attributes:
         address: of the running instruction, or of the one after the call.
-        place: an address within the call, which says whose it is.
-        note: how the frame was found, where that is uncertain; or what it is.
+        place: an address within the call, which identifies the function.
+        note: how the frame was found if that is uncertain, or its kind.
     """
 
     address: int
@@ -50,7 +50,7 @@ def backtrace(symbols: Symbols, registers: Mapping[int, int], read: Read) -> lis
     state = dict(registers)
     frames = [Frame(state[PC], state[PC])]
     while len(frames) < DEEPEST:
-        note = _unwound(symbols, state, read, frames[-1].place, newest=len(frames) == 1)
+        note = _unwind(symbols, state, read, frames[-1].place, newest=len(frames) == 1)
         if note is None:
             break
         place = state[PC] if note == INTERRUPTED else state[PC] - 2
@@ -65,10 +65,10 @@ def _word(read: Read, address: int) -> int | None:
     return int.from_bytes(data, "little") if len(data) == 4 else None
 
 
-def _unwound(
+def _unwind(
     symbols: Symbols, state: dict[int, int], read: Read, place: int, *, newest: bool
 ) -> str | None:
-    """Go to the caller's frame; a note on how, None where the stack ends."""
+    """Change ``state`` to the caller's frame; returns a note, None at the end of the stack."""
     before = state[PC], state[SP]
     note = ""
     rules = _rules(symbols, place)
@@ -111,7 +111,7 @@ def _apply(rules: Mapping[Any, Any], state: dict[int, int], read: Read) -> bool:
                 return False
             found[number] = value
         elif number == LR and rule.type == "UNDEFINED":
-            return False  # the outermost one
+            return False  # the outermost frame
     state |= found
     state[PC], state[SP] = state[LR], cfa
     return True
@@ -139,7 +139,7 @@ def _behind_call(address: int, read: Read) -> bool:
 
 
 def _pop_exception(state: dict[int, int], read: Read) -> bool:
-    """The frame that the processor stacked when it entered the exception."""
+    """Restore the registers from the exception frame."""
     if state[PC] & 4 and PSP in state:  # EXC_RETURN: to the process stack
         state[SP] = state[PSP]
     words = [_word(read, state[SP] + 4 * index) for index in range(FRAME_WORDS)]

@@ -1,8 +1,7 @@
 """Writes a profile in callgrind's format, which KCachegrind and callgrind_annotate read.
 
-Valgrind manual, "Callgrind Format Specification". Costs are cycles, by source line where the
-program tells; calls carry the cycles of everything below them. Exceptions are called by a function
-of their own name.
+Valgrind manual, "Callgrind Format Specification". Costs are cycles per source line if known; calls
+include the cycles of everything below them. The caller of exceptions is named "(exceptions)".
 """
 
 from collections import defaultdict
@@ -16,7 +15,7 @@ NOWHERE = "(unknown)"
 
 
 class _Names:
-    """Names in compressed form: each is written once, and its number after that."""
+    """Compressed names: the first use writes name and number, later ones the number."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
@@ -29,14 +28,13 @@ class _Names:
 
 
 def write_callgrind(observer: Observer, stream: IO[str]) -> None:
-    """Write what ``observer`` has counted."""
     symbols = observer.symbols
     costs: dict[tuple[str, str], dict[tuple[str, int], int]] = defaultdict(lambda: defaultdict(int))
     places: dict[str, tuple[str, str]] = {}
 
     def place(function: Function | None, address: int) -> tuple[str, str]:
         """File and name of a function."""
-        name = function.name if function else f"{NOWHERE}"
+        name = function.name if function else NOWHERE
         if name not in places:
             line = symbols.line_at(function.address if function else address)
             places[name] = (line.file if line else NOWHERE, name)

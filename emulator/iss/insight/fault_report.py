@@ -1,4 +1,4 @@
-"""What went wrong, in one screen: fault status in words, registers, the stacked frame, backtrace.
+"""Fault report of one screen: fault status in words, registers, stacked frame, backtrace.
 
 ARMv7-M Architecture Reference Manual, B3.2.15 to B3.2.18 (fault status registers) and B1.5.6 (the
 stack frame).
@@ -59,14 +59,14 @@ HFSR = {
 MMARVALID, BFARVALID = 1 << 7, 1 << 15
 
 BRANCH_TO_SELF = b"\xfe\xe7"
-"""``b .``, which a handler ends with that has nothing to do."""
+"""``b .``, a handler's endless loop."""
 
 REPORTED_FRAMES = 12
 
 
 @dataclass(frozen=True)
 class Fault:
-    """The core's record of the last fault; ``FaultRecord`` of system.h."""
+    """``FaultRecord`` of system.h."""
 
     exception: int
     cfsr: int
@@ -82,7 +82,7 @@ class Fault:
 
 
 def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType({})) -> str:
-    """Of an exception by its number; ``interrupts`` are the part's by theirs, from 0."""
+    """Name of an exception; ``interrupts``: names of the part's interrupts by number, from 0."""
     if number - FIRST_INTERRUPT in interrupts:
         return interrupts[number - FIRST_INTERRUPT]
     if number >= FIRST_INTERRUPT:
@@ -91,26 +91,26 @@ def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType
 
 
 def last_fault(machine: Machine) -> Fault:
-    """Of a machine; its ``count`` is 0 where there was none since reset."""
+    """The last fault; its ``count`` is 0 if there was none since power-on."""
     values = (ctypes.c_int64 * len(fields(Fault)))()
     insight_library().insight_fault(machine.handle, values)
     return Fault(*values)
 
 
 def unhandled(machine: Machine) -> bool:
-    """Whether it stands in the handler of a fault for ever."""
+    """Whether it is in a fault handler that only branches to itself."""
     if machine.register("xpsr") & 0x1FF not in FAULTS:
         return False
     return machine.peek(machine.register("pc"), 2) == BRANCH_TO_SELF
 
 
 def fault_report(machine: Machine, symbols: Symbols, time_ps: int) -> str:
-    """One screen about the last fault of ``machine``, and where it is now."""
+    """Report about the last fault of ``machine`` and its present state."""
     return "\n".join(_lines(machine, symbols, last_fault(machine), time_ps))
 
 
 def reasons(cfsr: int, hfsr: int) -> list[str]:
-    """Each bit that is set, in words."""
+    """Meanings of the bits that are set."""
     words = []
     for table, value in ((CFSR, cfsr), (HFSR, hfsr)):
         for bit, (fault, name, meaning) in table.items():

@@ -1,4 +1,4 @@
-"""Where a program was when, for traces: its function, and the exception that it served."""
+"""Functions and exceptions over time, for traces."""
 
 from collections.abc import Iterator, Mapping
 
@@ -9,23 +9,23 @@ FUNCTION, EXCEPTION, HANDLER = "function", "exception", "handler"
 
 
 class History:
-    """Takes an observer's changes, as variables of a trace.
+    """Converts an observer's changes to variables of a trace.
 
     Attributes:
-        variables: bits of each variable by name; None for a text.
+        variables: bits of each variable by name; None for text.
     """
 
     variables: Mapping[str, int | None] = {FUNCTION: None, EXCEPTION: 8, HANDLER: None}
 
     def __init__(self, observer: Observer, interrupts: Mapping[int, str]) -> None:
-        """Take note from now on; ``interrupts`` are names of the part's by number."""
+        """Start; ``interrupts``: names of the part's interrupts by number."""
         self._observer = observer
         self._interrupts = interrupts
         self._exception = 0
         observer.trace()
 
     def take(self) -> Iterator[tuple[int, str, int | str]]:
-        """What has changed since the last call: time in ps, variable and value, by time."""
+        """Changes since the last call by time: time in ps, variable, value."""
         for change in self._observer.changes():
             yield change.time_ps, FUNCTION, change.function
             if change.exception != self._exception:

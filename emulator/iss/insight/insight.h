@@ -1,10 +1,10 @@
-// Counts what a program does, and takes note of where it is: for profile, coverage, traces and
-// stack reports. It looks at instructions and changes nothing.
+// Profile of a program: counts, calls, changes of function and stack use. It observes instructions
+// and changes nothing.
 //
 // Calls are recognised by their instructions (BL, BLX), tail calls by a branch from one function
-// into another, returns by address and stack pointer. An exception is called by nobody: its cycles
-// are its own, not those of what it interrupted. When an exception returns to another stack than
-// it came from, the open calls of the one task are kept until it goes on.
+// into another, returns by address and stack pointer. An exception has no caller: its cycles do not
+// count for the code that it interrupts. When an exception returns to another stack than it came
+// from, the open calls of the old task are kept until it continues.
 #pragma once
 
 #include "armv7m/core/cpu.h"
@@ -15,7 +15,7 @@
 
 namespace insight {
 
-// Where code can be. Arrays have an element for each half-word; the counters may be null.
+// A memory that can hold code. Arrays have one element per half-word; the counters may be null.
 struct CodeRange {
     uint32_t base, size;
     const uint8_t *host;
@@ -29,7 +29,7 @@ struct Edge {
     uint64_t count, cycles;
 };
 
-// From `time` on the program was in `function` with `exception` active. Picoseconds.
+// From `time` (ps) on the program was in `function` with `exception` active.
 struct Change {
     int64_t time;
     uint16_t function, exception;
@@ -42,7 +42,7 @@ class Insight : public armv7m::Tracer {
 public:
     static constexpr uint32_t EDGES = 1 << 14, CHANGES = 1 << 14;
     static constexpr int DEPTH = 1024, TASKS = 16, TASK_DEPTH = 64;
-    // Cycles between two instructions that are waits; what is longer is sleep.
+    // Longer gaps between two instructions, in cycles, are sleep.
     static constexpr int64_t LONGEST_WAIT = 64;
 
     using Now = int64_t (*)(void *owner);
@@ -54,7 +54,7 @@ public:
 
     void instruction(uint32_t pc, uint32_t next, int64_t before, int64_t after,
                      armv7m::Cpu &cpu) override {
-        if (returning) {  // what comes before this instruction is the return's
+        if (returning) {  // cycles before this instruction belong to the return
             if (before - last <= LONGEST_WAIT) {
                 charge(range_of(last_pc), last_pc, before - last, 0);
                 last = before;
@@ -71,10 +71,10 @@ public:
         if (next != pc + 2 && next != pc + 4)
             jumped(range, pc, next, cpu);
         if (tracing)
-            look(next, cpu);
+            record(next, cpu);
     }
 
-    // Its cycles are the first instruction's.
+    // The cycles of the entry count for the first instruction.
     void exception_entry(int number, uint32_t returns_to, armv7m::Cpu &cpu) override {
         if (returning)
             leave_exception(last);
@@ -82,7 +82,7 @@ public:
         push({returns_to, from_process(cpu) ? cpu.process_sp() : 0,
               EXCEPTION_SITE + (uint32_t)number, cpu.r[15], last, stolen, true});
         if (tracing)
-            look(cpu.r[15], cpu);
+            record(cpu.r[15], cpu);
     }
 
     void exception_return(uint32_t exc_return, armv7m::Cpu &cpu) override {
@@ -90,7 +90,7 @@ public:
         resumed = exc_return & 4 ? cpu.process_sp() : 0;
     }
 
-    // Callers that are still open are closed; for the end of a profile.
+    // Closes all open calls; for the end of a profile.
     void finish() {
         while (depth)
             close(last);
@@ -102,7 +102,7 @@ public:
     Change changes[CHANGES];
     uint32_t change_count = 0;
     int64_t idle = 0;
-    uint32_t lowest_sp[2] = {UINT32_MAX, UINT32_MAX};  // of MSP and PSP while it was in use
+    uint32_t lowest_sp[2] = {UINT32_MAX, UINT32_MAX};  // of MSP and PSP while in use
 
 private:
     struct Frame {
@@ -117,8 +117,8 @@ private:
         Frame frames[TASK_DEPTH];
     };
 
-    // The cycle from which on an instruction or exception at `cycles` counts: what comes between
-    // it and the one before is its own, but for sleep.
+    // The first cycle that counts for an instruction or exception at `cycles`: waits since the previous
+    // one count, sleep does not.
     int64_t wait_or_sleep(int64_t cycles) {
         const int64_t gap = cycles - last;
         if (gap <= LONGEST_WAIT)
@@ -151,7 +151,7 @@ private:
             switch_task(stack, resumed, cycles);
     }
 
-    // LR is EXC_RETURN at an exception's entry.
+    // At an exception's entry LR is EXC_RETURN.
     static bool from_process(const armv7m::Cpu &cpu) { return (cpu.r[14] & 0xC) == 0xC; }
 
     const CodeRange *range_of(uint32_t pc) const {
@@ -173,7 +173,7 @@ private:
             open(pc + length, sp, pc, next, cpu.cycles);
             return;
         }
-        // Frames above the stack pointer were left by a longjmp or the like.
+        // Frames above the stack pointer were left, for example by longjmp.
         while (depth && !frames[depth - 1].exception && frames[depth - 1].sp < sp)
             close(cpu.cycles);
         bool returned = false;
@@ -189,7 +189,7 @@ private:
             open(frames[depth - 1].returns_to, frames[depth - 1].sp, pc, next, cpu.cycles);
     }
 
-    // Bytes of the call at `pc`; 0 if it is none. ARMv7-M, A7.7.18 and A7.7.19.
+    // Length in bytes of the call at `pc`; 0: no call. ARMv7-M, A7.7.18 and A7.7.19.
     static uint32_t call_length(const CodeRange *range, uint32_t pc) {
         if (!range || pc - range->base + 4 > range->size)
             return 0;
@@ -205,7 +205,7 @@ private:
         push({returns_to, sp, site, callee, cycles, stolen, false});
     }
 
-    // A recursion without end forgets how it began.
+    // An endless recursion drops its oldest calls.
     void push(const Frame &frame) {
         if (depth == DEPTH)
             depth = 0;
@@ -216,7 +216,8 @@ private:
         const Frame &frame = frames[--depth];
         const uint32_t mask = EDGES - 1;
         uint32_t at = (frame.site * 2654435761u ^ frame.callee * 40503u) & mask;
-        while (edges[at].count && (edges[at].site != frame.site || edges[at].callee != frame.callee))
+        while (edges[at].count &&
+               (edges[at].site != frame.site || edges[at].callee != frame.callee))
             at = (at + 1) & mask;
         if (!edges[at].count) {
             if (edge_count >= EDGES * 3 / 4) {
@@ -257,11 +258,11 @@ private:
         }
     }
 
-    void look(uint32_t pc, armv7m::Cpu &cpu) {
+    void record(uint32_t pc, armv7m::Cpu &cpu) {
         const uint16_t function = function_at(pc);
-        if (function == shown && cpu.ipsr == shown_exception)
+        if (function == recorded && cpu.ipsr == recorded_exception)
             return;
-        shown = function, shown_exception = cpu.ipsr;
+        recorded = function, recorded_exception = cpu.ipsr;
         changes[change_count++] = {now(owner), function, cpu.ipsr, pc};
         if (change_count + 2 >= CHANGES)
             cpu.stop();
@@ -278,8 +279,8 @@ private:
     int64_t last = 0, stolen = 0;
     bool returning = false, tracing = false;
     uint32_t last_pc = 0;
-    uint32_t resumed = 0;  // process stack pointer to which an exception returns
-    uint16_t shown = 0xFFFF, shown_exception = 0xFFFF;
+    uint32_t resumed = 0;  // process stack pointer to which an exception returns; 0: main stack
+    uint16_t recorded = 0xFFFF, recorded_exception = 0xFFFF;
 };
 
 }  // namespace insight

@@ -1,6 +1,6 @@
-"""Writes which source lines were executed, and how often, as lcov's tracefile (geninfo(1)).
+"""Writes execution counts of source lines as lcov's tracefile (geninfo(1)).
 
-A line was executed as often as the first instruction of one of its statements, the most frequent.
+The count of a line is that of the first instruction of its most frequent statement.
 """
 
 from collections import defaultdict
@@ -10,7 +10,7 @@ from cubestack.emulator.iss.insight.observer import Observer
 
 
 def write_lcov(observer: Observer, stream: IO[str]) -> None:
-    """Write what ``observer`` has counted; a program without line table gives an empty file."""
+    """Write the counts of ``observer``; nothing for a program without a line table."""
     symbols = observer.symbols
     lines: dict[str, dict[int, int]] = defaultdict(dict)
     for row in symbols.rows:

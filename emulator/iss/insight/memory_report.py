@@ -1,33 +1,33 @@
-"""How deep a program's stacks have been, how far its heap, and what is static.
+"""Memory use of a program: stacks, heap, static data.
 
-The stacks by the lowest stack pointers that the observer saw. The heap, which begins at the linker
-script's ``end``, by the bytes that are others than at the observer's start: what a program
-allocates and never writes is not seen.
+Stack use is the lowest stack pointer that the observer saw. The heap begins at the linker script's
+``end``; its use is the highest byte that differs from the observer's start, so memory that is
+allocated but never written does not count.
 """
 
 from dataclasses import dataclass
 
 from cubestack.emulator.iss.insight.observer import Observer
-from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE
+from cubestack.emulator.iss.machine import RAM_BASE
 
 ENDS = ("end", "_end", "__end__", "bss_end", "_ebss", "__bss_end__", "ebss")
-"""Names that linker scripts give to the end of static data, the surest one first."""
+"""Names of the end of static data in linker scripts, the most reliable one first."""
 
 VECTOR_TABLE = 0xE000_ED08
 
 
 @dataclass(frozen=True)
 class MemoryUse:
-    """Bytes; None for what is not known.
+    """Bytes; None if unknown.
 
     Attributes:
         flash: of the program.
         flash_size, ram_size: of the part.
-        static: data with a fixed place.
-        heap: beyond that, up to the highest byte that was ever written.
+        static: data with fixed addresses.
+        heap: from there to the highest byte written.
         stack: deepest use of the main stack.
-        process_stack: lowest address of the process stack; None where there is none.
-        free: never touched, between heap and main stack.
+        process_stack: lowest address of the process stack; None if there is none.
+        free: never used, between heap and main stack.
     """
 
     flash: int
@@ -41,7 +41,7 @@ class MemoryUse:
 
 
 def memory_use(observer: Observer) -> MemoryUse:
-    """Of the observed program so far."""
+    """Memory use of the observed program so far."""
     machine, labels, figures = observer.machine, observer.symbols.labels, observer.figures()
     table = int.from_bytes(machine.peek(VECTOR_TABLE, 4), "little")
     top = int.from_bytes(machine.peek(table, 4), "little")
@@ -56,8 +56,9 @@ def memory_use(observer: Observer) -> MemoryUse:
         changed = (machine.ram[begin:stop] != observer.ram_at_start[begin:stop]).nonzero()[0]
         heap = int(changed[-1]) + 1 if changed.size else 0
         free = stop - begin - heap
+    segments = machine.image.segments if machine.image is not None else ()
     return MemoryUse(
-        flash=sum(len(data) for at, data in _segments(observer) if at >= FLASH_BASE),
+        flash=sum(len(data) for _, data in segments),
         flash_size=machine.flash.size,
         ram_size=machine.ram.size,
         static=None if end is None else end - RAM_BASE,
@@ -66,8 +67,3 @@ def memory_use(observer: Observer) -> MemoryUse:
         process_stack=figures.process_sp,
         free=free,
     )
-
-
-def _segments(observer: Observer) -> tuple[tuple[int, bytes], ...]:
-    image = observer.machine.image
-    return () if image is None else image.segments

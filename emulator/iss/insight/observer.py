@@ -1,6 +1,6 @@
-"""Looks at a machine while it runs: cycles and executions by address, calls, where it is when.
+"""Observes a running machine: cycles and executions by address, calls, functions over time.
 
-The machine is slower meanwhile, and does the same at the same times.
+Observation slows the machine down but does not change its behaviour or timing.
 """
 
 import ctypes
@@ -31,11 +31,11 @@ class Edge:
     """Calls from one place to one function.
 
     Attributes:
-        site: address of the call; of an exception, its number.
+        site: address of the call, or number of the exception.
         callee: address of the function.
-        count: how often.
-        cycles: spent in it and in what it called.
-        exception: whether it was called by the processor.
+        count: number of calls.
+        cycles: of the function and everything it called.
+        exception: whether the processor called it.
     """
 
     site: int
@@ -54,13 +54,13 @@ class Change(NamedTuple):
 
 
 class Figures(NamedTuple):
-    """What else there is.
+    """Further measurements.
 
     Attributes:
-        main_sp: lowest main stack pointer while it was in use; None before the first use.
-        process_sp: likewise, of the process stack.
-        idle_cycles: asleep.
-        edges_lost: calls that there was no room for.
+        main_sp: lowest main stack pointer while in use; None before the first use.
+        process_sp: likewise of the process stack.
+        idle_cycles: cycles asleep.
+        edges_lost: calls not counted because the table was full.
     """
 
     main_sp: int | None
@@ -71,7 +71,7 @@ class Figures(NamedTuple):
 
 @dataclass
 class Code:
-    """Counters of a memory that code can be in, an element for each half-word."""
+    """Counters of a memory that can hold code, one element per half-word."""
 
     base: int
     cycles: NDArray[np.uint64]
@@ -84,17 +84,16 @@ class Code:
 
 
 class Observer:
-    """Looks at one machine from now on.
+    """Observes one machine until it is closed.
 
     Attributes:
-        machine: it.
+        machine: the observed machine.
         symbols: of its program.
-        ram_at_start: its RAM when this began.
+        ram_at_start: its RAM at the start of the observation.
         codes: counters of flash and RAM.
     """
 
     def __init__(self, machine: Machine, symbols: Symbols) -> None:
-        """Count cycles and calls."""
         self._library = insight_library()
         self.machine, self.symbols = machine, symbols
         self.ram_at_start = machine.ram.copy()
@@ -119,21 +118,20 @@ class Observer:
         self._handle: int | None = self._library.insight_new(machine.handle, ranges, 2)
 
     def trace(self, on: bool = True) -> None:
-        """Whether to take note of changes from now on; who wants them has to take them."""
+        """Record changes from now on; the caller must collect them with ``changes``."""
         self._library.insight_trace(self._handle, on)
 
     def add(self, other: "Observer") -> None:
-        """Count what another one has counted of the same program; both have been closed."""
+        """Add the counts of another observer of the same program; both must be closed."""
         for mine, its in zip(self.codes, other.codes, strict=True):
             mine.cycles += its.cycles
             mine.counts += its.counts
         self._found += other._found
 
     def close(self) -> None:
-        """Look no longer; what was counted stays."""
+        """End the observation; the counts stay."""
         if self._handle is not None:
             self._found, self._last = self.edges(), self.figures()
-        if self._handle is not None:
             try:
                 machine: int | None = self.machine.handle
             except RuntimeError:  # closed
@@ -142,7 +140,7 @@ class Observer:
             self._handle = None
 
     def count_of(self, address: int) -> int:
-        """How often the instruction at ``address`` was executed."""
+        """Number of executions of the instruction at ``address``."""
         for code in self.codes:
             index = (address - code.base) // 2
             if 0 <= index < code.counts.size:
@@ -150,7 +148,7 @@ class Observer:
         return 0
 
     def edges(self) -> list[Edge]:
-        """Calls so far, those that have not returned among them."""
+        """Calls so far, including those that have not returned."""
         if self._handle is None:
             return self._found
         self._library.insight_finish(self._handle)
@@ -168,7 +166,7 @@ class Observer:
         ]
 
     def changes(self) -> Iterator[Change]:
-        """Take the changes since the last call, in the order of time."""
+        """Remove and yield the changes since the last call, in the order of time."""
         if self._handle is None:
             return
         count = self._library.insight_changes(self._handle, self._changes)
@@ -177,7 +175,6 @@ class Observer:
             yield Change(one.time, name, one.exception)
 
     def figures(self) -> Figures:
-        """Stack pointers, and what was not counted."""
         if self._handle is None:
             return self._last
         values = (ctypes.c_int64 * 4)()
@@ -186,7 +183,7 @@ class Observer:
         return Figures(main, process, values[2], values[3])
 
     def _functions(self, base: int, halves: int) -> NDArray[np.uint16]:
-        """Number of the function of each half-word; 0 for none."""
+        """Number of the function of each half-word; 0: none."""
         numbers = np.zeros(halves, np.uint16)
         for function in self.symbols.functions:
             first, last = (function.address - base) // 2, (function.end - base + 1) // 2

@@ -1,6 +1,6 @@
-"""Names of a program: functions, variables and source lines by address, from ELF and DWARF.
+"""Symbols of a program from ELF and DWARF: functions, variables, source lines.
 
-A stripped program, or one that is no ELF file, has no names; everything works without them.
+A stripped program, or one that is not an ELF file, has none; everything works without them.
 """
 
 import os
@@ -16,7 +16,7 @@ from cubestack.emulator.iss.image import Image
 
 @dataclass(frozen=True)
 class Function:
-    """A function, or a piece of code with a name."""
+    """A function or other named code."""
 
     name: str
     address: int
@@ -24,13 +24,12 @@ class Function:
 
     @property
     def end(self) -> int:
-        """The address behind it."""
         return self.address + self.size
 
 
 @dataclass(frozen=True)
 class Variable:
-    """Data with a name."""
+    """A named object in memory."""
 
     name: str
     address: int
@@ -39,7 +38,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Line:
-    """Code from ``address`` up to ``end`` - 1 that belongs to a line of a source file."""
+    """A line of a source file and its code, ``address`` to ``end`` - 1."""
 
     address: int
     end: int
@@ -49,16 +48,16 @@ class Line:
 
 
 class Symbols:
-    """What the file of a program says of its addresses.
+    """The symbols of one program.
 
     Attributes:
-        functions: by address; none overlaps another.
+        functions: sorted by address, without overlap.
         variables: by name.
-        labels: value of every symbol by name, those of the linker script among them.
+        labels: value of every symbol by name, including those of the linker script.
     """
 
     def __init__(self, elf: bytes | None) -> None:
-        """Read an ELF file; None is a program without names."""
+        """Read the contents of an ELF file; None: no symbols."""
         self._elf = elf
         self.functions: list[Function] = []
         self.variables: dict[str, Variable] = {}
@@ -70,11 +69,11 @@ class Symbols:
     @staticmethod
     @lru_cache(maxsize=4)
     def of(image: Image | None) -> "Symbols":
-        """Those of a program, read once; none for none."""
+        """Symbols of a program, cached."""
         return Symbols(None if image is None else image.elf)
 
     def function_at(self, address: int) -> Function | None:
-        """The function that has code at ``address``."""
+        """The function with code at ``address``."""
         index = bisect_right(self._starts, address) - 1
         if index < 0 or address >= self.functions[index].end:
             return None
@@ -88,13 +87,13 @@ class Symbols:
         return self.lines[index]
 
     def function(self, name: str) -> Function | None:
-        """The function ``name``."""
         return next((found for found in self.functions if found.name == name), None)
 
     def describe(self, address: int, place: int | None = None) -> str:
-        """An address for a reader: function and offset, file and line where they are known.
+        """An address with function and offset, file and line if known.
 
-        These are of ``place``, if given: what calls last of all returns behind its end.
+        ``place``: the address to look up instead. The return address of a call at the end of a
+        function lies behind that function.
         """
         place = address if place is None else place
         function, line = self.function_at(place), self.line_at(place)
@@ -108,12 +107,12 @@ class Symbols:
 
     @cached_property
     def lines(self) -> list[Line]:
-        """The line table by address, of what was linked."""
+        """The line table by address."""
         return [line for line in self.rows if line.end > line.address]
 
     @cached_property
     def rows(self) -> list[Line]:
-        """Likewise with rows of no length: a statement of which no code is left of its own."""
+        """The line table including statements without code of their own."""
         return sorted(self._read_lines(), key=lambda line: line.address)
 
     @cached_property
@@ -185,7 +184,7 @@ class Symbols:
                 state = entry.state
                 if state is None:
                     continue
-                if before is None:  # what was left out by the linker begins at address 0
+                if before is None:  # code that the linker discarded begins at address 0
                     linked = self.function_at(state.address) is not None
                 elif linked:
                     yield Line(
@@ -199,7 +198,7 @@ class Symbols:
 
 
 def _apart(functions: list[Function]) -> Iterator[Function]:
-    """Functions by address, each cut where the next one begins; one without a size ends there."""
+    """Functions by address, each cut at the next one; one without a size ends there."""
     for index, function in enumerate(functions):
         follower = functions[index + 1].address if index + 1 < len(functions) else None
         size = function.size or 2
@@ -209,7 +208,7 @@ def _apart(functions: list[Function]) -> Iterator[Function]:
 
 
 def _file_names(program: Any, folder: str) -> dict[int, str]:
-    """Paths by the numbers that a line program uses for them."""
+    """Paths by their numbers in a line program."""
     header = program.header
     folders = [
         name.decode() if isinstance(name, bytes) else name for name in header["include_directory"]

@@ -117,7 +117,8 @@ public:
     void set_process_sp(uint32_t value) { (control & 2 ? r[13] : other_sp) = value & ~3u; }
     void set_control(uint8_t value);   // switches r[13] when SPSEL changes
 
-    // Sets the registers to their reset values, except those that System reads from the vector table.
+    // Sets the registers to their reset values, except those that System reads from the vector
+    // table.
     void reset();
 
     // Deadline and stopping, from outside or from a callee.
@@ -132,16 +133,16 @@ public:
     // [low, high) are not counted.
     void steps(int64_t count, uint32_t low = 0, uint32_t high = 0);
 
-    // Memory. Call regions_changed() after changing a region (waits, writable, host) or the MPU. While
-    // mpu.enabled() every access and each fetch from another 32 bytes checks mpu.allows().
+    // Memory. Call regions_changed() after changing a region (waits, writable, host) or the MPU.
+    // While mpu.enabled() every access and each fetch from another 32 bytes checks mpu.allows().
     std::vector<Region> regions;
     void add_region(const Region &region) { regions.push_back(region), regions_changed(); }
     void regions_changed();
     // Call it after code in a region was changed other than by the core's stores.
     void invalidate(uint32_t address, uint32_t size);
 
-    // Accesses for System (stacking, vectors), with protection, watchpoints and waits. They raise no
-    // fault. Unaligned ones are split.
+    // Accesses for System (stacking, vectors), with protection, watchpoints and waits. They raise
+    // no fault. Unaligned ones are split.
     Result load(uint32_t address, uint32_t size, uint32_t &value, bool as_privileged = true);
     Result store(uint32_t address, uint32_t size, uint32_t value, bool as_privileged = true);
     // Accesses for a debugger: they take no time, and peeks have no side effects; poke also writes
@@ -228,7 +229,7 @@ private:
     // The code that the loop executes: operations[0] is at code_base.
     Operation *operations = nullptr;
     uint32_t code_base = 0, code_size = 0;
-    Operation aside[3] = {};           // an instruction outside of all regions, or with a breakpoint
+    Operation aside[3] = {};           // an instruction outside all regions, or at a breakpoint
     const FetchLines *lines = nullptr;
     bool guarded = false;              // the MPU checks fetches
     bool fetch_costs = false;          // `lines` or `guarded`

@@ -1,5 +1,6 @@
-// Data watchpoint and trace unit: the counters of cycles, sleep and exception overhead; the comparators
-// are plain registers. ARMv7-M Architecture Reference Manual C1.8. CPICNT, LSUCNT and FOLDCNT stay 0.
+// Data watchpoint and trace unit: the counters of cycles, sleep and exception overhead; the
+// comparators are plain registers. ARMv7-M Architecture Reference Manual C1.8. CPICNT, LSUCNT and
+// FOLDCNT stay 0.
 
 #pragma once
 
@@ -11,7 +12,7 @@ class Dwt {
 public:
     explicit Dwt(int comparators) : comparators(comparators) {}
     void reset();
-    void set_trace_enabled(bool enabled, int64_t now);    // DEMCR.TRCENA: without it all counters stop
+    void set_trace_enabled(bool enabled, int64_t now);    // DEMCR.TRCENA; off: counters stop
     void count_sleep(int64_t cycles) { count(sleep, 19, cycles); }
     void count_exception(int64_t cycles) { count(exception, 18, cycles); }
 

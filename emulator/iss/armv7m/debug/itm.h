@@ -1,5 +1,5 @@
-// Instrumentation trace macrocell, whose stimulus ports carry printf. ARMv7-M Architecture Reference
-// Manual C1.7. A port is always ready.
+// Instrumentation trace macrocell, whose stimulus ports carry printf. ARMv7-M Architecture
+// Reference Manual C1.7. A port is always ready.
 
 #pragma once
 

@@ -1,6 +1,6 @@
-// Semihosting: BKPT 0xAB calls the host, for printf and exit of programs built with newlib's rdimon.
-// Operations and parameter blocks: "Semihosting for AArch32 and AArch64", Arm 100863. The console is
-// the only file.
+// Semihosting: BKPT 0xAB calls the host, for printf and exit of programs built with newlib's
+// rdimon. Operations and parameter blocks: "Semihosting for AArch32 and AArch64", Arm 100863. The
+// console is the only file.
 
 #include "armv7m/system/system.h"
 

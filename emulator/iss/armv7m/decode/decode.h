@@ -11,8 +11,8 @@ namespace armv7m {
 // Whether this half-word begins a 32-bit instruction (A5.1).
 inline bool is_wide(uint32_t half) { return half >> 11 >= 0x1D; }
 
-// Decode a 16-bit and a 32-bit instruction. UNPREDICTABLE instructions decode to C_UNDEFINED unless a
-// comment says otherwise: a UsageFault is the safe choice, and compilers do not emit them.
+// Decode a 16-bit and a 32-bit instruction. UNPREDICTABLE instructions decode to C_UNDEFINED unless
+// a comment says otherwise: a UsageFault is the safe choice, and compilers do not emit them.
 Operation decode_16(uint32_t half);
 Operation decode_32(uint32_t first, uint32_t second);
 

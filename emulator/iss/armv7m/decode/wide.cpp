@@ -33,8 +33,8 @@ uint32_t field_12(uint32_t first, uint32_t second) {
     return (first << 1 & 0x800) | (second >> 4 & 0x700) | (second & 0xFF);
 }
 
-// Sets the code of a data-processing instruction; `form`: 0 constant, 1 register, 2 shifted register.
-// False: not an instruction.
+// Sets the code of a data-processing instruction; `form`: 0 constant, 1 register, 2 shifted
+// register. False: not an instruction.
 bool choose(Operation &op, uint32_t number, bool flags, uint32_t form) {
     static const uint16_t codes[16] = {
         C_AND_I, C_BIC_I, C_ORR_I, C_ORN_I, C_EOR_I, 0, 0, 0, C_ADD_I, 0, C_ADC_I, C_SBC_I, 0,

@@ -129,8 +129,8 @@ static uint32_t half_at(const uint8_t *code, uint32_t offset) {
     return code[offset] | (uint32_t)code[offset + 1] << 8;
 }
 
-// Finds where the preceding instruction begins: in a run of half-words that look like the first half of
-// a 32-bit instruction, first and second halves alternate.
+// Finds where the preceding instruction begins: in a run of half-words that look like the first
+// half of a 32-bit instruction, first and second halves alternate.
 uint8_t address_stall(const Operation &op, const uint8_t *code, uint32_t offset) {
     if (op.code < C_LDR_O || op.code > C_STREX || offset < 2) return 0;
     if (op.code >= C_LDR_L && op.code <= C_LDRSB_L) return 0;

@@ -1,6 +1,6 @@
-// Enabled, pending and active exceptions and their priorities: exception numbers 1 to 15 (system) and
-// from 16 on (external interrupts). ARMv7-M Architecture Reference Manual B1.5.4 (priorities), B3.4
-// (NVIC).
+// Enabled, pending and active exceptions and their priorities: exception numbers 1 to 15 (system)
+// and from 16 on (external interrupts). ARMv7-M Architecture Reference Manual B1.5.4 (priorities),
+// B3.4 (NVIC).
 
 #pragma once
 

@@ -79,8 +79,8 @@ void System::pend_interrupt(int interrupt) {
 
 void System::pend_nmi() { pend(NMI); }
 
-// An exception caused by the running instruction must be taken now, else it escalates to HardFault. A
-// derived fault (of stacking) does not lock up: the handler that was due runs.
+// An exception caused by the running instruction must be taken now, else it escalates to HardFault.
+// A derived fault (of stacking) does not lock up: the handler that was due runs.
 void System::pend_synchronous(int number, bool derived) {
     if (!escalates(number)) {
         pend(number);

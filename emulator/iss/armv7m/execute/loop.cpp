@@ -2,8 +2,9 @@
 //
 // The state that every instruction needs is in local variables: `op`, and `now` for Cpu::cycles. It
 // is written back (SYNC) before anything else is called. Instructions in an IT block go through a
-// second table of labels, all of which lead to the code that checks the condition; so the others have
-// no cost for IT. Mode 1 calls a tracer and counts steps, mode 2 charges fetches and checks the MPU.
+// second table of labels, all of which lead to the code that checks the condition; so the others
+// have no cost for IT. Mode 1 calls a tracer and counts steps, mode 2 charges fetches and checks
+// the MPU.
 
 #include "armv7m/core/cpu.h"
 #include "armv7m/decode/codes.h"

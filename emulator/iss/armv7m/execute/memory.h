@@ -1,7 +1,7 @@
 // Loads and stores (ARMv7-M ARM A4.6, A4.7; cycles in cycles.h). Part of Cpu::loop.
 
-// Start of a load: it waits for its address, and for a store that is still on the bus. A single store
-// waits only until its data can follow that store's.
+// Start of a load: it waits for its address, and for a store that is still on the bus. A single
+// store waits only until its data can follow that store's.
 #define WAIT_FOR_BUS() \
     do { \
         now += op->stall; \

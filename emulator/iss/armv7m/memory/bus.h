@@ -2,7 +2,8 @@
 //
 // A Region is memory that the core accesses directly; it also runs predecoded code from there. For
 // everything else it calls the Bus, once per access. The private peripheral bus (0xE0000000 to
-// 0xE00FFFFF) belongs to System, and the core resolves the bit-band aliases: neither reaches the Bus.
+// 0xE00FFFFF) belongs to System, and the core resolves the bit-band aliases: neither reaches the
+// Bus.
 
 #pragma once
 
@@ -37,14 +38,14 @@ class Bus {
 public:
     virtual ~Bus() = default;
 
-    // An aligned access of 1, 2 or 4 bytes outside all regions. False is a bus error. During the call
-    // Cpu::cycles is the cycle of the data phase; the slave adds its wait states to it. Smaller values
-    // are in the low bits, the others are 0.
+    // An aligned access of 1, 2 or 4 bytes outside all regions. False is a bus error. During the
+    // call Cpu::cycles is the cycle of the data phase; the slave adds its wait states to it.
+    // Smaller values are in the low bits, the others are 0.
     virtual bool read(uint32_t address, uint32_t size, uint32_t &value) = 0;
     virtual bool write(uint32_t address, uint32_t size, uint32_t value) = 0;
 
-    // Cycles by which the fetch of the word at `address` delays the program, for regions with lines.
-    // `sequential`: the previous word was fetched last; else a branch led there.
+    // Cycles by which the fetch of the word at `address` delays the program, for regions with
+    // lines. `sequential`: the previous word was fetched last; else a branch led there.
     virtual uint32_t fetch(uint32_t address, bool sequential) {
         (void)address, (void)sequential;
         return 0;

@@ -79,8 +79,8 @@ bool Cpu::decode_at(uint32_t pc, Operation *op) {
     return false;
 }
 
-// Does the loop's work at the target of a branch that left the loop: a 32-bit instruction across two
-// words costs one cycle more, and the refill hides a stall.
+// Does the loop's work at the target of a branch that left the loop: a 32-bit instruction across
+// two words costs one cycle more, and the refill hides a stall.
 void Cpu::arrive() {
     const bool odd = arriving == ArrivingOdd;
     if (arriving == NotArriving) return;

@@ -59,14 +59,15 @@ enum class Fault : uint8_t {
 
 enum class Sleep : uint8_t { Awake, Wfi, Wfe, OnExit };
 
-// Callbacks to the part around the system. They must not call the instruction loop; they may stop it.
+// Callbacks to the part around the system. They must not call the instruction loop; they may stop
+// it.
 class SystemListener {
 public:
     virtual ~SystemListener() = default;
     virtual void reset_requested() {}                              // AIRCR.SYSRESETREQ, VECTRESET
     virtual void locked_up() {}                                    // until a reset (or an NMI)
-    // In the middle of an exception's entry or return: perform all events up to cpu.cycles, so that a
-    // late interrupt is seen.
+    // In the middle of an exception's entry or return: perform all events up to cpu.cycles, so that
+    // a late interrupt is seen.
     virtual void catch_up() {}
     virtual int64_t time_ps() { return 0; }
     virtual void itm(int port, uint32_t value, int bytes) { (void)port, (void)value, (void)bytes; }

@@ -18,7 +18,8 @@ public:
     void analog_changed() override { compare(); }
 
 protected:
-    // Whether the positive input is above the negative one; `before`: the output now, for hysteresis.
+    // Whether the positive input is above the negative one; `before`: the output now, for
+    // hysteresis.
     virtual bool above(bool before) const = 0;
     virtual int reflex() const = 0;
     virtual void drive_output(bool output) { (void)output; }

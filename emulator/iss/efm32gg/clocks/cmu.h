@@ -1,4 +1,5 @@
-// Clock management unit: oscillators, clock tree, enable bits. EFM32GG Reference Manual, chapter 11.
+// Clock management unit: oscillators, clock tree, enable bits. EFM32GG Reference Manual, chapter
+// 11.
 #pragma once
 
 #include "efm32gg/part/part.h"

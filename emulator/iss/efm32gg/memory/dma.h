@@ -1,10 +1,10 @@
 // DMA controller: PL230 with 12 channels. EFM32GG Reference Manual, chapter 8; ARM DDI 0417.
 //
-// One arbitration moves up to 2^R items; it reads the channel's descriptor before and writes it back
-// after. Its cost in HFCORECLK cycles is an estimate (the manuals give none); it delays the next
-// arbitration and the interrupt, but does not slow the core.
-// Requests of units with buffers of two entries count as single requests: one item each.
-// Not modelled: loops and rectangles of channels 0 and 1.
+// One arbitration moves up to 2^R items; it reads the channel's descriptor before and writes it
+// back after. Its cost in HFCORECLK cycles is an estimate (the manuals give none); it delays the
+// next arbitration and the interrupt, but does not slow the core. Requests of units with buffers of
+// two entries count as single requests: one item each. Not modelled: loops and rectangles of
+// channels 0 and 1.
 #pragma once
 
 #include "efm32gg/part/part.h"

@@ -1,5 +1,5 @@
-// What the part tells the world outside. The part never calls out for it: it appends to the outbox
-// and, where the world has to act at that picosecond, asks the core to stop behind the instruction.
+// Messages from the part. The part makes no callbacks: it appends to the outbox and, where the
+// receiver must act at that picosecond, stops the core after the instruction.
 #pragma once
 
 #include <cstdint>
@@ -9,23 +9,22 @@
 namespace efm32gg {
 
 enum class Kind : int32_t {
-    PIN,          // unit: port * 16 + bit; value: level 0 or 1, or -1: no longer driven; extra: drive
-    UART,         // a character begins; unit: see Unit; value: its bits; extra: its duration in ps
+    PIN,          // unit: port * 16 + bit; value: level 0 or 1, -1: released; extra: drive
+    UART,         // a character begins; unit; value: its bits; extra: its duration in ps
     I2C_START,    // master; unit; value: address byte
     I2C_WRITE,    // master; value: byte
-    I2C_READ,     // master wants a byte; extra: 1 if it acknowledged the one before
+    I2C_READ,     // master requests a byte; extra: 1 if it acknowledged the previous one
     I2C_STOP,     // master
-    I2C_SLAVE,    // answer of the slave; value: what, extra: byte
+    I2C_SLAVE,    // value: answer of the slave
     ITM,          // unit: port; value; extra: size
     SEMIHOSTING,  // text
-    LOG,          // text: something not modelled, or used wrongly; each once
-    RESET,        // the part was reset; value: RMU's cause bits; text: what the program did not
-                  // want
+    LOG,          // text: something not modelled or used wrongly; each text once
+    RESET,        // the part was reset; value: RMU's cause bits; text: an unexpected cause
     SLEEP,        // value: energy mode 1..4, 0: awake
-    FLASH,        // value: address; extra: bytes written, or page size with unit 1: erased
-    SUPPLY,       // value: state of clocks has changed (power)
+    FLASH,        // value: address; unit 0: written, extra: bytes; 1: erased, extra: wear or bytes
+    SUPPLY,       // not sent
     SPI,          // a word begins; unit; value: bits; extra: duration in ps
-    FAULT,        // the core is locked up, or met what it can not go on with; text
+    FAULT,        // the program ended or cannot continue; text
 };
 
 struct Outgoing {

@@ -3,16 +3,15 @@
 
 #include "efm32gg/part/schedule.h"
 
-#include <numeric>
-
 namespace efm32gg {
 
 class Rate {
 public:
     Rate() = default;
 
-    // `hertz` / `divider` edges a second, edge 0 at `origin`; 0 hertz: it stands.
-    Rate(int64_t hertz, int64_t divider, int64_t origin) : origin(origin), hertz(hertz), divider(divider) {
+    // `hertz` / `divider` edges per second, edge 0 at `origin`; 0 hertz: stopped.
+    Rate(int64_t hertz, int64_t divider, int64_t origin)
+        : origin(origin), hertz(hertz), divider(divider) {
         if (!hertz)
             return;
         numerator = (__int128)SECOND * divider;
@@ -26,7 +25,7 @@ public:
     double frequency() const { return (double)hertz / (double)divider; }
     int64_t whole_hertz() const { return hertz / divider; }
 
-    // Time of edge k; NEVER when the clock stands.
+    // Time of edge k; NEVER if the clock is stopped.
     int64_t time(int64_t k) const {
         if (!hertz)
             return NEVER;
@@ -35,7 +34,7 @@ public:
         return origin + (int64_t)((__int128)numerator * k / denominator);
     }
 
-    // Edges after the origin, up to and with `time`.
+    // Number of edges after the origin, up to and including `time`.
     int64_t edges(int64_t time) const {
         if (!hertz || time < origin)
             return 0;
@@ -49,10 +48,12 @@ public:
         return edges(time - 1) + 1;
     }
 
-    // Picoseconds that n periods take, rounded down; NEVER when the clock stands.
-    int64_t span(int64_t n) const { return hertz ? (int64_t)((__int128)numerator * n / denominator) : NEVER; }
+    // Picoseconds of n periods, rounded down; NEVER if the clock is stopped.
+    int64_t span(int64_t n) const {
+        return hertz ? (int64_t)((__int128)numerator * n / denominator) : NEVER;
+    }
 
-    // The same clock behind a divider that was set to 0 at `start`.
+    // The clock behind a divider that starts at `start`.
     Rate divided(int64_t by, int64_t start) const { return {hertz, divider * by, start}; }
 
     bool same_frequency(const Rate &other) const {

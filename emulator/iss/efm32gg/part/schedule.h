@@ -1,5 +1,5 @@
-// What happens when: events at picoseconds, the earliest first, equal ones in the order in which
-// they were scheduled. An event belongs to its peripheral and is in the schedule at most once.
+// Schedule of events by time in picoseconds; equal ones in the order in which they were scheduled. An
+// event belongs to its peripheral and is in the schedule at most once.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,8 @@ struct Event {
 
     // Event overflow = Event::of<&Timer::on_overflow>(this), of a void on_overflow(int64_t time).
     template <auto Method, class Owner> static Event of(Owner *owner) {
-        return {owner, [](void *self, int64_t time) { (static_cast<Owner *>(self)->*Method)(time); }};
+        return {owner,
+                [](void *self, int64_t time) { (static_cast<Owner *>(self)->*Method)(time); }};
     }
 
     void *owner;
@@ -27,14 +28,14 @@ struct Event {
     bool pending() const { return place >= 0; }
 };
 
-// A binary heap that knows where its events are.
+// A binary heap; each event stores its place in it.
 class Schedule {
 public:
     static constexpr int32_t CAPACITY = 256;
 
     int64_t next_time() const { return count ? heap[0]->time : NEVER; }
 
-    // At `time`; one that is scheduled already moves there.
+    // Schedules `event` at `time`, or moves it there.
     void add(Event &event, int64_t time) {
         remove(event);
         if (time == NEVER || count == CAPACITY)

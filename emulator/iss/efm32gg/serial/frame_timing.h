@@ -10,8 +10,8 @@ class FrameTiming {
 public:
     int64_t begin = 0, end = 0;  // of the latest frame
 
-    // Adds a frame of `units`, with `per_clock` units per period of `clock`. It begins at the end of
-    // the previous one if it `follows` that, else at the first edge at or after `now`.
+    // Adds a frame of `units`, with `per_clock` units per period of `clock`. It begins at the end
+    // of the previous one if it `follows` that, else at the first edge at or after `now`.
     void append(const Rate &clock, int64_t units, int64_t per_clock, bool follows, int64_t now) {
         if (!follows || rate.origin != clock.origin || !rate.same_frequency(clock)) {
             rate = clock;

@@ -1,8 +1,8 @@
 // I2C, master and slave. EFM32GG Reference Manual, chapter 16.
 //
 // As master it sends a message for each start, byte and stop, and holds the bus until `answer`
-// delivers the reply. As slave it is called by the slave_ functions; WAITING means that it holds the
-// clock low until firmware has served it, and the answer follows by the outbox.
+// delivers the reply. As slave it is called by the slave_ functions; WAITING means that it holds
+// the clock low until firmware has served it, and the answer follows by the outbox.
 #pragma once
 
 #include "efm32gg/part/part.h"

@@ -1,7 +1,7 @@
 // USART and UART. EFM32GG Reference Manual, chapter 17.
 //
-// A character is sent as one message with its duration, and received at the end of its stop bit.
-// As SPI master each word is sent likewise; the line from the slave is idle high, or the master's own
+// A character is sent as one message with its duration, and received at the end of its stop bit. As
+// SPI master each word is sent likewise; the line from the slave is idle high, or the master's own
 // output with LOOPBK. Not modelled: SPI slave, I2S, IrDA, smart card mode, collisions.
 #pragma once
 
