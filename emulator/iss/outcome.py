@@ -49,9 +49,8 @@ class Kind(IntEnum):
     RESET = 10
     SLEEP = 11
     FLASH = 12
-    SUPPLY = 13
-    SPI = 14
-    FAULT = 15
+    SPI = 13
+    FAULT = 14
 
 
 class Outgoing(NamedTuple):

@@ -36,7 +36,7 @@ QUIET_AWAKE_PS = 5 * PS_PER_S
 FAULT_CHECK_PS = 10 * PS_PER_MS
 """Period of the check whether the program hangs in a fault handler."""
 
-INWARD = frozenset({Kind.SLEEP, Kind.LOG, Kind.SUPPLY})
+INWARD = frozenset({Kind.SLEEP, Kind.LOG})
 """Outputs that do not count as activity visible outside."""
 
 logger = logging.getLogger(__name__)

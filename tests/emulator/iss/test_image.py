@@ -96,7 +96,10 @@ BAD = {
     "long.bin": (VECTORS + bytes(1 << 20), "beyond the flash"),
     "text.hex": (b"hello", "is not an Intel HEX file"),
     "sum.hex": (b":0100000001FF\n", "line 1: wrong checksum"),
-    "short.hex": (hex_record(0, 0, VECTORS).encode() + b":0400\n", "line 2: not an Intel HEX record"),
+    "short.hex": (
+        hex_record(0, 0, VECTORS).encode() + b":0400\n",
+        "line 2: not an Intel HEX record",
+    ),
     "kind.hex": (hex_record(7, 0, b"").encode(), "line 1: unknown record type 07"),
     "none.hex": (hex_record(1, 0, b"").encode(), "has no data records"),
 }

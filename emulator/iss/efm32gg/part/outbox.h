@@ -22,7 +22,6 @@ enum class Kind : int32_t {
     RESET,        // the part was reset; value: RMU's cause bits; text: an unexpected cause
     SLEEP,        // value: energy mode 1..4, 0: awake
     FLASH,        // value: address; unit 0: written, extra: bytes; 1: erased, extra: wear or bytes
-    SUPPLY,       // not sent
     SPI,          // a word begins; unit; value: bits; extra: duration in ps
     FAULT,        // the program ended or cannot continue; text
 };

@@ -1,4 +1,4 @@
-"""The core and its system with plain memory, driven from Python (system_bench.cpp)."""
+"""The core and its system with plain memory, controlled from Python (system_bench.cpp)."""
 
 import ctypes
 from functools import lru_cache, partial
@@ -25,21 +25,26 @@ REGISTERS = {
     "exit_code": 27, "debug_stop": 28,
 }  # fmt: skip
 
-STOP, SLEEP, LOCKUP = 2, 4, 8
-"""Bits of what a run returns."""
+SYSTEM = {
+    **{name: 0xE000_ED04 + 4 * n for n, name in enumerate((
+        "ICSR", "VTOR", "AIRCR", "SCR", "CCR", "SHPR1", "SHPR2", "SHPR3", "SHCSR", "CFSR", "HFSR",
+        "DFSR", "MMFAR", "BFAR",
+    ))},
+    **{name: 0xE000_E100 + 0x80 * n for n, name in enumerate((
+        "ISER", "ICER", "ISPR", "ICPR", "IABR"
+    ))},
+    "IPR": 0xE000_E400, "ACTLR": 0xE000_E008, "SYSTICK": 0xE000_E010, "DHCSR": 0xE000_EDF0,
+    "DCRDR": 0xE000_EDF8, "DEMCR": 0xE000_EDFC, "STIR": 0xE000_EF00, "MPU": 0xE000_ED90,
+    "DWT": 0xE000_1000, "CYCCNT": 0xE000_1004, "EXCCNT": 0xE000_100C, "ITM": 0xE000_0000,
+}  # fmt: skip
+"""Registers of the private peripheral bus."""
 
-ICSR, VTOR, AIRCR, SCR, CCR = (0xE000ED00 + 4 * n for n in range(1, 6))
-SHPR1, SHPR2, SHPR3, SHCSR, CFSR, HFSR, DFSR, MMFAR, BFAR = (0xE000ED18 + 4 * n for n in range(9))
-ACTLR, SYSTICK, DEMCR, STIR = 0xE000E008, 0xE000E010, 0xE000EDFC, 0xE000EF00
-ISER, ICER, ISPR, ICPR, IABR = (0xE000E100 + 0x80 * n for n in range(5))
-IPR = 0xE000E400
-MPU = 0xE000ED90
-DWT = 0xE0001000
-ITM = 0xE0000000
+STOP, SLEEP, LOCKUP = 2, 4, 8
+"""Bits of the result of a run."""
 
 
 class Entry(NamedTuple):
-    """Something a program wrote to the log."""
+    """A value that the program wrote to the log."""
 
     cycle: int
     value: int
@@ -47,7 +52,7 @@ class Entry(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """The last fault as the system recorded it."""
+    """The system's record of the last fault."""
 
     exception: int
     cfsr: int
@@ -87,7 +92,7 @@ def _library() -> ctypes.CDLL:
 
 
 class Bench:
-    """A processor. Memory by slices of ``code`` and ``ram``; registers by name."""
+    """A processor. Memory in ``code`` and ``ram``; items are registers of REGISTERS and SYSTEM."""
 
     def __init__(
         self,
@@ -111,22 +116,29 @@ class Bench:
         self.reset()
 
     def __del__(self) -> None:
-        self._library.bench_delete(self._bench)
+        if hasattr(self, "_bench"):
+            self._library.bench_delete(self._bench)
 
     def __getitem__(self, name: str) -> int:
+        if name in SYSTEM:
+            value = self.read(SYSTEM[name])
+            assert value is not None
+            return value
         return self._library.bench_get(self._bench, REGISTERS[name])
 
     def __setitem__(self, name: str, value: int) -> None:
-        self._library.bench_set(self._bench, REGISTERS[name], ctypes.c_uint32(value))
+        if name in SYSTEM:
+            assert self.write(SYSTEM[name], value)
+        else:
+            self._library.bench_set(self._bench, REGISTERS[name], ctypes.c_uint32(value))
 
     @property
     def ipsr(self) -> int:
-        """Number of the exception being handled."""
+        """Number of the active exception."""
         return self["xpsr"] & 0x1FF
 
     @property
     def cycles(self) -> int:
-        """Processor cycles since the beginning."""
         return self._library.bench_cycles(self._bench)
 
     @cycles.setter
@@ -135,47 +147,45 @@ class Bench:
 
     @property
     def log(self) -> list[Entry]:
-        """What the program wrote to ``LOG``."""
+        """Values written to ``LOG``."""
         entries = (_LogEntry * 4096)()
         count = self._library.bench_log(self._bench, entries, 4096)
         return [Entry(each.cycle, each.value, each.ipsr) for each in entries[:count]]
 
     @property
     def text(self) -> str:
-        """What came by semihosting, and by the ITM as ``<port:value/bytes>``."""
+        """Text by semihosting, and by the ITM as ``<port:value/bytes>``."""
         buffer = ctypes.create_string_buffer(8192)
         length = self._library.bench_text(self._bench, buffer, 8192)
         return buffer.raw[:length].decode()
 
     @property
     def fault(self) -> Fault:
-        """The last fault."""
         words = (ctypes.c_uint32 * 10)()
         self._library.bench_fault(self._bench, words)
         return Fault(*words)
 
     def reset(self, power_on: bool = True) -> None:
-        """Start from the vector table; also forgets decoded code."""
+        """Start from the vector table; also discards decoded code."""
         self._library.bench_reset(self._bench, power_on)
 
     def run(self, cycles: int) -> int:
-        """Run for so many cycles, or until something stops it; why, as bits."""
+        """Run for a number of cycles or until a stop; returns the reasons as bits."""
         return self._library.bench_run(self._bench, ctypes.c_int64(self.cycles + cycles))
 
     def at(self, cycle: int, kind: int, number: int = 0) -> None:
-        """An event at a cycle."""
+        """Schedule an event."""
         self._library.bench_at(self._bench, ctypes.c_int64(cycle), kind, number)
 
     def line(self, number: int, level: bool) -> None:
-        """Set an interrupt's line now."""
         self._library.bench_line(self._bench, number, level)
 
     def service(self) -> None:
-        """What the instruction loop does between two instructions."""
+        """Do what the instruction loop does between two instructions."""
         self._library.bench_service(self._bench)
 
     def exception_return(self, value: int) -> None:
-        """A branch to an EXC_RETURN value."""
+        """Branch to an EXC_RETURN value."""
         self._library.bench_return(self._bench, ctypes.c_uint32(value))
 
     def debugger(self, catches: int) -> None:
@@ -184,11 +194,11 @@ class Bench:
 
     @property
     def next_cycle(self) -> int:
-        """When SysTick pends its exception."""
+        """Cycle at which SysTick pends its exception."""
         return self._library.bench_next_cycle(self._bench)
 
     def read(self, address: int, size: int = 4) -> int | None:
-        """Read a register of the private peripheral bus; None is a bus error."""
+        """Read the private peripheral bus; None is a bus error."""
         value = ctypes.c_uint32()
         done = self._library.bench_read(
             self._bench, ctypes.c_uint32(address), size, ctypes.byref(value)
@@ -196,7 +206,7 @@ class Bench:
         return value.value if done else None
 
     def write(self, address: int, value: int, size: int = 4) -> bool:
-        """Write one; False is a bus error."""
+        """Write the private peripheral bus; False is a bus error."""
         return bool(
             self._library.bench_write(
                 self._bench, ctypes.c_uint32(address), size, ctypes.c_uint32(value)
@@ -204,10 +214,10 @@ class Bench:
         )
 
     def peek(self, address: int) -> int:
-        """Read one as a debugger does."""
+        """Read as a debugger does."""
         return self._library.bench_peek(self._bench, ctypes.c_uint32(address))
 
     def word(self, address: int) -> int:
-        """A word of RAM."""
+        """Read a word of RAM."""
         offset = address - RAM
         return int.from_bytes(bytes(self.ram[offset : offset + 4]), "little")

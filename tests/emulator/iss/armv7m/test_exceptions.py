@@ -1,28 +1,8 @@
-"""Entry, return, nesting, chaining and late arrival, by instructions and to the cycle (B1.5)."""
+"""Exception entry, return, nesting, tail-chaining and late arrival, to the cycle (B1.5)."""
 
 import pytest
 
-from .bench import (
-    AIRCR,
-    CCR,
-    DEMCR,
-    DWT,
-    ICSR,
-    IPR,
-    ISER,
-    ISPR,
-    LINE_HIGH,
-    LINES,
-    LOG,
-    NMI,
-    PULSE,
-    RAM,
-    SHPR2,
-    SHPR3,
-    STOP,
-    VTOR,
-    Bench,
-)  # fmt: skip
+from .bench import LINE_HIGH, LINES, LOG, NMI, PULSE, RAM, STOP, SYSTEM, Bench
 from .thumb import Program
 
 TOP = 0x2000_8000
@@ -31,7 +11,7 @@ MARK = 6
 
 
 def program(*interrupts: int) -> Program:
-    """A main program of NOPs with some interrupts enabled, each handler logging its number."""
+    """A main program of NOPs; the handlers of ``interrupts`` write to the log."""
     code = Program()
     code.load(MARK, LOG)
     code.label("main")
@@ -45,57 +25,68 @@ def program(*interrupts: int) -> Program:
     return code
 
 
-def start(code: Program, *interrupts: int, priorities: dict[int, int] | None = None) -> Bench:
-    """A bench that runs it, interrupts enabled, up to the first NOPs."""
-    bench = Bench(code.finish())
+def start(*interrupts: int, priorities: dict[int, int] | None = None) -> Bench:
+    """A bench with that program at its first NOPs, interrupts enabled."""
+    bench = Bench(program(*interrupts).finish())
     for number in interrupts:
-        bench.write(ISER + number // 32 * 4, 1 << number % 32)
+        bench.write(SYSTEM["ISER"] + number // 32 * 4, 1 << number % 32)
     for number, priority in (priorities or {}).items():
-        bench.write(IPR + number, priority, 1)
+        bench.write(SYSTEM["IPR"] + number, priority, 1)
     bench.run(20)
     return bench
 
 
-def entries(bench: Bench) -> list[tuple[int, int]]:
-    """Exceptions in the order of their log entries, and the cycle of the handler's beginning.
+def pulse(bench: Bench, *pulses: tuple[int, int], run: int = 200) -> int:
+    """Pulse interrupts, (delay, number) each, and run; returns the cycle of delay 0."""
+    begin = bench.cycles
+    for delay, number in pulses:
+        bench.at(begin + delay, PULSE, number)
+    bench.run(run)
+    return begin
 
-    A handler's first instruction is the store, whose data phase is one cycle later.
+
+def entries(bench: Bench) -> list[tuple[int, int]]:
+    """Exceptions by log entry, each with the cycle of its handler's first instruction.
+
+    That is the store to the log, whose data phase is one cycle later.
     """
     return [(entry.exception, entry.cycle - 1) for entry in bench.log]
 
 
+def numbers(bench: Bench) -> list[int]:
+    return [entry.exception for entry in bench.log]
+
+
 def test_entry_takes_12_cycles_and_stacks_eight_words():
-    bench = start(program(3), 3)
-    begin = bench.cycles
-    bench["r0"], bench["r1"], bench["r2"], bench["r3"] = 10, 11, 12, 13
-    bench["r12"], bench["lr"], bench["xpsr"] = 22, 0x1235, 0xA100_0000
+    bench = start(3)
+    values = {"r0": 10, "r1": 11, "r2": 12, "r3": 13, "r12": 22, "lr": 0x1235}
+    for name, value in values.items():
+        bench[name] = value
+    bench["xpsr"] = 0xA100_0000
     address = bench["pc"]
-    bench.at(begin, PULSE, 3)
-    bench.run(13)
+    begin = pulse(bench, (0, 3), run=13)
     assert entries(bench) == [(19, begin + 12)]
     frame = [bench.word(TOP - 32 + 4 * n) for n in range(8)]
-    assert frame == [10, 11, 12, 13, 22, 0x1235, address, 0xA100_0000]
+    assert frame == [*values.values(), address, 0xA100_0000]
     assert (bench["sp"], bench["lr"], bench.ipsr) == (TOP - 32, 0xFFFF_FFF9, 19)
     bench.run(40)
-    assert (bench["sp"], bench["lr"], bench["xpsr"]) == (TOP, 0x1235, 0xA100_0000)
-    assert [bench[f"r{n}"] for n in (0, 1, 2, 3, 12)] == [10, 11, 12, 13, 22]
+    assert (bench["sp"], bench["xpsr"]) == (TOP, 0xA100_0000)
+    assert {name: bench[name] for name in values} == values
 
 
-def test_return_takes_10_cycles_behind_the_branch():
-    bench = start(program(3), 3)
-    begin, at = bench.cycles, bench["pc"]
-    bench.at(begin, PULSE, 3)
-    bench.run(12 + 1 + 3 + 1 + 10)  # entry, STR, NOPs, BX, return
+def test_return_takes_10_cycles_after_the_branch():
+    bench = start(3)
+    at = bench["pc"]
+    begin = pulse(bench, (0, 3), run=12 + 1 + 3 + 1 + 10)  # entry, STR, NOPs, BX, return
     assert (bench["pc"], bench.ipsr, bench.cycles) == (at, 0, begin + 27)
 
 
 @pytest.mark.parametrize("aligned", [True, False])
-def test_the_frame_is_aligned_to_eight_bytes_if_stkalign(aligned):
-    bench = start(program(3), 3)
-    bench.write(CCR, 0x200 * aligned)
+def test_stkalign_aligns_the_frame_to_eight_bytes(aligned):
+    bench = start(3)
+    bench["CCR"] = 0x200 * aligned
     bench["sp"] = TOP - 4
-    bench.at(bench.cycles, PULSE, 3)
-    bench.run(13)
+    pulse(bench, (0, 3), run=13)
     assert bench["sp"] == TOP - 4 - 32 - 4 * aligned
     assert bench.word(bench["sp"] + 28) >> 9 & 1 == aligned
     bench.run(40)
@@ -103,97 +94,72 @@ def test_the_frame_is_aligned_to_eight_bytes_if_stkalign(aligned):
     assert bench["xpsr"] & 0x200 == 0
 
 
-def test_handlers_chain_in_6_cycles_without_popping():
-    bench = start(program(3, 4), 3, 4)
-    begin = bench.cycles
-    bench.at(begin, PULSE, 4)
-    bench.at(begin, PULSE, 3)
-    bench.run(200)
+def test_tail_chaining_takes_6_cycles_without_unstacking():
+    bench = start(3, 4)
+    begin = pulse(bench, (0, 4), (0, 3))
     first = begin + 12
     assert entries(bench) == [(19, first), (20, first + 1 + 3 + 1 + 6)]
     assert bench["sp"] == TOP
 
 
-def test_the_more_urgent_one_comes_first_and_preempts():
-    code = program(3, 4, 5)
-    bench = start(code, 3, 4, 5, priorities={3: 0x80, 4: 0x40, 5: 0x20})
-    begin = bench.cycles
-    for number in (3, 4):
-        bench.at(begin, PULSE, number)
-    bench.at(begin + 13, PULSE, 5)  # in the handler of 4
-    bench.run(200)
-    assert [number for number, _ in entries(bench)] == [20, 21, 19]
+def test_higher_priority_is_taken_first_and_preempts():
+    bench = start(3, 4, 5, priorities={3: 0x80, 4: 0x40, 5: 0x20})
+    begin = pulse(bench, (0, 3), (0, 4), (13, 5))  # the last one in the handler of 4
+    assert numbers(bench) == [20, 21, 19]
     assert entries(bench)[1][1] == begin + 13 + 12
-    assert bench.word(TOP - 64 + 28) & 0x1FF == 20  # the nested frame, of the handler
+    assert bench.word(TOP - 64 + 28) & 0x1FF == 20  # xPSR in the nested frame
 
 
-def test_nested_return_value_and_stack():
-    bench = start(program(3, 4), 3, 4, priorities={3: 0x80, 4: 0x40})
-    begin = bench.cycles
-    bench.at(begin, PULSE, 3)
-    bench.at(begin + 14, PULSE, 4)
-    bench.run(27)
+def test_nested_handler_has_its_return_value_and_frame():
+    bench = start(3, 4, priorities={3: 0x80, 4: 0x40})
+    pulse(bench, (0, 3), (14, 4), run=27)
     assert (bench.ipsr, bench["lr"], bench["sp"]) == (20, 0xFFFF_FFF1, TOP - 64)
-    assert bench.read(ICSR) >> 11 & 1 == 0  # RETTOBASE
+    assert bench["ICSR"] >> 11 & 1 == 0  # RETTOBASE
     bench.run(200)
     assert (bench.ipsr, bench["sp"]) == (0, TOP)
 
 
 @pytest.mark.parametrize(("delay", "late"), [(1, True), (6, True), (7, False), (11, False)])
-def test_a_late_one_takes_over_the_frame(delay, late):
-    bench = start(program(3, 4), 3, 4, priorities={3: 0x80, 4: 0x40})
-    begin = bench.cycles
-    bench.at(begin, PULSE, 3)
-    bench.at(begin + delay, PULSE, 4)
-    bench.run(200)
-    order = entries(bench)
+def test_late_arrival_takes_over_the_frame(delay, late):
+    bench = start(3, 4, priorities={3: 0x80, 4: 0x40})
+    begin = pulse(bench, (0, 3), (delay, 4))
     if late:  # 12 cycles for the first, and no second frame
-        assert order == [(20, begin + 12), (19, begin + 12 + 5 + 6)]
+        assert entries(bench) == [(20, begin + 12), (19, begin + 12 + 5 + 6)]
     else:  # preempted before its first instruction, which comes when 4 returns
-        assert [number for number, _ in order] == [20, 19]
-        assert order[0][1] == begin + 24
+        assert numbers(bench) == [20, 19]
+        assert entries(bench)[0][1] == begin + 24
 
 
-def test_a_late_one_of_the_same_priority_waits():
-    bench = start(program(3, 4), 3, 4)
-    begin = bench.cycles
-    bench.at(begin, PULSE, 4)
-    bench.at(begin + 3, PULSE, 3)
-    bench.run(200)
-    # Among equals the lower number wins as long as none is active.
-    assert [number for number, _ in entries(bench)] == [19, 20]
+def test_late_arrival_of_the_same_priority_with_a_lower_number_is_taken_first():
+    bench = start(3, 4)
+    pulse(bench, (0, 4), (3, 3))
+    assert numbers(bench) == [19, 20]
 
 
-def test_one_that_comes_while_the_frame_is_read_chains():
-    bench = start(program(3, 4), 3, 4)
-    begin = bench.cycles
-    bench.at(begin, PULSE, 3)
-    popping = begin + 12 + 5
-    bench.at(popping + 2, PULSE, 4)
-    bench.run(200)
-    assert entries(bench)[1] == (20, popping + 4 + 6)
+def test_exception_during_unstacking_is_tail_chained():
+    bench = start(3, 4)
+    unstacking = 12 + 5
+    begin = pulse(bench, (0, 3), (unstacking + 2, 4))
+    assert entries(bench)[1] == (20, begin + unstacking + 4 + 6)
 
 
-def test_masks_hold_back_what_is_not_more_urgent():
-    bench = start(program(3, 4), 3, 4, priorities={3: 0x80, 4: 0x40})
+def test_masks_hold_back_exceptions_of_lower_priority():
+    bench = start(3, 4, priorities={3: 0x80, 4: 0x40})
     bench["basepri"] = 0x80
-    bench.at(bench.cycles, PULSE, 3)
-    bench.run(50)
-    assert entries(bench) == []
-    bench.at(bench.cycles, PULSE, 4)
-    bench.run(50)
-    assert [number for number, _ in entries(bench)] == [20]
+    pulse(bench, (0, 3), run=50)
+    assert numbers(bench) == []
+    pulse(bench, (0, 4), run=50)
+    assert numbers(bench) == [20]
     bench["primask"] = 1
     bench["basepri"] = 0
-    bench.at(bench.cycles, PULSE, 4)
-    bench.run(50)
+    pulse(bench, (0, 4), run=50)
     assert len(bench.log) == 1
     bench["primask"] = 0
     bench.run(80)
-    assert [number for number, _ in entries(bench)] == [20, 20, 19]
+    assert numbers(bench) == [20, 20, 19]
 
 
-def test_faultmask_is_cleared_by_the_return():
+def test_exception_return_clears_faultmask():
     code = Program()
     code.load(MARK, LOG)
     code.svc()
@@ -209,34 +175,32 @@ def test_faultmask_is_cleared_by_the_return():
     assert (bench.log[0].value, bench["faultmask"], bench["r0"]) == (1, 0, 0)
 
 
-def test_svc_returns_behind_itself_and_pendsv_comes_after():
+def test_svc_returns_to_the_next_instruction_and_pendsv_is_taken_before():
     code = Program()
     code.load(MARK, LOG)
-    code.poke(ICSR, 1 << 28, by=(0, 1))
+    code.poke(SYSTEM["ICSR"], 1 << 28, by=(0, 1))
     code.svc(7)
     after = code.forever()
-    code.handler(11)
-    code.str(0, MARK)
-    code.bx()
-    code.handler(14)
-    code.str(0, MARK)
-    code.bx()
+    for number in (11, 14):
+        code.handler(number)
+        code.str(0, MARK)
+        code.bx()
     bench = Bench(code.finish())
     bench["primask"] = 0
-    bench.write(SHPR3, 0xE0 << 16)
+    bench["SHPR3"] = 0xE0 << 16
     bench.run(200)
-    assert [entry.exception for entry in bench.log] == [14, 11]
+    assert numbers(bench) == [14, 11]
     assert bench.word(TOP - 32 + 24) == after
     assert bench["pc"] == after
 
 
-def test_svc_that_may_not_be_taken_is_a_hard_fault():
+def test_masked_svc_is_a_hard_fault():
     code = Program()
     code.svc()
     code.handler(3)
     code.forever()
     bench = Bench(code.finish())
-    bench.write(SHPR2, 0x80 << 24)
+    bench["SHPR2"] = 0x80 << 24
     bench["basepri"] = 0x80
     bench.run(100)
     assert bench.ipsr == 3
@@ -261,14 +225,12 @@ def test_nmi_preempts_the_hard_fault_handler():
     assert bench.ipsr == 3
 
 
-def test_process_stack_and_unprivileged_thread():
-    code = program(3)
-    bench = start(code, 3)
+def test_exception_of_an_unprivileged_thread_uses_the_main_stack():
+    bench = start(3)
     bench["psp"] = TOP - 0x1000
     bench["control"] = 3
     main = bench["msp"]
-    bench.at(bench.cycles, PULSE, 3)
-    bench.run(13)
+    pulse(bench, (0, 3), run=13)
     assert bench["lr"] == 0xFFFF_FFFD
     assert bench["sp"] == main
     assert bench["psp"] == TOP - 0x1000 - 32
@@ -277,8 +239,8 @@ def test_process_stack_and_unprivileged_thread():
     assert (bench["control"], bench["sp"]) == (3, TOP - 0x1000)
 
 
-def test_tasks_are_switched_by_pendsv():
-    """What an operating system does: the handler changes PSP, and returns to another task."""
+def test_pendsv_switches_tasks():
+    """As an operating system does: the handler changes PSP and returns to another task."""
     code = Program()
     code.load(0, 0x2000_4000)
     code.msr("psp", 0)
@@ -287,9 +249,7 @@ def test_tasks_are_switched_by_pendsv():
     code.half(0xF3BF, 0x8F6F)  # ISB
     code.load(MARK, LOG)
     code.movs(0, 1)
-    code.load(1, ICSR)
-    code.load(2, 1 << 28)
-    code.str(2, 1)
+    code.poke(SYSTEM["ICSR"], 1 << 28, by=(1, 2))
     code.label("first")
     code.str(0, MARK)
     code.b("first")
@@ -302,32 +262,26 @@ def test_tasks_are_switched_by_pendsv():
     code.msr("psp", 3)
     code.bx()
     bench = Bench(code.finish())
-    frame = [0, 0, 0, 0, 0, 0xFFFF_FFFF, other, 1 << 24]
-    for n, word in enumerate(frame):
+    for n, word in enumerate([0, 0, 0, 0, 0, 0xFFFF_FFFF, other, 1 << 24]):
         at = 0x5000 - 32 + 4 * n
         bench.ram[at : at + 4] = list(word.to_bytes(4, "little"))
     bench["r6"] = LOG
     bench.run(300)
-    values = {entry.value for entry in bench.log}
-    assert 2 in values
     assert bench.log[-1].value == 2
     assert bench["sp"] == 0x2000_5000
 
 
 def test_vector_table_moves():
-    code = program(3)
-    bench = start(code, 3)
-    moved = bytearray(bench.code[:0x100])
-    bench.ram[0x400:0x500] = list(moved)
-    bench.write(VTOR, RAM + 0x47F)
-    assert bench.read(VTOR) == RAM + 0x400
+    bench = start(3)
+    bench.ram[0x400:0x500] = list(bench.code[:0x100])
+    bench["VTOR"] = RAM + 0x47F
+    assert bench["VTOR"] == RAM + 0x400
     bench.code[4 * 19 : 4 * 20] = [0] * 4
-    bench.at(bench.cycles, PULSE, 3)
-    bench.run(13)
+    pulse(bench, (0, 3), run=13)
     assert bench.ipsr == 19
 
 
-def test_level_interrupt_runs_until_its_handler_acknowledges():
+def test_level_interrupt_repeats_until_its_handler_clears_the_line():
     code = Program()
     code.load(MARK, LOG)
     code.movs(4, 0)
@@ -343,39 +297,35 @@ def test_level_interrupt_runs_until_its_handler_acknowledges():
     code.label("stay")
     code.bx()
     bench = Bench(code.finish())
-    bench.write(ISER, 1 << 7)
+    bench["ISER"] = 1 << 7
     bench.run(10)
     bench.at(bench.cycles, LINE_HIGH, 7)
     bench.run(300)
     assert [entry.value for entry in bench.log] == [1, 2, 3]
-    assert (bench.ipsr, bench.read(ISPR)) == (0, 0)
+    assert (bench.ipsr, bench["ISPR"]) == (0, 0)
 
 
 def test_exception_counter_and_cycle_counter():
-    bench = start(program(3), 3)
-    bench.write(DEMCR, 1 << 24)
-    bench.write(DWT + 4, 0)
-    bench.write(DWT, 1 | 1 << 18)
-    begin = bench.cycles
-    bench.at(begin, PULSE, 3)
-    bench.run(100)
-    assert bench.read(DWT + 4) == bench.cycles - begin
-    assert bench.read(DWT + 12) == 22
-    bench.write(DEMCR, 0)  # stands without TRCENA
-    stood = bench.read(DWT + 4)
+    bench = start(3)
+    bench["DEMCR"] = 1 << 24
+    bench["CYCCNT"] = 0
+    bench["DWT"] = 1 | 1 << 18
+    begin = pulse(bench, (0, 3), run=100)
+    assert bench["CYCCNT"] == bench.cycles - begin
+    assert bench["EXCCNT"] == 22
+    bench["DEMCR"] = 0  # stops without TRCENA
+    stopped = bench["CYCCNT"]
     bench.run(10)
-    assert bench.read(DWT + 4) == stood
+    assert bench["CYCCNT"] == stopped
 
 
 @pytest.mark.parametrize("value", [0x05FA_0004, 0x05FA_0001])
 def test_reset_request_stops_the_run(value):
     code = Program()
-    code.load(0, AIRCR)
-    code.load(1, value)
-    code.str(1, 0)
+    code.poke(SYSTEM["AIRCR"], value, by=(0, 1))
     code.forever()
     bench = Bench(code.finish())
     assert bench.run(100) & STOP
     assert bench["resets"] == 1
-    bench.write(AIRCR, 0x0004)
+    bench["AIRCR"] = 0x0004
     assert bench["resets"] == 1  # the key is missing

@@ -1,33 +1,32 @@
-"""The memory protection unit: which region decides, what it allows, what a violation sets."""
+"""Memory protection unit: matching region, access permissions, status of violations."""
 
 import pytest
 
-from .bench import CFSR, ICSR, ISER, MMFAR, MPU, PULSE, RAM, SHCSR, Bench
+from .bench import PULSE, SYSTEM, Bench
 from .thumb import Program
 
-TYPE, CTRL, RNR, RBAR, RASR = (MPU + 4 * n for n in range(5))
+TYPE, CTRL, RNR, RBAR, RASR = (SYSTEM["MPU"] + 4 * n for n in range(5))
 ENABLE, HFNMIENA, PRIVDEFENA = 1, 2, 4
 NONE, PRIVILEGED, USER_READS, FULL, _, READ_PRIVILEGED, READ_ONLY, READ_ONLY_TOO = range(8)
 XN = 1 << 28
 DACCVIOL_VALID, IACCVIOL, MSTKERR, MUNSTKERR = 0x82, 1, 16, 8
 
 USER = 0x2000_2000
-"""Where the access under test goes."""
+"""Address of the access under test."""
 
 
 def attributes(size_log2: int, access: int, disabled_parts: int = 0, never: bool = False) -> int:
-    """RASR's value."""
+    """Value of RASR."""
     return never * XN | access << 24 | disabled_parts << 8 | (size_log2 - 1) << 1 | 1
 
 
 def region(bench: Bench, number: int, base: int, value: int) -> None:
-    """Set one region."""
     bench.write(RBAR, base | 0x10 | number)
     bench.write(RASR, value)
 
 
 def accessing(address: int, store: bool, privileged: bool) -> Program:
-    """One access, then r2 is 1."""
+    """A program that makes one access, then sets r2 to 1."""
     code = Program()
     code.load(1, address)
     if not privileged:
@@ -45,12 +44,12 @@ def accessing(address: int, store: bool, privileged: bool) -> Program:
 
 
 def guarded(code: Program, control: int = ENABLE) -> Bench:
-    """Region 0 is the code, for everyone; region 1 the stack."""
+    """A bench with region 0 for the code and region 1 for the stack, both for all."""
     bench = Bench(code.finish())
     region(bench, 0, 0, attributes(16, READ_ONLY))
     region(bench, 1, 0x2000_4000, attributes(14, FULL))
     bench.write(CTRL, control)
-    bench.write(SHCSR, 1 << 16)
+    bench["SHCSR"] = 1 << 16
     return bench
 
 
@@ -74,7 +73,7 @@ def test_access_permissions(access, case):
     allowed = bool(ALLOWED[access][case])
     assert (bench["r2"], bench.ipsr) == ((1, 0) if allowed else (0, 4))
     if not allowed:
-        assert (bench.read(CFSR), bench.read(MMFAR)) == (DACCVIOL_VALID, USER)
+        assert (bench["CFSR"], bench["MMFAR"]) == (DACCVIOL_VALID, USER)
 
 
 @pytest.mark.parametrize(
@@ -86,60 +85,55 @@ def test_access_permissions(access, case):
         (0, False, True),
     ],
 )
-def test_background(control, privileged, allowed):
+def test_background_region(control, privileged, allowed):
     bench = guarded(accessing(USER, False, privileged), control)
     bench.run(100)
     assert (bench.ipsr == 0) == allowed
 
 
-def test_the_highest_numbered_region_decides_and_its_disabled_parts_do_not():
-    bench = guarded(accessing(USER, False, True))
-    region(bench, 2, 0x2000_2000, attributes(13, FULL))
-    region(bench, 3, 0x2000_2000, attributes(8, NONE))
+@pytest.mark.parametrize(
+    ("offset", "disabled_parts", "fault"), [(0, 0, True), (0, 1, False), (32, 1, True)]
+)
+def test_highest_numbered_region_decides_except_in_its_disabled_parts(
+    offset, disabled_parts, fault
+):
+    bench = guarded(accessing(USER + offset, False, True))
+    region(bench, 2, USER, attributes(13, FULL))
+    region(bench, 3, USER, attributes(8, NONE, disabled_parts))  # 8 parts of 32 bytes
     bench.run(100)
-    assert bench.ipsr == 4
-    bench = guarded(accessing(USER, False, True))
-    region(bench, 2, 0x2000_2000, attributes(13, FULL))
-    region(bench, 3, 0x2000_2000, attributes(8, NONE, disabled_parts=1))  # the first 32 bytes
-    bench.run(100)
-    assert bench.ipsr == 0
-    bench = guarded(accessing(USER + 32, False, True))
-    region(bench, 2, 0x2000_2000, attributes(13, FULL))
-    region(bench, 3, 0x2000_2000, attributes(8, NONE, disabled_parts=1))
-    bench.run(100)
-    assert bench.ipsr == 4
+    assert bench.ipsr == (4 if fault else 0)
 
 
-def test_execute_never():
+def in_ram() -> Program:
+    """A program that jumps to ``USER``."""
     code = Program()
-    code.load(0, RAM + 0x2001)
+    code.load(0, USER | 1)
     code.bx(0)
     code.handler(4)
     code.forever()
+    return code
+
+
+def test_execute_never():
     for never in (False, True):
-        bench = guarded(code)
+        bench = guarded(in_ram())
         bench.ram[0x2000:0x2002] = [0xFE, 0xE7]
         region(bench, 2, USER, attributes(5, FULL, never=never))
         bench.run(100)
         assert bench.ipsr == (4 if never else 0)
-        assert bench.read(CFSR) == (IACCVIOL if never else 0)
+        assert bench["CFSR"] == (IACCVIOL if never else 0)
 
 
-def test_running_off_a_region_faults_at_its_end():
-    code = Program()
-    code.load(0, RAM + 0x2001)
-    code.bx(0)
-    code.handler(4)
-    code.forever()
-    bench = guarded(code)
+def test_execution_faults_at_the_end_of_its_region():
+    bench = guarded(in_ram())
     bench.ram[0x2000:0x2100] = [0x00, 0xBF] * 128
     region(bench, 2, USER, attributes(5, FULL))
     bench.run(200)
-    assert (bench.ipsr, bench.read(CFSR)) == (4, IACCVIOL)
+    assert (bench.ipsr, bench["CFSR"]) == (4, IACCVIOL)
     assert bench.word(0x2000_8000 - 32 + 24) == USER + 32
 
 
-def test_stacking_is_checked_with_the_rights_of_the_code():
+def test_stacking_is_checked_with_the_rights_of_the_interrupted_code():
     code = Program()
     code.nop(60)
     code.handler(4)
@@ -147,23 +141,22 @@ def test_stacking_is_checked_with_the_rights_of_the_code():
     bench = guarded(code)
     bench["psp"] = 0x2000_3000
     bench["control"] = 3
-    bench.write(0xE000EF14, 0)  # nothing there
     bench["control"] = 2
-    bench.write(ISER, 1)
+    bench["ISER"] = 1
     bench["control"] = 3
     bench.at(5, PULSE, 0)
     bench.run(60)
     assert bench.ipsr == 4
     bench["control"] = 0
-    assert bench.read(CFSR) == MSTKERR
+    assert bench["CFSR"] == MSTKERR
     assert bench["psp"] == 0x2000_3000 - 32
 
 
-def test_unstacking_is_checked_too():
+def test_unstacking_is_checked():
     code = Program()
     code.nop(60)
     code.handler(16)
-    code.load(0, USER)  # where no region is
+    code.load(0, USER)  # outside all regions
     code.msr("psp", 0)
     code.bx()
     code.handler(4)
@@ -171,15 +164,15 @@ def test_unstacking_is_checked_too():
     bench = guarded(code, ENABLE)
     bench["psp"] = 0x2000_7000
     bench["control"] = 2
-    bench.write(ISER, 1)
+    bench["ISER"] = 1
     bench.at(5, PULSE, 0)
     bench.run(80)
-    assert (bench.ipsr, bench.read(CFSR)) == (4, MUNSTKERR)
+    assert (bench.ipsr, bench["CFSR"]) == (4, MUNSTKERR)
     assert bench["psp"] == USER
 
 
 @pytest.mark.parametrize("on", [False, True])
-def test_it_is_off_in_the_hard_fault_handler_unless_hfnmiena(on):
+def test_hfnmiena_enables_it_in_the_hard_fault_handler(on):
     code = Program()
     code.half(0xDE00)
     code.handler(3)
@@ -195,7 +188,7 @@ def test_registers():
     bench = Bench()
     assert bench.read(TYPE) == 8 << 8
     bench.write(RNR, 5)
-    bench.write(RNR, 8)  # there is none
+    bench.write(RNR, 8)  # not implemented
     assert bench.read(RNR) == 5
     bench.write(RBAR, 0x2000_0010 | 3)
     assert (bench.read(RNR), bench.read(RBAR)) == (3, 0x2000_0003)
@@ -204,4 +197,4 @@ def test_registers():
     assert bench.read(RBAR + 8) == 0x2000_0003
     bench.reset()
     assert (bench.read(CTRL), bench.read(RASR)) == (0, 0)
-    assert bench.read(ICSR) == 1 << 11
+    assert bench["ICSR"] == 1 << 11

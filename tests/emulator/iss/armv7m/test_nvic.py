@@ -4,14 +4,17 @@ import random
 
 import pytest
 
-from .bench import AIRCR, IABR, ICER, ICPR, ICSR, IPR, ISER, ISPR, SHPR3, STIR, Bench
+from .bench import SYSTEM, Bench
 
 NMI, PEND_SV, SYSTICK, FIRST = 2, 14, 15, 16
+ISER, ICER, ISPR, ICPR, IABR, IPR = (
+    SYSTEM[name] for name in ("ISER", "ICER", "ISPR", "ICPR", "IABR", "IPR")
+)
 SEEDS = 20
 
 
 class Rules:
-    """What is pending, active and enabled, in sets; no bits anywhere."""
+    """The rules, on sets of exceptions instead of bits."""
 
     def __init__(self, bits: int) -> None:
         self.bits = bits
@@ -26,14 +29,14 @@ class Rules:
         self.nested: list[int] = []
 
     def preempting(self, priority: int) -> int:
-        """A priority's group."""
+        """Group of a priority."""
         if priority < 0:
             return priority
         step = 2 ** (self.group + 1)
         return priority // step * step
 
     def running(self) -> int:
-        """Execution priority."""
+        """The execution priority."""
         candidates = [256, *(self.preempting(self.priority[each]) for each in self.nested)]
         if self.base:
             candidates.append(self.preempting(self.base))
@@ -44,19 +47,19 @@ class Rules:
         return min(candidates)
 
     def first(self) -> int:
-        """The pending exception that is next, 0 if none."""
+        """The next pending exception; 0: none."""
         ready = self.pending & self.enabled
         return min(ready, key=lambda each: (self.priority[each], each), default=0)
 
     def take(self) -> None:
-        """Enter the next exception if it may."""
+        """Enter the next exception if its priority allows."""
         number = self.first()
         if number and self.preempting(self.priority[number]) < self.running():
             self.pending.discard(number)
             self.nested.append(number)
 
     def leave(self) -> None:
-        """Return from the handler; another may follow at once."""
+        """Return from the handler; another may be tail-chained."""
         number = self.nested.pop()
         if number != NMI:
             self.fault_masked = False
@@ -65,14 +68,13 @@ class Rules:
         self.take()
 
     def line(self, number: int, level: bool) -> None:
-        """Set a line."""
         if level and number not in self.high:
             self.pending.add(number)
         (self.high.add if level else self.high.discard)(number)
 
 
 def one_action(chance: random.Random, bench: Bench, rules: Rules) -> None:
-    """Do the same to both."""
+    """Do the same on both."""
     kind = chance.choice(
         ["line"] * 3
         + ["pend"] * 3
@@ -91,7 +93,7 @@ def one_action(chance: random.Random, bench: Bench, rules: Rules) -> None:
         if chance.random() < 0.5:
             bench.write(ISPR + word, bit)
         else:
-            bench.write(STIR, interrupt)
+            bench["STIR"] = interrupt
         rules.pending.add(number)
     elif kind == "enable":
         bench.write(ISER + word, bit | 1)
@@ -108,13 +110,13 @@ def one_action(chance: random.Random, bench: Bench, rules: Rules) -> None:
         bench.write(IPR + interrupt, value, 1)
         if number not in rules.nested:
             rules.priority[number] = value >> (8 - rules.bits) << (8 - rules.bits)
-        else:  # of an active exception: the order of the nested ones must stay sane
+        else:  # an active exception keeps its priority: the nesting must stay consistent
             bench.write(IPR + interrupt, rules.priority[number], 1)
     elif kind == "group":
         if not rules.nested:
             rules.group = chance.randrange(8)
-            bench.write(AIRCR, 0x05FA0000 | rules.group << 8)
-            bench.write(AIRCR, 0x12340000)  # without the key: nothing
+            bench["AIRCR"] = 0x05FA0000 | rules.group << 8
+            bench["AIRCR"] = 0x12340000  # ignored without the key
     elif kind == "base":
         rules.base = chance.choice([0, 0, chance.randrange(256)])
         rules.base = rules.base >> (8 - rules.bits) << (8 - rules.bits)
@@ -128,11 +130,11 @@ def one_action(chance: random.Random, bench: Bench, rules: Rules) -> None:
             bench["faultmask"] = rules.fault_masked
     elif kind == "system":
         number = chance.choice([NMI, PEND_SV, SYSTICK])
-        bench.write(ICSR, 1 << {NMI: 31, PEND_SV: 28, SYSTICK: 26}[number])
+        bench["ICSR"] = 1 << {NMI: 31, PEND_SV: 28, SYSTICK: 26}[number]
         rules.pending.add(number)
         if not rules.nested:
             rules.priority[PEND_SV] = chance.randrange(256) >> (8 - rules.bits) << (8 - rules.bits)
-            bench.write(SHPR3, rules.priority[PEND_SV] << 16)
+            bench["SHPR3"] = rules.priority[PEND_SV] << 16
     elif kind == "service":
         bench.service()
         rules.take()
@@ -155,7 +157,7 @@ def test_random_sequences_follow_the_rules(seed):
         assert bench.ipsr == (rules.nested[-1] if rules.nested else 0)
         running = bench["priority"]
         assert running - (1 << 32) * (running >> 31) == rules.running()
-        assert bench.read(ICSR) >> 12 & 0x1FF == rules.first()
+        assert bench["ICSR"] >> 12 & 0x1FF == rules.first()
         pending = bench.read(ISPR) | bench.read(ISPR + 4) << 32
         assert pending == sum(1 << each - FIRST for each in rules.pending if each >= FIRST)
         active = bench.read(IABR) | bench.read(IABR + 4) << 32
@@ -163,7 +165,7 @@ def test_random_sequences_follow_the_rules(seed):
     assert not bench["locked"]
 
 
-def test_registers_of_interrupts_that_are_not_there_read_zero():
+def test_registers_of_unimplemented_interrupts_read_zero():
     bench = Bench()
     for address in (ISER, ISER + 4, ISER + 8, ISPR + 4):
         bench.write(address, 0xFFFFFFFF)
@@ -177,7 +179,7 @@ def test_registers_of_interrupts_that_are_not_there_read_zero():
     assert bench.read(0xE000E004) == 1  # ICTR
 
 
-def test_a_line_that_stays_high_pends_again_when_its_handler_ends():
+def test_line_that_stays_high_pends_again_at_the_end_of_its_handler():
     bench = Bench()
     bench.write(ISER, 1 << 5)
     bench.line(5, True)

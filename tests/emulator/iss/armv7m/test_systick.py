@@ -1,4 +1,4 @@
-"""SysTick, computed when asked, against a counter that is stepped cycle by cycle (B3.3)."""
+"""SysTick against a counter that is stepped cycle by cycle (B3.3)."""
 
 from dataclasses import dataclass, replace
 
@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .bench import ICSR, SYSTICK, Bench
+from .bench import SYSTEM, Bench
 
-CSR, RVR, CVR, CALIB = (SYSTICK + 4 * n for n in range(4))
+CSR, RVR, CVR, CALIB = (SYSTEM["SYSTICK"] + 4 * n for n in range(4))
 REFERENCE = (7, 2)  # 7 core cycles are 2 of its ticks
 
 
 @dataclass
 class Counter:
-    """The counter as the manual tells it."""
+    """The counter as the manual describes it."""
 
     control: int = 0
     reload: int = 0
@@ -23,7 +23,6 @@ class Counter:
     pending: bool = False
 
     def tick(self) -> None:
-        """One tick of its clock."""
         if not self.control & 1:
             return
         if self.value == 0:
@@ -35,14 +34,13 @@ class Counter:
             self.pending |= bool(self.control & 2)
 
     def cycle(self, now: int) -> None:
-        """From the cycle ``now`` to the next."""
+        """Pass one core cycle, the one that begins at ``now``."""
         cycles, ticks = REFERENCE
         by_core = self.control & 4
         if by_core or (now + 1) * ticks // cycles > now * ticks // cycles:
             self.tick()
 
     def csr(self) -> int:
-        """Read CSR."""
         value = self.control | self.flag << 16
         self.flag = False
         return value
@@ -60,7 +58,7 @@ ACTIONS = st.one_of(
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(ACTIONS, max_size=60))
-def test_it_counts_as_a_counter_that_is_stepped(actions):
+def test_counts_like_a_stepped_counter(actions):
     bench = Bench(reference=REFERENCE)
     bench["primask"] = 1  # pending, but not taken
     counter = Counter()
@@ -87,9 +85,9 @@ def test_it_counts_as_a_counter_that_is_stepped(actions):
             bench.write(CVR, argument)
             counter.value, counter.flag = 0, False
         else:
-            bench.write(ICSR, 1 << 25)
+            bench["ICSR"] = 1 << 25
             counter.pending = False
-        assert bool(bench.read(ICSR) >> 26 & 1) == counter.pending
+        assert bool(bench["ICSR"] >> 26 & 1) == counter.pending
         ahead = replace(counter, pending=False)
         for cycle in range(bench.cycles, bench.cycles + 80):
             ahead.cycle(cycle)
@@ -113,13 +111,13 @@ def test_long_periods_wrap_at_their_cycle():
     bench.cycles += 1
     bench.service()
     assert bench.ipsr == 15
-    bench.cycles = start + 5 * (1 << 24) + 3  # many wraps at once
+    bench.cycles = start + 5 * (1 << 24) + 3  # several wraps at once
     assert bench.read(CSR) == 7 | 1 << 16
     assert bench.read(CVR) == (1 << 24) - 3
 
 
 @pytest.mark.parametrize(("reference", "source"), [((0, 1), 4), (REFERENCE, 0)])
-def test_without_reference_clock_the_source_reads_one(reference, source):
+def test_clksource_reads_one_without_reference_clock(reference, source):
     bench = Bench(reference=reference)
     bench.write(CSR, 0)
     assert bench.read(CSR) == source

@@ -1,19 +1,19 @@
 """Assembles small Thumb programs, so that most tests need no tool chain.
 
-Encodings: ARMv7-M Architecture Reference Manual (DDI 0403), A7.7. Only what the tests of the
-system need; labels are resolved when the program is complete.
+Encodings: ARMv7-M Architecture Reference Manual (DDI 0403), A7.7, as far as tests need them. Labels
+are resolved when the program is complete.
 """
 
 import struct
 
 UNEXPECTED = 0xFF00
-"""Where vectors lead that no handler was written for: a BKPT, so to a lock-up in the end."""
+"""Address of vectors without a handler: a BKPT, which ends in a lock-up."""
 
 
 class Program:
-    """Code of a 64 kB memory at address 0: vectors first, then what the methods append.
+    """A 64 kB memory at address 0: vectors, then the code that the methods append.
 
-    Every instruction's method returns the instruction's address.
+    Methods for instructions have the names of the mnemonics and return the instruction's address.
     """
 
     def __init__(self, stack: int = 0x2000_8000, start: int = 0x400) -> None:
@@ -26,35 +26,27 @@ class Program:
         self.vector(1, start | 1)
 
     def vector(self, exception: int, value: int) -> None:
-        """Write an entry of the vector table."""
         struct.pack_into("<I", self.image, 4 * exception, value)
 
     def handler(self, exception: int, at: int | None = None) -> int:
-        """The exception's handler begins here."""
+        """Begin the exception's handler, at the current address or ``at``."""
         self.at = self.at if at is None else at
         self.vector(exception, self.at | 1)
         return self.at
 
     def half(self, *halves: int) -> int:
-        """Append half-words as they are."""
         address = self.at
         for value in halves:
             struct.pack_into("<H", self.image, self.at, value)
             self.at += 2
         return address
 
-    def word(self, value: int) -> int:
-        """Append a word of data, aligned."""
-        self.at = (self.at + 3) & ~3
-        return self.half(value & 0xFFFF, value >> 16)
-
     def label(self, name: str) -> int:
-        """Name the next address."""
         self.labels[name] = self.at
         return self.at
 
     def finish(self) -> bytes:
-        """Resolve branches; the image."""
+        """Resolve branches and return the image."""
         for address, name, condition in self._branches:
             offset = self.labels[name] - (address + 4)
             if condition == 14:
@@ -65,10 +57,8 @@ class Program:
         self._branches.clear()
         return bytes(self.image)
 
-    # data processing
-
     def load(self, register: int, value: int) -> int:
-        """Any 32-bit constant: MOVW and MOVT."""
+        """Load any constant, by MOVW and MOVT."""
         address = self.at
         for opcode, part in ((0xF240, value & 0xFFFF), (0xF2C0, value >> 16)):
             i, imm3, imm4 = part >> 11 & 1, part >> 8 & 7, part >> 12
@@ -76,102 +66,65 @@ class Program:
         return address
 
     def movs(self, register: int, value: int) -> int:
-        """MOVS Rd, #imm8."""
         return self.half(0x2000 | register << 8 | value)
 
-    def mov(self, to: int, register: int) -> int:
-        """MOV Rd, Rm."""
-        return self.half(0x4600 | (to & 8) << 4 | register << 3 | to & 7)
-
     def adds(self, register: int, value: int) -> int:
-        """ADDS Rdn, #imm8."""
         return self.half(0x3000 | register << 8 | value)
 
-    def subs(self, register: int, value: int) -> int:
-        """SUBS Rdn, #imm8."""
-        return self.half(0x3800 | register << 8 | value)
-
     def udiv(self, to: int, dividend: int, divisor: int) -> int:
-        """UDIV Rd, Rn, Rm."""
         return self.half(0xFBB0 | dividend, 0xF0F0 | to << 8 | divisor)
 
-    # memory
-
     def ldr(self, register: int, base: int, offset: int = 0) -> int:
-        """LDR Rt, [Rn, #offset] of low registers."""
         return self.half(0x6800 | offset >> 2 << 6 | base << 3 | register)
 
     def str(self, register: int, base: int, offset: int = 0) -> int:
-        """STR Rt, [Rn, #offset] of low registers."""
         return self.half(0x6000 | offset >> 2 << 6 | base << 3 | register)
 
     def strb(self, register: int, base: int) -> int:
-        """STRB Rt, [Rn] of low registers."""
         return self.half(0x7000 | base << 3 | register)
 
     def push(self, *registers: int) -> int:
-        """PUSH of low registers and LR (14)."""
-        return self.half(0xB400 | self._list(registers, 14))
-
-    def pop(self, *registers: int) -> int:
-        """POP of low registers and PC (15)."""
-        return self.half(0xBC00 | self._list(registers, 15))
-
-    @staticmethod
-    def _list(registers: tuple[int, ...], high: int) -> int:
-        return sum(1 << (8 if register == high else register) for register in registers)
-
-    # flow
+        """Low registers and LR (14)."""
+        return self.half(0xB400 | sum(1 << min(register, 8) for register in registers))
 
     def b(self, name: str, condition: int = 14) -> int:
-        """B, with a condition's number (0 is EQ, 1 NE)."""
+        """Branch; ``condition`` is the number in the encoding (0 EQ, 1 NE, 14 always)."""
         self._branches.append((self.at, name, condition))
         return self.half(0)
 
     def bx(self, register: int = 14) -> int:
-        """BX Rm."""
         return self.half(0x4700 | register << 3)
 
     def forever(self) -> int:
-        """A branch to itself."""
+        """Branch to itself."""
         return self.half(0xE7FE)
 
-    # system
-
     def nop(self, count: int = 1) -> int:
-        """NOPs."""
         return self.half(*[0xBF00] * count)
 
     def svc(self, number: int = 0) -> int:
-        """SVC #imm8."""
         return self.half(0xDF00 | number)
 
     def bkpt(self, number: int = 0) -> int:
-        """BKPT #imm8."""
         return self.half(0xBE00 | number)
 
     def wfi(self) -> int:
-        """WFI."""
         return self.half(0xBF30)
 
     def wfe(self) -> int:
-        """WFE."""
         return self.half(0xBF20)
 
     def sev(self) -> int:
-        """SEV."""
         return self.half(0xBF40)
 
     def cps(self, enable: bool, fault: bool = False) -> int:
-        """CPSIE or CPSID, i or f."""
+        """CPSIE or CPSID, of PRIMASK or FAULTMASK."""
         return self.half(0xB660 | (not enable) << 4 | (1 if fault else 2))
 
     def msr(self, special: str, register: int) -> int:
-        """MSR special, Rn."""
         return self.half(0xF380 | register, 0x8800 | _SPECIAL[special])
 
     def mrs(self, register: int, special: str) -> int:
-        """MRS Rd, special."""
         return self.half(0xF3EF, 0x8000 | register << 8 | _SPECIAL[special])
 
     def poke(self, address: int, value: int, by: tuple[int, int] = (6, 7)) -> int:
