@@ -1,6 +1,7 @@
 """A machine whose registers are read and written by name, over its bus."""
 
 import shutil
+import struct
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -22,7 +23,7 @@ _ENTRY = 0x100
 
 @cache
 def address_of(name: str) -> int:
-    """Of "CMU.STATUS"."""
+    """Address of a register like "CMU.STATUS"."""
     unit, register = name.split(".")
     for layout in LAYOUTS:
         for instance in layout.instances:
@@ -33,7 +34,7 @@ def address_of(name: str) -> int:
 
 @cache
 def mask_of(name: str) -> int:
-    """Of "CMU.STATUS.HFXORDY"; the instance is that of an only one or of any."""
+    """Mask of a field like "CMU.STATUS.HFXORDY", by the name of the layout or an instance."""
     unit, register, field = name.split(".")
     for layout in LAYOUTS:
         if unit in (layout.name, *(instance.name for instance in layout.instances)):
@@ -42,7 +43,7 @@ def mask_of(name: str) -> int:
 
 
 class Bench:
-    """A machine that runs ``code``, half-words from 0x100 on; without, a loop on the spot."""
+    """A machine that runs ``code``, half-words at 0x100; by default a branch to itself."""
 
     def __init__(self, *code: int, image: bytes | None = None, external_bytes: int = 0) -> None:
         self.machine = Machine(external_bytes=external_bytes)
@@ -69,7 +70,7 @@ class Bench:
         assert self.machine.write(address_of(name), value)
 
     def peek(self, name: str) -> int:
-        """A register as a debugger sees it: no time passes."""
+        """Read a register as a debugger: without side effects."""
         return int.from_bytes(self.machine.peek(address_of(name), 4), "little")
 
     def is_set(self, field: str) -> bool:
@@ -77,12 +78,18 @@ class Bench:
         return bool(self[field.rpartition(".")[0]] & mask_of(field))
 
     def set(self, *fields: str) -> None:
-        """Set fields to all ones; the others stay."""
+        """Set fields to all ones; others keep their values."""
         for field in fields:
             self[field.rpartition(".")[0]] |= mask_of(field)
 
+    def load(self, unit: str, **registers: int) -> "Bench":
+        """Write registers of a unit in this order."""
+        for name, value in registers.items():
+            self[f"{unit}.{name}"] = value
+        return self
+
     def command(self, field: str) -> None:
-        """Write nothing but this field's ones."""
+        """Write a register with only this field set."""
         self[field.rpartition(".")[0]] = mask_of(field)
 
     @property
@@ -90,7 +97,7 @@ class Bench:
         return self.machine.now_ps
 
     def run_until(self, time_ps: int) -> None:
-        """Run, and collect what comes out."""
+        """Run and collect messages."""
         for _ in range(100_000):
             done = self.machine.now_ps >= time_ps
             if not done:
@@ -104,18 +111,35 @@ class Bench:
         self.run_until(self.now + ps)
 
     def out(self, kind: Kind) -> list[Outgoing]:
-        """What came out of this kind since the last time."""
+        """Remove and return the messages of a kind."""
         self.items += self.machine.outbox()
         found = [item for item in self.items if item.kind is kind]
         self.items = [item for item in self.items if item.kind is not kind]
         return found
 
+    def pins(self, pin: int | None = None) -> list[tuple[int, int, int]]:
+        """Time, pin and level of the changes of one pin or all."""
+        items = self.out(Kind.PIN)
+        return [(one.time_ps, one.unit, one.value) for one in items if pin in (None, one.unit)]
+
+    def pending(self) -> list[int]:
+        """Numbers of the pending interrupts."""
+        words = [self.machine.read(0xE000_E200 + 4 * n) or 0 for n in range(2)]
+        return [n for n in range(64) if words[n // 32] >> n % 32 & 1]
+
+    def dma(self, channel: int, request: int, *descriptor: int) -> None:
+        """Enable a channel: source end, target end and control word of its descriptor."""
+        self.clock("DMA")
+        self.machine.poke(0x2000_0400 + 16 * channel, struct.pack("<4I", *descriptor, 0))
+        self.load("DMA", CTRLBASE=0x2000_0400, CONFIG=1)
+        self[f"DMA.CH{channel}_CTRL"] = request
+        self["DMA.CHENS"] = 1 << channel
+
     def log(self) -> str:
-        """Texts of the log."""
         return "\n".join(item.text for item in self.out(Kind.LOG))
 
     def clock(self, *units: str) -> "Bench":
-        """Switch on clocks of peripherals, by field names of the enable registers."""
+        """Enable clocks of peripherals, by field names of the enable registers."""
         for unit in units:
             core = unit in ("DMA", "AES", "LE", "EBI")
             self.set(f"CMU.{'HFCORECLKEN0' if core else 'HFPERCLKEN0'}.{unit}")
@@ -123,10 +147,10 @@ class Bench:
 
 
 def asleep(mode: int = 1, interrupts: bool = True) -> Bench:
-    """A part that sleeps in EM1 or EM2, and again after every interrupt, of which none is served.
+    """A part that sleeps in EM1 or EM2, and again after every interrupt; none is served.
 
-    Its registers can be reached. ``interrupts`` are enabled in the NVIC and masked in the core, so
-    that they wake it; without them its time is exact, as no instruction is in the way.
+    Its registers can be accessed. ``interrupts`` are enabled in the NVIC but masked in the core, so
+    that they wake it; without them its times are exact, as no instruction delays them.
     """
     bench = Bench(0xB672, WFI, 0xE7FD)  # CPSID i; loop: WFI
     bench.machine.reset(POWER_ON)
@@ -137,7 +161,7 @@ def asleep(mode: int = 1, interrupts: bool = True) -> Bench:
     ):
         bench.machine.write(address, value)
     if mode == 2:
-        bench.command("CMU.OSCENCMD.LFRCOEN")  # without an oscillator it is EM3
+        bench.command("CMU.OSCENCMD.LFRCOEN")  # without an oscillator EM2 is EM3
     bench.run_for(START_UP + 200 * US)
     assert bench.machine.energy_mode == mode
     return bench
@@ -186,7 +210,7 @@ SECTIONS {
 
 
 def compiled(source: str, folder: Path) -> bytes:
-    """A program's image: ``main``, and ``IRQ`` for all interrupts if it is there."""
+    """Image of a program with ``main``, and optionally ``IRQ`` for all interrupts."""
     assert COMPILER is not None
     (folder / "efm32gg.h").write_text(c_header(LAYOUTS))
     (folder / "program.c").write_text(_START + source)

@@ -11,7 +11,7 @@ from .bench import MS, US, Bench, S, mask_of
 HFXO, LFRCO, LFXO = 2, 3, 4
 
 
-def test_the_part_starts_on_14_mhz() -> None:
+def test_part_starts_at_14_mhz() -> None:
     bench = Bench()
     assert bench.machine.hz == 14_000_000
     assert bench["CMU.STATUS"] == 0x403
@@ -21,7 +21,7 @@ def test_the_part_starts_on_14_mhz() -> None:
     ("band", "hz"),
     [(0, 1_200_000), (1, 6_600_000), (2, 11_000_000), (3, 14_000_000), (4, 21_000_000)],
 )
-def test_bands_of_the_hfrco(band: int, hz: int) -> None:
+def test_hfrco_bands(band: int, hz: int) -> None:
     bench = Bench()
     bench["CMU.HFRCOCTRL"] = band << 8 | 0x80
     assert bench.machine.hz == hz
@@ -36,7 +36,7 @@ def test_bands_of_the_hfrco(band: int, hz: int) -> None:
         ("AUXHFRCO", US * 6 // 10, "AUXHFRCORDY"),
     ],
 )
-def test_an_oscillator_is_ready_after_its_start_up(name: str, start_ps: int, flag: str) -> None:
+def test_oscillator_is_ready_after_its_start_up_time(name: str, start_ps: int, flag: str) -> None:
     bench = Bench()
     began = bench.now
     bench.command(f"CMU.OSCENCMD.{name}EN")
@@ -51,7 +51,7 @@ def test_an_oscillator_is_ready_after_its_start_up(name: str, start_ps: int, fla
     assert not bench.is_set(f"CMU.STATUS.{name}RDY")
 
 
-def test_selecting_a_clock_that_starts_holds_the_core_until_then() -> None:
+def test_selecting_a_starting_clock_stops_the_core_until_it_runs() -> None:
     bench = Bench()
     bench["MSC.READCTRL"] = 4
     bench.command("CMU.OSCENCMD.HFXOEN")
@@ -66,14 +66,14 @@ def test_selecting_a_clock_that_starts_holds_the_core_until_then() -> None:
     assert bench.machine.instructions - count > 1000
 
 
-def test_selecting_a_clock_that_is_off_is_reported_and_changes_nothing() -> None:
+def test_selecting_a_disabled_clock_is_reported_and_ignored() -> None:
     bench = Bench()
     bench["CMU.CMD"] = LFXO
     assert bench.is_set("CMU.STATUS.HFRCOSEL")
     assert "HFCLKSEL" in bench.log()
 
 
-def test_the_oscillator_of_the_core_can_not_be_switched_off() -> None:
+def test_oscillator_of_the_core_cannot_be_switched_off() -> None:
     bench = Bench()
     bench.command("CMU.OSCENCMD.HFRCODIS")
     assert bench.is_set("CMU.STATUS.HFRCORDY")
@@ -92,8 +92,7 @@ def test_locked_registers_keep_their_values() -> None:
     bench = Bench()
     bench["CMU.LOCK"] = 0
     assert bench["CMU.LOCK"] == 1
-    bench["CMU.HFPERCLKEN0"] = 1
-    bench["CMU.LFACLKEN0"] = 1
+    bench.load("CMU", HFPERCLKEN0=1, LFACLKEN0=1)
     assert (bench["CMU.HFPERCLKEN0"], bench["CMU.LFACLKEN0"]) == (0, 0)
     bench["CMU.LOCK"] = 0x580E
     assert bench["CMU.LOCK"] == 0
@@ -115,12 +114,11 @@ def test_low_frequency_registers_wait_for_their_clock() -> None:
     assert bench["CMU.SYNCBUSY"] == 0
 
 
-def test_freeze_holds_low_frequency_registers_back() -> None:
+def test_freeze_delays_low_frequency_registers() -> None:
     bench = Bench()
     bench.command("CMU.OSCENCMD.LFRCOEN")
     bench.run_for(200 * US)
-    bench["CMU.FREEZE"] = 1
-    bench["CMU.LFACLKEN0"] = 2
+    bench.load("CMU", FREEZE=1, LFACLKEN0=2)
     bench.run_for(MS)
     assert bench["CMU.SYNCBUSY"] == 1
     bench["CMU.FREEZE"] = 0
@@ -142,7 +140,7 @@ def test_calibration_counts_one_clock_by_another(count: int) -> None:
     assert bench["CMU.CALCNT"] == (count + 1) * 14_000_000 // 32768
 
 
-def test_too_few_wait_states_are_reported_by_name() -> None:
+def test_too_few_wait_states_are_reported() -> None:
     bench = Bench()
     bench["MSC.READCTRL"] = 0
     assert bench.log() == ""
@@ -170,7 +168,7 @@ def test_time_is_exact_over_clock_changes(steps: list[tuple[int, int, int, int, 
     bands = [1_200_000, 6_600_000, 11_000_000, 14_000_000, 21_000_000]
 
     def check() -> None:
-        """Every cycle so far has taken its period; a change rounds down by less than 1 ps."""
+        """Each cycle took its period; a clock change rounds down by less than 1 ps."""
         nonlocal low, high, cycles
         passed = (bench.machine.cycles - cycles) * S / hz
         low, high, cycles = low + passed - 1, high + passed, bench.machine.cycles

@@ -36,8 +36,7 @@ def describe(machine: Machine, channel: int, source_end: int, target_end: int, w
 
 def dma(channels: int = 1) -> Bench:
     bench = asleep(1, interrupts=False).clock("DMA")
-    bench["DMA.CTRLBASE"] = BASE
-    bench["DMA.CONFIG"] = 1
+    bench.load("DMA", CTRLBASE=BASE, CONFIG=1)
     bench.machine.poke(DATA, bytes(range(256)))
     return bench
 
@@ -50,11 +49,10 @@ def left(bench: Bench, channel: int = 0, base: int = BASE) -> int:
     return words(bench, base + 16 * channel + 8, 1)[0]
 
 
-def test_an_automatic_transfer_copies_and_stops() -> None:
+def test_automatic_transfer_copies_and_stops() -> None:
     bench = dma()
     describe(bench.machine, 0, DATA + 4 * 31, TARGET + 4 * 31, control(AUTO, 32, power=3))
-    bench["DMA.CHENS"] = 1
-    bench["DMA.CHSWREQ"] = 1
+    bench.load("DMA", CHENS=1, CHSWREQ=1)
     bench.run_for(100 * US)
     assert words(bench, TARGET, 32) == words(bench, DATA, 32)
     assert words(bench, TARGET + 128, 1) == [0]
@@ -64,21 +62,20 @@ def test_an_automatic_transfer_copies_and_stops() -> None:
 
 
 @pytest.mark.parametrize("size", [BYTES, HALVES, WORDS])
-def test_sizes_and_steps(size: int) -> None:
+def test_item_sizes_and_increments(size: int) -> None:
     bench = dma()
     width = 1 << size
     describe(
         bench.machine, 0, DATA + 7 * width, TARGET + 7 * 4, control(AUTO, 8, size, 10, target=WORDS)
     )
-    bench["DMA.CHENS"] = 1
-    bench["DMA.CHSWREQ"] = 1
+    bench.load("DMA", CHENS=1, CHSWREQ=1)
     bench.run_for(100 * US)
     data = bench.machine.peek(DATA, 8 * width)
     expected = [int.from_bytes(data[n : n + width], "little") for n in range(0, 8 * width, width)]
     assert words(bench, TARGET, 8) == expected
 
 
-def test_a_basic_transfer_moves_2_to_the_r_items_a_request() -> None:
+def test_basic_transfer_moves_2_to_the_r_items_per_request() -> None:
     bench = dma()
     describe(bench.machine, 2, DATA + 4 * 9, TARGET + 4 * 9, control(BASIC, 10, power=2))
     bench["DMA.CHENS"] = 4
@@ -96,20 +93,17 @@ def test_a_basic_transfer_moves_2_to_the_r_items_a_request() -> None:
 def receiver() -> Bench:
     bench = dma().clock("UART0", "GPIO")
     bench["GPIO.PF_MODEL"] = 4 << 24 | 1 << 28
-    bench["UART0.ROUTE"] = 3
-    bench["UART0.CMD"] = 5
+    bench.load("UART0", ROUTE=3, CMD=5)
     return bench
 
 
-def test_a_uart_receives_by_ping_pong() -> None:
+def test_uart_receives_by_ping_pong() -> None:
     bench = receiver()
     machine = bench.machine
     word = control(PING_PONG, 4, BYTES, source=FIXED)
     describe(machine, 0, RXDATA, TARGET + 3, word)
     describe(machine, 0, RXDATA, TARGET + 7, word, ALTERNATE)
-    bench["DMA.CH0_CTRL"] = UART0_RX
-    bench["DMA.IEN"] = 1
-    bench["DMA.CHENS"] = 1
+    bench.load("DMA", CH0_CTRL=UART0_RX, IEN=1, CHENS=1)
     received = []
     for byte in range(20):
         machine.uart_receive(UART0, 0x40 + byte)
@@ -133,8 +127,7 @@ def test_ping_pong_ends_at_a_descriptor_that_was_not_renewed() -> None:
     word = control(PING_PONG, 1, BYTES, source=FIXED)
     describe(bench.machine, 0, RXDATA, TARGET, word)
     describe(bench.machine, 0, RXDATA, TARGET + 1, word, ALTERNATE)
-    bench["DMA.CH0_CTRL"] = UART0_RX
-    bench["DMA.CHENS"] = 1
+    bench.load("DMA", CH0_CTRL=UART0_RX, CHENS=1)
     for _ in range(3):
         bench.machine.uart_receive(UART0, 0x55)
         bench.run_for(20 * US)
@@ -142,26 +135,23 @@ def test_ping_pong_ends_at_a_descriptor_that_was_not_renewed() -> None:
     assert bench.is_set("UART0.STATUS.RXDATAV")
 
 
-def test_a_uart_sends_a_text_without_the_core() -> None:
+def test_uart_sends_text_by_dma() -> None:
     bench = receiver()
     text = b"Hello from the DMA"
     bench.machine.poke(DATA, text)
     describe(
         bench.machine, 1, DATA + len(text) - 1, TXDATA, control(BASIC, len(text), BYTES, target=3)
     )
-    bench["DMA.CH1_CTRL"] = UART0_TX
-    bench["DMA.CHENS"] = 2
+    bench.load("DMA", CH1_CTRL=UART0_TX, CHENS=2)
     bench.run_for(len(text) * 10 * 17 * S // HZ)
     assert bytes(item.value for item in bench.out(Kind.UART)) == text
     assert bench["DMA.IF"] == 2
 
 
-def test_a_masked_request_waits() -> None:
+def test_masked_request_waits() -> None:
     bench = receiver()
     describe(bench.machine, 0, RXDATA, TARGET, control(BASIC, 1, BYTES, source=FIXED))
-    bench["DMA.CH0_CTRL"] = UART0_RX
-    bench["DMA.CHREQMASKS"] = 1
-    bench["DMA.CHENS"] = 1
+    bench.load("DMA", CH0_CTRL=UART0_RX, CHREQMASKS=1, CHENS=1)
     bench.machine.uart_receive(UART0, 0x55)
     bench.run_for(20 * US)
     assert bench["DMA.CHREQSTATUS"] == 1
@@ -171,7 +161,7 @@ def test_a_masked_request_waits() -> None:
     assert bench["DMA.IF"] == 1
 
 
-def test_memory_scatter_gather_follows_its_list() -> None:
+def test_memory_scatter_gather() -> None:
     bench = dma()
     tasks = 0x2000_3000
     list_of = [
@@ -181,8 +171,7 @@ def test_memory_scatter_gather_follows_its_list() -> None:
     ]
     bench.machine.poke(tasks, b"".join(struct.pack("<4I", *task, 0) for task in list_of))
     describe(bench.machine, 0, tasks + 16 * 3 - 4, ALTERNATE + 12, control(MEMORY, 12, WORDS, 2))
-    bench["DMA.CHENS"] = 1
-    bench["DMA.CHSWREQ"] = 1
+    bench.load("DMA", CHENS=1, CHSWREQ=1)
     bench.run_for(100 * US)
     machine = bench.machine
     assert machine.peek(TARGET, 4) == bytes(range(4))
@@ -201,8 +190,7 @@ def test_peripheral_scatter_gather_waits_for_requests() -> None:
     ]
     bench.machine.poke(tasks, b"".join(struct.pack("<4I", *task, 0) for task in list_of))
     describe(bench.machine, 0, tasks + 16 * 2 - 4, ALTERNATE + 12, control(PERIPHERAL, 8, WORDS, 2))
-    bench["DMA.CH0_CTRL"] = UART0_RX
-    bench["DMA.CHENS"] = 1
+    bench.load("DMA", CH0_CTRL=UART0_RX, CHENS=1)
     for byte in (0x11, 0x22, 0x33, 0x44):
         assert bench["DMA.IF"] == 0
         bench.machine.uart_receive(UART0, byte)
@@ -213,15 +201,14 @@ def test_peripheral_scatter_gather_waits_for_requests() -> None:
 
 
 @pytest.mark.parametrize("bad", ["source", "target", "descriptor"])
-def test_a_bus_error_ends_the_channel_and_is_told(bad: str) -> None:
+def test_bus_error_disables_the_channel_and_sets_error(bad: str) -> None:
     bench = dma()
     source = 0x6000_0000 if bad == "source" else DATA
     target = 0x6000_0000 if bad == "target" else TARGET
     describe(bench.machine, 0, source, target, control(AUTO, 1))
     if bad == "descriptor":
         bench["DMA.CTRLBASE"] = 0x6000_0000
-    bench["DMA.CHENS"] = 1
-    bench["DMA.CHSWREQ"] = 1
+    bench.load("DMA", CHENS=1, CHSWREQ=1)
     bench.run_for(20 * US)
     assert bench["DMA.IF"] & 1 << 31
     assert bench["DMA.ERRORC"] == 1
@@ -230,16 +217,14 @@ def test_a_bus_error_ends_the_channel_and_is_told(bad: str) -> None:
     assert bench["DMA.ERRORC"] == 0
 
 
-def test_high_priority_goes_first() -> None:
+def test_high_priority_is_served_first() -> None:
     bench = dma()
     for channel in (0, 1):
         describe(
             bench.machine, channel, DATA + 4 * 255, TARGET + 0x1000 * channel + 4 * 255,
             control(AUTO, 256),
         )  # fmt: skip
-    bench["DMA.CHPRIS"] = 2
-    bench["DMA.CHENS"] = 3
-    bench["DMA.CHSWREQ"] = 3
+    bench.load("DMA", CHPRIS=2, CHENS=3, CHSWREQ=3)
     for _ in range(1000):
         bench.run_for(US)
         if bench["DMA.IF"]:
@@ -247,7 +232,7 @@ def test_high_priority_goes_first() -> None:
     assert bench["DMA.IF"] == 2
 
 
-def test_nothing_moves_without_clock_or_enable() -> None:
+def test_no_transfer_without_clock_or_enable() -> None:
     for name in ("CMU.HFCORECLKEN0", "DMA.CONFIG"):
         bench = dma()
         describe(bench.machine, 0, DATA, TARGET, control(AUTO, 1))
@@ -259,7 +244,7 @@ def test_nothing_moves_without_clock_or_enable() -> None:
         assert words(bench, TARGET, 1) == [0]
 
 
-def test_the_primary_data_is_where_the_base_says() -> None:
+def test_base_of_primary_and_alternate_descriptors() -> None:
     bench = dma()
     bench["DMA.CTRLBASE"] = 0x2000_07FF
     assert bench["DMA.CTRLBASE"] == 0x2000_0600

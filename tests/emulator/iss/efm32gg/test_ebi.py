@@ -1,4 +1,4 @@
-"""External bus: who is selected, how wide, how long; the write buffer."""
+"""External bus: banks, widths, cycles; the write buffer."""
 
 import pytest
 
@@ -20,9 +20,7 @@ def ebi(
     """Bank 0 with 1 kB of memory; timing is set-up 1, strobe 2, hold 1; no idle cycle."""
     bench = Bench(external_bytes=1024).clock("EBI")
     bench["EBI.ADDRTIMING"], bench["EBI.RDTIMING"] = address, read
-    bench["EBI.WRTIMING"] = write
-    bench["EBI.ROUTE"] = 0x23 | 28 << 18
-    bench["EBI.CTRL"] = mode | 0x100 | control
+    bench.load("EBI", WRTIMING=write, ROUTE=0x23 | 28 << 18, CTRL=mode | 0x100 | control)
     return bench
 
 
@@ -36,7 +34,7 @@ def cost(bench: Bench, size: int, *, write: bool = False, address: int = BANK) -
 
 
 @pytest.mark.parametrize("mode", [D8A8, D16A16ALE, D8A24ALE, D16])
-def test_memory_is_there_in_all_widths(mode: int) -> None:
+def test_memory_access_in_all_modes_and_sizes(mode: int) -> None:
     machine = ebi(mode).machine
     assert machine.write(BANK + 4, 0x1234_5678)
     assert machine.write(BANK + 8, 0xABCD, 2)
@@ -63,18 +61,18 @@ def test_memory_is_there_in_all_widths(mode: int) -> None:
         (D16A16ALE, 4, 12),
     ],
 )
-def test_a_read_takes_its_transactions(mode: int, size: int, cycles: int) -> None:
+def test_cycles_of_a_read(mode: int, size: int, cycles: int) -> None:
     assert cost(ebi(mode), size) == cycles
 
 
-def test_a_strobe_takes_a_cycle_at_least_and_an_idle_cycle_follows() -> None:
+def test_strobe_takes_at_least_one_cycle_and_an_idle_cycle_follows() -> None:
     bench = ebi(D8A24ALE, address=0, read=0)
     assert cost(bench, 1) == 1 + 1
     bench = ebi(D8A24ALE, address=0, read=0, control=0)
     assert cost(bench, 1) == 1 + 1 + 1
 
 
-def test_the_write_buffer_takes_one_access() -> None:
+def test_write_buffer_holds_one_access() -> None:
     bench = ebi(D8A24ALE)
     assert cost(bench, 1, write=True) == 0
     assert bench.peek("EBI.STATUS") == 1
@@ -92,7 +90,7 @@ def test_individual_timing_and_mode_of_a_bank() -> None:
     assert cost(bench, 4, address=0x8400_0000) == 2 * (EBI_CYCLES_MAX + 1)
 
 
-def test_a_bank_that_is_off_is_a_bus_fault() -> None:
+def test_disabled_bank_is_a_bus_fault() -> None:
     bench = ebi()
     assert bench.machine.read(0x8400_0000) is None
     assert "bank 1" in bench.log()
@@ -101,7 +99,7 @@ def test_a_bank_that_is_off_is_a_bus_fault() -> None:
     assert not bench.machine.write(BANK, 0)
 
 
-def test_without_its_pins_the_memory_does_not_hear() -> None:
+def test_memory_is_not_accessed_without_pins() -> None:
     bench = ebi()
     bench["EBI.ROUTE"] = 0x3
     bench.machine.write(BANK, 0)

@@ -13,7 +13,7 @@ CPSID = 0xB672
 
 
 def sleeper(*, deep: bool = False) -> Bench:
-    """Sleeps whenever no interrupt is pending; it takes none. Pin A0 pends one."""
+    """A part that sleeps whenever no interrupt is pending, and serves none. Pin A0 pends one."""
     bench = Bench(CPSID, WFI, 0xE7FD)
     bench.clock("GPIO", "LE")
     bench["GPIO.PA_MODEL"] = 1
@@ -25,7 +25,7 @@ def sleeper(*, deep: bool = False) -> Bench:
 
 
 def fall_asleep(bench: Bench) -> None:
-    """What has kept it awake is over."""
+    """Clear the pending interrupt that keeps it awake."""
     bench.machine.pin(0, 0, 0)
     bench["GPIO.IFC"] = 1
     bench.machine.write(0xE000_E280, 2)
@@ -41,7 +41,7 @@ def modes(bench: Bench) -> list[int]:
     return [item.value for item in bench.out(Kind.SLEEP)]
 
 
-def test_wfi_is_energy_mode_1_and_its_clocks_go_on() -> None:
+def test_wfi_enters_em1_where_clocks_continue() -> None:
     bench = sleeper()
     cycles = bench.machine.cycles
     bench.run_for(MS)
@@ -51,7 +51,7 @@ def test_wfi_is_energy_mode_1_and_its_clocks_go_on() -> None:
 
 
 @pytest.mark.parametrize(("oscillator", "mode"), [("LFRCO", 2), (None, 3)])
-def test_deep_sleep_stops_the_clock_of_the_core(oscillator: str | None, mode: int) -> None:
+def test_deep_sleep_stops_the_core_clock(oscillator: str | None, mode: int) -> None:
     bench = sleeper(deep=True)
     wake(bench)
     if oscillator:
@@ -64,13 +64,13 @@ def test_deep_sleep_stops_the_clock_of_the_core(oscillator: str | None, mode: in
     assert bench.machine.cycles == cycles
     bench.machine.pin(0, 0, 1)
     bench.run_for(US)
-    assert bench.machine.cycles == cycles  # it starts its oscillator first
+    assert bench.machine.cycles == cycles  # the oscillator starts first
     bench.run_for(3 * US)
     assert bench.machine.cycles > cycles
     assert modes(bench) == [0]
 
 
-def test_the_part_awakes_on_the_hfrco() -> None:
+def test_part_wakes_on_the_hfrco() -> None:
     bench = sleeper(deep=True)
     wake(bench)
     bench["MSC.READCTRL"] = 4
@@ -85,7 +85,7 @@ def test_the_part_awakes_on_the_hfrco() -> None:
     assert bench.peek("CMU.STATUS") & 0x40F == 0x403
 
 
-def test_em2_can_be_blocked() -> None:
+def test_em2block_limits_sleep_to_em1() -> None:
     bench = sleeper(deep=True)
     wake(bench)
     bench["EMU.CTRL"] = 2
@@ -94,17 +94,15 @@ def test_em2_can_be_blocked() -> None:
     assert modes(bench) == [1]
 
 
-def test_the_emu_lock() -> None:
+def test_emu_lock() -> None:
     bench = Bench()
-    bench["EMU.LOCK"] = 0
-    bench["EMU.CTRL"] = 2
+    bench.load("EMU", LOCK=0, CTRL=2)
     assert (bench["EMU.LOCK"], bench["EMU.CTRL"]) == (1, 0)
-    bench["EMU.LOCK"] = 0xADE8
-    bench["EMU.CTRL"] = 2
+    bench.load("EMU", LOCK=0xADE8, CTRL=2)
     assert bench["EMU.CTRL"] == 2
 
 
-def test_em4_takes_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
+def test_em4_needs_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
     bench = Bench().clock("GPIO")
     bench["GPIO.PA_MODEL"] = 1
     bench["GPIO.EM4WUEN"] = bench["GPIO.EM4WUPOL"] = 1
@@ -112,7 +110,7 @@ def test_em4_takes_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
     for value in (2, 3, 2, 3, 3, 2, 3, 2, 3, 2, 3, 2, 3):
         bench["EMU.CTRL"] = value << 2
     bench.run_for(US)
-    assert modes(bench) == []  # broken once: eight of nine
+    assert modes(bench) == []  # the sequence was broken once: eight of nine writes
     bench["EMU.CTRL"] = 2 << 2
     bench.run_for(S)
     assert modes(bench) == [4]
@@ -130,7 +128,7 @@ def test_em4_takes_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
 # -- resets ----------------------------------------------------------------------------------------
 
 
-def test_causes_add_up_until_they_are_cleared() -> None:
+def test_reset_causes_accumulate_until_cleared() -> None:
     bench = Bench()
     assert bench["RMU.RSTCAUSE"] == POWER_ON
     bench.reset(PIN_RESET)
@@ -143,7 +141,7 @@ def test_causes_add_up_until_they_are_cleared() -> None:
     assert bench["RMU.RSTCAUSE"] == POWER_ON
 
 
-def test_a_reset_request_resets_registers_and_keeps_the_ram() -> None:
+def test_reset_request_resets_registers_but_not_the_ram() -> None:
     bench = Bench()
     bench.clock("GPIO")
     bench.machine.write(0x2000_0100, 0x1234_5678)
@@ -155,7 +153,7 @@ def test_a_reset_request_resets_registers_and_keeps_the_ram() -> None:
     assert bench.machine.read(0x2000_0100) == 0x1234_5678
 
 
-def test_a_lock_up_resets_unless_that_is_switched_off() -> None:
+def test_lock_up_resets_unless_disabled() -> None:
     undefined = 0xDE00
     bench = Bench(undefined)
     bench.out(Kind.RESET)
@@ -177,7 +175,7 @@ def test_a_lock_up_resets_unless_that_is_switched_off() -> None:
     assert bench.now == began + MS or bench.now - began < 2 * MS
 
 
-def test_the_first_instruction_comes_after_the_start_up() -> None:
+def test_first_instruction_runs_after_the_start_up_time() -> None:
     bench = Bench()
     bench.machine.reset(PIN_RESET)
     began, count = bench.now, bench.machine.instructions
@@ -190,7 +188,7 @@ def test_the_first_instruction_comes_after_the_start_up() -> None:
 # -- the watchdog ----------------------------------------------------------------------------------
 
 
-def dog(control: int) -> Bench:
+def watchdog(control: int) -> Bench:
     bench = Bench().clock("LE")
     bench["RMU.CMD"] = 1
     bench.out(Kind.RESET)
@@ -198,42 +196,42 @@ def dog(control: int) -> Bench:
     return bench
 
 
-def bitten(bench: Bench) -> bool:
+def watchdog_reset(bench: Bench) -> bool:
     return any(item.value == WATCHDOG for item in bench.out(Kind.RESET))
 
 
 @pytest.mark.parametrize("period", [0, 3, 7])
-def test_the_watchdog_bites_after_its_period(period: int) -> None:
-    bench = dog(1 | period << 8)
+def test_watchdog_resets_after_its_period(period: int) -> None:
+    bench = watchdog(1 | period << 8)
     bench.run_for(3 * MS)  # synchronised
     bench.run_for((8 << period) * MS - 2 * MS)
-    assert not bitten(bench)
+    assert not watchdog_reset(bench)
     bench.run_for(3 * MS)
-    assert bitten(bench)
+    assert watchdog_reset(bench)
     assert bench["RMU.RSTCAUSE"] == WATCHDOG
 
 
-def test_a_fed_watchdog_does_not_bite() -> None:
-    bench = dog(1 | 1 << 8)
+def test_cleared_watchdog_does_not_reset() -> None:
+    bench = watchdog(1 | 1 << 8)
     for _ in range(20):
         bench.run_for(10 * MS)
         bench["WDOG.CMD"] = 1
-    assert not bitten(bench)
+    assert not watchdog_reset(bench)
     bench.run_for(30 * MS)
-    assert bitten(bench)
+    assert watchdog_reset(bench)
 
 
-def test_a_locked_watchdog_can_not_be_stopped() -> None:
-    bench = dog(1 | 1 << 4)
+def test_locked_watchdog_cannot_be_stopped() -> None:
+    bench = watchdog(1 | 1 << 4)
     bench.run_for(4 * MS)
     bench["WDOG.CTRL"] = 0
     assert bench["WDOG.CTRL"] == 0x11
     bench.run_for(20 * MS)
-    assert bitten(bench)
+    assert watchdog_reset(bench)
 
 
-@pytest.mark.parametrize(("runs", "bites"), [(0, False), (1 << 3, True)])
-def test_in_deep_sleep_it_runs_if_it_shall(runs: int, bites: bool) -> None:
+@pytest.mark.parametrize(("runs", "resets"), [(0, False), (1 << 3, True)])
+def test_watchdog_runs_in_deep_sleep_if_configured(runs: int, resets: bool) -> None:
     bench = sleeper(deep=True)
     bench.out(Kind.RESET)
     wake(bench)
@@ -241,10 +239,10 @@ def test_in_deep_sleep_it_runs_if_it_shall(runs: int, bites: bool) -> None:
     bench.run_for(4 * MS)
     fall_asleep(bench)
     bench.run_for(S)
-    assert bitten(bench) is bites
+    assert watchdog_reset(bench) is resets
 
 
-def test_the_watchdog_on_a_crystal_is_exact() -> None:
+def test_watchdog_period_on_the_crystal() -> None:
     bench = Bench().clock("LE")
     bench.command("CMU.OSCENCMD.LFXOEN")
     bench.run_for(1401 * MS)

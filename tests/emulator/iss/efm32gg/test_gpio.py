@@ -1,10 +1,8 @@
-"""Pins: modes, pulls, outputs, locks, pin interrupts; the reflex system."""
+"""Pins: modes, pulls, outputs, locks, interrupts; the peripheral reflex system (PRS)."""
 
 from itertools import pairwise
 
 import pytest
-
-from cubestack.emulator.iss.outcome import Kind
 
 from .bench import US, WFI, Bench
 
@@ -17,25 +15,23 @@ def gpio() -> Bench:
 
 
 def pins(bench: Bench) -> list[tuple[int, int]]:
-    return [(item.unit, item.value) for item in bench.out(Kind.PIN)]
+    return [(pin, level) for _, pin, level in bench.pins()]
 
 
-def test_a_push_pull_pin_follows_its_output() -> None:
+def test_push_pull_pin_follows_its_output() -> None:
     bench = gpio()
     bench["GPIO.PB_DOUT"] = 0x8000
     assert pins(bench) == []
     bench["GPIO.PB_MODEH"] = PUSH_PULL << 28
     assert pins(bench) == [(16 * B + 15, 1)]
     bench["GPIO.PB_DOUTCLR"] = 0x8000
-    bench["GPIO.PB_DOUTCLR"] = 0x8000
-    bench["GPIO.PB_DOUTSET"] = 0x8000
-    bench["GPIO.PB_DOUTTGL"] = 0x8000
+    bench.load("GPIO", PB_DOUTCLR=0x8000, PB_DOUTSET=0x8000, PB_DOUTTGL=0x8000)
     assert pins(bench) == [(31, 0), (31, 1), (31, 0)]
     bench["GPIO.PB_MODEH"] = INPUT << 28
     assert pins(bench) == [(31, -1)]
 
 
-def test_a_disabled_pin_reads_0_and_an_enabled_one_its_level() -> None:
+def test_disabled_pin_reads_0_and_enabled_pin_its_level() -> None:
     bench = gpio()
     bench.machine.pin(A, 3, 1)
     assert bench["GPIO.PA_DIN"] == 0
@@ -61,16 +57,15 @@ def test_a_disabled_pin_reads_0_and_an_enabled_one_its_level() -> None:
         (AND_UP, 0, -1, 0),
     ],
 )
-def test_who_drives_a_pin(mode: int, dout: int, outside: int, level: int) -> None:
+def test_pin_level(mode: int, dout: int, outside: int, level: int) -> None:
     bench = gpio()
     bench.machine.pin(F, 2, outside)
-    bench["GPIO.PF_DOUT"] = dout << 2
-    bench["GPIO.PF_MODEL"] = mode << 8
+    bench.load("GPIO", PF_DOUT=dout << 2, PF_MODEL=mode << 8)
     assert bench["GPIO.PF_DIN"] >> 2 == level
     assert bench.machine.pin_level(F, 2) == level
 
 
-def test_the_time_of_a_pin_is_that_of_the_store() -> None:
+def test_pin_changes_at_the_time_of_the_store() -> None:
     # str r1, [r0] three times, then a loop; r0 is PA_DOUTTGL.
     bench = Bench(0x6001, 0x6001, 0x6001, 0xE7FE)
     bench.clock("GPIO")
@@ -80,31 +75,24 @@ def test_the_time_of_a_pin_is_that_of_the_store() -> None:
     bench.machine.set_register("pc", 0x100)
     pins(bench)
     bench.run_for(10 * US)
-    times = [item.time_ps for item in bench.out(Kind.PIN)]
+    times = [time for time, _, _ in bench.pins()]
     assert len(times) == 3
     cycles = [(late - early) * 14 / 10**6 for early, late in pairwise(times)]
     assert all(1.9 < one < 3.1 for one in cycles)
 
 
-def test_a_locked_port_keeps_its_modes() -> None:
+def test_locked_port_keeps_its_modes() -> None:
     bench = gpio()
-    bench["GPIO.LOCK"] = 0
-    bench["GPIO.PA_MODEL"] = PUSH_PULL
-    bench["GPIO.EXTIPSELL"] = 1
-    bench["GPIO.PA_DOUT"] = 5
+    bench.load("GPIO", LOCK=0, PA_MODEL=PUSH_PULL, EXTIPSELL=1, PA_DOUT=5)
     assert (bench["GPIO.PA_MODEL"], bench["GPIO.EXTIPSELL"], bench["GPIO.PA_DOUT"]) == (0, 0, 5)
-    bench["GPIO.LOCK"] = 0xA534
-    bench["GPIO.PA_MODEL"] = PUSH_PULL
+    bench.load("GPIO", LOCK=0xA534, PA_MODEL=PUSH_PULL)
     assert bench["GPIO.PA_MODEL"] == PUSH_PULL
 
 
-def test_a_locked_pin_keeps_mode_and_level_until_a_reset() -> None:
+def test_locked_pin_keeps_mode_and_level_until_a_reset() -> None:
     bench = gpio()
-    bench["GPIO.PA_MODEL"] = PUSH_PULL | PUSH_PULL << 4
-    bench["GPIO.PA_PINLOCKN"] = 0xFFFE
-    bench["GPIO.PA_PINLOCKN"] = 0xFFFF
-    bench["GPIO.PA_MODEL"] = 0
-    bench["GPIO.PA_DOUT"] = 3
+    bench.load("GPIO", PA_MODEL=PUSH_PULL | PUSH_PULL << 4, PA_PINLOCKN=0xFFFE)
+    bench.load("GPIO", PA_PINLOCKN=0xFFFF, PA_MODEL=0, PA_DOUT=3)
     assert (bench["GPIO.PA_MODEL"], bench["GPIO.PA_DOUT"]) == (PUSH_PULL, 2)
     bench.reset()
     bench.clock("GPIO")
@@ -114,9 +102,7 @@ def test_a_locked_pin_keeps_mode_and_level_until_a_reset() -> None:
 @pytest.mark.parametrize(("rise", "fall", "edges"), [(1, 0, 1), (0, 1, 1), (1, 1, 2), (0, 0, 0)])
 def test_edges_of_the_selected_port_set_the_flag(rise: int, fall: int, edges: int) -> None:
     bench = gpio()
-    bench["GPIO.PF_MODEL"] = INPUT << 12
-    bench["GPIO.PB_MODEL"] = INPUT << 12
-    bench["GPIO.EXTIPSELL"] = F << 12
+    bench.load("GPIO", PF_MODEL=INPUT << 12, PB_MODEL=INPUT << 12, EXTIPSELL=F << 12)
     bench["GPIO.EXTIRISE"], bench["GPIO.EXTIFALL"] = rise << 3, fall << 3
     seen = 0
     for level in (1, 0):
@@ -128,7 +114,7 @@ def test_edges_of_the_selected_port_set_the_flag(rise: int, fall: int, edges: in
     assert seen == edges
 
 
-def test_odd_and_even_pins_have_their_own_interrupts() -> None:
+def test_odd_and_even_pins_have_separate_interrupts() -> None:
     bench = gpio()
     bench["GPIO.IEN"] = 0xFFFF
     pending = 0xE000_E200
@@ -140,7 +126,7 @@ def test_odd_and_even_pins_have_their_own_interrupts() -> None:
         assert bench.machine.read(pending) == 0
 
 
-def test_a_pin_wakes_the_sleeping_core() -> None:
+def test_pin_wakes_the_sleeping_core() -> None:
     bench = Bench(WFI, 0xE7FD)
     bench.clock("GPIO")
     bench["GPIO.PA_MODEL"] = INPUT
@@ -154,7 +140,7 @@ def test_a_pin_wakes_the_sleeping_core() -> None:
     assert bench.machine.instructions > before
 
 
-def test_a_pin_leads_through_the_reflex_system() -> None:
+def test_pin_drives_another_pin_through_the_prs() -> None:
     bench = Bench().clock("GPIO", "PRS")
     bench["GPIO.PA_MODEH"] = INPUT << 4
     bench["PRS.CH1_CTRL"] = 1 | 49 << 16  # pin 9
@@ -168,7 +154,7 @@ def test_a_pin_leads_through_the_reflex_system() -> None:
     assert pins(bench) == [(1, 1)]
 
 
-def test_a_software_pulse_of_the_reflex_system() -> None:
+def test_software_pulse_of_the_prs() -> None:
     bench = Bench().clock("GPIO", "PRS")
     bench["PRS.ROUTE"] = 1
     bench["GPIO.PA_MODEL"] = PUSH_PULL

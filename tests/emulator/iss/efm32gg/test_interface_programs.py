@@ -1,4 +1,4 @@
-"""Compiled programs: units by interrupt and together, as a customer of the vendor writes them."""
+"""Compiled programs that combine units and use their interrupts."""
 
 from pathlib import Path
 
@@ -114,7 +114,7 @@ def run_i2c(bench: Bench, known: int) -> list[str]:
 
 
 @needs_compiler
-def test_an_i2c_master_by_interrupt(tmp_path: Path) -> None:
+def test_i2c_master_by_interrupt(tmp_path: Path) -> None:
     bench = Bench(image=compiled(I2C_MASTER, tmp_path))
     assert run_i2c(bench, 0x68) == ["SD0", "W75", "SD1", "R0", "R1", "R1", "R1", "P"]
     assert bench.machine.read(RESULT) == 4
@@ -122,7 +122,7 @@ def test_an_i2c_master_by_interrupt(tmp_path: Path) -> None:
 
 
 @needs_compiler
-def test_an_i2c_master_that_meets_nobody(tmp_path: Path) -> None:
+def test_i2c_master_without_answer(tmp_path: Path) -> None:
     bench = Bench(image=compiled(I2C_MASTER, tmp_path))
     assert run_i2c(bench, 0x10) == ["SD0", "P"]
     assert bench.machine.read(RESULT) == 5
@@ -179,7 +179,7 @@ int main(void)
 
 
 @needs_compiler
-def test_a_timer_samples_by_reflex_and_dma(tmp_path: Path) -> None:
+def test_timer_triggers_adc_and_dma(tmp_path: Path) -> None:
     bench = Bench(image=compiled(SAMPLER, tmp_path))
     bench.machine.analog[3] = 1.25
     bench.run_for(2 * MS)
@@ -226,7 +226,7 @@ int main(void)
 
 
 @needs_compiler
-def test_a_timer_measures_pulses(tmp_path: Path) -> None:
+def test_timer_measures_pulses(tmp_path: Path) -> None:
     bench = Bench(image=compiled(CAPTURE, tmp_path))
     bench.run_for(MS)
     widths = (100 * US, 37 * US, 2 * MS)

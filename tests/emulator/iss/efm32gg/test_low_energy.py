@@ -1,4 +1,4 @@
-"""What works in EM2: LEUART, RTC, LETIMER, BURTC with its retention registers, pulse counters."""
+"""Units that work in EM2: LEUART, RTC, LETIMER, BURTC with its retention registers, PCNT."""
 
 import pytest
 from hypothesis import given, settings
@@ -11,21 +11,20 @@ from .bench import MS, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, Bench, S, asleep,
 HZ = 32768
 TICK = S // HZ + 1
 PUSH_PULL, INPUT = 4, 1
-PD4, PD5 = 3 * 16 + 4, 3 * 16 + 5
+PD4, PD5, PD6 = (3 * 16 + n for n in (4, 5, 6))
 LEUART0 = 5
 LETIMER_IRQ, BURTC_IRQ = 26, 31
-PENDING, NOT_PENDING = 0xE000_E200, 0xE000_E280
+NOT_PENDING = 0xE000_E280
 
 
 def low(mode: int = 2, *units: str, interrupts: bool = False) -> Bench:
-    """A part that sleeps, with LFRCO and the clocks of low energy units."""
+    """A sleeping part with LFRCO and the clocks of low-energy units."""
     bench = asleep(mode, interrupts).clock("LE", "GPIO")
     if mode != 2:
         bench.command("CMU.OSCENCMD.LFRCOEN")
         bench.run_for(200 * US)
     for unit in units:
-        domain = "LFBCLKEN0" if unit.startswith("LEUART") else "LFACLKEN0"
-        bench.set(f"CMU.{domain}.{unit}")
+        bench.set(f"CMU.LF{'B' if unit.startswith('LEUART') else 'A'}CLKEN0.{unit}")
     bench.run_for(4 * TICK)
     return bench
 
@@ -33,23 +32,18 @@ def low(mode: int = 2, *units: str, interrupts: bool = False) -> Bench:
 # -- RTC --
 
 
-def rtc(**registers: int) -> Bench:
-    bench = low(2, "RTC")
-    for name, value in registers.items():
-        bench[f"RTC.{name}"] = value
-    return bench
+def rtc(*, interrupts: bool = False, **registers: int) -> Bench:
+    return low(2, "RTC", interrupts=interrupts).load("RTC", **registers)
 
 
-def test_the_rtc_counts_in_em2() -> None:
+def test_rtc_counts_in_em2() -> None:
     bench = rtc(CTRL=1)
     bench.run_for(S)
     assert abs(bench["RTC.CNT"] - HZ) <= 1
 
 
-def test_a_compare_match_wakes_from_em2_at_its_time() -> None:
-    bench = low(2, "RTC", interrupts=True)
-    bench["RTC.COMP0"] = 3276
-    bench["RTC.IEN"] = 2
+def test_rtc_compare_match_wakes_from_em2_at_its_time() -> None:
+    bench = rtc(interrupts=True, COMP0=3276, IEN=2)
     began = bench.now
     bench["RTC.CTRL"] = 1
     bench.out(Kind.SLEEP)
@@ -62,7 +56,7 @@ def test_a_compare_match_wakes_from_em2_at_its_time() -> None:
     assert bench["RTC.IF"] & 2
 
 
-def test_compare_0_as_top_makes_a_period() -> None:
+def test_rtc_compare_0_as_top_sets_the_period() -> None:
     bench = rtc(COMP0=99, COMP1=50, CTRL=5)
     matches = 0
     for _ in range(10):
@@ -75,9 +69,8 @@ def test_compare_0_as_top_makes_a_period() -> None:
     assert bench["RTC.CNT"] <= 99
 
 
-def test_the_overflow_after_24_bits() -> None:
-    bench = rtc(CTRL=1)
-    bench["RTC.CNT"] = 0xFF_FFF0
+def test_rtc_overflows_after_24_bits() -> None:
+    bench = rtc(CTRL=1, CNT=0xFF_FFF0)
     bench.run_for(15 * S // HZ)
     assert bench["RTC.IF"] == 0
     bench.run_for(2 * TICK)
@@ -93,16 +86,14 @@ def test_disabling_the_rtc_clears_its_count() -> None:
     assert bench["RTC.CNT"] <= 1
 
 
-def test_synchronisation_shows_for_two_to_three_clocks() -> None:
-    bench = rtc()
-    bench["RTC.COMP1"] = 5
+def test_synchronisation_takes_two_to_three_clocks_and_waits_while_frozen() -> None:
+    bench = rtc(COMP1=5)
     assert bench["RTC.SYNCBUSY"] == 4
     bench.run_for(2 * S // HZ - TICK // 10)
     assert bench["RTC.SYNCBUSY"] == 4
     bench.run_for(TICK + TICK // 5)
     assert bench["RTC.SYNCBUSY"] == 0
-    bench["RTC.FREEZE"] = 1
-    bench["RTC.COMP1"] = 6
+    bench.load("RTC", FREEZE=1, COMP1=6)
     bench.run_for(MS)
     assert (bench["RTC.SYNCBUSY"], bench["RTC.COMP1"]) == (4, 5)
     bench["RTC.FREEZE"] = 0
@@ -118,13 +109,13 @@ def test_synchronisation_shows_for_two_to_three_clocks() -> None:
     st.booleans(),
     st.lists(st.integers(0, 200), min_size=1, max_size=5),
 )
-def test_the_rtc_is_a_counter_that_counts(
+def test_rtc_counts_like_a_stepped_counter(
     compare0: int, compare1: int, is_top: bool, watched: bool, waits: list[int]
 ) -> None:
     bench = rtc(COMP0=compare0, COMP1=compare1, IEN=7 if watched else 0)
     bench.run_for(5 * TICK)
     bench["RTC.CTRL"] = 5 if is_top else 1
-    while not bench.peek("RTC.CNT"):  # until just behind an edge
+    while not bench.peek("RTC.CNT"):  # until just after an edge
         bench.run_for(TICK // 16)
     value = bench["RTC.CNT"]
     flags = bench["RTC.IF"]
@@ -140,23 +131,22 @@ def test_the_rtc_is_a_counter_that_counts(
 
 # -- LETIMER --
 
-
-def letimer(control: int = 0, **registers: int) -> Bench:
-    bench = low(2, "LETIMER0")
-    bench["GPIO.PD_MODEL"] = PUSH_PULL << 24 | PUSH_PULL << 28
-    bench["LETIMER0.CTRL"] = control
-    for name, value in registers.items():
-        bench[f"LETIMER0.{name}"] = value
-    return bench
-
-
 TOP = mask_of("LETIMER.CTRL.COMP0TOP")
 
 
-def test_the_letimer_counts_down_from_its_top() -> None:
-    bench = letimer(TOP, COMP0=99)
-    bench["LETIMER0.CMD"] = 1
-    assert bench.is_set("LETIMER0.STATUS.RUNNING")
+def letimer(control: int = 0, *, interrupts: bool = False, **registers: int) -> Bench:
+    bench = low(2, "LETIMER0", interrupts=interrupts)
+    bench["GPIO.PD_MODEL"] = PUSH_PULL << 24 | PUSH_PULL << 28
+    return bench.load("LETIMER0", CTRL=control, **registers)
+
+
+def letimer_runs(bench: Bench) -> bool:
+    return bench.is_set("LETIMER0.STATUS.RUNNING")
+
+
+def test_letimer_counts_down_from_its_top() -> None:
+    bench = letimer(TOP, COMP0=99, CMD=1)
+    assert letimer_runs(bench)
     bench.run_for(3 * TICK)
     assert bench["LETIMER0.CNT"] in (96, 97, 98)
     assert bench["LETIMER0.IF"] & 4  # from 0 the first clock is an underflow
@@ -165,12 +155,8 @@ def test_the_letimer_counts_down_from_its_top() -> None:
     assert bench["LETIMER0.IF"] & 4
 
 
-def test_the_letimer_wakes_from_em2_each_period() -> None:
-    bench = low(2, "LETIMER0", interrupts=True)
-    bench["LETIMER0.CTRL"] = TOP
-    bench["LETIMER0.COMP0"] = 327
-    bench["LETIMER0.IEN"] = 4
-    bench["LETIMER0.CMD"] = 1
+def test_letimer_wakes_from_em2_each_period() -> None:
+    bench = letimer(TOP, interrupts=True, COMP0=327, IEN=4, CMD=1)
     times = []
     bench.out(Kind.SLEEP)
     for _ in range(5):
@@ -185,51 +171,43 @@ def test_the_letimer_wakes_from_em2_each_period() -> None:
         assert abs(times[n + 1] - times[n] - 328 * S // HZ) <= 2 * US
 
 
-def test_one_shot_repeats_as_often_as_it_is_told() -> None:
-    bench = letimer(TOP | 1, COMP0=9, REP0=3)
-    bench["LETIMER0.CMD"] = 1
-    bench.run_for(15 * TICK)
-    assert bench.is_set("LETIMER0.STATUS.RUNNING")
-    assert bench["LETIMER0.REP0"] == 1
-    bench.run_for(20 * TICK)
-    assert not bench.is_set("LETIMER0.STATUS.RUNNING")
-    assert bench["LETIMER0.IF"] & 8
+@pytest.mark.parametrize(
+    ("mode", "repeats", "first", "left", "second", "flag"),
+    [(1, {"REP0": 3}, 15, 1, 20, 8), (2, {"REP0": 1, "REP1": 2}, 5, 2, 30, 0x10)],
+    ids=["one-shot", "buffered"],
+)
+def test_letimer_stops_after_its_repeats(
+    mode: int, repeats: dict[str, int], first: int, left: int, second: int, flag: int
+) -> None:
+    bench = letimer(TOP | mode, COMP0=9, **repeats, CMD=1)
+    bench.run_for(first * TICK)
+    assert letimer_runs(bench)
+    assert bench["LETIMER0.REP0"] == left
+    bench.run_for(second * TICK)
+    assert not letimer_runs(bench)
+    assert bench["LETIMER0.IF"] & flag
 
 
-def test_buffered_repeats_take_the_second_count() -> None:
-    bench = letimer(TOP | 2, COMP0=9, REP0=1, REP1=2)
-    bench["LETIMER0.CMD"] = 1
-    bench.run_for(5 * TICK)
-    assert bench["LETIMER0.REP0"] == 2
-    assert bench["LETIMER0.IF"] & 0x10
-    bench.run_for(30 * TICK)
-    assert not bench.is_set("LETIMER0.STATUS.RUNNING")
-
-
-def test_pwm_of_the_letimer_is_on_its_pin() -> None:
-    bench = letimer(TOP | 3 << 2, COMP0=99, COMP1=25, REP0=1)
-    bench["LETIMER0.ROUTE"] = 1
-    bench["LETIMER0.CMD"] = 1
+def test_letimer_pwm_drives_its_pin() -> None:
+    bench = letimer(TOP | 3 << 2, COMP0=99, COMP1=25, REP0=1, ROUTE=1, CMD=1)
     bench.run_for(350 * TICK)
-    found = [(one.time_ps, one.value) for one in bench.out(Kind.PIN) if one.unit == 3 * 16 + 6]
-    rises = [time for time, level in found if level]
-    falls = [time for time, level in found if not level and time > rises[0]]
+    found = bench.pins(PD6)
+    rises = [time for time, _, level in found if level]
+    falls = [time for time, _, level in found if not level and time > rises[0]]
     assert len(rises) >= 3
     for rise, fall in zip(rises, falls, strict=False):
         assert abs(fall - rise - 26 * S // HZ) <= US
     assert abs(rises[1] - rises[0] - 100 * S // HZ) <= US
 
 
-def test_the_rtc_starts_the_letimer() -> None:
+def test_rtc_starts_the_letimer() -> None:
     bench = low(2, "RTC", "LETIMER0")
-    bench["LETIMER0.CTRL"] = TOP | mask_of("LETIMER.CTRL.RTCC0TEN")
-    bench["LETIMER0.COMP0"] = 999
-    bench["RTC.COMP0"] = 50
-    bench["RTC.CTRL"] = 1
+    bench.load("LETIMER0", CTRL=TOP | mask_of("LETIMER.CTRL.RTCC0TEN"), COMP0=999)
+    bench.load("RTC", COMP0=50, CTRL=1)
     bench.run_for(45 * TICK)
-    assert not bench.is_set("LETIMER0.STATUS.RUNNING")
+    assert not letimer_runs(bench)
     bench.run_for(10 * TICK)
-    assert bench.is_set("LETIMER0.STATUS.RUNNING")
+    assert letimer_runs(bench)
 
 
 # -- LEUART --
@@ -238,15 +216,12 @@ def test_the_rtc_starts_the_letimer() -> None:
 def leuart(clkdiv: int = 617, control: int = 0, *, interrupts: bool = False) -> Bench:
     bench = low(2, "LEUART0", interrupts=interrupts)
     bench["GPIO.PD_MODEL"] = PUSH_PULL << 16 | INPUT << 20
-    bench["LEUART0.ROUTE"] = 3
-    bench["LEUART0.CTRL"] = control
-    bench["LEUART0.CLKDIV"] = clkdiv & 0x7FF8
-    bench["LEUART0.CMD"] = 5
+    bench.load("LEUART0", ROUTE=3, CTRL=control, CLKDIV=clkdiv & 0x7FF8, CMD=5)
     bench.run_for(4 * TICK)
     return bench
 
 
-def test_the_leuart_sends_at_9600_baud_in_em2() -> None:
+def test_leuart_sends_at_9600_baud_in_em2() -> None:
     bench = leuart()
     for byte in b"go":
         bench["LEUART0.TXDATA"] = byte
@@ -263,7 +238,7 @@ def test_the_leuart_sends_at_9600_baud_in_em2() -> None:
     assert bench.machine.energy_mode == 2
 
 
-def test_commands_arrive_two_to_three_clocks_later() -> None:
+def test_leuart_commands_take_two_to_three_clocks() -> None:
     bench = leuart()
     bench["LEUART0.CMD"] = 2
     assert bench["LEUART0.SYNCBUSY"] == 2
@@ -273,7 +248,7 @@ def test_commands_arrive_two_to_three_clocks_later() -> None:
     assert not bench.is_set("LEUART0.STATUS.RXENS")
 
 
-def test_of_opposite_commands_the_later_one_counts() -> None:
+def test_later_of_opposite_leuart_commands_wins() -> None:
     bench = leuart()
     bench["LEUART0.CMD"] = mask_of("LEUART.CMD.RXDIS")
     bench["LEUART0.CMD"] = mask_of("LEUART.CMD.RXEN") | mask_of("LEUART.CMD.TXDIS")
@@ -282,7 +257,7 @@ def test_of_opposite_commands_the_later_one_counts() -> None:
     assert not bench.is_set("LEUART0.STATUS.TXENS")
 
 
-def test_a_received_character_wakes_from_em2() -> None:
+def test_received_character_wakes_from_em2() -> None:
     bench = leuart(interrupts=True)
     bench["LEUART0.IEN"] = 4
     bench.out(Kind.SLEEP)
@@ -292,11 +267,9 @@ def test_a_received_character_wakes_from_em2() -> None:
     assert bench["LEUART0.RXDATA"] == 0x7E
 
 
-def test_start_and_signal_frames() -> None:
+def test_leuart_start_and_signal_frames() -> None:
     bench = leuart(control=mask_of("LEUART.CTRL.SFUBRX"))
-    bench["LEUART0.STARTFRAME"] = 0x02
-    bench["LEUART0.SIGFRAME"] = 0x03
-    bench["LEUART0.CMD"] = 0x10
+    bench.load("LEUART0", STARTFRAME=0x02, SIGFRAME=0x03, CMD=0x10)
     bench.run_for(4 * TICK)
     for byte in b"ab\x02hi\x03":
         bench.machine.uart_receive(LEUART0, byte)
@@ -308,7 +281,7 @@ def test_start_and_signal_frames() -> None:
     assert bench["LEUART0.RXDATA"] == 2
 
 
-def test_the_leuart_overflows_behind_two_and_the_shift_register() -> None:
+def test_leuart_buffers_two_characters_and_the_shift_register() -> None:
     bench = leuart()
     for byte in range(4):
         assert not bench.is_set("LEUART0.IF.RXOF")
@@ -317,15 +290,10 @@ def test_the_leuart_overflows_behind_two_and_the_shift_register() -> None:
     assert [bench["LEUART0.RXDATA"] for _ in range(3)] == [0, 1, 3]
 
 
-def test_the_dma_takes_characters_in_em2_when_it_may_wake() -> None:
-    bench = leuart(control=mask_of("LEUART.CTRL.RXDMAWU")).clock("DMA")
+def test_dma_reads_characters_in_em2_with_rxdmawu() -> None:
+    bench = leuart(control=mask_of("LEUART.CTRL.RXDMAWU"))
     word = 3 << 26 | 3 << 4 | 1  # basic, four bytes from a fixed address
-    for n, value in enumerate((0x4008_401C, 0x2000_1003, word)):
-        bench.machine.write(0x2000_0400 + 4 * n, value)
-    bench["DMA.CTRLBASE"] = 0x2000_0400
-    bench["DMA.CONFIG"] = 1
-    bench["DMA.CH0_CTRL"] = 16 << 16
-    bench["DMA.CHENS"] = 1
+    bench.dma(0, 16 << 16, 0x4008_401C, 0x2000_1003, word)
     for byte in b"abcd":
         bench.machine.uart_receive(LEUART0, byte)
         bench.run_for(MS)
@@ -336,18 +304,18 @@ def test_the_dma_takes_characters_in_em2_when_it_may_wake() -> None:
 
 # -- BURTC --
 
-
-def burtc(control: int = 0) -> Bench:
-    bench = low(1)
-    bench["RMU.CTRL"] = 0
-    bench["BURTC.CTRL"] = control
-    return bench
-
-
 ULFRCO = 3 << 12 | 1
 
 
-def test_the_backup_domain_is_held_in_reset_at_first() -> None:
+def burtc(control: int = 0, **registers: int) -> Bench:
+    return low(1).load("RMU", CTRL=0).load("BURTC", CTRL=control, **registers)
+
+
+def retained(bench: Bench) -> list[int]:
+    return [bench[f"BURTC.RET{n}_REG"] for n in range(128)]
+
+
+def test_backup_domain_is_held_in_reset_until_rmu_releases_it() -> None:
     bench = low(1)
     bench["BURTC.RET0_REG"] = 1
     assert bench["BURTC.RET0_REG"] == 0
@@ -357,31 +325,25 @@ def test_the_backup_domain_is_held_in_reset_at_first() -> None:
     assert bench["BURTC.RET0_REG"] == 1
 
 
-def test_512_bytes_survive_every_reset_but_power_on() -> None:
-    bench = burtc()
-    for n in range(128):
-        bench[f"BURTC.RET{n}_REG"] = 0x1234_0000 + n
+def test_retention_registers_survive_every_reset_but_power_on() -> None:
+    values = [0x1234_0000 + n for n in range(128)]
+    bench = burtc(0, **{f"RET{n}_REG": value for n, value in enumerate(values)})
     for cause in (SYSTEM_REQUEST, WATCHDOG):
         bench.reset(cause)
-        bench.clock("LE")
-        assert [bench[f"BURTC.RET{n}_REG"] for n in range(128)] == [
-            0x1234_0000 + n for n in range(128)
-        ]
+        assert retained(bench.clock("LE")) == values
     bench.reset(POWER_ON)
-    bench.clock("LE")
-    assert bench["BURTC.RET5_REG"] == 0
+    assert retained(bench.clock("LE")) == [0] * 128
 
 
-def test_the_reset_of_the_backup_domain_leaves_the_memory() -> None:
-    bench = burtc(ULFRCO)
-    bench["BURTC.RET7_REG"] = 77
+def test_reset_of_the_backup_domain_keeps_the_retention_registers() -> None:
+    bench = burtc(ULFRCO, RET7_REG=77)
     bench["RMU.CTRL"] = mask_of("RMU.CTRL.BURSTEN")
     bench["RMU.CTRL"] = 0
     assert bench["BURTC.CTRL"] == mask_of("BURTC.CTRL.RSTEN")
     assert bench["BURTC.RET7_REG"] == 77
 
 
-def test_the_burtc_counts_on_over_a_reset() -> None:
+def test_burtc_continues_over_a_reset() -> None:
     bench = burtc(ULFRCO)
     bench.run_for(100 * MS)
     assert abs(bench["BURTC.CNT"] - 100) <= 1
@@ -391,53 +353,47 @@ def test_the_burtc_counts_on_over_a_reset() -> None:
     assert abs(bench["BURTC.CNT"] - 200) <= 2
 
 
-def test_the_burtc_interrupts_at_its_compare_value() -> None:
-    bench = burtc(ULFRCO)
-    bench["BURTC.COMP0"] = 10
-    bench["BURTC.IEN"] = 2
+def test_burtc_interrupts_at_its_compare_value() -> None:
+    bench = burtc(ULFRCO, COMP0=10, IEN=2)
     bench.run_for(8 * MS)
     assert not bench.peek("BURTC.IF")
     bench.run_for(4 * MS)
     assert bench.peek("BURTC.IF") == 2
-    assert bench.machine.read(PENDING) == 1 << BURTC_IRQ
+    assert bench.pending() == [BURTC_IRQ]
 
 
-def test_the_burtc_prescaler_and_lock() -> None:
+def test_burtc_prescaler_and_lock() -> None:
     bench = burtc(ULFRCO | 3 << 8)
     bench.run_for(800 * MS)
     assert abs(bench["BURTC.CNT"] - 100) <= 1
-    bench["BURTC.LOCK"] = 0
-    bench["BURTC.CTRL"] = 0
+    bench.load("BURTC", LOCK=0, CTRL=0)
     assert bench["BURTC.CTRL"] == ULFRCO | 3 << 8
     assert "BURTC is locked" in bench.log()
-    bench["BURTC.LOCK"] = 0xAEE8
-    bench["BURTC.CTRL"] = 8
+    bench.load("BURTC", LOCK=0xAEE8, CTRL=8)
     assert bench["BURTC.CNT"] == 0
 
 
 # -- PCNT --
 
 
+def after_edges(number: int, **registers: int) -> Bench:
+    """Pulse counter 0 after that many pulses at its pin."""
+    bench = low(1)
+    bench["GPIO.PC_MODEH"] = INPUT << 20
+    bench.load("PCNT0", **registers)
+    bench.run_for(4 * TICK)
+    for _ in range(number):
+        bench.machine.pin(2, 13, 1)
+        bench.machine.pin(2, 13, 0)
+    return bench
+
+
 @pytest.mark.parametrize(("control", "counted"), [(1, 5), (2, 5), (0, 0), (1 | 8, 5)])
-def test_a_pulse_counter_counts_edges(control: int, counted: int) -> None:
-    bench = low(1)
-    bench["GPIO.PC_MODEH"] = INPUT << 20
-    bench["PCNT0.CTRL"] = control
-    bench.run_for(4 * TICK)
-    for _ in range(5):
-        bench.machine.pin(2, 13, 1)
-        bench.machine.pin(2, 13, 0)
-    assert bench["PCNT0.CNT"] == counted
+def test_pulse_counter_counts_edges(control: int, counted: int) -> None:
+    assert after_edges(5, CTRL=control)["PCNT0.CNT"] == counted
 
 
-def test_a_pulse_counter_overflows_at_its_top() -> None:
-    bench = low(1)
-    bench["GPIO.PC_MODEH"] = INPUT << 20
-    bench["PCNT0.TOPB"] = 2
-    bench["PCNT0.CTRL"] = 1
-    bench.run_for(4 * TICK)
-    for _ in range(4):
-        bench.machine.pin(2, 13, 1)
-        bench.machine.pin(2, 13, 0)
+def test_pulse_counter_overflows_at_its_top() -> None:
+    bench = after_edges(4, TOPB=2, CTRL=1)
     assert bench["PCNT0.CNT"] == 1
     assert bench["PCNT0.IF"] & 2

@@ -13,23 +13,21 @@ UNLOCK = 0x1B71
 
 
 def erased(bench: Bench, page: int = PAGE) -> Bench:
-    """The page is erased, by registers."""
-    bench["MSC.WRITECTRL"] = 1
-    bench["MSC.ADDRB"] = page
+    """Start to erase a page."""
+    bench.load("MSC", WRITECTRL=1, ADDRB=page)
     bench.command("MSC.WRITECMD.LADDRIM")
     bench.command("MSC.WRITECMD.ERASEPAGE")
     return bench
 
 
 def write_word(bench: Bench, address: int, value: int) -> None:
-    bench["MSC.WRITECTRL"] = 1
-    bench["MSC.ADDRB"] = address
+    bench.load("MSC", WRITECTRL=1, ADDRB=address)
     bench.command("MSC.WRITECMD.LADDRIM")
     bench["MSC.WDATA"] = value
     bench.command("MSC.WRITECMD.WRITEONCE")
 
 
-def test_a_page_is_erased_in_20_ms_and_wears() -> None:
+def test_page_erase_takes_20_ms_and_counts_wear() -> None:
     bench = Bench()
     bench.machine.flash[PAGE : PAGE + 8192] = 0
     erased(bench)
@@ -48,7 +46,7 @@ def test_a_page_is_erased_in_20_ms_and_wears() -> None:
     assert erasures == [(PAGE, 1), (PAGE, 2)]
 
 
-def test_a_word_is_written_in_20_us_and_bits_only_fall() -> None:
+def test_word_write_takes_20_us_and_only_clears_bits() -> None:
     bench = Bench()
     write_word(bench, PAGE, 0x1234_5678)
     assert bench.is_set("MSC.STATUS.BUSY")
@@ -62,10 +60,9 @@ def test_a_word_is_written_in_20_us_and_bits_only_fall() -> None:
     assert "written without erasure" in bench.log()
 
 
-def test_a_sequence_of_words_goes_to_the_next_addresses() -> None:
+def test_sequence_of_words_fills_consecutive_addresses() -> None:
     bench = Bench()
-    bench["MSC.WRITECTRL"] = 1
-    bench["MSC.ADDRB"] = PAGE
+    bench.load("MSC", WRITECTRL=1, ADDRB=PAGE)
     bench.command("MSC.WRITECMD.LADDRIM")
     words = [0x1111_1111, 0x2222_2222, 0x3333_3333]
     for word in words:
@@ -78,7 +75,7 @@ def test_a_sequence_of_words_goes_to_the_next_addresses() -> None:
     assert [bench.machine.read(PAGE + 4 * n) for n in range(4)] == [*words, 0xFFFF_FFFF]
 
 
-def test_nothing_is_written_without_enable_or_with_the_key_wrong() -> None:
+def test_write_needs_wren_and_unlocked_registers() -> None:
     bench = Bench()
     write = ("MSC.WDATA", 0), ("MSC.WRITECMD", 8)
     for name, value in write:
@@ -94,7 +91,7 @@ def test_nothing_is_written_without_enable_or_with_the_key_wrong() -> None:
 
 
 @pytest.mark.parametrize("address", [0x10_0000, 0x2000_0000, 0x0FE0_8000])
-def test_an_address_outside_of_the_flash_is_invalid(address: int) -> None:
+def test_address_outside_the_flash_is_invalid(address: int) -> None:
     bench = Bench()
     write_word(bench, address, 0)
     assert bench.is_set("MSC.STATUS.INVADDR")
@@ -122,7 +119,7 @@ def test_the_user_data_page_can_be_written_and_erased() -> None:
     assert bench.machine.read(0x0FE0_0010) == 0xFFFF_FFFF
 
 
-def test_code_in_flash_stands_while_the_flash_is_busy() -> None:
+def test_code_in_flash_stalls_while_the_flash_is_busy() -> None:
     bench = Bench()
     erased(bench)
     count = bench.machine.instructions
@@ -170,7 +167,7 @@ int main(void)
 
 
 @needs_compiler
-def test_a_program_in_ram_writes_the_flash_and_goes_on_meanwhile(tmp_path: Path) -> None:
+def test_program_in_ram_runs_while_it_writes_the_flash(tmp_path: Path) -> None:
     bench = Bench(image=compiled(FROM_RAM, tmp_path))
     began = bench.now
     bench.run_for(MS)
@@ -180,7 +177,7 @@ def test_a_program_in_ram_writes_the_flash_and_goes_on_meanwhile(tmp_path: Path)
     ]
     ticks = bench.machine.read(0x2001_0000)
     assert ticks is not None
-    assert 100 < ticks < 8 * 20 * 14 // 5  # it polled all the time
+    assert 100 < ticks < 8 * 20 * 14 // 5  # it polled during all writes
     times = [item.time_ps for item in bench.out(Kind.FLASH)]
     assert len(times) == 8
     assert 8 * 20 * US < times[-1] + 20 * US - began < 8 * 28 * US
@@ -192,7 +189,7 @@ NOP = 0xBF00
 
 
 def cycles_of_a_loop(*, mode: int, disabled: bool = False, nops: int = 40) -> float:
-    """Cycles of an instruction in a loop of ``nops`` (each 1 cycle) and a branch."""
+    """Cycles per instruction of a loop of ``nops`` (1 cycle each) and a branch."""
     branch = 0xE000 | (-(nops + 2) & 0x7FF)
     bench = Bench(*[NOP] * nops, branch)
     bench["MSC.READCTRL"] = mode | disabled << 3
@@ -206,15 +203,15 @@ def test_wait_states_cost_nothing_inside_the_cache() -> None:
     assert cycles_of_a_loop(mode=4) == pytest.approx(cycles_of_a_loop(mode=0), rel=1e-3)
 
 
-def test_without_cache_straight_code_takes_a_word_in_1_plus_wait_states() -> None:
+def test_uncached_code_takes_1_plus_wait_states_per_word() -> None:
     fast = cycles_of_a_loop(mode=0, disabled=True)
     slow = cycles_of_a_loop(mode=4, disabled=True)
     assert fast < 1.1
-    # Two instructions a word; a word each three cycles.
+    # Two instructions per word, three cycles per word.
     assert slow == pytest.approx(1.5, rel=0.1)
 
 
-def test_a_loop_larger_than_512_bytes_does_not_stay_in_the_cache() -> None:
+def test_loop_larger_than_512_bytes_misses_the_cache() -> None:
     assert cycles_of_a_loop(mode=4, nops=500) > 1.3
     assert cycles_of_a_loop(mode=4, nops=200) < 1.1
 

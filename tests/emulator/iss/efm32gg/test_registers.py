@@ -1,4 +1,4 @@
-"""Every register against its table: reset values, reserved bits; the C header's offsets."""
+"""All registers against their tables: reset values, reserved bits; the C header's offsets."""
 
 import shutil
 import subprocess
@@ -21,22 +21,13 @@ from .bench import Bench
 UNITS = [(layout, instance) for layout in LAYOUTS for instance in layout.instances]
 MODELLED = [(layout, instance) for layout, instance in UNITS if layout.modelled]
 LIVE = {"RMU.RSTCAUSE": 1}
-"""Registers that do not have their reset value after power-on, with what they have."""
+"""Values after power-on of registers that differ from their reset values."""
 
 PLAIN_UNITS = ("CMU", "GPIO", "EBI", "PRS", "EMU", "USART1", "I2C1", "TIMER2", "ADC0", "DAC0",
                "ACMP1", "VCMP")  # fmt: skip
-SPECIAL = {
-    "LOCK",
-    "DTLOCK",
-    "FREEZE",
-    "AUXCTRL",
-    "HFRCOCTRL",
-    "OSCENCMD",
-    "EM4CONF",
-    "HFCORECLKDIV",
-    "CTRL",
-}
-"""Registers whose write does something, in these units."""
+SPECIAL = {"LOCK", "DTLOCK", "FREEZE", "AUXCTRL", "HFRCOCTRL", "OSCENCMD", "EM4CONF",
+           "HFCORECLKDIV", "CTRL"}  # fmt: skip
+"""Registers of these units whose writes have side effects."""
 
 
 @pytest.mark.parametrize(("layout", "instance"), MODELLED, ids=lambda one: one.name)
@@ -49,7 +40,7 @@ def test_reset_values_are_those_of_the_table(layout: Layout, instance: Instance)
 
 
 @pytest.mark.parametrize(("layout", "instance"), MODELLED, ids=lambda one: one.name)
-def test_reserved_bits_read_0_whatever_is_written(layout: Layout, instance: Instance) -> None:
+def test_reserved_bits_read_0(layout: Layout, instance: Instance) -> None:
     for register in layout.registers:
         bench = Bench()
         bench["CMU.HFPERCLKEN0"] = bench["CMU.HFCORECLKEN0"] = 0xFFFF_FFFF
@@ -61,7 +52,7 @@ def test_reserved_bits_read_0_whatever_is_written(layout: Layout, instance: Inst
 
 @pytest.mark.parametrize("pattern", [0x5555_5555, 0xAAAA_AAAA])
 @pytest.mark.parametrize("name", PLAIN_UNITS)
-def test_writable_bits_keep_what_is_written(name: str, pattern: int) -> None:
+def test_writable_bits_keep_their_values(name: str, pattern: int) -> None:
     layout, instance = next(unit for unit in UNITS if unit[1].name == name)
     for register in layout.registers:
         if register.readable != register.writable or register.name in SPECIAL:
@@ -74,7 +65,7 @@ def test_writable_bits_keep_what_is_written(name: str, pattern: int) -> None:
         assert value == pattern & register.writable, register.name
 
 
-def test_bytes_and_halfwords_reach_their_part_of_a_register() -> None:
+def test_byte_and_halfword_accesses_of_a_register() -> None:
     bench = Bench().clock("GPIO")
     assert bench.machine.write(0x4000_6004, 0x12, 1)
     assert bench.machine.write(0x4000_6006, 0x3456, 2)
@@ -82,7 +73,7 @@ def test_bytes_and_halfwords_reach_their_part_of_a_register() -> None:
     assert bench.machine.read(0x4000_6007, 1) == 0x34
 
 
-def test_a_unit_without_clock_reads_0_and_takes_nothing() -> None:
+def test_unit_without_clock_reads_0_and_ignores_writes() -> None:
     bench = Bench()
     bench["GPIO.PA_MODEL"] = 0x4
     assert bench["GPIO.INSENSE"] == 0
@@ -92,7 +83,7 @@ def test_a_unit_without_clock_reads_0_and_takes_nothing() -> None:
     assert bench.log() == ""
 
 
-def test_an_unmodelled_unit_is_reported_once() -> None:
+def test_unmodelled_unit_is_reported_once() -> None:
     bench = Bench().clock("AES")
     for _ in range(3):
         bench["AES.CTRL"] = 1
@@ -100,27 +91,27 @@ def test_an_unmodelled_unit_is_reported_once() -> None:
     assert bench.log().count("AES is not modelled") == 1
 
 
-def test_where_there_is_nothing_is_a_bus_fault() -> None:
+def test_access_to_an_unused_address_is_a_bus_fault() -> None:
     machine = Bench().machine
     for address in (0x0010_0000, 0x2002_0000, 0x4000_F000, 0x6000_0000, 0xC000_0000):
         assert machine.read(address) is None, hex(address)
         assert not machine.write(address, 0), hex(address)
 
 
-def test_the_ram_is_at_its_code_alias_too() -> None:
+def test_ram_has_an_alias_in_the_code_space() -> None:
     machine = Bench().machine
     assert machine.write(0x1000_0010, 0xDEAD_BEEF)
     assert machine.read(0x2000_0010) == 0xDEAD_BEEF
 
 
-def test_the_device_information_says_which_part_it_is() -> None:
+def test_device_information_identifies_the_part() -> None:
     machine = Bench().machine
     assert machine.read(0x0FE0_81FC) == 0x2448_0118  # GG, number 280
     assert machine.read(0x0FE0_81F8) == 128 << 16 | 1024  # sizes in kB
     assert machine.read(0x0FE0_0000) == 0xFFFF_FFFF  # user data
 
 
-def test_the_c_header_has_the_offsets_of_the_table(tmp_path: Path) -> None:
+def test_c_header_has_the_offsets_of_the_table(tmp_path: Path) -> None:
     compiler = find_compiler()
     if compiler is None:
         pytest.skip("no C++ compiler")
@@ -138,7 +129,7 @@ def test_the_c_header_has_the_offsets_of_the_table(tmp_path: Path) -> None:
     subprocess.run(call, check=True)
 
 
-def test_the_c_header_is_c(tmp_path: Path) -> None:
+def test_c_header_compiles_as_c(tmp_path: Path) -> None:
     compiler = shutil.which("arm-none-eabi-gcc")
     if compiler is None:
         pytest.skip("arm-none-eabi-gcc is not installed")
@@ -161,7 +152,7 @@ def test_instances_do_not_overlap_and_names_are_unique() -> None:
     assert max(lines) == 38
 
 
-def test_an_address_has_a_name() -> None:
+def test_register_by_address() -> None:
     found = register_at(0x400C_802C)
     assert found is not None
     assert (found[0].name, found[1].name) == ("CMU", "STATUS")
@@ -180,7 +171,7 @@ def test_an_address_has_a_name() -> None:
         "xyz CTRL rw 0 EN:0",
     ],
 )
-def test_a_wrong_line_is_named(line: str) -> None:
+def test_error_names_the_wrong_line(line: str) -> None:
     with pytest.raises(RegisterTableError, match=line.splitlines()[-1][:4]):
         peripheral("UNIT", "", line)
 

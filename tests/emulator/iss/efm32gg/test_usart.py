@@ -18,11 +18,7 @@ def uart(clkdiv: int = 0, frame: int = 0x1005, control: int = 0) -> Bench:
     """UART0 on PF6 and PF7, both directions on."""
     bench = Bench().clock("UART0", "GPIO")
     bench["GPIO.PF_MODEL"] = PUSH_PULL << 24 | INPUT << 28
-    bench["UART0.CTRL"] = control
-    bench["UART0.FRAME"] = frame
-    bench["UART0.CLKDIV"] = clkdiv
-    bench["UART0.ROUTE"] = 3
-    bench["UART0.CMD"] = 0x5
+    bench.load("UART0", CTRL=control, FRAME=frame, CLKDIV=clkdiv, ROUTE=3, CMD=0x5)
     return bench
 
 
@@ -36,7 +32,7 @@ def sent(bench: Bench) -> list[int]:
 
 @pytest.mark.parametrize("clkdiv", [0, 64, 3648, 14 << 8 | 0xC0, 0x1FFFC0])
 @pytest.mark.parametrize(("ovs", "oversampling"), [(0, 16), (1, 8), (2, 6), (3, 4)])
-def test_the_baud_is_exact(clkdiv: int, ovs: int, oversampling: int) -> None:
+def test_character_duration(clkdiv: int, ovs: int, oversampling: int) -> None:
     bench = uart(clkdiv, control=ovs << 5)
     bench["UART0.TXDATA"] = 0x5A
     frame_ps = 10 * bit_ps(clkdiv, oversampling)
@@ -45,7 +41,7 @@ def test_the_baud_is_exact(clkdiv: int, ovs: int, oversampling: int) -> None:
     assert item.extra in (int(frame_ps), int(frame_ps) + 1)
 
 
-def test_characters_back_to_back_do_not_drift() -> None:
+def test_back_to_back_characters_do_not_drift() -> None:
     bench = uart(3648 & ~0x3F)
     bench["UART0.TXDATA"] = 0
     starts = []
@@ -80,7 +76,7 @@ def test_frame_formats(frame: int, halves: int) -> None:
     assert item.value == (1 << ((frame & 15) + 3)) - 1
 
 
-def test_two_characters_wait_behind_the_one_that_goes_and_a_third_is_an_overflow() -> None:
+def test_transmit_buffer_holds_two_characters_beside_the_one_being_sent() -> None:
     bench = uart()
     for byte in (1, 2, 3):
         bench["UART0.TXDATA"] = byte
@@ -96,7 +92,7 @@ def test_two_characters_wait_behind_the_one_that_goes_and_a_third_is_an_overflow
     assert bench.is_set("UART0.IF.TXC")
 
 
-def test_half_full_raises_the_buffer_level_earlier() -> None:
+def test_txbil_sets_the_buffer_level_at_half_full() -> None:
     bench = uart(control=mask_of("USART.CTRL.TXBIL"))
     bench["UART0.TXDATA"] = 1
     bench["UART0.TXDATA"] = 2
@@ -105,7 +101,7 @@ def test_half_full_raises_the_buffer_level_earlier() -> None:
     assert not bench.is_set("UART0.STATUS.TXBL")
 
 
-def test_nothing_on_the_wire_without_route_pin_or_clock() -> None:
+def test_nothing_is_sent_without_route_pin_clock_or_transmitter() -> None:
     for name, value in (("UART0.ROUTE", 1), ("GPIO.PF_MODEL", 0), ("CMU.HFPERCLKEN0", 1 << 13)):
         bench = uart()
         bench[name] = value
@@ -120,7 +116,7 @@ def test_nothing_on_the_wire_without_route_pin_or_clock() -> None:
     assert sent(bench) == [1]
 
 
-def test_a_break_and_what_else_goes_with_a_character() -> None:
+def test_break_and_disable_after_a_character() -> None:
     bench = uart()
     bench["UART0.TXDATAX"] = mask_of("USART.TXDATAX.TXBREAK") | mask_of("USART.TXDATAX.TXDISAT")
     assert sent(bench) == [0x10000]
@@ -128,7 +124,7 @@ def test_a_break_and_what_else_goes_with_a_character() -> None:
     assert not bench.is_set("UART0.STATUS.TXENS")
 
 
-def test_received_characters_are_buffered_and_the_third_but_one_is_lost() -> None:
+def test_receive_buffer_overflows_at_the_fourth_character() -> None:
     bench = uart()
     bench.machine.uart_receive(UART0, 0x11)
     assert bench.is_set("UART0.STATUS.RXDATAV")
@@ -146,7 +142,7 @@ def test_received_characters_are_buffered_and_the_third_but_one_is_lost() -> Non
     assert bench.is_set("UART0.IF.RXUF")
 
 
-def test_errors_are_flagged_beside_the_character() -> None:
+def test_error_flags_of_a_character() -> None:
     bench = uart()
     bench.machine.uart_receive(UART0, 0x55, 1)
     bench.machine.uart_receive(UART0, 0x66, 2)
@@ -156,7 +152,7 @@ def test_errors_are_flagged_beside_the_character() -> None:
     assert bench["UART0.RXDATAX"] == 0x4066
 
 
-def test_a_line_at_another_bit_rate_is_a_framing_error() -> None:
+def test_wrong_bit_rate_is_a_framing_error() -> None:
     bench = uart(3648)
     bench.machine.uart_receive(UART0, 0x55, round(S / bit_ps(3648)) << 8)
     assert bench["UART0.RXDATAX"] == 0x55
@@ -164,7 +160,7 @@ def test_a_line_at_another_bit_rate_is_a_framing_error() -> None:
     assert bench["UART0.RXDATAX"] & 0x8000
 
 
-def test_a_character_reaches_whoever_listens_at_the_pin() -> None:
+def test_character_is_received_by_the_unit_at_the_pin() -> None:
     bench = uart()
     bench.machine.uart_receive(0x100 | PF6, 0x11)
     assert not bench.is_set("UART0.STATUS.RXDATAV")
@@ -175,7 +171,7 @@ def test_a_character_reaches_whoever_listens_at_the_pin() -> None:
     assert not bench.is_set("UART0.STATUS.RXDATAV")
 
 
-def test_double_registers_carry_two() -> None:
+def test_double_registers_hold_two_characters() -> None:
     bench = uart()
     bench["UART0.TXDOUBLE"] = 0x4241
     bench.run_for(22 * int(bit_ps(0)))
@@ -186,7 +182,7 @@ def test_double_registers_carry_two() -> None:
     assert bench["UART0.RXDOUBLE"] == 0x3231
 
 
-def test_loopback_hears_itself() -> None:
+def test_loopback() -> None:
     bench = uart(control=mask_of("USART.CTRL.LOOPBK"))
     bench["UART0.TXDATA"] = 0xA5
     bench.run_for(9 * int(bit_ps(0)))
@@ -195,7 +191,7 @@ def test_loopback_hears_itself() -> None:
     assert bench["UART0.RXDATA"] == 0xA5
 
 
-def test_multiprocessor_mode_passes_addresses_only() -> None:
+def test_multiprocessor_mode_passes_only_addresses() -> None:
     bench = uart(frame=0x1006, control=mask_of("USART.CTRL.MPM") | mask_of("USART.CTRL.MPAB"))
     bench.command("UART0.CMD.RXBLOCKEN")
     bench.machine.uart_receive(UART0, 0x055)
@@ -205,7 +201,7 @@ def test_multiprocessor_mode_passes_addresses_only() -> None:
     assert bench["UART0.RXDATAX"] == 0x1AA
 
 
-def test_receive_and_transmit_have_interrupts_of_their_own() -> None:
+def test_receiver_and_transmitter_have_separate_interrupts() -> None:
     bench = uart()
     pending = 0xE000_E200
     bench["UART0.IEN"] = mask_of("USART.IEN.RXDATAV")
@@ -218,13 +214,10 @@ def test_receive_and_transmit_have_interrupts_of_their_own() -> None:
     assert value & 1 << 21
 
 
-def test_spi_master_sends_words_and_hears_an_idle_line() -> None:
+def test_spi_master_sends_words_and_receives_the_idle_line() -> None:
     bench = Bench().clock("USART1", "GPIO")
     bench["GPIO.PD_MODEL"] = PUSH_PULL | INPUT << 4
-    bench["USART1.CTRL"] = mask_of("USART.CTRL.SYNC")
-    bench["USART1.CLKDIV"] = 256
-    bench["USART1.ROUTE"] = 0xB | 1 << 8
-    bench["USART1.CMD"] = 0x15
+    bench.load("USART1", CTRL=mask_of("USART.CTRL.SYNC"), CLKDIV=256, ROUTE=0xB | 1 << 8, CMD=0x15)
     bench["USART1.TXDATA"] = 0x9F
     [item] = bench.out(Kind.SPI)
     assert item.value == 0x9F
@@ -233,11 +226,10 @@ def test_spi_master_sends_words_and_hears_an_idle_line() -> None:
     assert bench["USART1.RXDATA"] == 0xFF
 
 
-def test_asleep_in_em2_a_uart_hears_nothing() -> None:
+def test_uart_receives_nothing_in_em2() -> None:
     bench = asleep(mode=2)
     bench.clock("UART0", "GPIO")
     bench["GPIO.PF_MODEL"] = INPUT << 28
-    bench["UART0.ROUTE"] = 1
-    bench["UART0.CMD"] = 1
+    bench.load("UART0", ROUTE=1, CMD=1)
     bench.machine.uart_receive(UART0, 1)
     assert not bench.peek("UART0.STATUS") & mask_of("USART.STATUS.RXDATAV")
