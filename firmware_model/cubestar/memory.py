@@ -55,7 +55,7 @@ CAPACITY = {
 
 def _limit(command: str, field: str) -> int:
     declared = INTERFACE.telecommand(command).field(field)
-    largest = declared.raw_range[1] if declared.maximum is None else declared.maximum
+    largest = min(declared.raw_range[1], declared.high)
     return int(max(largest, declared.also or 0))
 
 

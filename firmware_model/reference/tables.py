@@ -5,6 +5,7 @@ may have and the flags for others, the place of each setting and the telemetry t
 states that telecommands report. ``generate`` writes them.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from itertools import groupby
 
@@ -208,7 +209,7 @@ def _rules(message: Message, ranges: list[str]) -> Iterator[str]:
         flag = f"FLAG_{field.range_flag}" if field.range_flag else "NO_FLAG"
         offset = field.bit_offset // 8
         if field.type == "f32":
-            ends = f"{_bound(field.minimum, '-')}, {_bound(field.maximum, '')}"
+            ends = f"{_bound(field.low)}, {_bound(field.high)}"
             yield f"{{RULE_F32, {offset}, 0, 0, 255, {flag}, {{.f32 = {{{ends}}}}}}},"
             continue
         kind = "RULE_U16" if field.type == "u16" else "RULE_U8"
@@ -230,15 +231,16 @@ def _rules(message: Message, ranges: list[str]) -> Iterator[str]:
         yield f"{{{kind}, {places[0]}, {places[1]}, 0, 255, {flag}, {{.list = {{0, 0}}}}}},"
 
 
-def _bound(limit: float | None, sign: str) -> str:
-    return f"{sign}INFINITY" if limit is None else f"{float(limit)!r}f"
+def _bound(limit: float) -> str:
+    sign = "-" if limit < 0 else ""
+    return f"{sign}INFINITY" if math.isinf(limit) else f"{float(limit)!r}f"
 
 
 def _allowed(
     message: Message, field: Field
 ) -> Iterator[tuple[int, int, int, list[tuple[int, int]]]]:
     """Ranges of allowed raw values, after the offset and range of the u8 that they depend on."""
-    dependent, last = field.maximum_by or field.choices_by, field.raw_range[1]
+    dependent, last = field.high_by or field.choices_by, field.raw_range[1]
     if dependent is None:
         yield 0, 0, _U8, _ranges(last, lambda raw: field.allows(field.decode(raw), {}))
         return

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cubestack.firmware_model.interface.codec.field import Field as Field
     from cubestack.firmware_model.interface.codec.field import InterfaceError as InterfaceError
     from cubestack.firmware_model.interface.codec.field import bool1 as bool1
+    from cubestack.firmware_model.interface.codec.field import byte_array as byte_array
     from cubestack.firmware_model.interface.codec.field import enum8 as enum8
     from cubestack.firmware_model.interface.codec.field import f32 as f32
     from cubestack.firmware_model.interface.codec.field import i16 as i16

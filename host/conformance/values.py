@@ -39,10 +39,8 @@ def limits_of(field: Field) -> tuple[float, float]:
     if field.type.startswith("bytes"):
         return 0, 0
     low, high = (0.0, 1.0) if field.type == "f32" else _raw_limits(field)
-    return (
-        low if field.minimum is None else field.minimum,
-        high if field.maximum is None else field.maximum,
-    )
+    least, most = field.ends
+    return (low if least is None else least, high if most is None else most)
 
 
 def _raw_limits(field: Field) -> tuple[float, float]:

@@ -43,7 +43,8 @@ def _all_keys(message: Message, notes: ConformanceNotes) -> Iterator[dict[str, V
         yield first
     for name in first:
         field = message.field(name)
-        for value in range(int(field.minimum or 0), int(field.maximum or 0) + 1):
+        low, high = (int(end or 0) for end in field.ends)
+        for value in range(low, high + 1):
             yield {name: value}
 
 

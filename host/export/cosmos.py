@@ -69,8 +69,8 @@ def _range(field: Field) -> str:
         ends = "MIN", "MAX"
     else:
         ends = f"{low / field.scale:.10g}", f"{high / field.scale:.10g}"
-    least = ends[0] if field.minimum is None else f"{field.minimum:.10g}"
-    largest = ends[1] if field.maximum is None else f"{field.maximum:.10g}"
+    limits = zip(ends, field.ends, strict=True)
+    least, largest = (end if limit is None else f"{limit:.10g}" for end, limit in limits)
     if field.also is not None:  # allowed beyond the limits, which COSMOS can not say
         least, largest = ends
     return f"{least} {largest} {float(field.reset or 0):.10g}"

@@ -10,22 +10,23 @@ def field_type(field: Field) -> str:
 
 def field_details(field: Field) -> str:
     """Meaning, unit, allowed values, reset value and error flag."""
+    low, high = field.ends
     parts = [field.meaning + (f" [{field.unit}]" if field.unit else "")]
     if field.choices is not None:
         parts.append(f"see {field.choices.__name__}")
     if field.choices_by is not None:
         other, sets = field.choices_by
         parts.append(f"by {other}, see {', '.join(choices.__name__ for choices in sets.values())}")
-    if field.maximum_by is not None:
-        other, limits = field.maximum_by
+    if field.high_by is not None:
+        other, limits = field.high_by
         listed = ", ".join(f"{limit:g} for {int(value)}" for value, limit in limits.items())
         parts.append(f"at most, by {other}, {listed}")
-    elif field.minimum is not None and field.maximum is not None:
-        parts.append(f"{field.minimum:g} to {field.maximum:g}")
-    elif field.minimum is not None:
-        parts.append(f"at least {field.minimum:g}")
-    elif field.maximum is not None:
-        parts.append(f"at most {field.maximum:g}")
+    elif None not in (low, high):
+        parts.append(f"{low:g} to {high:g}")
+    elif low is not None:
+        parts.append(f"at least {low:g}")
+    elif high is not None:
+        parts.append(f"at most {high:g}")
     if field.also is not None:
         parts.append(f"or {field.also:g}")
     if field.reset and not isinstance(field.reset, bytes):
@@ -48,7 +49,9 @@ def field_json(field: Field) -> dict[str, object]:
         **picked(field, "name", "type", "bit_offset", "meaning", "unit", "scale"),
         "choices": _numbers(field.choices),
         "choices_by": by and (by[0], {at: _numbers(choices) for at, choices in by[1].items()}),
-        **picked(field, "minimum", "maximum", "also", "maximum_by", "range_flag", "flag"),
+        **dict(zip(("minimum", "maximum"), field.ends, strict=True)),
+        **{"also": field.also, "maximum_by": field.high_by},
+        **picked(field, "range_flag", "flag"),
         "reset": field.reset.hex() if isinstance(field.reset, bytes) else field.reset,
     }
 

@@ -2,16 +2,19 @@
 
 import json
 import textwrap
-from dataclasses import asdict
 
 from cubestack.firmware_model.interface.codec.switches import Switches
+from cubestack.host.export.field_text import picked
+
+FIELDS = ("meaning", "published", "extended", "source", "reason", "choices", "hardware")
 
 
 def render_switches(title: str, switches: type[Switches], format_name: str) -> str:
     """The switches of the sensor that is called ``title``."""
     declared = switches.declared()
     if format_name == "json":
-        return json.dumps({name: asdict(one) for name, one in declared.items()}, indent=2) + "\n"
+        shown = {name: picked(one, *FIELDS) for name, one in declared.items()}
+        return json.dumps(shown, indent=2) + "\n"
     if format_name == "table":
         return (
             "".join(

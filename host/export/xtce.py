@@ -112,7 +112,7 @@ def _type(parent: Xml.Element, kind: str, name: str, field: Field, limits: bool 
         for choice in field.choices:
             Xml.SubElement(listed, "Enumeration", value=str(int(choice)), label=choice.name)
     elif limits and field.type != "bool1" and field.also is None:
-        ends = {"minInclusive": field.minimum, "maxInclusive": field.maximum}
+        ends = dict(zip(("minInclusive", "maxInclusive"), field.ends, strict=True))
         given = {key: _number(field, end) for key, end in ends.items() if end is not None}
         if given:
             Xml.SubElement(Xml.SubElement(own, "ValidRangeSet"), "ValidRange", given)

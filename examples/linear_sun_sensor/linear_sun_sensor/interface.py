@@ -5,7 +5,7 @@ Frames, buses and the messages of every node are those of the CubeSpace family.
 
 from enum import IntEnum
 
-from cubestack.sensor import Field, Message, enum8, f32, node_interface, u8, u16
+from cubestack.sensor import Message, byte_array, enum8, f32, node_interface, u8, u16
 
 PIXELS = 128
 PITCH_MM = 0.0635
@@ -46,7 +46,7 @@ INTERFACE = node_interface(
         ),
         Message(141, "Settings", "what telecommands have set").of(_EXPOSURE, _THRESHOLD),
         Message(142, "Pixels", "the latest readout").of(
-            Field(f"bytes{PIXELS}", "Pixels", "brightness of each, from the first one on")
+            byte_array(PIXELS, "Pixels", "brightness of each, from the first one on")
         ),
     ),
 )

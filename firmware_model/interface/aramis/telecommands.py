@@ -16,7 +16,15 @@ from cubestack.firmware_model.interface.aramis.codes import (
 )
 from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.firmware_model.interface.cameras import mt9m001
-from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
+from cubestack.firmware_model.interface.codec.field import (
+    Field,
+    byte_array,
+    enum8,
+    f32,
+    u8,
+    u16,
+    u32,
+)
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
 
@@ -46,7 +54,7 @@ _USE_CASES = (
     Message(2, "Deactivate", "stop the loop and the camera; settings stay"),
     Message(3, "SetSystemTime", "set the clock, at the instant the telecommand came").of(
         u32("JulianDay", "whole Julian days, which begin at noon UT", "d"),
-        u32("Millisecond", "since that noon", "ms", maximum=MS_PER_DAY - 1),
+        u32("Millisecond", "since that noon", "ms", high=MS_PER_DAY - 1),
     ),
     Message(4, "GetAttitude", "measure the attitude, lost in space; result: Attitude"),
     Message(
@@ -86,7 +94,7 @@ _USE_CASES = (
     ),
     Message(9, "CatalogueBlock", "a block of the catalogue's image, in any order").of(
         u16("BlockNumber", "block n covers bytes 128 n to 128 n + 127"),
-        Field(f"bytes{BLOCK_BYTES}", "Data", "bytes; those beyond the length do not count"),
+        byte_array(BLOCK_BYTES, "Data", "bytes; those beyond the length do not count"),
     ),
     Message(
         10, "CommitCatalogue", "check what was loaded, write it to flash error-coded, and use it"
@@ -123,13 +131,13 @@ _EXTENSIONS = (
             "Sigmas",
             "a bright pixel is above the mean by so many standard deviations",
             scale=10,
-            maximum=20,
+            high=20,
             reset=2,
         ),
         enum8("Spikes", "how spikes are removed", choices=SpikeMethod, reset=SpikeMethod.CENTRE),
         u8("Needed", "bright pixels that a window of 25 must have", reset=13).within(1, 25),
-        u16("MinPixels", "smallest star", "px", minimum=1, reset=1),
-        u16("MaxPixels", "largest star", "px", minimum=1, reset=2500),
+        u16("MinPixels", "smallest star", "px", low=1, reset=1),
+        u16("MaxPixels", "largest star", "px", low=1, reset=2500),
         u8("MaxStars", "the brightest are kept", reset=30).within(3, 64),
         enum8("Subtract", "take the mean level off before weighing", choices=OnOff, reset=OnOff.ON),
         ordered=(("MinPixels", "MaxPixels"),),
@@ -138,7 +146,7 @@ _EXTENSIONS = (
         u16("Noise", "expected noise of a centroid per axis", "px", scale=1000, reset=0.151).within(
             0.01, 10
         ),
-        u8("Pivots", "pivot triangles at most", maximum=3, reset=3),
+        u8("Pivots", "pivot triangles at most", high=3, reset=3),
         enum8(
             "Verify",
             "further stars must confirm the attitude; off is the published way",
@@ -150,7 +158,7 @@ _EXTENSIONS = (
             "a boresight farther from the rough direction is refused",
             "deg",
             scale=100,
-            maximum=180,
+            high=180,
             reset=6,
         ),
     ),
@@ -175,7 +183,7 @@ _EXTENSIONS = (
         u16(
             "BlockNumber",
             "block of the latest picture, row after row",
-            maximum=IMAGE_BYTES // BLOCK_BYTES - 1,
+            high=IMAGE_BYTES // BLOCK_BYTES - 1,
         )
     ),
     Message(

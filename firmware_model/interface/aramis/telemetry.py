@@ -14,7 +14,15 @@ from cubestack.firmware_model.interface.aramis.telecommands import (
     TELECOMMANDS,
 )
 from cubestack.firmware_model.interface.codec.attitude_quality import ATTITUDE_QUALITY
-from cubestack.firmware_model.interface.codec.field import Field, enum8, f32, u8, u16, u32
+from cubestack.firmware_model.interface.codec.field import (
+    Field,
+    byte_array,
+    enum8,
+    f32,
+    u8,
+    u16,
+    u32,
+)
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 
@@ -140,7 +148,7 @@ _REPORTS = (
         u16("NextBlock", "first one that is missing"),
     ),
     Message(203, "ImageBlock", "the block that ImageBlockSet selected").of(
-        Field(f"bytes{BLOCK_BYTES}", "Block", "pixels, row after row")
+        byte_array(BLOCK_BYTES, "Block", "pixels, row after row")
     ),
     Message(204, "CameraRegister", "the register that SelectCameraRegister read").of(
         u8("Address", "register's address"),

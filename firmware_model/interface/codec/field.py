@@ -16,11 +16,13 @@ import re
 import struct
 from collections.abc import Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from difflib import get_close_matches
 from enum import IntEnum
 from functools import partial
 from typing import Self, SupportsFloat
+
+from cubestack.firmware_model.values import Declaration
 
 #: A field's value: bool for bool1, bytes for bytesN, a number for all others.
 Value = int | float | bool | bytes
@@ -59,19 +61,16 @@ def _round_half_away(value: float) -> int:
 
 
 @dataclass(frozen=True)
-class Field:
+class Field(Declaration):
     """A field of a message; u8, u16, ... below make one of their type.
 
+    ``low`` and ``high`` are in ``unit``; numbers without a limit of their own have their type's.
+
     Attributes:
-        type: bool1, u8, u16, u32, i16, f32, enum8, or bytesN (N bytes).
-        name: printed name.
-        meaning: one phrase for a reader.
-        unit: unit of the value, empty for pure numbers.
         scale: raw counts for one unit.
-        choices: the allowed values and their names, or None.
-        minimum, maximum: smallest and largest allowed value, in ``unit``.
-        also: a value that is allowed beyond these limits, or None.
-        maximum_by: (other field, {its value: largest allowed value here}), or None.
+        type: bool1, u8, u16, u32, i16, f32, enum8, or bytesN (N bytes).
+        also: a value that is allowed beyond the limits, or None.
+        high_by: (other field, {its value: largest allowed value here}), or None.
         choices_by: (other field, {its value: the choices that go with it}), or None.
         range_flag: error flag that a value outside these limits raises, or empty.
         flag: for a bool1 that shows an error flag: that flag's name.
@@ -80,16 +79,15 @@ class Field:
         bit_offset: first bit in its message, which places it; 0 outside of one.
     """
 
-    type: str
     name: str
     meaning: str = ""
     unit: str = ""
     scale: float = 1.0
+    _: KW_ONLY
+    type: str
     choices: Choices | None = None
-    minimum: float | None = None
-    maximum: float | None = None
     also: float | None = None
-    maximum_by: tuple[str, Mapping[int, float]] | None = None
+    high_by: tuple[str, Mapping[int, float]] | None = None
     choices_by: tuple[str, Mapping[int, Choices]] | None = None
     range_flag: str = ""
     flag: str = ""
@@ -115,9 +113,16 @@ class Field:
         match = _BYTES.fullmatch(self.type)
         return 8 * int(match[1]) if match else _WIDTHS[self.type]
 
-    def within(self, minimum: float | None, maximum: float | None, flag: str = "") -> Self:
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """``low`` and ``high``; None for no limit."""
+        low, high = (one if math.isfinite(one) else None for one in (self.low, self.high))
+        return low, high
+
+    def within(self, low: float | None, high: float | None, flag: str = "") -> Self:
         """This field with its limits, in ``unit``, and the error flag that others raise."""
-        return replace(self, minimum=minimum, maximum=maximum, range_flag=flag)
+        ends = -math.inf if low is None else low, math.inf if high is None else high
+        return replace(self, low=ends[0], high=ends[1], range_flag=flag)
 
     def behind(self, end: int) -> Self:
         """This field, placed after a field that ends before bit ``end``, and after its own gap.
@@ -183,12 +188,10 @@ class Field:
             other, choices = self.choices_by
             if value not in {int(choice) for choice in choices.get(int(others[other]), ())}:
                 return False
-        maximum = self.maximum
-        if self.maximum_by is not None:
-            other, limits = self.maximum_by
-            maximum = limits.get(int(others[other]), maximum)  # an unlisted one is that field's
-        low = -math.inf if self.minimum is None else self.minimum
-        high = math.inf if maximum is None else maximum
+        low, high = self.low, self.high
+        if self.high_by is not None:
+            other, limits = self.high_by
+            high = limits.get(int(others[other]), high)  # an unlisted one is that field's
         if self.type == "f32":  # the limits as the wire carries them: pi / 2 is allowed
             low, high = _nearest_f32(low), _nearest_f32(high)
         return math.isfinite(value) and low <= value <= high
@@ -223,9 +226,14 @@ class Field:
         return int.from_bytes(value, "little")
 
 
-u8, u16, u32 = partial(Field, "u8"), partial(Field, "u16"), partial(Field, "u32")
-i16, f32 = partial(Field, "i16"), partial(Field, "f32")
-bool1, enum8 = partial(Field, "bool1"), partial(Field, "enum8")
+u8, u16, u32 = partial(Field, type="u8"), partial(Field, type="u16"), partial(Field, type="u32")
+i16, f32 = partial(Field, type="i16"), partial(Field, type="f32")
+bool1, enum8 = partial(Field, type="bool1"), partial(Field, type="enum8")
+
+
+def byte_array(count: int, name: str, meaning: str) -> Field:
+    """A field of ``count`` bytes."""
+    return Field(name, meaning, type=f"bytes{count}")
 
 
 def flags_at(flags: Iterable[tuple[int, str, str, str]]) -> tuple[Field, ...]:

@@ -87,7 +87,7 @@ class Message:
         if len(set(names)) != len(names):
             raise InterfaceError(f"message {self.name}: two fields of one name")
         related = [name for pair in self.ordered for name in pair]
-        dependent = [by for f in self.fields for by in (f.maximum_by, f.choices_by) if by]
+        dependent = [by for f in self.fields for by in (f.high_by, f.choices_by) if by]
         related += [other for other, _ in dependent]
         for name in related:
             self.field(name)

@@ -104,7 +104,8 @@ def _numbers(switches: type[Switches]) -> dict[str, dict[str, int]]:
 
 def _value(switches: type[Switches], name: str, number: int) -> str:
     """The value as declared; an unknown one is returned as its number, which no switch accepts."""
-    values = zip(_numbers(switches)[name].values(), switches.declared()[name].choices, strict=True)
+    choices: tuple[str, ...] = switches.declared()[name].choices
+    values = zip(_numbers(switches)[name].values(), choices, strict=True)
     return dict(values).get(number, str(number))
 
 

@@ -5,9 +5,10 @@ A sensor declares its switches as one dataclass with `switch` fields. A profile 
 best known ones. Single switches can differ from the profile.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any, Literal, Self, get_args
+
+from cubestack.firmware_model.values import Declaration, DeclaredValues
 
 Profile = Literal["published", "extended"]
 PROFILES: tuple[Profile, ...] = get_args(Profile)
@@ -17,58 +18,44 @@ DEFAULT_PROFILE: Profile = "published"
 MIXED = "mixed"
 
 
-@dataclass(frozen=True)
-class Switch:
-    """Declaration of a switch, in the metadata of its field.
+@dataclass(frozen=True, kw_only=True)
+class Switch(Declaration):
+    """Declaration of a switch.
 
     Attributes:
-        meaning: one phrase: what it decides.
         published: value according to the documents.
         extended: the better value.
         source: document and section.
         reason: why there is another value.
-        choices: all values, as typed.
         hardware: it describes the built board, so no telecommand can change it.
     """
 
-    meaning: str
     published: str
     extended: str
     source: str
     reason: str
-    choices: tuple[str, ...]
     hardware: bool = False
 
 
-def switch(
-    meaning: str,
-    published: str,
-    extended: str,
-    *others: str,
-    source: str,
-    reason: str,
-    hardware: bool = False,
-) -> Any:
-    """A dataclass field for a switch; its default is that of the default profile."""
-    choices = tuple(dict.fromkeys((published, extended, *others)))
-    declared = Switch(meaning, published, extended, source, reason, choices, hardware)
-    return field(default=getattr(declared, DEFAULT_PROFILE), metadata={"switch": declared})
+def switch(meaning: str, published: str, extended: str, *others: str, **more: Any) -> Any:
+    """A switch with the values of the profiles, and others; ``more`` as in `Switch`."""
+    return Switch(
+        meaning=meaning,
+        choices=tuple(dict.fromkeys((published, extended, *others))),
+        default={"published": published, "extended": extended}[DEFAULT_PROFILE],
+        published=published,
+        extended=extended,
+        **more,
+    )
 
 
 @dataclass(frozen=True)
-class Switches:
+class Switches(DeclaredValues):
     """Base of a sensor's switches; by itself, for a sensor without any."""
 
-    def __post_init__(self) -> None:
-        """Raise ValueError for a value that a switch does not have."""
-        for name, declared in self.declared().items():
-            if (value := getattr(self, name)) not in declared.choices:
-                known = ", ".join(declared.choices)
-                raise ValueError(f"switch {name} must be one of {known}, not {value!r}")
-
     @classmethod
-    def declared(cls) -> Mapping[str, Switch]:
-        return {one.name: one.metadata["switch"] for one in fields(cls)}
+    def refusal(cls, name: str, text: str) -> ValueError:
+        return ValueError(f"switch {name} {text}")
 
     @classmethod
     def of(cls, profile: str = DEFAULT_PROFILE, changes: str = "") -> Self:

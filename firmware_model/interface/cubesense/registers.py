@@ -9,7 +9,7 @@ results are those of the node protocol, and so are their reset values.
 from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
-from cubestack.firmware_model.interface.codec.field import Field, i16, u8
+from cubestack.firmware_model.interface.codec.field import Field, byte_array, i16, u8
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.telecommands import TELECOMMANDS
@@ -36,7 +36,7 @@ def _camera(camera: codes.Camera) -> Iterator[PointerRegister]:
         address: u8(f"{name}_{register}", meaning, reset=resets[parameter])
         for address, (register, parameter, meaning) in enumerate(settings)
     } | {
-        0x05: u8(f"{name}_AUTO", "1: the camera adjusts itself", maximum=1),
+        0x05: u8(f"{name}_AUTO", "1: the camera adjusts itself", high=1),
         0x20: u8(f"{name}_CAPTURE", "what became of the capture", choices=codes.CaptureResult),
         0x21: u8(f"{name}_DETECT", "what became of the detection", choices=codes.DetectResult),
         0x22: u8(f"{name}_POINTS", "edges of the fit, or Sun pixels of the mean"),
@@ -73,10 +73,10 @@ _COMMON = (
         0x14, _RW, u8("NADIR_SEARCH", "how edges are looked for", choices=codes.NadirSearch)
     ),
     PointerRegister(
-        0x30, _RO, u8("OVER_CURRENT", "bit 0: SRAM1 drew too much, bit 1: SRAM2", maximum=3)
+        0x30, _RO, u8("OVER_CURRENT", "bit 0: SRAM1 drew too much, bit 1: SRAM2", high=3)
     ),
     PointerRegister(
-        0x60, _RO, Field(f"bytes{codes.IMAGE_BYTES}", "IMAGE", "640 x 480 pixels, row after row")
+        0x60, _RO, byte_array(codes.IMAGE_BYTES, "IMAGE", "640 x 480 pixels, row after row")
     ),
 )
 

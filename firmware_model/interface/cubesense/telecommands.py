@@ -35,7 +35,7 @@ _LOCATION = u8(
     "Location",
     "half of the memory; one picture fills it",
     choices=codes.ImageLocation,
-    maximum=codes.ImageLocation.TOP,
+    high=codes.ImageLocation.TOP,
 )
 
 
@@ -51,7 +51,7 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
             42 + 2 * camera,
             f"AutoAdjust{number}",
             f"automatic exposure and gain of camera {number}, {name}",
-        ).of(u8("Enabled", "1: the camera adjusts itself", maximum=1)),
+        ).of(u8("Enabled", "1: the camera adjusts itself", high=1)),
         _high(
             43 + 2 * camera, f"CameraSettings{number}", f"settings of camera {number}, {name}"
         ).of(
@@ -69,8 +69,8 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
             f"Boresight{number}",
             f"pixel of the optical axis of camera {number}, {name}",
         ).of(
-            u16("X", "column", "px", 100, maximum=codes.COLUMNS - 1, reset=x),
-            u16("Y", "row", "px", 100, maximum=codes.ROWS - 1, reset=y),
+            u16("X", "column", "px", 100, high=codes.COLUMNS - 1, reset=x),
+            u16("Y", "row", "px", 100, high=codes.ROWS - 1, reset=y),
         ),
         _low(
             52 + camera,
@@ -78,10 +78,10 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
             f"area that detection ignores, camera {number}; ends included, all 0: none",
         ).of(
             u8("Area", "number of the area", reset=1).within(1, codes.MASK_AREAS),
-            u16("XMin", "first column", "px", maximum=codes.COLUMNS - 1),
-            u16("XMax", "last column", "px", maximum=codes.COLUMNS - 1),
-            u16("YMin", "first row", "px", maximum=codes.ROWS - 1),
-            u16("YMax", "last row", "px", maximum=codes.ROWS - 1),
+            u16("XMin", "first column", "px", high=codes.COLUMNS - 1),
+            u16("XMax", "last column", "px", high=codes.COLUMNS - 1),
+            u16("YMin", "first row", "px", high=codes.ROWS - 1),
+            u16("YMax", "last row", "px", high=codes.ROWS - 1),
             ordered=(("XMin", "XMax"), ("YMin", "YMax")),
         ),
         _low(
@@ -131,7 +131,7 @@ _COMMON = (
         u16(
             "Frame",
             "number from 0, row after row; must exist in the selected size",
-            maximum=codes.ImageSize.SIDE_1024.frames - 1,
+            high=codes.ImageSize.SIDE_1024.frames - 1,
         )
     ),
     Message(

@@ -8,7 +8,7 @@ of Identification has seconds before milliseconds.
 from collections.abc import Iterator, Mapping
 from functools import partial
 
-from cubestack.firmware_model.interface.codec.field import Field, i16, u8, u16
+from cubestack.firmware_model.interface.codec.field import Field, byte_array, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.cubesense import codes
@@ -71,7 +71,7 @@ def _mask(camera: codes.Camera) -> Message:
         f"areas that detection ignores, camera {camera + 1}; ends included, all 0: none",
     ).of(
         *(
-            u16(f"{name}{area}", f"{what} of area {area}", "px", maximum=size - 1)
+            u16(f"{name}{area}", f"{what} of area {area}", "px", high=size - 1)
             for area in range(1, codes.MASK_AREAS + 1)
             for name, what, size in limits
         )
@@ -88,7 +88,7 @@ _NODE = (
         u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
     ),
     _low(129, "SerialNumber", "serial number").of(
-        Field("bytes6", "SerialNumber", "ASCII; zero behind a shorter one")
+        byte_array(6, "SerialNumber", "ASCII; zero behind a shorter one")
     ),
     _low(130, "CommunicationStatus", "counters and error flags of the host's buses").of(
         u16("TcmdCount", "telecommands received"),
@@ -116,7 +116,7 @@ _STATE = (
     ),
     _high(168, "Configuration", "thresholds and camera settings").of(*_configuration_fields()),
     _high(192, "ImageFrame", "the frame that is ready").of(
-        Field(f"bytes{codes.FRAME_BYTES}", "Frame", "pixels, row after row")
+        byte_array(codes.FRAME_BYTES, "Frame", "pixels, row after row")
     ),
     _high(193, "ImageFrameInfo", "which frame is ready").of(
         u16("FrameNumber", "65535 (assumed): none is ready yet", reset=codes.EMPTY_FRAME),

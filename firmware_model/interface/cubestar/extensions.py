@@ -8,7 +8,15 @@ has no message for the image sensor's frame rate, which the thesis' ground softw
 from dataclasses import replace
 
 from cubestack.firmware_model.interface.codec.attitude_quality import ATTITUDE_QUALITY
-from cubestack.firmware_model.interface.codec.field import Field, bool1, enum8, f32, u8, u16, u32
+from cubestack.firmware_model.interface.codec.field import (
+    bool1,
+    byte_array,
+    enum8,
+    f32,
+    u8,
+    u16,
+    u32,
+)
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import switch_messages
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode, Reason
@@ -29,13 +37,13 @@ _TELECOMMANDS = (
         u16("BlockNumber", "block n covers bytes 128 n to 128 n + 127, row after row").within(
             None, IMAGE_BYTES // UPLOAD_BLOCK_BYTES - 1, "ImageBlockSizeError"
         ),
-        Field(f"bytes{UPLOAD_BLOCK_BYTES}", "Data", "pixels"),
+        byte_array(UPLOAD_BLOCK_BYTES, "Data", "pixels"),
     ),
     Message(
         101,
         "SelectImageBank",
         "half of the frame buffer that the next capture fills and the next transfer reads",
-    ).of(u8("Bank", "bank", maximum=1)),
+    ).of(u8("Bank", "bank", high=1)),
     Message(102, "SetFrameRate", "frame rate of the image sensor").of(
         u16(
             "FrameRate",

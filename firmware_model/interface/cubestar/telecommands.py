@@ -134,8 +134,8 @@ _IMAGE = (
         u16(
             "BlockNumber",
             "block of the picture, row after row",
-            maximum=IMAGE_BYTES // codes.ImageBlockSize.BYTES_32.length - 1,
-            maximum_by=(
+            high=IMAGE_BYTES // codes.ImageBlockSize.BYTES_32.length - 1,
+            high_by=(
                 "BlockSize",
                 {size: IMAGE_BYTES // size.length - 1 for size in codes.ImageBlockSize},
             ),
@@ -232,7 +232,7 @@ _IDENTIFICATION = (
         ),
     ),
     Message(27, "setIDMargin", "tolerance of the distance between two stars").of(
-        u8("Margin", "tolerance", "rad", scale=10_000, minimum=0.0001, reset=0.001)
+        u8("Margin", "tolerance", "rad", scale=10_000, low=0.0001, reset=0.001)
     ),
     Message(28, "IDStars", "identify the detected stars"),
     Message(29, "SelectBestStars", "select the three identified stars of highest confidence"),

@@ -16,6 +16,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import (
     Field,
     bool1,
+    byte_array,
     enum8,
     f32,
     i16,
@@ -155,7 +156,7 @@ _CAMERA = (
         u8("DataH", "always 0: this sensor's registers have 8 bits"), u8("DataL", "value")
     ),
     Message(143, "ImageBlock", "block that ImageBlockSet selected").of(
-        Field("bytes128", "Block", "pixels, row after row; zero behind a shorter block")
+        byte_array(128, "Block", "pixels, row after row; zero behind a shorter block")
     ),
     Message(144, "CameraTiming", "times of the image sensor's use").of(
         *_times(

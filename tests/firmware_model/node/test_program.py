@@ -26,7 +26,7 @@ INTERFACE = node_interface(
     i2c_address=0x30,
     flags={"Overdone": "more than 9 in all"},
     telecommands=(
-        Message(10, "Work", "take some time").of(u8("Amount", "to be added", maximum=9)),
+        Message(10, "Work", "take some time").of(u8("Amount", "to be added", high=9)),
         Message(11, "SetLevel", "set the level").of(_LEVEL),
     ),
     telemetries=(

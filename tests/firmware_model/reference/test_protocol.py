@@ -95,7 +95,7 @@ def _parameters(message: Message, rng: np.random.Generator) -> bytes:
         if rng.random() < 0.6 and not field.type.startswith("bytes"):
             near: Any = values[field.name]
             if field.type == "f32":
-                limits = [v for v in (field.minimum, field.maximum, 0.0, np.nan) if v is not None]
+                limits = [v for v in (*field.ends, 0.0, np.nan) if v is not None]
                 bits = struct.pack("<f", rng.choice([near, *limits]))
             else:
                 raw = round(float(near) * field.scale) + int(rng.integers(-3, 4))

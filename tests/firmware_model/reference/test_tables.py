@@ -1,5 +1,6 @@
 """The tables of the reference program, as C."""
 
+import math
 import re
 from itertools import pairwise
 
@@ -41,8 +42,8 @@ def test_ranges_that_a_field_depends_on_cover_all_values() -> None:
 
 
 def test_limits_are_written_as_c() -> None:
-    assert [tables._bound(None, "-"), tables._bound(5, "")] == ["-INFINITY", "5.0f"]
-    assert re.fullmatch(r"0\.1f", tables._bound(0.1, "-"))
+    bounds = [tables._bound(limit) for limit in (-math.inf, math.inf, 5, 0.1)]
+    assert bounds == ["-INFINITY", "INFINITY", "5.0f", "0.1f"]
 
 
 def test_a_field_that_may_have_any_value_has_no_rule() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.hazards import Hazard
+from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.values import (
     FLAG,
     NUMBER,
@@ -19,6 +20,7 @@ from cubestack.firmware_model.values import (
     DeclaredValues,
     ListDeclaration,
 )
+from cubestack.host.devices.registry import devices
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = ("firmware_model", "emulator", "host")
@@ -109,3 +111,25 @@ def test_values_of_another_type_are_refused_by_name(owner: type[Any]) -> None:
         for wrong in of_other_kinds(scalar(one)):
             with pytest.raises(owner.error, match=f"{name}.* must be "):
                 owner(**NEEDED.get(owner.__name__, {}) | {name: filled(one, wrong)})
+
+
+FIELDS = [
+    pytest.param(field, id=f"{one.name}-{message.name}-{field.name}")
+    for one in devices()
+    for message in one.interface.telecommands
+    for field in message.fields
+    if field.choices is None and None not in field.ends and field.high_by is None
+]
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_message_fields_allow_what_is_within_their_limits(field: Field) -> None:
+    for limit, outward in ((field.low, -1), (field.high, 1)):
+        raw = field.encode(limit, saturate=False)
+        assert field.allows(field.decode(raw), {})
+        step = 2e-7 * max(1.0, abs(limit)) if field.type == "f32" else 1 / field.scale
+        beyond = limit + outward * step
+        low, high = field.raw_range
+        if field.type == "f32" or low <= beyond * field.scale <= high:
+            value = field.decode(field.encode(beyond, saturate=False))
+            assert not field.allows(value, {}) or value == field.also

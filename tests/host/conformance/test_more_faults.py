@@ -210,7 +210,7 @@ class Filled(Slave):
         super().__init__()
         for one in REGISTERS:
             if one.readable and not one.streams:
-                least = int(max(one.field.minimum or 0, 0))
+                least = int(max(one.field.low, 0))
                 self.content[one.address] = least.to_bytes(one.length, "big")
 
 

@@ -35,7 +35,7 @@ class Registers(Slave):
         self.kept: set[str] = set()
         self.takes_all = False
         for one in SETTINGS:
-            self.content[one.address] = bytes([int(one.field.reset or one.field.minimum or 0)])
+            self.content[one.address] = bytes([int(one.field.reset or one.field.ends[0] or 0)])
 
     def i2c_rdwr(self, *messages: Any) -> None:
         before = dict(self.content)

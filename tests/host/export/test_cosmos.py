@@ -113,4 +113,4 @@ def test_commands_carry_what_the_node_reads(interface: Interface) -> None:
                     assert low <= default <= high
                     if one.also is None:
                         assert low >= one.raw_range[0] / one.scale - 1e-9
-                        assert one.minimum is None or low == pytest.approx(one.minimum)
+                        assert one.ends[0] is None or low == pytest.approx(one.low)

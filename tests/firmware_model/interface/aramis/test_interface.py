@@ -63,10 +63,10 @@ def test_each_setting_is_shown_as_it_is_sent() -> None:
 
 
 def test_limits_are_those_of_the_things_themselves() -> None:
-    last = INTERFACE.telecommand("ImageBlockSet").field("BlockNumber").maximum
+    last = INTERFACE.telecommand("ImageBlockSet").field("BlockNumber").high
     assert last == IMAGE_BYTES // 128 - 1 == 1280 * 1024 // 128 - 1
-    assert INTERFACE.telecommand("SetExposure").field("Rows").maximum == 0x3FFF
-    assert INTERFACE.telecommand("SetSystemTime").field("Millisecond").maximum == MS_PER_DAY - 1
+    assert INTERFACE.telecommand("SetExposure").field("Rows").high == 0x3FFF
+    assert INTERFACE.telecommand("SetSystemTime").field("Millisecond").high == MS_PER_DAY - 1
 
 
 @pytest.mark.parametrize(

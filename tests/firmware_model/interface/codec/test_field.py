@@ -8,7 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, suggestion
+from cubestack.firmware_model.interface.codec.field import (
+    Field,
+    InterfaceError,
+    bool1,
+    byte_array,
+    enum8,
+    f32,
+    i16,
+    suggestion,
+    u8,
+    u16,
+)
 
 
 class Colour(IntEnum):
@@ -23,21 +34,21 @@ INTEGERS = {"u8": (0, 255), "u16": (0, 65535), "u32": (0, 2**32 - 1), "i16": (-3
 @given(data=st.data())
 def test_every_raw_count_survives_decoding_and_encoding(kind: str, data: st.DataObject) -> None:
     low, high = INTEGERS[kind]
-    field = Field(kind, "x", "", scale=data.draw(st.sampled_from([1, 10, 50, 100, 10_000])))
+    field = Field("x", "", type=kind, scale=data.draw(st.sampled_from([1, 10, 50, 100, 10_000])))
     raw = data.draw(st.integers(low, high)) & ((1 << field.bits) - 1)
     assert field.encode(field.decode(raw), saturate=False) == raw
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_float_bits_are_those_of_ieee(raw: int) -> None:
-    value = Field("f32", "x", "").decode(raw)
+    value = f32("x", "").decode(raw)
     expected = struct.unpack("<f", struct.pack("<I", raw))[0]
     assert value == expected or (math.isnan(value) and math.isnan(expected))
 
 
 @given(st.floats(-3.2767, 3.2767))
 def test_rounding_is_half_away_from_zero(value: float) -> None:
-    raw = Field("i16", "x", "", scale=10_000).encode(value, saturate=False)
+    raw = i16("x", "", scale=10_000).encode(value, saturate=False)
     counts = Decimal(value * 10_000)
     expected = int(counts.quantize(Decimal(1), rounding=ROUND_HALF_UP))  # half away, in decimal
     assert raw == expected & 0xFFFF
@@ -47,13 +58,13 @@ def test_rounding_is_half_away_from_zero(value: float) -> None:
     ("value", "raw"), [(0.5, 1), (-0.5, -1), (1.5, 2), (-2.5, -3), (0.49999999999999994, 0)]
 )
 def test_rounding_of_halves(value: float, raw: int) -> None:
-    assert Field("i16", "x", "").encode(value, saturate=False) == raw & 0xFFFF
+    assert i16("x", "").encode(value, saturate=False) == raw & 0xFFFF
 
 
 @pytest.mark.parametrize("kind", INTEGERS)
 def test_telemetry_saturates_and_telecommands_refuse(kind: str) -> None:
     low, high = INTEGERS[kind]
-    field = Field(kind, "x", "")
+    field = Field("x", "", type=kind)
     for value, end in ((high + 1, high), (low - 1, low), (math.inf, high), (-math.inf, low)):
         assert field.decode(field.encode(value, saturate=True)) == end
         with pytest.raises(InterfaceError, match=f"x: .* does not fit; {kind} carries"):
@@ -61,14 +72,14 @@ def test_telemetry_saturates_and_telecommands_refuse(kind: str) -> None:
 
 
 def test_not_a_number_is_zero_in_telemetry_and_refused_in_telecommands() -> None:
-    field = Field("i16", "x", "")
+    field = i16("x", "")
     assert field.encode(math.nan, saturate=True) == 0
     with pytest.raises(InterfaceError, match="does not fit"):
         field.encode(math.nan, saturate=False)
 
 
 def test_large_floats_become_infinite_in_telemetry_and_are_refused_in_telecommands() -> None:
-    field = Field("f32", "x", "")
+    field = f32("x", "")
     assert field.decode(field.encode(-1e39, saturate=True)) == -math.inf
     assert field.decode(field.encode(math.inf, saturate=False)) == math.inf
     with pytest.raises(InterfaceError, match="x: 1e\\+39 is too large for a float32"):
@@ -76,7 +87,7 @@ def test_large_floats_become_infinite_in_telemetry_and_are_refused_in_telecomman
 
 
 def test_bytes_keep_their_order_and_their_length() -> None:
-    field = Field("bytes3", "x", "")
+    field = byte_array(3, "x", "")
     assert field.encode(b"\x01\x02\x03", saturate=False) == 0x030201
     assert field.decode(0x030201) == b"\x01\x02\x03"
     with pytest.raises(InterfaceError, match="x: has 2 bytes, must have 3"):
@@ -86,7 +97,7 @@ def test_bytes_keep_their_order_and_their_length() -> None:
 
 
 def test_choices_go_by_number_or_name() -> None:
-    field = Field("enum8", "x", "", choices=Colour, reset=Colour.RED)
+    field = enum8("x", "", choices=Colour, reset=Colour.RED)
     assert field.encode("green", saturate=False) == field.encode(4, saturate=False) == 4
     assert field.label(4) == "GREEN"
     assert field.label(2) == "2"
@@ -97,29 +108,29 @@ def test_choices_go_by_number_or_name() -> None:
 
 def test_text_is_no_number() -> None:
     with pytest.raises(InterfaceError, match="x: '7' is not a number"):
-        Field("u8", "x", "").encode("7", saturate=True)
+        u8("x", "").encode("7", saturate=True)
 
 
 @given(st.floats(width=32))
 def test_limits_of_floats_are_taken_as_the_wire_carries_them(value: float) -> None:
-    field = Field("f32", "x", "", minimum=-math.pi / 2, maximum=math.pi / 2)
+    field = f32("x", "", low=-math.pi / 2, high=math.pi / 2)
     edge = struct.unpack("<f", struct.pack("<f", math.pi / 2))[0]
     assert field.allows(value, {}) == (math.isfinite(value) and abs(value) <= edge)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_a_float_without_limits_must_still_be_finite(value: float) -> None:
-    assert not Field("f32", "x", "").allows(value, {})
+    assert not f32("x", "").allows(value, {})
 
 
 def test_counts_without_a_scale_stay_integers() -> None:
-    assert isinstance(Field("u16", "x", "").decode(5), int)
-    assert isinstance(Field("u16", "x", "", scale=10).decode(50), float)
-    assert Field("bool1", "x", "").decode(1) is True
+    assert isinstance(u16("x", "").decode(5), int)
+    assert isinstance(u16("x", "", scale=10).decode(50), float)
+    assert bool1("x", "").decode(1) is True
 
 
 def test_a_limit_may_hang_on_another_field() -> None:
-    field = Field("u16", "x", "", maximum=100, maximum_by=("size", {0: 100, 1: 50}))
+    field = u16("x", "", high=100, high_by=("size", {0: 100, 1: 50}))
     assert field.allows(100, {"size": 0})
     assert not field.allows(51, {"size": 1})
     assert field.allows(100, {"size": 9})  # the size's own violation

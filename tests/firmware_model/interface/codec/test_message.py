@@ -20,8 +20,8 @@ MIXED = Message(200, "Mixed", "").of(
 )
 
 WINDOW = Message(20, "Window", "").of(
-    u8("low", "", minimum=1, range_flag="LowError", reset=1),
-    u8("high", "", maximum=9, range_flag="HighError", reset=9),
+    u8("low", "", low=1, range_flag="LowError", reset=1),
+    u8("high", "", high=9, range_flag="HighError", reset=9),
     ordered=(("low", "high"),),
 )
 
@@ -100,8 +100,8 @@ def test_errors_name_the_offender_in_one_line(call: Callable[[], object], messag
     [
         ((1, u8("a", ""), u8("a", "")), "two fields of one name"),
         ((256,), "ID 256 is not a byte"),
-        ((1, u8("a", "", minimum=1)), "reset value of a"),
-        ((1, u8("a", "", maximum_by=("z", {}))), "no field 'z'"),
+        ((1, u8("a", "", low=1)), "reset value of a"),
+        ((1, u8("a", "", high_by=("z", {}))), "no field 'z'"),
     ],
 )
 def test_wrong_declarations_are_refused(arguments: tuple[Any, ...], message: str) -> None:

@@ -5,14 +5,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
-from cubestack.firmware_model.interface.codec.field import Field, InterfaceError
+from cubestack.firmware_model.interface.codec.field import (
+    InterfaceError,
+    bool1,
+    byte_array,
+    i16,
+    u8,
+)
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
 
 _RW, _RO, _WO = (RegisterAccess.READ_WRITE, RegisterAccess.READ_ONLY, RegisterAccess.WRITE_ONLY)
-LEVEL = PointerRegister(0x10, _RW, Field("u8", "LEVEL", "", maximum=9))
-CENTRE = PointerRegister(0x20, _RO, Field("i16", "CENTRE", "", "px", 100))
-START = PointerRegister(0x30, _WO, Field("u8", "START", ""))
-STREAM = PointerRegister(0x40, _RO, Field("bytes5", "STREAM", ""))
+LEVEL = PointerRegister(0x10, _RW, u8("LEVEL", "", high=9))
+CENTRE = PointerRegister(0x20, _RO, i16("CENTRE", "", "px", 100))
+START = PointerRegister(0x30, _WO, u8("START", ""))
+STREAM = PointerRegister(0x40, _RO, byte_array(5, "STREAM", ""))
 MAP = PointerMap(0x1C, (STREAM, LEVEL, CENTRE, START))
 
 
@@ -54,12 +60,12 @@ def test_lookup() -> None:
         (lambda: MAP["LEVL"], "no register 'LEVL'; did you mean LEVEL?"),
         (lambda: CENTRE.decode(b"a"), "register CENTRE has 2 bytes, not 1"),
         (lambda: STREAM.encode(1), "register STREAM is a stream"),
-        (lambda: PointerRegister(256, _RO, Field("u8", "A", "")), "address 256 is not a byte"),
-        (lambda: PointerRegister(0, _RO, Field("bool1", "A", "")), "must be whole bytes"),
-        (lambda: PointerRegister(0, _RW, Field("i16", "A", "")), "writes one byte, not 2"),
+        (lambda: PointerRegister(256, _RO, u8("A", "")), "address 256 is not a byte"),
+        (lambda: PointerRegister(0, _RO, bool1("A", "")), "must be whole bytes"),
+        (lambda: PointerRegister(0, _RW, i16("A", "")), "writes one byte, not 2"),
         (lambda: PointerMap(1, (LEVEL, LEVEL)), "both have address 0x10"),
         (
-            lambda: PointerMap(1, (LEVEL, PointerRegister(0, _RO, Field("u8", "level", "")))),
+            lambda: PointerMap(1, (LEVEL, PointerRegister(0, _RO, u8("level", "")))),
             "two registers are called",
         ),
     ],
