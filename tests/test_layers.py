@@ -43,6 +43,7 @@ ORDER = {
         "interface",
         "formats mcu",
         "attitude node",
+        "star_tracker",
         "cubestar cubesense aramis",
         "reference",
     ),

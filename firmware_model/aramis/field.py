@@ -22,7 +22,7 @@ _ONE = np.float32(1)
 
 
 @dataclass(frozen=True)
-class Field(DeclaredValues):
+class CameraField(DeclaredValues):
     """A pinhole camera and the part of its picture that is used."""
 
     fov_deg: float = number(FOV_DEG, "field across the shorter side of the picture", 1, 90)
@@ -53,17 +53,17 @@ class Field(DeclaredValues):
         return self.pitch_x_mm / self.focal_length_mm, self.pitch_y_mm / self.focal_length_mm
 
     @cached_property
-    def smallest_cosine(self) -> float:
+    def smallest_cosine(self) -> np.float32:
         """Cosine of the angle between the boresight and the farthest direction in the field."""
         width, height = self.columns * self.pitch_x_mm, self.rows * self.pitch_y_mm
         farthest = self.radius_mm if self.round else hypot(width, height) / 2
-        return cos(atan(farthest / self.focal_length_mm))
+        return np.float32(cos(atan(farthest / self.focal_length_mm)))
 
     @cached_property
     def solid_angle_sr(self) -> float:
         """Solid angle of the field, of a rectangle as if it were flat."""
         if self.round:
-            return 2 * pi * (1 - self.smallest_cosine)
+            return 2 * pi * (1 - float(self.smallest_cosine))
         across, down = self.scale
         return self.columns * across * self.rows * down
 
@@ -96,10 +96,11 @@ class Field(DeclaredValues):
         """Which points (n, 2) of the picture in px are in the field."""
         return self._inside(*self._tangents(points, meter), meter)
 
-    def contains(self, directions: Floats, meter: Meter) -> Mask:
-        """Which unit vectors (n, 3) in camera axes are in the field."""
+    def contains(self, directions: Floats, meter: Meter, factor: float = 1.0) -> Mask:
+        """Which unit vectors (n, 3) in camera axes are in the field; ``factor``: by which tangents
+        of measured field angles are multiplied."""
         x, y, z = directions.T
-        depth = np.maximum(z, np.float32(1e-6))
+        depth = np.maximum(z, np.float32(1e-6)) * np.float32(factor)
         meter.charge(f32_div=2 * len(directions), f32_compare=len(directions))
         in_front: Mask = np.greater(z, 0)
         return in_front & self._inside(x / depth, y / depth, meter)

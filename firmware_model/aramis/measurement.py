@@ -14,11 +14,11 @@ from cubestack.firmware_model.aramis import pipeline
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.camera import Camera
 from cubestack.firmware_model.aramis.catalogue.flash_store import CatalogueStore
-from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.background import LevelHistory
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
-from cubestack.firmware_model.aramis.field import FOV_DEG, Field
+from cubestack.firmware_model.aramis.field import FOV_DEG, CameraField
 from cubestack.firmware_model.aramis.settings import StoredSettings
-from cubestack.firmware_model.aramis.state import Measurement, State
+from cubestack.firmware_model.aramis.state import MeasurementResult, State
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface import aramis
 from cubestack.firmware_model.interface.aramis import MeasurementMode, Reason, SensorState
@@ -33,9 +33,9 @@ HALF_FALSE = 2
 
 
 @lru_cache(maxsize=4)
-def _lens(fov_deg: float, only_round: bool) -> Field:
+def _lens(fov_deg: float, only_round: bool) -> CameraField:
     """The lens; kept, because it holds the mask of its pixels."""
-    return Field(fov_deg=fov_deg, round=only_round)
+    return CameraField(fov_deg=fov_deg, round=only_round)
 
 
 def configuration(
@@ -46,7 +46,7 @@ def configuration(
     field = settings.all("SetField")
     lens = _lens(float(field["FieldOfView"]), bool(field["Round"]))
     local = switches.detection == "local"
-    detection = pipeline.Detection(
+    detection = pipeline.DetectionSettings(
         sigmas=float(search["Sigmas"]),
         spikes=SpikeRemoval(search["Spikes"]),
         needed=int(search["Needed"]),
@@ -87,7 +87,7 @@ class Measuring:
 
     def restart(self) -> None:
         """Pictures from now on have nothing to do with those before."""
-        self._background = Background()
+        self._background = LevelHistory()
 
     def latest_boresight(self) -> Floats | None:
         """Inertial unit vector (3,) of the latest measurement's boresight; None without one."""
@@ -102,7 +102,7 @@ class Measuring:
         With ``overlap``, the next frame comes while this one is worked on.
         """
         mode = MeasurementMode.LOST_IN_SPACE if hint is None else MeasurementMode.AIDED
-        result = Measurement(mode=mode)
+        result = MeasurementResult(mode=mode)
         steps = self._steps(result, hint, overlap=overlap)
         failure = yield from self._timed(result, "Total", steps)
         if failure is not None:
@@ -110,7 +110,7 @@ class Measuring:
         self._state.star = 0
         self._state.measurement = result
 
-    def _timed(self, result: Measurement, step: str, routine: Routine[T]) -> Routine[T]:
+    def _timed(self, result: MeasurementResult, step: str, routine: Routine[T]) -> Routine[T]:
         started_us: int = yield ReadTimer()
         outcome = yield from routine
         yield Pay()
@@ -119,7 +119,7 @@ class Measuring:
         return outcome
 
     def _steps(
-        self, result: Measurement, hint: Floats | None, *, overlap: bool
+        self, result: MeasurementResult, hint: Floats | None, *, overlap: bool
     ) -> Routine[Reason | None]:
         if not self._state.active:
             self._state.raise_flag("NotActive")
@@ -133,7 +133,7 @@ class Measuring:
         self._state.sensor = SensorState.READY
         return failure
 
-    def _picture(self, result: Measurement, *, overlap: bool) -> Routine[Reason | None]:
+    def _picture(self, result: MeasurementResult, *, overlap: bool) -> Routine[Reason | None]:
         failure = yield from self._timed(result, "Setup", self._camera.start())
         if failure is None:
             failure = yield from self._timed(result, "Capture", self._camera.take())
@@ -145,7 +145,7 @@ class Measuring:
             self._camera.expose()
         return None
 
-    def _check(self, result: Measurement) -> Routine[Reason | None]:
+    def _check(self, result: MeasurementResult) -> Routine[Reason | None]:
         """Make sure that RAM holds a good catalogue."""
         errors = self._catalogue.ram_errors
         good = yield from self._timed(result, "Check", self._catalogue.ensure())
@@ -156,7 +156,7 @@ class Measuring:
         missing = self._catalogue.state is aramis.CatalogueState.MISSING
         return Reason.NO_CATALOGUE if missing else Reason.CATALOGUE_DAMAGED
 
-    def _process(self, result: Measurement, hint: Floats | None) -> Routine[None]:
+    def _process(self, result: MeasurementResult, hint: Floats | None) -> Routine[None]:
         database, place = self._catalogue.database, self._camera.latest
         assert database is not None
         assert place is not None
@@ -173,7 +173,7 @@ class Measuring:
                 result.threshold = past.threshold(settings.detection.sigmas, self._meter)
                 result.pictures = len(past.sums)
             else:
-                result.mean, result.threshold = round(light.level), round(light.threshold)
+                result.mean, result.threshold = round(light.background), round(light.threshold)
                 result.pictures = 1
         yield Pay()
         result.solution, result.outcome = solution, solution.outcome
@@ -183,7 +183,7 @@ class Measuring:
             self._state.matched = int((solution.stars >= 0).sum())
 
     @contextmanager
-    def _phases(self, result: Measurement) -> Iterator[None]:
+    def _phases(self, result: MeasurementResult) -> Iterator[None]:
         """Book the cycles of each phase that the block charges."""
         before = dict(self._meter.phases)
         yield

@@ -11,26 +11,47 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.firmware_model.aramis.detection.background import Background
-from cubestack.firmware_model.aramis.detection.local import brighter, measure_sky
+from cubestack.firmware_model.aramis.detection import charges
+from cubestack.firmware_model.aramis.detection.background import LevelHistory
 from cubestack.firmware_model.aramis.detection.regions import NO_REGIONS, find_regions, locate_stars
 from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
 from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval, remove_spikes
 from cubestack.firmware_model.aramis.detection.spots import find_spots
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.reasons import is_hit, true_reason
-from cubestack.firmware_model.aramis.solution import Light, Profile, Solution, StarList, unsolved
+from cubestack.firmware_model.aramis.solution import (
+    PictureLight,
+    Profile,
+    Solution,
+    StarList,
+    unsolved,
+)
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
+from cubestack.firmware_model.star_tracker.background import (
+    UNIT,
+    cell_middles,
+    estimate,
+    sample_offsets,
+)
+
+STEP = 2
+"""Distance of the background's samples in px."""
+
+LEAST_NOISE = 19
+"""In 1/16 count: the converter's steps hide less, and levels near 0 are cut off there."""
+
+BLIND = 240
+"""Level from which on no star can be told from its surroundings."""
 
 SPIKE_SIGMAS = 8.0
 """A pixel is far above its surroundings from so many standard deviations on."""
 
 
 @dataclass(frozen=True)
-class Detection(DeclaredValues):
+class DetectionSettings(DeclaredValues):
     """Settings of the search for stars; the defaults are the published ones.
 
     ``spikes`` says how noise is removed. The limits of a star's size and of the number of stars
@@ -54,15 +75,15 @@ class Detection(DeclaredValues):
         self.check_within("min_pixels", high=self.max_pixels)
 
 
-_FIELD, _DETECTION, _PROFILE = Field(), Detection(), Profile()
+_FIELD, _DETECTION, _PROFILE = CameraField(), DetectionSettings(), Profile()
 
 
 @dataclass(frozen=True)
 class Configuration:
     """Everything that is set before flight."""
 
-    field: Field = _FIELD
-    detection: Detection = _DETECTION
+    field: CameraField = _FIELD
+    detection: DetectionSettings = _DETECTION
     profile: Profile = _PROFILE
 
 
@@ -71,7 +92,7 @@ PUBLISHED = Configuration()
 
 VERIFIED = replace(
     PUBLISHED,
-    detection=Detection(
+    detection=DetectionSettings(
         spikes=SpikeRemoval.CENTRE, min_pixels=1, max_stars=60, subtract=True, local=True
     ),
     profile=Profile(sigma_rad=5.6e-5, verify=True),
@@ -79,7 +100,7 @@ VERIFIED = replace(
 """An extension: further stars must confirm the attitude; noise of 0.15 px is expected."""
 
 
-def _check_size(picture: NDArray[np.uint8], field: Field) -> None:
+def _check_size(picture: NDArray[np.uint8], field: CameraField) -> None:
     if picture.shape != (field.rows, field.columns):
         raise ValueError(
             f"a picture must have {field.rows} rows of {field.columns} pixels, not {picture.shape}"
@@ -88,9 +109,9 @@ def _check_size(picture: NDArray[np.uint8], field: Field) -> None:
 
 def detect(
     picture: NDArray[np.uint8],
-    background: Background,
-    field: Field,
-    settings: Detection,
+    background: LevelHistory,
+    field: CameraField,
+    settings: DetectionSettings,
     meter: Meter,
 ) -> StarList | None:
     """Stars of a picture (rows, columns) in the field; None when too many pixels are lit.
@@ -109,20 +130,22 @@ def detect(
         meter.charge(pixel_read=pixels, i32_add=pixels, ram_write=picture.size // 4, loop=pixels)
     mask = remove_spikes(mask, settings.spikes, settings.needed, meter)
     with meter.phase("centroids"):
-        regions = find_regions(mask, meter)
+        regions = find_regions(mask)
+        charges.charge_regions(mask.size, regions, meter)
         if regions is None:
             return None
         floor = background.mean(meter) if settings.subtract else 0
-        sizes = settings.min_pixels, settings.max_pixels
-        stars = locate_stars(picture, regions, floor, *sizes, meter)
+        stars = locate_stars(picture, regions, floor, settings.min_pixels, settings.max_pixels)
+        charges.charge_centroids(regions, len(stars), meter)
         inside = np.flatnonzero(field.inside(stars.centroids, meter))[: settings.max_stars]
-        smear = smear_px(picture, regions, background.mean(meter), meter)
+        smear = smear_px(picture, regions, background.mean(meter))
+        charges.charge_smear(regions, meter)
     return StarList(stars.centroids[inside], stars.brightness[inside], smear)
 
 
 def solve(
     picture: NDArray[np.uint8],
-    background: Background,
+    background: LevelHistory,
     configuration: Configuration,
     database: Database,
     meter: Meter,
@@ -153,11 +176,11 @@ def solve(
     if is_hit(stars, field):
         return unsolved(Reason.RADIATION, stars)
     solution = identify(stars, field, profile, database, meter, hint, until)
-    return replace(solution, reason=true_reason(solution, field))
+    return replace(solution, reason=true_reason(solution))
 
 
 def detect_locally(
-    picture: NDArray[np.uint8], field: Field, settings: Detection, meter: Meter
+    picture: NDArray[np.uint8], field: CameraField, settings: DetectionSettings, meter: Meter
 ) -> StarList:
     """Stars of a picture (rows, columns) in the field, and what else it shows.
 
@@ -168,24 +191,37 @@ def detect_locally(
     """
     _check_size(picture, field)
     with meter.phase("threshold"):
-        sky = measure_sky(picture, field, meter)
-        above = settings.sigmas * sky.noise
-        mask = brighter(picture, sky.levels + above, meter) & field.mask
-        far = brighter(picture, sky.levels + SPIKE_SIGMAS * sky.noise, meter) & field.mask
+        down, across = sample_offsets(*picture.shape, STEP)
+        sky = estimate(picture[np.ix_(down, across)], STEP, LEAST_NOISE).smoothed()
+        charges.charge_background(sky, meter)
+        mask = sky.brighter(picture, settings.sigmas) & field.mask
+        far = sky.brighter(picture, SPIKE_SIGMAS) & field.mask
+        for _ in (mask, far):
+            charges.charge_thresholds(*picture.shape, meter)
     large = remove_spikes(mask, settings.spikes, settings.needed, meter)
     spikes = int(np.count_nonzero(far & ~large))
     with meter.phase("centroids"):
-        regions = find_regions(large & field.mask, meter)
-        if regions is None:
-            regions = NO_REGIONS
+        regions = find_regions(large & field.mask)
+        charges.charge_regions(mask.size, regions, meter)
+        regions = regions or NO_REGIONS
+        seen = field.mask[np.ix_(*(cell_middles(size) for size in picture.shape))]
+        levels, noise = sky.levels[seen] / UNIT, float(np.median(sky.noises[seen])) / UNIT
         sizes = settings.min_pixels, settings.max_pixels
-        spots = find_spots(picture, regions, sky.deviation, sizes, meter)
+        spots = find_spots(picture, regions, noise, sizes)
+        charges.charge_spots(regions, sizes, spots, meter)
         spots = spots.of(field.inside(spots.centroids, meter))
-        spots, smear_px = without_tracks(spots, field, meter)
-        threshold = sky.level + settings.sigmas * sky.deviation
-        light = Light(
-            sky.level, threshold, sky.deviation, sky.spread, sky.blind, spots.widest, spikes,
-            spots.rejected,
-        )  # fmt: skip
-        kept = spots.of(np.arange(min(len(spots), settings.max_stars)))
+        charges.charge_tracks(spots, meter)
+        stars, smear_px = without_tracks(spots, field)
+        low, level, high = np.percentile(levels, (5, 50, 95)).tolist()
+        light = PictureLight(
+            background=level,
+            background_range=high - low,
+            noise=noise,
+            saturated=float(np.mean(levels >= BLIND)),
+            spikes=spikes,
+            threshold=level + settings.sigmas * noise,
+            widest=spots.widest,
+            rejected=spots.rejected,
+        )
+        kept = stars.of(np.arange(min(len(stars), settings.max_stars)))
     return StarList(kept.centroids, kept.brightness, smear_px, sigma_px=kept.sigma_px, light=light)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
+from cubestack.firmware_model.star_tracker.disturbance import SkyStatistics
+from cubestack.firmware_model.star_tracker.rating import Rating
 from cubestack.firmware_model.values import DeclaredValues, choice, flag, number, whole
 
 NONE = -1
@@ -62,7 +64,7 @@ class Profile(DeclaredValues):
         1e-5, "believed wrong attitudes per picture, at most, that would be confirmed as well", 0, 1
     )
     largest_sigma_rad: float = number(
-        1.5e-3, "largest standard deviation of the turn about the boresight", 0, 1
+        1.65e-3, "largest standard deviation of the turn about the boresight", 0, 1
     )
     within_ms: float = number(650.0, "processor time from the picture until it gives up", 1, 10_000)
     hint_tolerance_deg: float = number(
@@ -81,26 +83,17 @@ class Profile(DeclaredValues):
 
 
 @dataclass(frozen=True)
-class Light:
-    """What a picture has beside stars.
+class PictureLight(SkyStatistics):
+    """What a picture has beside stars, in counts.
 
     Attributes:
-        level, threshold: of the sky, and of a bright pixel; medians over the field, in counts.
-        noise: standard deviation of a pixel.
-        spread: of the level over the field.
-        blind: share of the field that is too bright for stars, 0 to 1.
+        threshold: median level of a bright pixel.
         widest: pixels of the largest bright region.
-        spikes: pixels far above their surroundings that are too few to be a star.
         rejected: regions whose shape no star has.
     """
 
-    level: float
     threshold: float
-    noise: float
-    spread: float
-    blind: float
     widest: int
-    spikes: int
     rejected: int
 
 
@@ -122,34 +115,11 @@ class StarList:
     smear_px: float = 0.0
     skew_px: float = 0.0
     sigma_px: Floats | None = None
-    light: Light | None = None
+    light: PictureLight | None = None
 
     def __len__(self) -> int:
         """Number of stars."""
         return len(self.centroids)
-
-
-@dataclass(frozen=True, eq=False)
-class Quality:
-    """What a confirmed attitude is worth.
-
-    Attributes:
-        covariance: (3, 3) of small turns about the camera's axes, in rad squared.
-        residual_rad: root mean square of its stars' residuals in each axis.
-        false_alarm: wrong attitudes to be expected that would be confirmed as well.
-        scale: focal length that the stars show, beside the one that is set.
-    """
-
-    covariance: Floats
-    residual_rad: float
-    false_alarm: float
-    scale: float
-
-    @property
-    def sigma_rad(self) -> Floats:
-        """(3,) standard deviations about the camera's axes."""
-        sigma: Floats = np.sqrt(np.diagonal(self.covariance)).astype(np.float32)
-        return sigma
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +135,7 @@ class Solution:
         candidates, pivots: of the last triple: triangles left, and pivot triangles used.
         triples: tried.
         expected: catalogue stars in the field by the attitude, 0 without verification.
-        quality: of a confirmed attitude.
+        rating: of a confirmed attitude.
     """
 
     outcome: MeasurementOutcome
@@ -177,12 +147,10 @@ class Solution:
     pivots: int = 0
     triples: int = 0
     expected: int = 0
-    quality: Quality | None = None
+    rating: Rating | None = None
 
 
 def unsolved(reason: Reason, measured: StarList, **counts: int) -> Solution:
     """A solution without attitude."""
     nothing = np.full(len(measured), NONE, dtype=np.int32)
-    return Solution(
-        MeasurementOutcome.NONE, reason, None, nothing, measured, quality=None, **counts
-    )
+    return Solution(MeasurementOutcome.NONE, reason, None, nothing, measured, rating=None, **counts)

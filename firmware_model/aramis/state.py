@@ -36,7 +36,7 @@ class Clock:
 
 
 @dataclass
-class Measurement:
+class MeasurementResult:
     """The latest measurement.
 
     Attributes:
@@ -94,7 +94,7 @@ class State(NodeState):
         self.switches = RunningSwitches(switches)
         self.clock = Clock()
         self.sensor = SensorState.INACTIVE
-        self.measurement = Measurement()
+        self.measurement = MeasurementResult()
         self.quaternion: Floats | None = None
         self.matched = 0
         self.frames = 0

@@ -17,11 +17,7 @@ from cubestack.firmware_model.attitude.geometry import angles_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.interface.aramis import INTERFACE, OnOff
 from cubestack.firmware_model.interface.aramis.telemetry import SETTINGS_SHOWN
-from cubestack.firmware_model.interface.codec.attitude_quality import (
-    UNRATED,
-    covariance_fields,
-    log_false_alarm,
-)
+from cubestack.firmware_model.interface.codec.attitude_quality import UNRATED
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.switch_messages import SHOWN, shown_values
 from cubestack.firmware_model.mcu.costs import Meter
@@ -207,26 +203,18 @@ class Telemetry:
         if found is not None and found.measured.light is not None:
             light = found.measured.light
             values |= {
-                "Background": light.level,
+                "Background": light.background,
                 "Noise": light.noise,
-                "Spread": light.spread,
-                "Blind": light.blind,
+                "Spread": light.background_range,
+                "Blind": light.saturated,
                 "Spikes": light.spikes,
                 "Rejected": light.rejected,
             }
-        if found is None or found.quality is None:
+        if found is None or found.rating is None:
             return values
-        quality = found.quality
         self._meter.charge(f32_sqrt=3, f32_mul=3, f32_div=3, f32_atan2=1)
-        return values | {
-            "Valid": int(latest.valid),
-            **covariance_fields(quality.covariance.tolist()),
-            "LogFalseAlarm": log_false_alarm(quality.false_alarm),
-            "Matched": int((found.stars >= 0).sum()),
-            "Expected": found.expected,
-            "Residual": quality.residual_rad,
-            "Scale": quality.scale,
-        }
+        matched = int((found.stars >= 0).sum())
+        return values | found.rating.values(matched, found.expected)
 
     def _star_details(self) -> Values:
         found, database = self._state.measurement.solution, self._catalogue.database

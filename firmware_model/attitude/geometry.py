@@ -110,3 +110,16 @@ def turned(vectors: NDArray[np.float32], dcm: NDArray[np.float32]) -> NDArray[np
         vectors[:, :1] * dcm[:, 0] + vectors[:, 1:2] * dcm[:, 1] + vectors[:, 2:] * dcm[:, 2]
     )
     return product
+
+
+def scaled(directions: NDArray[np.float32], factor: float, meter: Meter) -> NDArray[np.float32]:
+    """Unit vectors (n, 3) in camera axes with the tangents of their field angles multiplied by a
+    factor, as by another focal length."""
+    if factor == 1.0:
+        return directions
+    count = len(directions)
+    meter.charge(f32_mul=8 * count, f32_add=2 * count, f32_sqrt=count, f32_div=count, loop=count)
+    longer = directions * np.array((factor, factor, 1), np.float32)
+    x, y, z = (longer * longer).T
+    longer /= np.sqrt(x + y + z)[:, None]
+    return longer

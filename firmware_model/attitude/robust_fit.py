@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.confirmation import scaled
 from cubestack.firmware_model.attitude.covariance import covariance, information, inverse
+from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.attitude.quest import dcm, quest
 from cubestack.firmware_model.mcu.costs import Meter
 
@@ -36,7 +36,7 @@ _HALF_CHI2 = 0.693
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class AttitudeFit:
     """An attitude with what is known of its error.
 
     Attributes:
@@ -60,11 +60,12 @@ def robust_fit(
     *,
     scale: float,
     excess: float,
-) -> Fit:
+    beyond: float = 1.0,
+) -> AttitudeFit:
     """Fit ``reference`` (n, 3) to ``measured`` (n, 3), unit vectors of the set focal length.
 
-    ``sigmas`` (n,) are the stars' expected errors in rad, ``scale`` the first guess; ``excess``:
-    see ``covariance``. Raises AttitudeError as QUEST does.
+    ``sigmas`` (n,) are the stars' expected errors in rad, ``scale`` the first guess; ``excess`` and
+    ``beyond``: see ``covariance``. Raises AttitudeError as QUEST does.
     """
     believed = sigmas.astype(np.float32)
     trusted, free = believed, scale != 1.0
@@ -96,13 +97,13 @@ def robust_fit(
             loop=len(stars),
         )
     residuals = np.sqrt(squares)
-    claimed = covariance(stars, residuals, trusted, meter, excess=excess)
+    claimed = covariance(stars, residuals, trusted, meter, excess=excess, beyond=beyond)
     if free:
         # The posterior scale of the variance counts for both.
         ratio = np.trace(claimed) / np.trace(stretch.alone)
         turn = stretch.turn * np.float32(stretch.sigma)
         claimed = claimed + np.outer(turn, turn) * ratio
-    return Fit(quaternion, np.asarray(claimed, np.float32), residuals, scale)
+    return AttitudeFit(quaternion, np.asarray(claimed, np.float32), residuals, scale)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cubestack.firmware_model.attitude.field import Field, field_of
+from cubestack.firmware_model.attitude.field_of_view import FieldOfView, field_of_view
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.detection import DetectionConfig
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -52,8 +52,8 @@ def camera_parameters(settings: Settings) -> CameraParameters:
     )
 
 
-def field(settings: Settings) -> Field:
-    return field_of(camera_parameters(settings), COLUMNS, ROWS)
+def field(settings: Settings) -> FieldOfView:
+    return field_of_view(camera_parameters(settings), COLUMNS, ROWS)
 
 
 def field_cosine(camera: CameraParameters) -> np.float32:

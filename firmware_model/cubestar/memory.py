@@ -10,7 +10,6 @@ not modelled, so flash and RAM must leave room for it.
 import numpy as np
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.detection.background import CELL
 from cubestack.firmware_model.cubestar.detection.background_search import (
     MOST_AREAS,
     MOST_SHAPES,
@@ -18,7 +17,7 @@ from cubestack.firmware_model.cubestar.detection.background_search import (
 )
 from cubestack.firmware_model.cubestar.detection.spots import HALF
 from cubestack.firmware_model.cubestar.link import SEND_BUFFER_BYTES
-from cubestack.firmware_model.cubestar.matching.triangles import MOST_PAIRS
+from cubestack.firmware_model.cubestar.matching.pair_triangles import MOST_PAIRS
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, CONFIG_PAGE, MODE_PAGE, State
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -29,6 +28,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.memory_budget import Buffer, Memory
 from cubestack.firmware_model.node.link import longest_command
 from cubestack.firmware_model.node.queue import QUEUE_DEPTH
+from cubestack.firmware_model.star_tracker.background import CELL
 
 KB = 1024
 EXTERNAL_RAM_BYTES = 1024 * KB

@@ -26,9 +26,13 @@ from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, random_quaternion
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH, load_sky
-from cubestack.firmware_model.attitude.confirmation import scaled
-from cubestack.firmware_model.attitude.field import field_of
-from cubestack.firmware_model.attitude.geometry import CameraParameters, undistort, unit_vectors
+from cubestack.firmware_model.attitude.field_of_view import field_of_view
+from cubestack.firmware_model.attitude.geometry import (
+    CameraParameters,
+    scaled,
+    undistort,
+    unit_vectors,
+)
 from cubestack.firmware_model.cubestar.matching.confirmed import identify
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
@@ -37,7 +41,7 @@ from cubestack.host.experiments.attitude import is_right
 NOISE_PX, BORDER_PX, MOST = 0.05, 3, 40
 LENS_NAMES = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
 CAMERA = CameraParameters(**{name: getattr(LENS, name) for name in LENS_NAMES})
-FIELD = field_of(CAMERA, LENS.columns, LENS.rows)
+FIELD = field_of_view(CAMERA, LENS.columns, LENS.rows)
 CATALOGUE = onboard_catalogue()
 
 Rays = NDArray[np.float32]

@@ -10,13 +10,13 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.mcu.costs import Meter
 
 FRAMES = 5
 
 
-class Background:
+class LevelHistory:
     """Grey levels of the last pictures; what the program keeps from one picture to the next.
 
     Attributes:
@@ -28,7 +28,7 @@ class Background:
         """No picture yet."""
         self.sums: deque[tuple[int, int, int]] = deque(maxlen=FRAMES)
 
-    def add(self, picture: NDArray[np.uint8], field: Field, meter: Meter) -> None:
+    def add(self, picture: NDArray[np.uint8], field: CameraField, meter: Meter) -> None:
         """Take a picture (rows, columns) into account; pixels outside the field do not count."""
         levels = np.bincount(picture[field.mask], minlength=256).astype(np.int64)
         values, pixels = np.arange(256), field.pixels

@@ -7,14 +7,14 @@ subtracts a level first (an extension).
 """
 
 from dataclasses import dataclass
-from math import ceil, log2
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Indices, Mask
 from cubestack.firmware_model.aramis.solution import StarList
-from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.regions import Moments, Runs
 
 MOST_RUNS = 20_000
 """Runs of pixels that the list in RAM holds (assumed); a picture of stars has some hundred."""
@@ -28,46 +28,75 @@ class Regions:
         rows, columns: (p,) the pixels of all regions.
         labels: (p,) region of each pixel, 0 to count - 1.
         count: number of regions.
+        runs, comparisons: runs of pixels, and comparisons of two runs, to find them.
     """
 
     rows: Indices
     columns: Indices
     labels: Indices
     count: int
+    runs: int = 0
+    comparisons: int = 0
+
+    @cached_property
+    def sizes(self) -> Indices:
+        """Pixels (n,) of each region."""
+        return np.bincount(self.labels, minlength=self.count)
+
+    @cached_property
+    def box(self) -> tuple[Indices, Indices, Indices, Indices]:
+        """First row and column, last row and column (n,) of each region."""
+        first, last = np.full((2, self.count), np.iinfo(np.intp).max), np.zeros((2, self.count))
+        pixels = np.stack([self.rows, self.columns])
+        for axis in (0, 1):
+            np.minimum.at(first[axis], self.labels, pixels[axis])
+            np.maximum.at(last[axis], self.labels, pixels[axis])
+        (top, left), (bottom, right) = first, last.astype(np.intp)
+        return top, left, bottom, right
+
+    def only(self, chosen: Mask) -> "Regions":
+        """The chosen regions (n,)."""
+        pixels = np.flatnonzero(chosen[self.labels])
+        numbers = np.cumsum(chosen) - 1
+        return Regions(
+            self.rows[pixels],
+            self.columns[pixels],
+            numbers[self.labels[pixels]],
+            int(np.count_nonzero(chosen)),
+        )
+
+    def moments(self, weights: NDArray[np.floating], least: float) -> Moments:
+        """Moments of pixels weighted by ``weights`` (p,), whose sums are ``least`` at least."""
+        return Moments.of(self.labels, weights, self.rows, self.columns, self.box[:2], least)
 
 
 _NONE = np.zeros(0, np.intp)
 NO_REGIONS = Regions(_NONE, _NONE, _NONE, 0)
 
 
-def find_regions(mask: Mask, meter: Meter) -> Regions | None:
+def find_regions(mask: Mask) -> Regions | None:
     """Regions of a mask (rows, columns); None when it has more than `MOST_RUNS` runs of pixels.
 
     One pass lists the runs of each row, a second joins runs of neighbouring rows that touch.
     """
     width = mask.shape[1] + 1
-    padded = np.zeros((mask.shape[0], width), dtype=np.int8)
+    padded = np.zeros((mask.shape[0], width), np.bool_)
     padded[:, :-1] = mask
-    edges = np.diff(padded.ravel(), prepend=0)
-    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    meter.charge(table_byte=mask.size, i32_add=mask.size, loop=mask.size)
-    if len(starts) > MOST_RUNS:
+    runs = Runs.of(padded)
+    if len(runs) > MOST_RUNS:
         return None
-    parents = _join(starts, stops, width, meter)
-    _, run_labels = np.unique(parents, return_inverse=True)
-    lengths = stops - starts
-    rows, columns = np.divmod(np.flatnonzero(padded), width)
-    count = int(run_labels.max()) + 1 if len(run_labels) else 0
-    return Regions(rows, columns, np.repeat(run_labels.ravel(), lengths), count)
+    labels, touching = runs.join(width)
+    above = 0  # runs of the rows above that were passed by
+    if len(runs):
+        above = min(int(np.searchsorted(runs.ends, runs.begins[-1] - width)), len(runs) - 1)
+    rows, columns = np.divmod(runs.places(), width)
+    count = int(labels.max(initial=-1)) + 1
+    pixels = np.repeat(labels, runs.lengths)
+    return Regions(rows, columns, pixels, count, len(runs), touching + above)
 
 
 def locate_stars(
-    picture: NDArray[np.uint8],
-    regions: Regions,
-    floor: int,
-    min_pixels: int,
-    max_pixels: int,
-    meter: Meter,
+    picture: NDArray[np.uint8], regions: Regions, floor: int, min_pixels: int, max_pixels: int
 ) -> StarList:
     """Centroid and brightness of each region of `min_pixels` to `max_pixels`, brightest first.
 
@@ -82,43 +111,11 @@ def locate_stars(
     total = np.bincount(labels, weight, count)
     down = np.bincount(labels, weight * (regions.rows - top[labels]), count)
     across = np.bincount(labels, weight * (regions.columns - left[labels]), count)
-    sizes = np.bincount(labels, minlength=count)
-    pixels = len(labels)
-    meter.charge(pixel_read=pixels, ram_read=2 * pixels, i32_add=6 * pixels, i32_mul=2 * pixels)
-    meter.charge(f32_convert=5 * count, f32_div=2 * count, f32_add=2 * count, loop=pixels + count)
-    used = np.flatnonzero((sizes >= min_pixels) & (sizes <= max_pixels) & (total > 0))
+    used = np.flatnonzero(
+        (regions.sizes >= min_pixels) & (regions.sizes <= max_pixels) & (total > 0)
+    )
     scale = total[used].astype(np.float32)
     corner = np.stack([left, top])[:, used].astype(np.float32)
     centroids = (corner + np.stack([across, down])[:, used].astype(np.float32) / scale).T
     order = np.argsort(-scale, kind="stable")
-    steps = len(used) * ceil(log2(len(used) + 1))
-    meter.charge(f32_compare=steps, ram_read=steps, ram_write=steps, loop=steps)
     return StarList(centroids[order], scale[order])
-
-
-def _join(starts: Indices, stops: Indices, width: int, meter: Meter) -> Indices:
-    """Smallest run of the region of each run (n,): runs touch with their corners too."""
-    parents = list(range(len(starts)))
-
-    def root(run: int) -> int:
-        while parents[run] != run:
-            parents[run] = parents[parents[run]]
-            run = parents[run]
-        return run
-
-    begins, ends = starts.tolist(), stops.tolist()
-    above = looks = 0
-    for run, (begin, end) in enumerate(zip(begins, ends, strict=True)):
-        while above < run and ends[above] + width < begin:
-            above += 1
-            looks += 1
-        other = above
-        while other < run and begins[other] + width <= end:
-            first, second = sorted((root(other), root(run)))
-            parents[second] = first
-            other += 1
-            looks += 1
-    runs = len(begins)
-    meter.charge(ram_read=6 * looks + 2 * runs, ram_write=looks + 3 * runs)
-    meter.charge(i32_add=4 * looks + 2 * runs, loop=looks + runs)
-    return np.array([root(run) for run in range(runs)], dtype=np.intp)

@@ -17,9 +17,9 @@ import numpy as np
 
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.assignment import assign, assign_plainly
-from cubestack.firmware_model.aramis.matching.confirmed import identify_surely
+from cubestack.firmware_model.aramis.matching.confirmed import identify_confirmed
 from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.matching.triples import Match, match_triple
 from cubestack.firmware_model.aramis.matching.verification import sides_agree
@@ -31,7 +31,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 def identify(
     measured: StarList,
-    field: Field,
+    field: CameraField,
     profile: Profile,
     database: Database,
     meter: Meter,
@@ -48,7 +48,7 @@ def identify(
     if profile.verify:
         if until is None:
             until = meter.total + profile.within_ms * meter.table.clock_hz / 1000
-        return identify_surely(measured, field, profile, database, hint, meter, until)
+        return identify_confirmed(measured, field, profile, database, hint, meter, until)
     if len(measured) < 3 + profile.always_pivot:
         return unsolved(Reason.TOO_FEW_STARS, measured)
     vectors = field.directions(measured.centroids, meter)
@@ -65,7 +65,7 @@ class _Search:
 
     measured: StarList
     vectors: Floats
-    field: Field
+    field: CameraField
     profile: Profile
     database: Database
     hint: Floats | None
@@ -156,4 +156,4 @@ class _Search:
         stars = np.full(len(self.measured), NONE, dtype=np.int32)
         stars[measured] = identities
         outcome = MeasurementOutcome.CONCLUSIVE
-        return Solution(outcome, reason, quaternion, stars, self.measured, quality=None, **counts)
+        return Solution(outcome, reason, quaternion, stars, self.measured, rating=None, **counts)

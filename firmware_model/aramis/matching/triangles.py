@@ -85,7 +85,7 @@ def _gain(slopes: Floats, units: Floats, directions: Floats, meter: Meter) -> np
 
 
 @dataclass(frozen=True, eq=False)
-class Triangles:
+class MeasuredTriangles:
     """Measured triangles, each with the errors of its own stars.
 
     Attributes:
@@ -107,7 +107,7 @@ class Triangles:
         meter.charge(f32_sqrt=6 * count, f32_compare=2 * count, ram_read=12 * count, call=count)
 
 
-def measure_triangles(corners: Floats, sigma_rad: Floats) -> Triangles:
+def measure_triangles(corners: Floats, sigma_rad: Floats) -> MeasuredTriangles:
     """Measure triangles of unit vectors (n, 3, 3) with errors (n, 3), each axis; not charged."""
     edges = corners[:, [0, 1, 0]] - corners[:, [1, 2, 2]]
     squares = (edges * edges).sum(axis=2)
@@ -124,7 +124,7 @@ def measure_triangles(corners: Floats, sigma_rad: Floats) -> Triangles:
     area_sigma, moment_sigma = (
         _gains(slopes, units, corners, sigma_rad) for slopes in (by_side, moment_by_side)
     )
-    return Triangles(sides, area, area * total / _THIRTY_SIX, area_sigma, moment_sigma)
+    return MeasuredTriangles(sides, area, area * total / _THIRTY_SIX, area_sigma, moment_sigma)
 
 
 def _gains(slopes: Floats, units: Floats, corners: Floats, sigma_rad: Floats) -> Floats:

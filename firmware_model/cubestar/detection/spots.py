@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.mcu.costs import Meter
-
 HALF = 4
-"""Windows reach so many pixels to each side of the brightest one."""
+SIDE = 2 * HALF + 1
+"""Pixels of a window to each side of the brightest one, and along its side."""
 
 WIDE_SIGMA_PX = 1.5
 """Width of the weights of a saturated spot, whose middle is flat, and of those that measure it."""
@@ -28,6 +27,7 @@ USUAL_SIGMA_PX = 0.95
 
 SIGMA_RANGE_PX = 0.5, 2.0
 FEWEST_SPOTS = 3
+SHAPE_ROUNDS = 5
 SATURATED_DN = 250
 ROUNDS = 4
 SHARPEST = 0.6
@@ -35,8 +35,8 @@ SHARPEST = 0.6
 in one of 0.45 px, and more in what particles and hot pixels leave; chosen."""
 
 MOST_WIDTHS, USUAL_SHARE = 24, 0.6
-"""So many of the brightest round spots tell the usual width, and so many parts of them have it at
-most: chosen."""
+"""So many of the brightest round spots tell the usual width, and share of them that have at
+most it: chosen."""
 
 ROUND = 0.05
 """Share of a spot that may stand out above the Gaussian of its own width where it tells the usual
@@ -78,7 +78,7 @@ Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Spots:
+class Centroids:
     """Places (n, 2) x and y from the windows' middles, light in DN and expected errors in px."""
 
     places: NDArray[np.float32]
@@ -93,9 +93,7 @@ def too_sharp(windows: Ints, noises: Ints) -> NDArray[np.bool_]:
     return sharp
 
 
-def shapes(
-    windows: Ints, starts: Reals, saturated: Marks, noises: Ints, meter: Meter
-) -> tuple[Marks, float]:
+def shapes(windows: Ints, starts: Reals, saturated: Marks, noises: Ints) -> tuple[Marks, float]:
     """Which ``windows`` have a star in them, and the width of the stars' spots in px.
 
     A spot of variance v has 1 / (1/v + 1/w) under weights of variance w. The usual width is that of
@@ -114,7 +112,6 @@ def shapes(
     disturbed = _disturbed(windows, at, np.full(count, usual), noises)
     star = own > usual * np.where(saturated, NARROW_SATURATED, NARROW)
     star &= saturated | ((disturbed < MOST_DISTURBED) & (own < usual * WIDE))
-    _charge(count, 5, meter)
     return star, usual
 
 
@@ -125,9 +122,7 @@ def _disturbed(windows: Ints, at: Ints, sigmas: Reals, noises: Ints) -> Reals:
     return around.share(windows, around.cleaned(clean, windows, noises))
 
 
-def centre(
-    windows: Ints, starts: Reals, saturated: Marks, noises: Ints, sigma: float, meter: Meter
-) -> Spots:
+def centre(windows: Ints, starts: Reals, saturated: Marks, noises: Ints, sigma: float) -> Centroids:
     """Centroids of ``windows``: signal (n, 9, 9) in 1/16 DN, looked for from ``starts`` (n, 2).
 
     Args:
@@ -136,7 +131,6 @@ def centre(
         saturated: whose flat middle says nothing; weighed more widely (n,).
         noises: of a pixel in 1/16 DN (n,).
         sigma: of a spot in px.
-        meter: what is charged.
     """
     spread = np.where(saturated, np.maximum(WIDE_SIGMA_PX, sigma), sigma)
     # Weighed with its own width, a spot moves by half of what is missing.
@@ -151,7 +145,6 @@ def centre(
         step = gain[:, None] * around.means(clean)
         if turn < ROUNDS - 1:
             at = np.clip(at + np.rint(step).astype(np.int64), -2 * _PARTS, 2 * _PARTS)
-    _charge(len(windows), ROUNDS, meter)
     places = np.clip((at + step) / _PARTS, -2.5, 2.5)
     light = np.maximum(clean.sum(axis=(1, 2)) / 16, 1)
     disturbed = around.share(windows, clean)
@@ -161,10 +154,7 @@ def centre(
         + np.where(saturated, SATURATED_ERROR_PX, LEAST_ERROR_PX) ** 2
         + (DISTURBED_PX * disturbed) ** 2
     )
-    count = len(windows)
-    meter.charge(f32_convert=6 * count, f32_div=6 * count, f32_add=6 * count, f32_sqrt=count)
-    meter.charge(f32_mul=6 * count)
-    return Spots(places.astype(np.float32), light.astype(np.float32), errors.astype(np.float32))
+    return Centroids(places.astype(np.float32), light.astype(np.float32), errors.astype(np.float32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +219,3 @@ def _weighed(windows: Ints, wx: Ints, wy: Ints) -> Ints:
 def _in_parts(places: Reals) -> Ints:
     parts: Ints = np.rint(np.clip(places, -1.5, 1.5) * _PARTS).astype(np.int64)
     return parts
-
-
-def _charge(windows: int, rounds: int, meter: Meter) -> None:
-    """Charge sums of so many windows: a weight, a comparison and three products for each pixel."""
-    pixels = rounds * windows * (2 * HALF + 1) ** 2
-    meter.charge(ram_read=3 * pixels, i32_mul=4 * pixels, i32_add=5 * pixels, loop=pixels)
-    meter.charge(i32_div=4 * rounds * windows)

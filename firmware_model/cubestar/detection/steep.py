@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.cubestar.detection.background import CELL, UNIT, Background, Ints
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF, SATURATED_DN
-from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.background import CELL, UNIT, Ints, Marks, SkyBackground
 
 STEEP_DN, STEEP_SIGMAS = 12, 4
 """Range of a cell and its eight neighbours from which on it is steep, in DN and in times the noise
@@ -34,8 +33,6 @@ to 8000; those below are not searched."""
 
 _OTHER_WAYS = REACH * np.array([[-1, 0], [1, 0], [-1, -1], [1, 1], [-1, 1], [1, -1]])
 
-Marks = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -55,7 +52,7 @@ class Places:
         return Places(self.rows[which], self.columns[which], self.levels[which], self.noises[which])
 
 
-def steep(sky: Background, height: int, width: int) -> Marks:
+def steep(sky: SkyBackground, height: int, width: int) -> Marks:
     """Which pixels (height, width) are in a cell that differs much from one of its neighbours."""
     padded = np.pad(sky.levels, 1, mode="edge")
     around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
@@ -65,17 +62,12 @@ def steep(sky: Background, height: int, width: int) -> Marks:
     return marks
 
 
-def along_rows(
-    picture: NDArray[np.uint8], marks: Marks, sky: Background, least: int, meter: Meter
-) -> Places:
+def along_rows(picture: NDArray[np.uint8], marks: Marks, sky: SkyBackground, least: int) -> Places:
     """Marked pixels that stand out along their row, by ``least`` (1/16 DN) at least."""
     rows, columns = np.nonzero(marks)
     last = picture.shape[1] - 1
     one = picture[rows, np.maximum(columns - REACH, 0)].astype(np.int64)
     other = picture[rows, np.minimum(columns + REACH, last)].astype(np.int64)
-    # What is no brighter than both needs no sum; in place of the comparison with the cells' level.
-    count = len(rows)
-    meter.charge(ram_read=2 * count, i32_add=count)
     levels = (one + other + 1) // 2 * UNIT
     return _standing_out(picture, Places(rows, columns, levels, levels), sky, least)
 
@@ -91,20 +83,17 @@ def all_ways(
     picture: NDArray[np.uint8],
     places: Places,
     beside: NDArray[np.uint8],
-    sky: Background,
+    sky: SkyBackground,
     least: int,
-    meter: Meter,
 ) -> Places:
     """Which of the places stand out above the pixels ``beside`` (6 n,) too."""
     pairs = beside.reshape(3, 2, -1).sum(axis=1, dtype=np.int64)
     levels = np.maximum(places.levels, (pairs.max(axis=0, initial=0) + 1) // 2 * UNIT)
-    count = len(levels)
-    meter.charge(i32_add=15 * count, loop=3 * count)
     return _standing_out(picture, Places(places.rows, places.columns, levels, levels), sky, least)
 
 
 def _standing_out(
-    picture: NDArray[np.uint8], places: Places, sky: Background, least: int
+    picture: NDArray[np.uint8], places: Places, sky: SkyBackground, least: int
 ) -> Places:
     """Places above their level by four times the noise of the sky and of the light there, where
     that is not so bright that the end of the scale makes an edge."""
@@ -118,10 +107,10 @@ def _standing_out(
 
 
 @dataclass(frozen=True, eq=False)
-class Sky:
+class LocalBackground:
     """Level and noise of the sky, on slopes as the places there have it."""
 
-    cells: Background
+    cells: SkyBackground
     slopes: Marks
     places: Places
 

@@ -7,7 +7,6 @@ that share an identity then count as a contradiction, however close they are.
 """
 
 from dataclasses import dataclass, field
-from enum import Enum
 from math import nan
 from typing import Self
 
@@ -15,23 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.float_functions import arc_cosine
-from cubestack.firmware_model.cubestar.matching.prediction import Candidate
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.observation import Candidate
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 #: Mark of a centroid without identity.
 NONE = -1
-
-
-class MatchOutcome(Enum):
-    """How an identification ended."""
-
-    IDENTIFIED = "enough stars were identified"
-    TOO_FEW_CENTROIDS = "there were fewer centroids than an attitude needs"
-    TOO_FEW_MATCHED = "fewer stars agreed with each other than an attitude needs"
-    MIRRORED = "the stars agree with the mirror image of the sky only"
-    UNCONFIRMED = "no attitude is confirmed by more stars than chance would give"
-    AMBIGUOUS = "two attitudes are confirmed"
-    NO_TIME = "no time was left to try more attitudes"
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,26 +18,26 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.confirmation import by_chance, correction
-from cubestack.firmware_model.attitude.field import Field
+from cubestack.firmware_model.attitude.field_of_view import FieldOfView
 from cubestack.firmware_model.attitude.geometry import turned
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.identification import (
     NONE,
     CentroidPairs,
     Identification,
-    MatchOutcome,
     identified,
     unidentified,
     verify,
 )
-from cubestack.firmware_model.cubestar.matching.prediction import (
-    LARGEST_FALSE_ALARM,
-    LEVELS,
-    Picture,
-)
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, DEFAULT_MARGIN_RAD
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.confirmation import by_chance, correction
+from cubestack.firmware_model.star_tracker.observation import (
+    LARGEST_FALSE_ALARM,
+    LEVELS,
+    Observation,
+)
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 #: Largest angle between a centroid and its star's predicted direction, in degrees.
 REACH_DEG = 0.3
@@ -52,7 +52,7 @@ def track(
     attitude: NDArray[np.float32],
     meter: Meter,
     *,
-    field: Field | None = None,
+    field: FieldOfView | None = None,
     margin_rad: float = DEFAULT_MARGIN_RAD,
     radius_deg: float = CUT_RADIUS_DEG,
 ) -> Identification:
@@ -88,20 +88,22 @@ def track(
     if field is None:
         return Identification(kept, votes, MatchOutcome.IDENTIFIED)
     with meter.phase("verification"):
-        return _confirmed(Picture(directions, catalogue, field, margin_rad, meter), attitude, kept)
+        return _confirmed(
+            Observation(directions, catalogue, field, margin_rad, meter), attitude, kept
+        )
 
 
 def _confirmed(
-    picture: Picture, attitude: NDArray[np.float32], kept: NDArray[np.int32]
+    picture: Observation, attitude: NDArray[np.float32], kept: NDArray[np.int32]
 ) -> Identification:
     """The identification that an attitude gives, corrected by the stars (n,) that agree."""
     meter, named = picture.meter, np.flatnonzero(kept != NONE)
-    places = turned(picture.catalogue.vectors[kept[named]], attitude)
+    places = turned(picture.stars.vectors[kept[named]], attitude)
     turn, _ = correction(picture.directions[named], places, meter, with_scale=False)
     rotation = (turn @ attitude).astype(np.float32)
     reach = radians(REACH_DEG)
-    expected = len(picture.catalogue) / (4 * np.pi) * picture.field.solid_angle_sr
-    astray = expected * by_chance(len(kept), reach, picture.field.solid_angle_sr)
+    expected = len(picture.stars.vectors) / (4 * np.pi) * picture.view.solid_angle_sr
+    astray = expected * by_chance(len(kept), reach, picture.view.solid_angle_sr)
     tries = len(LEVELS) * astray**2 / 2 * min(picture.margin_rad / reach, 1.0)
     meter.charge(f32_mul=9 * len(named) + 34, f32_add=6 * len(named) + 18, f32_div=1)
     found = picture.confirm(rotation, FEWEST_STARS, tries)

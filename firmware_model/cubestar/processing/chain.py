@@ -16,7 +16,7 @@ from cubestack.firmware_model.cubestar import configuration, phases
 from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection import SearchEnd
-from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.processing import quality
 from cubestack.firmware_model.cubestar.processing.estimate import Estimate, by_errors, by_votes
 from cubestack.firmware_model.cubestar.processing.identify import (
@@ -32,6 +32,7 @@ from cubestack.firmware_model.interface.cubestar.codes import Reason, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 _SEARCH_FLAGS = {
     SearchEnd.STARS: "MaxStarsDetection",

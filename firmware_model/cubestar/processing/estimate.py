@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.confirmation import scaled
-from cubestack.firmware_model.attitude.geometry import CameraParameters
+from cubestack.firmware_model.attitude.geometry import CameraParameters, scaled
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.cubestar.matching.identification import Identification
-from cubestack.firmware_model.cubestar.processing.quality import Rating
 from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.rating import Rating
 
 CENTROID_ERROR_PX = 0.2
 """Of a search that does not tell what errors to expect."""
@@ -70,9 +69,9 @@ def by_errors(
         scale=scale,
         excess=EXCESS,
     )
-    residual = float(np.sqrt(np.mean(fit.residuals**2) / 2))
-    meter.charge(flash_read=3 * len(kept), f32_mul=len(kept), f32_add=len(kept), f32_sqrt=1)
-    return Estimate(fit.quaternion, len(kept), Rating(fit.covariance, residual, fit.scale))
+    meter.charge(flash_read=3 * len(kept))
+    rating = Rating.of(fit, identification.false_alarm, meter)
+    return Estimate(fit.quaternion, len(kept), rating)
 
 
 def _sigmas(

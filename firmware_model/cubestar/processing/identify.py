@@ -10,13 +10,14 @@ from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar import configuration
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching import confirmed, voting
-from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
 from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 FEWEST_STARS = 3
 """Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4)."""

@@ -6,8 +6,8 @@ said to have too few stars. The limits are chosen well above those of an undistu
 """
 
 from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
-from cubestack.firmware_model.cubestar.matching.identification import MatchOutcome
 from cubestack.firmware_model.interface.cubestar.codes import Reason
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 SATURATED_SHARE = 1e-3
 """Of the picture at the end of its scale, about 500 pixels: the brightest stars fill a few each."""

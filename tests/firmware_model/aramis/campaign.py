@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.measurement import configuration
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
@@ -29,7 +29,7 @@ def rates(
     profile: Profile,
     light: Light | None = None,
     hint_error_deg: float | None = None,
-    field: Field = FIELD,
+    field: CameraField = FIELD,
     stars_per_field: int = 6,
     seed: int = 0,
 ) -> dict[str, float]:
@@ -71,7 +71,7 @@ CASES: dict[str, tuple[Any, ...]] = {
     "published, 1 px": (PLAIN, replace(COARSE, noise_px=1.0)),
     "published, 1 px, 2 deg hint": (PLAIN, replace(COARSE, noise_px=1.0), 2.0),
     "published, 5 false stars": (PLAIN, Light(false_stars=5)),
-    "published, 18 deg": (PLAIN, Light(), None, Field(fov_deg=18)),
+    "published, 18 deg": (PLAIN, Light(), None, CameraField(fov_deg=18)),
     **{
         f"profile published, {light.noise_px:.2g} px, hint {hint}": (PRINTED, light, hint)
         for hint in (None, 2.0)
@@ -85,7 +85,7 @@ CASES: dict[str, tuple[Any, ...]] = {
     "verified, 5 false to mag 3": (CHECKED, Light(false_stars=5, false_mags=(3.0, 4.5))),
     "verified, 5 false to mag 0": (CHECKED, Light(false_stars=5, false_mags=(0.0, 3.0))),
     "verified, 10 false": (CHECKED, Light(false_stars=10)),
-    "verified, 18 deg, 5 false": (CHECKED, Light(false_stars=5), None, Field(fov_deg=18)),
+    "verified, 18 deg, 5 false": (CHECKED, Light(false_stars=5), None, CameraField(fov_deg=18)),
     "verified, only to mag 5, 5 false": (CHECKED, Light(mag_limit=5.0, false_stars=5)),
     "verified, 0.3 px, 5 false": (CHECKED, Light(noise_px=0.3, false_stars=5)),
     "nothing but 20 false stars": (CHECKED, NOTHING),

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters, build_database
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.solution import NONE, Solution, StarList
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 FALSE_STAR = 0
 """Stands for the Hipparcos number of a star that does not exist."""
 
-FIELD = Field()
+FIELD = CameraField()
 
 _build = lru_cache(maxsize=4)(build_database)
 
@@ -77,20 +77,20 @@ class Picture:
         return np.asarray(np.cos(angle) * boresight + np.sin(angle) * aside, dtype=np.float32)
 
 
-def project(directions: Array, field: Field) -> Array:
+def project(directions: Array, field: CameraField) -> Array:
     """Pixels (n, 2) of camera directions (n, 3) in front of the camera."""
     tangents = directions[:, :2] / directions[:, 2:]
     return np.asarray(tangents / field.scale + field.centre)
 
 
-def within(points: Array, field: Field) -> NDArray[np.bool_]:
+def within(points: Array, field: CameraField) -> NDArray[np.bool_]:
     x, y = (points - field.centre).T
     if field.round:
         return np.asarray(np.hypot(x * field.pitch_x_mm, y * field.pitch_y_mm) <= field.radius_mm)
     return np.asarray((abs(x) <= field.columns / 2) & (abs(y) <= field.rows / 2))
 
 
-def picture(rng: np.random.Generator, field: Field, light: Light | None = None) -> Picture:
+def picture(rng: np.random.Generator, field: CameraField, light: Light | None = None) -> Picture:
     """The sky in a random attitude."""
     light = light or Light()
     sky = load_sky(mag_limit=light.mag_limit)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.measurement import Measuring, configuration
-from cubestack.firmware_model.aramis.pipeline import VERIFIED, Detection
+from cubestack.firmware_model.aramis.pipeline import VERIFIED, DetectionSettings
 from cubestack.firmware_model.aramis.settings import StoredSettings
 from cubestack.firmware_model.aramis.state import State
 from cubestack.firmware_model.aramis.telemetry import body_quaternion
@@ -51,7 +51,7 @@ def test_every_setting_arrives() -> None:
     settings.put("SetIdentification", {"Noise": 0.5, "Pivots": 1, "Verify": 0, "HintTolerance": 9})
     found = configuration(settings, EXTENDED)
     assert (found.field.fov_deg, found.field.round) == (18.0, False)
-    assert found.detection == Detection(
+    assert found.detection == DetectionSettings(
         3.5, SpikeRemoval.WINDOW, 9, 4, 99, 24, subtract=False, local=True
     )
     profile = found.profile
@@ -92,4 +92,4 @@ def test_the_body_s_attitude_is_the_rotations_product(seed: int) -> None:
 
 def test_the_smallest_star_may_not_exceed_the_largest() -> None:
     with pytest.raises(ValueError, match="min_pixels must be 1 to 8 px, not 9"):
-        Detection(min_pixels=9, max_pixels=8)
+        DetectionSettings(min_pixels=9, max_pixels=8)

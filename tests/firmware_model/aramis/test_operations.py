@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.aramis.catalogue.hamming import decode, encode
-from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.background import LevelHistory
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.matching.shutter import at_middle_row
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration
@@ -57,7 +57,7 @@ def numbers(found: Solution) -> list[float]:
 def test_pictures(name: str) -> None:
     spent = meter()
     configuration: Configuration = PICTURES[name]
-    found = solve_picture(sky(9)[1], Background(), configuration, database(), spent)
+    found = solve_picture(sky(9)[1], LevelHistory(), configuration, database(), spent)
     as_on_record(f"AraMiS picture: {name}", spent, numbers(found))
 
 
@@ -74,7 +74,7 @@ def test_lists(light: str, profile: str, hint_deg: float | None) -> None:
 
 @pytest.mark.parametrize("round_", [False, True])
 def test_a_field(round_: bool) -> None:
-    spent, field = meter(), Field(round=round_)
+    spent, field = meter(), CameraField(round=round_)
     points = np.column_stack([np.linspace(0, 1279, 40), np.linspace(0, 1023, 40)]).astype(
         np.float32
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.background import LevelHistory
 from cubestack.firmware_model.aramis.detection.spikes import SpikeRemoval
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, detect
 from cubestack.firmware_model.aramis.pipeline import solve as solve_picture
@@ -41,13 +41,13 @@ def sky(seed: int) -> tuple[Picture, NDArray[np.uint8]]:
 
 def find(image: NDArray[np.uint8], **settings: Any) -> StarList | None:
     detection = replace(VERIFIED.detection, **settings)
-    return detect(image, Background(), FIELD, detection, meter())
+    return detect(image, LevelHistory(), FIELD, detection, meter())
 
 
 def solve(
     image: NDArray[np.uint8], configuration: Configuration = VERIFIED, spent: Meter | None = None
 ) -> Solution:
-    return solve_picture(image, Background(), configuration, database(), spent or meter())
+    return solve_picture(image, LevelHistory(), configuration, database(), spent or meter())
 
 
 def end_of(solution: Solution) -> tuple[MeasurementOutcome, Reason]:
@@ -97,7 +97,7 @@ def test_the_published_method_finds_fewer_stars() -> None:
 def test_what_lies_outside_the_field_is_not_seen() -> None:
     image = np.full((FIELD.rows, FIELD.columns), 10, dtype=np.uint8)
     image[500:510, 20:30] = image[500:510, 640:650] = 200
-    found = detect(image, Background(), FIELD, PUBLISHED.detection, meter())
+    found = detect(image, LevelHistory(), FIELD, PUBLISHED.detection, meter())
     np.testing.assert_allclose(found.centroids, [[644.5, 504.5]], atol=0.01)
 
 

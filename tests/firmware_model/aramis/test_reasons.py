@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.detection.background import Background
+from cubestack.firmware_model.aramis.detection.background import LevelHistory
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, solve
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
@@ -19,7 +19,7 @@ def picture(level: object, seed: int = 0) -> NDArray[np.uint8]:
 
 
 def reason(image: NDArray[np.uint8], configuration: Configuration = VERIFIED) -> Reason:
-    solution = solve(image, Background(), configuration, database(), meter())
+    solution = solve(image, LevelHistory(), configuration, database(), meter())
     assert solution.outcome is MeasurementOutcome.NONE
     return solution.reason
 
@@ -48,7 +48,7 @@ def test_the_reason_is_true(image: NDArray[np.uint8], expected: Reason) -> None:
 
 def test_a_picture_full_of_hits_is_not_even_tried() -> None:
     spent = meter()
-    solution = solve(hit(60_000), Background(), VERIFIED, database(), spent)
+    solution = solve(hit(60_000), LevelHistory(), VERIFIED, database(), spent)
     assert solution.reason is Reason.RADIATION
     assert "triangles" not in spent.phases
 

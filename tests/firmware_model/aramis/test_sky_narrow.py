@@ -14,8 +14,8 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.boards.aramis.catalogue import CatalogueParameters
-from cubestack.firmware_model.aramis.detection.background import Background
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.detection.background import LevelHistory
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED, Configuration, solve
 from cubestack.firmware_model.aramis.solution import Solution
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome
@@ -27,7 +27,7 @@ PICTURES = sorted(FOLDER.glob("*.png"))
 
 pytestmark = pytest.mark.skipif(not PICTURES, reason="the pictures are not part of the project")
 
-FIELD = Field(2 * degrees(atan(580 * 0.0083 / 2 / 20)), 752, 580, 0.0086, 0.0083, round=False)
+FIELD = CameraField(2 * degrees(atan(580 * 0.0083 / 2 / 20)), 752, 580, 0.0086, 0.0083, round=False)
 ONBOARD = CatalogueParameters(fov_deg=18, epoch=2014.8)
 
 
@@ -39,7 +39,7 @@ def solved(path: Path, configuration: Configuration, aided: bool) -> tuple[Solut
         picture = np.repeat(np.asarray(opened), 2, axis=0)
     hint = truth.inv().apply([0.03, 0.02, 1.0]).astype(np.float32) if aided else None
     own = replace(configuration, field=FIELD)
-    return solve(picture, Background(), own, database(ONBOARD), meter(), hint), truth
+    return solve(picture, LevelHistory(), own, database(ONBOARD), meter(), hint), truth
 
 
 @pytest.mark.parametrize("path", PICTURES, ids=lambda path: str(path.stem))

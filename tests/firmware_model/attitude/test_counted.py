@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.attitude import confirmation, geometry
+from cubestack.firmware_model.attitude import geometry
 from cubestack.firmware_model.attitude.covariance import information
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
@@ -52,7 +52,7 @@ CASES: dict[str, Case] = {
         {},
     ),
     "scaled": (
-        lambda stars, _, meter: confirmation.scaled(stars, 1.01, meter),
+        lambda stars, _, meter: geometry.scaled(stars, 1.01, meter),
         {"f32_div": -2, "f32_mul": +2},  # once by the length, and three products; z is not scaled
     ),
     "information": (

@@ -7,13 +7,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude import confirmation, geometry
+from cubestack.firmware_model.attitude import geometry
 from cubestack.firmware_model.attitude.covariance import covariance
-from cubestack.firmware_model.attitude.field import field_of
+from cubestack.firmware_model.attitude.field_of_view import field_of_view
 from cubestack.firmware_model.attitude.quest import dcm, quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker import confirmation
 
 from ..operations import as_on_record
 from ..registry import registered_in
@@ -85,7 +86,7 @@ def _(count: int, meter: Meter) -> None:
 
 @case("scaled")
 def _(count: int, meter: Meter) -> None:
-    confirmation.scaled(seen(count)[0], 1.01, meter)
+    geometry.scaled(seen(count)[0], 1.01, meter)
 
 
 @case("correction")
@@ -136,7 +137,7 @@ def _(count: int, meter: Meter) -> None:
     FIELD.without(np.eye(4, dtype=np.bool_)).contains(seen(count)[0], meter)
 
 
-FIELD = field_of(CAMERA, 1024, 512)
+FIELD = field_of_view(CAMERA, 1024, 512)
 
 
 @pytest.mark.parametrize("count", [4, 13])

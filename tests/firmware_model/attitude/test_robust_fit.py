@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.confirmation import scaled
+from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.attitude.quest import dcm, quest
-from cubestack.firmware_model.attitude.robust_fit import Fit, robust_fit
+from cubestack.firmware_model.attitude.robust_fit import AttitudeFit, robust_fit
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from tests.tiers import quick
@@ -35,7 +35,7 @@ def seen(
     return noisy, np.asarray(truth.inv().apply(body), np.float32), truth
 
 
-def fitted(measured: Floats, reference: Floats, scale: float = 1.0) -> Fit:
+def fitted(measured: Floats, reference: Floats, scale: float = 1.0) -> AttitudeFit:
     sigmas = np.full(len(measured), SIGMA, np.float32)
     return robust_fit(measured, reference, sigmas, METER, scale=scale, excess=1.0)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.field import Field, field_of
+from cubestack.firmware_model.attitude.field_of_view import FieldOfView, field_of_view
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
@@ -26,10 +26,10 @@ def meter() -> Meter:
     return Meter(CORTEX_M3)
 
 
-def pinhole() -> Field:
+def pinhole() -> FieldOfView:
     """The field that ``shoot`` draws: no distortion, the principal point in the middle."""
     middle = CameraParameters(6.28, FOCAL_PX, FOCAL_PX, 511.5, 255.5, 0, 0, 0, 0)
-    return field_of(middle, COLUMNS, ROWS)
+    return field_of_view(middle, COLUMNS, ROWS)
 
 
 @dataclass

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, detect_stars
 from cubestack.firmware_model.cubestar.matching import confirmed, voting
-from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.matching.tracking import track
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 from ..operations import as_on_record
 from .detection.pictures import drawn, spots, taken

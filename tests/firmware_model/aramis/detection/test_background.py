@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.aramis.detection.background import FRAMES, Background
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.detection.background import FRAMES, LevelHistory
+from cubestack.firmware_model.aramis.field import CameraField
 
 from ..sky import meter
 
-FLAT = Field(columns=64, rows=48, round=False)
-ROUND = Field(columns=64, rows=48)
+FLAT = CameraField(columns=64, rows=48, round=False)
+ROUND = CameraField(columns=64, rows=48)
 
 
 def noise(level: float, sigma: float, seed: int) -> np.ndarray:
@@ -17,8 +17,8 @@ def noise(level: float, sigma: float, seed: int) -> np.ndarray:
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
-def after(*pictures: np.ndarray, field: Field = FLAT) -> Background:
-    background = Background()
+def after(*pictures: np.ndarray, field: CameraField = FLAT) -> LevelHistory:
+    background = LevelHistory()
     for picture in pictures:
         background.add(picture, field, meter())
     return background
@@ -41,7 +41,7 @@ def test_only_the_last_five_count() -> None:
 
 
 def test_fewer_pictures_do() -> None:
-    assert Background().mean(meter()) == Background().threshold(2, meter()) == 0
+    assert LevelHistory().mean(meter()) == LevelHistory().threshold(2, meter()) == 0
     assert after(noise(50, 5, 1)).threshold(2, meter()) == pytest.approx(60, abs=1)
 
 
@@ -57,6 +57,6 @@ def test_what_is_outside_the_field_does_not_count() -> None:
 def test_the_largest_sums() -> None:
     """All white at full size: the squares of five pictures exceed 32 bits."""
     white = np.full((1024, 1280), 255, dtype=np.uint8)
-    background = after(*[white] * FRAMES, field=Field(round=False))
+    background = after(*[white] * FRAMES, field=CameraField(round=False))
     assert background.sums[0][2] < 2**39
     assert background.threshold(2, meter()) == 255

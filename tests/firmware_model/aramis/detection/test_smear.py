@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.detection.regions import find_regions
 from cubestack.firmware_model.aramis.detection.smear import smear_px, without_tracks
-from cubestack.firmware_model.aramis.detection.spots import Spots
+from cubestack.firmware_model.aramis.detection.spots import StarSpots
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import VERIFIED, detect_locally
 from cubestack.firmware_model.aramis.solution import StarList
@@ -41,7 +41,7 @@ def swept(
 @pytest.mark.parametrize("length", [0.0, 6.0, 20.0])
 def test_length_of_bright_streaks(length: float, angle_deg: float) -> None:
     image = swept(length, angle_deg, light=4000, count=4)
-    found_px = smear_px(image, find_regions(image > 12, meter()), 6, meter())
+    found_px = smear_px(image, find_regions(image > 12), 6)
     assert found_px == pytest.approx(length, abs=1.5)
 
 
@@ -60,21 +60,21 @@ def test_streaks_that_lie_the_same_way_are_motion(length: float, angle_deg: floa
 def test_streaks_around_the_boresight_are_motion() -> None:
     places = np.array([[300, 0], [0, 300], [-300, 0], [0, -300], [200, 200]], np.float32)
     spots = long_spots(places + FIELD.centre, np.arctan2(places[:, 1], places[:, 0]) + np.pi / 2)
-    kept, smear = without_tracks(spots, FIELD, meter())
+    kept, smear = without_tracks(spots, FIELD)
     assert (len(kept), smear) == (5, pytest.approx(12))
 
 
 @pytest.mark.parametrize(("count", "length"), [(3, 12), (2, 0)])
 def test_three_parallel_streaks_tell_a_motion_and_two_do_not(count: int, length: float) -> None:
     places = FIELD.centre + np.array([[100, 50], [-200, 80], [30, -250]][:count])
-    kept, smear = without_tracks(long_spots(places, np.full(count, 0.7)), FIELD, meter())
+    kept, smear = without_tracks(long_spots(places, np.full(count, 0.7)), FIELD)
     assert (len(kept), smear) == (count if length else 0, pytest.approx(length))
 
 
 def test_tracks_in_all_directions_are_left_out() -> None:
     rng = np.random.default_rng(1)
     spots = long_spots(FIELD.centre + rng.uniform(-300, 300, (20, 2)), rng.uniform(0, np.pi, 20))
-    kept, smear = without_tracks(spots, FIELD, meter())
+    kept, smear = without_tracks(spots, FIELD)
     assert (len(kept), smear) == (0, 0)
 
 
@@ -90,14 +90,14 @@ def test_stars_at_rest_are_not_drawn_out() -> None:
 
 def test_without_regions_nothing_is_drawn_out() -> None:
     image = np.zeros((FIELD.rows, FIELD.columns), np.uint8)
-    assert smear_px(image, find_regions(image > 0, meter()), 0, meter()) == 0  # type: ignore[arg-type]
+    assert smear_px(image, find_regions(image > 0), 0) == 0  # type: ignore[arg-type]
 
 
-def long_spots(places: NDArray[Any], angles: NDArray[Any]) -> Spots:
+def long_spots(places: NDArray[Any], angles: NDArray[Any]) -> StarSpots:
     """Streaks of 12 px."""
     count = len(places)
     ones = np.ones(count, np.float32)
-    return Spots(
+    return StarSpots(
         places.astype(np.float32),
         100 * ones,
         ones,

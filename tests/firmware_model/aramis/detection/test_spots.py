@@ -79,7 +79,7 @@ def test_an_edge_is_no_star_and_hides_none() -> None:
     assert np.abs(apart(stars, places)).max() < 1
     assert np.abs(apart(StarList(free, free[:, 0]), stars.centroids)).max() < 1
     assert stars.light is not None
-    assert stars.light.blind > 0.2
+    assert stars.light.saturated > 0.2
 
 
 def test_hot_pixels_are_no_stars_and_move_none() -> None:
@@ -112,7 +112,7 @@ def test_the_angle_is_that_of_the_streak() -> None:
     ahead = np.linspace(-8, 8, 17)[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], -1)
     middles = np.column_stack([[400, 500, 600, 700], np.full(4, 500)])
     image = spots((middles + ahead).reshape(-1, 2), 400.0)
-    streaks = find_spots(image, find_regions(image > 15, meter()), NOISE, (20, 400), meter())
+    streaks = find_spots(image, find_regions(image > 15), NOISE, (20, 400))
     order = np.argsort(streaks.centroids[:, 0])
     np.testing.assert_allclose(streaks.angle[order], angles, atol=0.03)
 

@@ -44,9 +44,9 @@ def test_its_errors_are_what_it_claims(noise_px: float) -> None:
         solution = found(made, noise_px=noise_px)
         if solution.quaternion is None:
             continue
-        assert solution.quality is not None
+        assert solution.rating is not None
         turn = Rotation.from_quat(solution.quaternion.astype(np.float64)) * made.attitude.inv()
-        inside.append(np.abs(turn.as_rotvec()) < solution.quality.sigma_rad)
+        inside.append(np.abs(turn.as_rotvec()) < solution.rating.sigma_rad)
     assert len(inside) > 50
     assert 0.55 < np.mean(inside) < 0.85
 
@@ -65,13 +65,13 @@ def test_another_focal_length_is_told_and_does_no_harm(scale: float) -> None:
     for made in pictures(6, 9):
         moved = ((made.stars.centroids - centre) * scale + centre).astype(np.float32)
         solution = found(made, replace(made.stars, centroids=moved))
-        assert solution.quality is not None
-        assert solution.quality.scale == pytest.approx(scale, abs=5e-4)
+        assert solution.rating is not None
+        assert solution.rating.scale == pytest.approx(scale, abs=5e-4)
         assert max(errors_deg(solution.quaternion, made.attitude)) < 0.1
 
 
 def test_a_focal_length_that_is_right_is_left_alone() -> None:
-    scales = [found(made).quality.scale for made in pictures(15, 10)]  # type: ignore[union-attr]
+    scales = [found(made).rating.scale for made in pictures(15, 10)]  # type: ignore[union-attr]
     assert scales.count(1.0) >= 13
 
 
@@ -115,6 +115,6 @@ def test_stars_that_determine_no_attitude_confirm_none(monkeypatch: pytest.Monke
         raise AttitudeError("the vectors all point the same way")
 
     assert found(made).reason is Reason.CONFIRMED
-    monkeypatch.setattr(confirmed, "quest", undetermined)
+    monkeypatch.setattr(confirmed, "robust_fit", undetermined)
     solution = found(made)
     assert (solution.quaternion, solution.reason) == (None, Reason.UNCONFIRMED)

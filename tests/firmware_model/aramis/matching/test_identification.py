@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.aramis.field import Field
+from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
 from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList
@@ -67,11 +67,11 @@ def test_a_rough_direction_rules_out_what_is_far_away() -> None:
         (Light(false_stars=5), 2.0, 0.98, FIELD),
         (Light(false_stars=5, false_mags=(0, 3)), None, 0.95, FIELD),
         (Light(mag_limit=5, false_stars=5), None, 0.95, FIELD),
-        (Light(false_stars=5), None, 0.95, Field(fov_deg=18)),
+        (Light(false_stars=5), None, 0.95, CameraField(fov_deg=18)),
     ],
 )
 def test_verification_is_right(
-    light: Light, hint_error_deg: float | None, right: float, field: Field
+    light: Light, hint_error_deg: float | None, right: float, field: CameraField
 ) -> None:
     found = rates(50, VERIFIED.profile, light, hint_error_deg, field, seed=1)
     assert found["wrong"] == 0

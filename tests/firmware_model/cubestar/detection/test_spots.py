@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import spots
 
-from ..sky import meter
 from .pictures import spots as drawn
 
 
@@ -21,11 +20,11 @@ def windows(
     return np.rint(16 * noisy).astype(np.int64), places
 
 
-def found(signal: NDArray[np.int64], noise: float, sigma: float) -> spots.Spots:
+def found(signal: NDArray[np.int64], noise: float, sigma: float) -> spots.Centroids:
     count = len(signal)
     noises = np.full(count, max(round(16 * noise), 5))
     start, saturated = np.zeros((count, 2)), np.zeros(count, np.bool_)
-    return spots.centre(signal, start, saturated, noises, sigma, meter())
+    return spots.centre(signal, start, saturated, noises, sigma)
 
 
 @pytest.mark.parametrize("sigma", [0.8, 0.9, 1.4])
@@ -61,7 +60,7 @@ def test_the_width_of_the_spots_is_measured(sigma: float) -> None:
     rng = np.random.default_rng(4)
     signal, _ = windows(rng, 20, 1500.0, 0.3, sigma)
     few = np.zeros(20, np.bool_)
-    star, usual = spots.shapes(signal, np.zeros((20, 2)), few, np.full(20, 5), meter())
+    star, usual = spots.shapes(signal, np.zeros((20, 2)), few, np.full(20, 5))
     assert usual == pytest.approx(np.hypot(sigma, 0.29), rel=0.05)
     assert np.all(star)
 
@@ -71,9 +70,7 @@ def test_narrow_and_wide_spots_are_doubtful() -> None:
     kinds = [windows(rng, 12, 900.0, 0.3), windows(rng, 5, 500.0, 0.3, 0.4)]
     kinds.append(windows(rng, 3, 600.0, 0.3, 2.2))
     signal = np.concatenate([kind[0] for kind in kinds])
-    star, usual = spots.shapes(
-        signal, np.zeros((20, 2)), np.zeros(20, np.bool_), np.full(20, 5), meter()
-    )
+    star, usual = spots.shapes(signal, np.zeros((20, 2)), np.zeros(20, np.bool_), np.full(20, 5))
     assert usual == pytest.approx(0.945, rel=0.05)
     assert star.tolist() == [True] * 12 + [False] * 8
 

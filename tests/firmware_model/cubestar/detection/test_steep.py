@@ -10,9 +10,9 @@ from cubestack.firmware_model.cubestar.detection import (
     detect_stars,
     steep,
 )
-from cubestack.firmware_model.cubestar.detection.background import UNIT, Background
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF
 from cubestack.firmware_model.cubestar.detection.steep import along_rows, beside
+from cubestack.firmware_model.star_tracker.background import UNIT, SkyBackground
 
 from ..sky import meter
 from .pictures import Places, spots, taken
@@ -52,8 +52,8 @@ def test_a_level_is_that_just_beyond_a_spot_on_both_sides_rounded_half_up(other:
     picture[4, [16 - away, 16, 16 + away]] = 10, 200, other
     marks = np.zeros(picture.shape, np.bool_)
     marks[4, 16] = True
-    dark = Background(np.zeros((2, 2), np.int64), np.zeros((2, 2), np.int64), 0.0)
-    places = along_rows(picture, marks, dark, UNIT, meter())
+    dark = SkyBackground(np.zeros((2, 2), np.int64), np.zeros((2, 2), np.int64), 0.0)
+    places = along_rows(picture, marks, dark, UNIT)
     assert places.levels.tolist() == [UNIT * (10 + (other - 10 + 1) // 2)]
 
 

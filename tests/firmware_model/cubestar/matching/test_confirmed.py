@@ -9,14 +9,16 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.confirmation import scaled, volume
-from cubestack.firmware_model.attitude.field import Field
+from cubestack.firmware_model.attitude.field_of_view import FieldOfView
+from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.confirmed import Pass, identify
-from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
-from cubestack.firmware_model.cubestar.matching.prediction import LARGEST_FALSE_ALARM
-from cubestack.firmware_model.cubestar.matching.triangles import steps
+from cubestack.firmware_model.cubestar.matching.confirmed import PairPass, identify
+from cubestack.firmware_model.cubestar.matching.identification import Identification
+from cubestack.firmware_model.cubestar.matching.pair_triangles import PairTriangles
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.star_tracker.confirmation import volume
+from cubestack.firmware_model.star_tracker.observation import LARGEST_FALSE_ALARM
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 from ..sky import meter, pinhole
 
@@ -25,12 +27,12 @@ Rays = NDArray[np.float32]
 
 
 @pytest.fixture(scope="module")
-def field() -> Field:
+def field() -> FieldOfView:
     return pinhole()
 
 
 @pytest.fixture(scope="module")
-def name(catalogue: StarCatalogue, field: Field) -> Callable[..., Identification]:
+def name(catalogue: StarCatalogue, field: FieldOfView) -> Callable[..., Identification]:
     def identified(directions: Rays, brightness: Any = None, **more: Any) -> Identification:
         return identify(directions, brightness, catalogue, field, more.pop("on", meter()), **more)
 
@@ -111,7 +113,7 @@ def test_the_mirror_image_of_the_sky_is_refused(name: Name, shoot: Shoot) -> Non
     assert outcomes.count(MatchOutcome.MIRRORED) >= 38
 
 
-def test_three_stars_that_fit_two_places_get_no_identity(field: Field) -> None:
+def test_three_stars_that_fit_two_places_get_no_identity(field: FieldOfView) -> None:
     rng = np.random.default_rng(80)
     triple = np.array([[0.1, 0.0, 1], [-0.12, 0.05, 1], [0.02, -0.17, 1]])
     triple /= np.linalg.norm(triple, axis=1, keepdims=True)
@@ -240,7 +242,8 @@ def test_triangles_are_those_that_trying_all_finds(catalogue: StarCatalogue) -> 
                 fits &= np.abs(listed[q] - apart[j, k]) <= tolerance
                 wanted |= {((i, p), (j, q), (k, r)) for r in np.flatnonzero(fits)}
         found = set()
-        for step in steps(rays, catalogue, tolerance, None, meter(), 1 << 62):
+        for step in PairTriangles(catalogue, None, meter(), 1 << 62).steps(rays, tolerance):
+            assert step is not None
             chance += step.by_chance
             for centroids, stars in zip(step.centroids, step.stars, strict=True):
                 seen += volume(rays[centroids]) * volume(vectors[stars]) > 0
@@ -253,7 +256,7 @@ def test_few_random_pictures_are_believed_and_no_more_than_said(name: Name) -> N
     rng = np.random.default_rng(98)
     believed = 0
     for _ in range(150):
-        loose = name(random_rays(rng, 8), largest_false_alarm=0.05, passes=(Pass(),))
+        loose = name(random_rays(rng, 8), largest_false_alarm=0.05, passes=(PairPass(),))
         believed += len(loose.matched) > 0
     assert believed <= 15  # twice what is said
 

@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.cubestar.matching.identification import MatchOutcome
 from cubestack.firmware_model.cubestar.matching.tracking import REACH_DEG, track
 from cubestack.firmware_model.cubestar.matching.voting import (
     CUT_RADIUS_DEG,
     DEFAULT_MARGIN_RAD,
     identify,
 )
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 from tests.tiers import quick
 
 from ..sky import meter, pinhole

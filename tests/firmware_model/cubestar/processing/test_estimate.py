@@ -5,9 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.attitude.geometry import CameraParameters
-from cubestack.firmware_model.cubestar.matching.identification import Identification, MatchOutcome
+from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.processing.estimate import by_errors
 from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 from ..sky import FOCAL_PX, meter
 

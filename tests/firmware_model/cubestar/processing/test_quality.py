@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
-from cubestack.firmware_model.cubestar.matching.identification import MatchOutcome
 from cubestack.firmware_model.cubestar.processing.reasons import reason_of
 from cubestack.firmware_model.cubestar.state import UNRATED
 from cubestack.firmware_model.interface.cubestar import Reason
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 from ..harness import Harness
 from ..sky import Sky, attitude_of, draw, take

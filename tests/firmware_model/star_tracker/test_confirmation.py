@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.confirmation import (
+from cubestack.firmware_model.attitude.geometry import scaled
+from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.confirmation import (
     by_chance,
     correction,
     false_alarm,
     from_three,
     matched,
-    scaled,
 )
-from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
-from cubestack.firmware_model.mcu.costs import Meter
 
 
 def meter() -> Meter:

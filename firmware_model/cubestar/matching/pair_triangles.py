@@ -19,11 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.attitude.float_functions import arc_cosine
+from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.observation import LEVELS
+from cubestack.firmware_model.star_tracker.search import Triangles
 
 Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
+Marks = NDArray[np.bool_]
 
 #: Entries that the newest centroid may have with all others; beyond, its step is not done.
 MOST_PAIRS = 3072
@@ -39,59 +43,46 @@ _UNEVEN = 2.5
 _SMALLEST_SQUARED_SINE = np.float32(1e-8)
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What more centroids bring, of which the last alone has triangles.
+class PairTriangles:
+    """Triangles among centroids, proposed by the pair list of a catalogue.
 
     Attributes:
-        newest: rank of the last one.
-        centroids, stars: (t, 3) triangles, by rank of centroid and index of star; the new centroid
-            is the last, those whose new star has most triangles first.
-        misfit: (t,) largest difference of the sides, in rad.
-        entries: entries of the pair list that the new centroids have with those before them.
-        by_chance: triangles that chance gives in this step to be expected.
+        entries: entries of the pair list that were as wide as a pair of centroids, so far.
     """
 
-    newest: int
-    centroids: Indices
-    stars: Indices
-    misfit: Floats
-    entries: int
-    by_chance: float
+    def __init__(
+        self, catalogue: StarCatalogue, listed: Marks | None, meter: Meter, limit: int
+    ) -> None:
+        """Use the ``listed`` (stars,) stars, None for all; end at ``limit`` cycles of the meter."""
+        self.catalogue, self.listed, self.meter, self.limit = catalogue, listed, meter, limit
+        self.entries = 0
 
+    def steps(
+        self, directions: Floats, tolerance_rad: float, factor: float = 1.0
+    ) -> Iterator[Triangles | None]:
+        """Triangles of unit vectors (n, 3), the brightest first, whose sides differ by
+        ``tolerance_rad`` at most; None where time or memory ends the steps.
 
-def steps(
-    rays: Floats,
-    catalogue: StarCatalogue,
-    tolerance_rad: float,
-    listed: NDArray[np.bool_] | None,
-    meter: Meter,
-    limit: int,
-) -> Iterator[Step]:
-    """Triangles of unit vectors (n, 3) in their order.
-
-    Args:
-        rays: brightest first.
-        catalogue: whose pair list is used.
-        tolerance_rad: largest difference of a side.
-        listed: (stars,) which stars count; None is all.
-        meter: charged step by step; phases `distances`, `votes`, `identities`.
-        limit: total of the meter at which this ends.
-    """
-    sides, done = _Sides(rays), 2
-    for batch in _BATCHES:
-        count = min(batch, len(rays))
-        if count > done:
-            found = _Batch(sides, done, count, catalogue, tolerance_rad, listed)
-            for first, last in found.groups():
-                if found.charged(first, last, meter, limit):
-                    yield found.step(first, last)
-                    continue
-                for newest in range(first, last + 1):
-                    if not found.charged(newest, newest, meter, limit):
-                        return
-                    yield found.step(newest, newest)
-            done = count
+        The meter is charged step by step, in phases `distances`, `votes` and `identities`.
+        ``factor`` multiplies the tangents of field angles.
+        """
+        with self.meter.phase("distances"):
+            rays = scaled(directions, factor, self.meter)
+        sides, done = _Sides(rays), 2
+        for batch in _BATCHES:
+            count = min(batch, len(rays))
+            if count > done:
+                found = _Batch(sides, done, count, self, tolerance_rad)
+                for first, last in found.groups():
+                    if found.charged(first, last):
+                        yield found.step(first, last, factor)
+                        continue
+                    for newest in range(first, last + 1):
+                        if not found.charged(newest, newest):
+                            yield None
+                            return
+                        yield found.step(newest, newest, factor)
+                done = count
 
 
 @lru_cache(maxsize=128)
@@ -137,22 +128,17 @@ class _Batch:
     ``done``, and what work each centroid makes."""
 
     def __init__(
-        self,
-        sides: _Sides,
-        done: int,
-        count: int,
-        catalogue: StarCatalogue,
-        tolerance_rad: float,
-        listed: NDArray[np.bool_] | None,
+        self, sides: _Sides, done: int, count: int, triangles: PairTriangles, tolerance_rad: float
     ) -> None:
-        self._done, self._count = done, count
-        self._catalogue, self._tolerance = catalogue, np.float32(tolerance_rad)
+        self._done, self._count, self._of = done, count, triangles
+        self._catalogue, self._tolerance_rad = triangles.catalogue, tolerance_rad
+        self._tolerance = np.float32(tolerance_rad)
         begin, end = done * (done - 1) // 2, count * (count - 1) // 2
         newer, older = (each[begin:] for each in _pairs_of(count))
         self._angle = sides.angles[begin:end]
         ranks = np.arange(done, count + 1)
-        walked = self._look_up(ranks * (ranks - 1) // 2 - begin, listed)
-        stars = len(catalogue)
+        walked = self._look_up(ranks * (ranks - 1) // 2 - begin)
+        stars = len(self._catalogue)
         # An entry joins the rim, an older centroid with one star, to the hub, the newer one with
         # the other star; either may be either.
         hub = ((newer * stars).take(self._pair) + self._ends[::-1]).ravel()
@@ -171,7 +157,7 @@ class _Batch:
         density = _UNEVEN * stars / (4 * pi)
         self._chance = len(hub) / (end - begin) * density * 2 * pi * tolerance_rad**2
 
-    def _look_up(self, pairs: Indices, listed: NDArray[np.bool_] | None) -> Indices:
+    def _look_up(self, pairs: Indices) -> Indices:
         """Find the entries as wide as the pairs; how many the pairs in front of some walk over."""
         angles, reach = self._catalogue.pairs.angle, self._tolerance
         start, end = angles.searchsorted(np.array((self._angle - reach, self._angle + reach)))
@@ -180,8 +166,8 @@ class _Batch:
         entry = np.arange(len(pair)) + (end - lengths.cumsum()).repeat(lengths)
         ends = self._catalogue.pairs.ends.take(entry, axis=1)
         walked = pair.searchsorted(pairs)
-        if listed is not None:
-            kept = listed[ends].all(axis=0)
+        if self._of.listed is not None:
+            kept = self._of.listed[ends].all(axis=0)
             pair, entry, ends = pair[kept], entry[kept], ends[:, kept]
         self._pair, self._entry, self._ends = pair, entry, ends
         return walked
@@ -217,12 +203,12 @@ class _Batch:
         lasts.append(self._count - 1)
         return [(one, two) for one, two in zip(firsts, lasts, strict=True) if one <= two]
 
-    def charged(self, first: int, last: int, meter: Meter, limit: int) -> bool:
+    def charged(self, first: int, last: int) -> bool:
         """Charge the steps of the centroids from a first to a last one, if the time suffices."""
         entries = self._before.entries[first - self._done : last + 2 - self._done]
         if max(after - before for before, after in pairwise(entries)) > MOST_PAIRS:
             return False
-        return meter.charge_all(self._operations(first, last), limit)
+        return self._of.meter.charge_all(self._operations(first, last), self._of.limit)
 
     def _operations(self, first: int, last: int) -> dict[str, dict[str, int]]:
         """What each phase of some steps of the part's program executes."""
@@ -264,10 +250,11 @@ class _Batch:
             },
         }
 
-    def step(self, first: int, last: int) -> Step:
-        """Triangles of the last of some centroids, with what all of them make."""
+    def step(self, first: int, last: int, factor: float) -> Triangles:
+        """Triangles of the last of some centroids, those whose newest star has most triangles
+        first, and the chance of all of them."""
         work, done = self._before, self._done
-        entries = work.entries[last + 1 - done] - work.entries[first - done]
+        self._of.entries += work.entries[last + 1 - done] - work.entries[first - done]
         triples = (last * (last * last - 1) - first * (first - 1) * (first - 2)) / 6
         fits = self._fits[work.found[last - done] : work.found[last + 1 - done]]
         hub = self._hub.take(self._first.take(fits))
@@ -283,4 +270,8 @@ class _Batch:
         wide = self._catalogue.pairs.angle.take(self._entry.take(both))
         one, two = np.abs(wide - self._angle.take(self._pair.take(both)))
         misfit = np.maximum(np.maximum(one, two), self._third.take(fits))
-        return Step(last, centroids, stars, misfit, entries, triples * self._chance)
+        # Entries and both rings are narrower by a level: its cube of triangles by chance.
+        level = np.searchsorted(LEVELS, np.minimum(misfit.astype(float) / self._tolerance_rad, 1))
+        shares = len(LEVELS) * np.array(LEVELS)[level] ** 3
+        factors = np.full(len(misfit), factor)
+        return Triangles(centroids, stars, shares, factors, triples * self._chance)

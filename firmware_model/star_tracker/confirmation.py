@@ -96,19 +96,6 @@ def by_chance(spare: int, radius_rad: float, solid_angle_sr: float) -> float:
     return min(spare * pi * radius_rad**2 / solid_angle_sr, 0.5)
 
 
-def scaled(directions: Floats, factor: float, meter: Meter) -> Floats:
-    """Unit vectors (n, 3) in camera axes with the tangents of their field angles multiplied by a
-    factor: what another focal length makes of them."""
-    if factor == 1.0:
-        return directions
-    count = len(directions)
-    meter.charge(f32_mul=8 * count, f32_add=2 * count, f32_sqrt=count, f32_div=count, loop=count)
-    longer = directions * np.array((factor, factor, 1), np.float32)
-    x, y, z = (longer * longer).T
-    longer /= np.sqrt(x + y + z)[:, None]
-    return longer
-
-
 def correction(
     measured: Floats, predicted: Floats, meter: Meter, *, with_scale: bool
 ) -> tuple[Floats, float]:
@@ -168,8 +155,8 @@ def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
 
 
 def volume(vectors: Floats) -> float:
-    """Six times the volume that three vectors (3, 3) span; its sign tells which way they turn.
-    Charged to whom it is called by."""
+    """Six times the volume that three vectors (3, 3) span; its sign says which way they turn.
+    The caller charges the meter."""
     (a, b, c), (d, e, f), (g, h, i) = vectors.tolist()
     return float(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
 

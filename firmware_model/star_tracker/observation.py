@@ -1,31 +1,27 @@
-"""What an attitude predicts in a picture, and how much of it is there.
+"""What an attitude predicts in a picture, and how much of it was measured.
 
-An extension; ``attitude.confirmation`` says how the false-alarm probability comes about. The
-attitude is refined with the stars that it predicts, within three margins first, then within one. A
-place that fits within a small part of the margin says more, so such parts are tried as well, and
-count as tries.
+``confirmation`` says how the false-alarm probability is calculated. An attitude is refined with the
+stars that it predicts, within three margins first, then within one. Places that agree within a
+small part of the margin say more, so such parts are tried as well, and count as tries.
 """
 
 from bisect import bisect
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import exp, factorial, inf, pi
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.attitude.confirmation import (
+from cubestack.firmware_model.attitude.geometry import scaled, turned
+from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.confirmation import (
     by_chance,
     correction,
     false_alarm,
     matched,
-    scaled,
 )
-from cubestack.firmware_model.attitude.field import Field
-from cubestack.firmware_model.attitude.geometry import turned
-from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
-from cubestack.firmware_model.mcu.costs import Meter
 
 Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
@@ -39,9 +35,39 @@ LEVELS = (0.0625, 0.25, 0.5, 1.0)
 #: Stars from which on the focal length is fitted as well.
 STARS_FOR_SCALE = 5
 
+#: Change of the focal length from which on it counts as another.
+OTHER_SCALE = 1e-3
+
 #: Stars in a picture, of those that the catalogue's density gives, below which a Poisson
 #: distribution has more of them than the sky with its empty regions: measured, see the test.
 _UNEVEN = 0.7
+
+
+class CatalogueStars(Protocol):
+    """Stars of a catalogue."""
+
+    @property
+    def vectors(self) -> Floats:
+        """Inertial unit vectors (n, 3)."""
+
+    def within(self, boresight: Floats, least: np.float32, meter: Meter) -> Indices:
+        """Stars, rising, whose cosine with a unit vector (3,) is ``least`` or more."""
+
+
+class View(Protocol):
+    """The part of the sky that a picture shows."""
+
+    @property
+    def smallest_cosine(self) -> np.float32:
+        """Cosine of the angle between the boresight and the farthest direction."""
+
+    @property
+    def solid_angle_sr(self) -> float:
+        """Of all of the picture in which stars can be seen."""
+
+    def contains(self, directions: Floats, meter: Meter, factor: float = 1.0) -> NDArray[np.bool_]:
+        """Which unit vectors (n, 3) lie where stars can be seen; ``factor``: by which tangents of
+        measured field angles are multiplied."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,25 +92,28 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
-    """Centroids and what is known about the picture that they are in.
+class Observation:
+    """Measured stars, and the sky and camera that they are compared with.
 
     Attributes:
-        directions: (n, 3) unit vectors in camera axes, as the calibration makes them.
-        catalogue: stars that may be in it.
-        field: its border.
+        directions: (n, 3) unit vectors in camera axes, by the calibration.
+        stars: catalogue stars that may be among them.
+        view: what the picture shows.
         margin_rad: largest distance of a star from its predicted place.
-        meter: charged with every operation.
+        levels: shares of the margin within which stars may agree, rising; the last is 1.
+        scales: attitudes that count for one whose focal length was changed: it can be any.
     """
 
     directions: Floats
-    catalogue: StarCatalogue
-    field: Field
+    stars: CatalogueStars
+    view: View
     margin_rad: float
     meter: Meter
+    levels: tuple[float, ...] = LEVELS
+    scales: float = 1.0
 
     def mirrored(self) -> Self:
-        """This picture with left and right exchanged about the boresight."""
+        """The same with left and right exchanged about the boresight."""
         return replace(self, directions=self.directions * np.array([-1, 1, 1], np.float32))
 
     def confirm(
@@ -100,10 +129,10 @@ class Picture:
 
         Args:
             rotation: (3, 3) inertial to camera.
-            given: stars that the attitude was made from.
-            tries: wrong attitudes to be expected so far that such stars propose.
+            given: stars that propose the attitude.
+            tries: wrong attitudes that such stars propose, to be expected so far.
             factor: by which tangents of field angles are multiplied.
-            largest: false alarms above which the attitude is not refined, as nothing comes of it.
+            largest: false alarms above which the attitude is not refined.
         """
         meter, margin = self.meter, self.margin_rad
         near, ahead, places = self._predict(rotation, factor)
@@ -111,7 +140,7 @@ class Picture:
         rows, predicted, apart = matched(rays, places, 3 * margin, meter)
         refined, loose = 0, True
         while loose and len(rows) >= given and refined < 2:
-            if self._chance(len(near), len(rows), given, LEVELS[0], tries) > largest:
+            if self._chance(len(near), len(rows), given, self.levels[0], tries) > largest:
                 break
             loose = bool(apart.max() > margin)
             turn, change = correction(
@@ -124,9 +153,11 @@ class Picture:
                 factor *= change
                 rays = scaled(self.directions, factor, meter)
             rows, predicted, apart = matched(rays, places, margin, meter)
+        if abs(factor - 1) > OTHER_SCALE:
+            tries *= self.scales
         least, most = inf, given - 1
         distances = sorted(apart.tolist())
-        for level in LEVELS if refined else ():
+        for level in self.levels if refined else ():
             found = bisect(distances, level * margin)
             if found > most:  # the same within a larger reach says less
                 least = min(least, self._chance(len(near), found, given, level, tries))
@@ -135,28 +166,28 @@ class Picture:
 
     def _predict(self, rotation: Floats, factor: float) -> tuple[Indices, Floats, Floats]:
         """Stars (m,) in the picture, and their unit vectors (m, 3) in inertial and camera axes."""
-        meter, vectors = self.meter, self.catalogue.vectors
-        near = self.catalogue.within(rotation[2], self.field.smallest_cosine, meter)
+        meter, vectors = self.meter, self.stars.vectors
+        near = self.stars.within(rotation[2], self.view.smallest_cosine, meter)
         ahead = vectors.take(near, axis=0)
         places = turned(ahead, rotation)
         meter.charge(f32_mul=9 * len(near), f32_add=6 * len(near), loop=len(near))
-        inside = self.field.contains(places, meter, factor).nonzero()[0]
+        inside = self.view.contains(places, meter, factor).nonzero()[0]
         return near.take(inside), ahead.take(inside, axis=0), places.take(inside, axis=0)
 
     def _chance(self, expected: int, found: int, given: int, level: float, tries: float) -> float:
         """False alarms where so many places agree within a part of the margin."""
         spare = len(self.directions) - given
-        chance = by_chance(spare, level * self.margin_rad, self.field.solid_angle_sr)
+        chance = by_chance(spare, level * self.margin_rad, self.view.solid_angle_sr)
         further, missing = found - given, expected - found
         with self.meter.phase("selection"):
             # Without further stars all parts of the margin say the same.
-            tries *= len(LEVELS) if further else 1
+            tries *= len(self.levels) if further else 1
             odds = false_alarm(tries, further + missing, further, chance, self.meter)
             if missing > 0:
                 return odds
             # A wrong attitude seldom puts so few stars into the picture that none is missing.
             self.meter.charge(flash_read=1, f32_mul=1)
-            return odds * so_few(expected, len(self.catalogue), self.field.solid_angle_sr)
+            return odds * so_few(expected, len(self.stars.vectors), self.view.solid_angle_sr)
 
 
 @lru_cache(maxsize=256)

@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.mlx75412.lens import LENS
-from cubestack.firmware_model.attitude.field import Field, field_of
+from cubestack.firmware_model.attitude.field_of_view import FieldOfView, field_of_view
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
@@ -14,9 +14,9 @@ COLUMNS, ROWS = 1024, 512
 NEAR_PX = 2.0
 
 
-def calibrated(lens: Optics) -> Field:
+def calibrated(lens: Optics) -> FieldOfView:
     names = ("focal_length_mm", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
-    return field_of(CameraParameters(**{n: getattr(lens, n) for n in names}), COLUMNS, ROWS)
+    return field_of_view(CameraParameters(**{n: getattr(lens, n) for n in names}), COLUMNS, ROWS)
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.98])
@@ -38,7 +38,7 @@ def test_it_is_that_of_the_lens(factor: float) -> None:
 def test_it_ends_at_the_outer_edges_of_the_pixels() -> None:
     focal_px, middle = 1000.0, np.array([COLUMNS / 2, ROWS / 2]) - 0.5
     camera = CameraParameters(6.0, focal_px, focal_px, *middle, 0, 0, 0, 0, pitch_mm=0.006)
-    field = field_of(camera, COLUMNS, ROWS)
+    field = field_of_view(camera, COLUMNS, ROWS)
     for corner in ([-0.5, -0.5], [COLUMNS - 0.5, ROWS - 0.5]):
         inwards = np.sign(middle - corner)
         for axis in ([1, 0], [0, 1]):

@@ -1,9 +1,9 @@
-"""Attitudes that triples of measured stars suggest, the most promising triples first.
+"""Triangles of measured stars that agree with those of the database, promising triples first.
 
 An extension of the AraMiS thesis' sections 5.5 to 5.8. A triple is looked up as there, by area and
 moment within the bounds of its own stars' errors; then the three sides must agree one by one, and
-so must the sense of rotation, which tells a triangle from its mirror image. That also says which
-star is which. What is left is one attitude for each triangle, and a first look whether it puts any
+so must the sense of rotation, which distinguishes a triangle from its mirror image. That also
+identifies the stars. Each triangle left gives one attitude, and a first look whether it puts any
 further star where one was measured.
 
 Where that finds nothing, the focal length may be another: then triangles of all sizes within
@@ -15,7 +15,6 @@ stars come by their brightness, false ones that are all bright are also soon lef
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 
@@ -24,9 +23,10 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
-from cubestack.firmware_model.aramis.field import Field
-from cubestack.firmware_model.aramis.matching.triangles import Triangles, measure_triangles
-from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.aramis.field import CameraField
+from cubestack.firmware_model.aramis.matching.triangles import MeasuredTriangles, measure_triangles
+from cubestack.firmware_model.star_tracker.observation import Observation
+from cubestack.firmware_model.star_tracker.search import SearchPass, Triangles
 
 BOUND_SIGMAS = 3.5
 """Of areas, moments and sides."""
@@ -77,26 +77,6 @@ _SIDES = _SIDE[_ORDERS[:, _FROM], _ORDERS[:, _TO]]
 _F = np.float32
 
 
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """An attitude that some triangle suggests.
-
-    Attributes:
-        turn: (3, 3) direction cosine matrix, inertial to camera.
-        measured, stars: (3,) measured stars, and those of the database.
-        triples: triples tried, this one included.
-        by_chance: wrong attitudes to be expected among those tried.
-        scale: focal length beside the one that is set.
-    """
-
-    turn: Floats
-    measured: Indices
-    stars: Indices
-    triples: int
-    by_chance: float
-    scale: float
-
-
 def pyramid(count: int) -> Iterator[tuple[int, int, int]]:
     """All triples of 0 to count - 1, so that no number stays for long."""
     for near in range(1, count - 1):
@@ -105,43 +85,55 @@ def pyramid(count: int) -> Iterator[tuple[int, int, int]]:
                 yield first, first + near, first + near + far
 
 
-@dataclass
-class TripleSearch:
-    """One picture's search.
+class TripleTriangles:
+    """Triangles among the measured stars of one picture, proposed by a triangle database.
 
     Attributes:
-        vectors: (n, 3) unit vectors of the measured stars in camera axes, the brightest first.
-        points: (n, 2) their places in px.
-        sigma_rad: (n,) their errors, each axis.
-        reach_px: a catalogue star is where one was measured within so many pixels.
-        faces: (f,) which faces count; None: all.
         triples: tried so far.
         matches: triangles of the database within the bounds so far.
-        by_chance: wrong attitudes to be expected among those tried so far.
     """
 
-    vectors: Floats
-    points: Floats
-    sigma_rad: Floats
-    field: Field
-    database: Database
-    reach_px: float
-    faces: Mask | None
-    meter: Meter
-    triples: int = 0
-    matches: int = 0
-    by_chance: float = 0.0
+    def __init__(
+        self,
+        picture: Observation,
+        points: Floats,
+        sigma_rad: Floats,
+        field: CameraField,
+        database: Database,
+    ) -> None:
+        """Look at measured stars, the brightest first.
 
-    def run(self, fewest: int) -> Iterator[Hypothesis | None]:
-        """Attitudes with so many stars that agree, and None now and then: time to look at time."""
+        Args:
+            picture: their directions, and how far from its place a star counts.
+            points: (n, 2) their places in px.
+            sigma_rad: (n,) their errors, each axis.
+            field: of the camera.
+            database: stars and triangles.
+        """
+        self._picture, self._points, self._sigma_rad = picture, points, sigma_rad
+        self._field, self._database = field, database
+        self._hint: tuple[Floats, np.float32, Mask] | None = None
+        self.triples = self.matches = 0
+
+    def aim(self, hint: Floats, tolerance_deg: float) -> None:
+        """Only take attitudes whose boresight is near a unit vector (3,): phase `faces`."""
+        with self._picture.meter.phase("faces"):
+            faces = self._database.sphere.around(hint, self._picture.meter)
+        self._hint = hint.astype(_F), _F(np.cos(np.radians(tolerance_deg))), faces
+
+    def passes(self, fewest: int) -> Iterator[SearchPass]:
+        """Triangles whose attitude puts at least ``fewest`` stars where some were measured: of the
+        set focal length first, then of others."""
         for stretch, most in ((0.0, MOST_TRIPLES), (STRETCH, MOST_STRETCHED_TRIPLES)):
-            triples = islice(pyramid(len(self.vectors)), most)
-            size = 4 if stretch else BATCH
-            while batch := list(islice(triples, size)):
-                yield from self._batch(np.array(batch, np.intp), fewest, stretch)
+            yield SearchPass(self._picture, self._steps(fewest, stretch, most))
 
-    def _batch(self, batch: Indices, fewest: int, stretch: float) -> Iterator[Hypothesis | None]:
-        corners, sigma = self.vectors[batch], self.sigma_rad[batch]
+    def _steps(self, fewest: int, stretch: float, most: int) -> Iterator[Triangles]:
+        triples = islice(pyramid(len(self._points)), most)
+        while batch := list(islice(triples, 4 if stretch else BATCH)):
+            yield from self._batch(np.array(batch, np.intp), fewest, stretch)
+
+    def _batch(self, batch: Indices, fewest: int, stretch: float) -> Iterator[Triangles]:
+        corners, sigma = self._picture.directions[batch], self._sigma_rad[batch]
         measured = measure_triangles(corners, sigma)
         found, looked_at = self._listed(measured, stretch)
         listed = np.array([len(part) for part in found])
@@ -151,36 +143,38 @@ class TripleSearch:
         kept, orders, scales = self._same_sides(
             measured.sides, reach, corners, owner, triangles, stretch
         )
-        owner, stars = owner[kept], self.database.stars[triangles[kept]].astype(np.intp)
+        owner, stars = owner[kept], self._database.stars[triangles[kept]].astype(np.intp)
         stars = np.take_along_axis(stars, _ORDERS[orders], axis=1)
         shrunk = (
             corners[owner] * np.stack([1 / scales, 1 / scales, np.ones_like(scales)], 1)[:, None]
         )
         shrunk /= np.sqrt((shrunk * shrunk).sum(axis=2, keepdims=True))
-        turns = _triad(shrunk.astype(_F), self.database.vectors[stars])
+        turns = _triad(shrunk.astype(_F), self._database.vectors[stars])
         agreeing, near = self._agreeing(turns, scales)
         triple = hypothesis = 0
         for index in np.flatnonzero(agreeing >= fewest).tolist():
             upto = int(owner[index]) + 1
             tried = near[hypothesis : index + 1]
-            self._charge(listed[triple:upto], looked_at[triple:upto], tried, stretch)
+            chance = self._charge(listed[triple:upto], looked_at[triple:upto], tried, stretch)
             triple, hypothesis = upto, index + 1
-            yield Hypothesis(
-                turns[index],
-                batch[owner[index]],
-                stars[index],
-                self.triples,
-                self.by_chance,
-                float(scales[index]),
-            )
-        self._charge(listed[triple:], looked_at[triple:], near[hypothesis:], stretch)
-        yield None
+            row = slice(index, index + self._is_near_hint(turns[index]))
+            one = np.ones(1)
+            yield Triangles(batch[owner[row]], stars[row], one, 1 / scales[row], chance)
+        chance = self._charge(listed[triple:], looked_at[triple:], near[hypothesis:], stretch)
+        yield Triangles(batch[:0], batch[:0], np.ones(0), np.ones(0), chance)
+
+    def _is_near_hint(self, turn: Floats) -> bool:
+        if self._hint is None:
+            return True
+        hint, least, _ = self._hint
+        self._picture.meter.charge(f32_mul=3, f32_add=2, f32_compare=1)
+        return bool(np.dot(turn[2], hint) >= least)
 
     def _listed(
-        self, measured: Triangles, stretch: float
+        self, measured: MeasuredTriangles, stretch: float
     ) -> tuple[list[NDArray[np.uint32]], NDArray[np.int_]]:
         """Triangles within each one's bounds, and moments that were looked at (n,)."""
-        database = self.database
+        database = self._database
         low, high = (1 - stretch) ** 2, (1 + stretch) ** 2
         area, moment = BOUND_SIGMAS * measured.area_sigma, BOUND_SIGMAS * measured.moment_sigma
         first = np.searchsorted(database.areas, ((measured.area - area) * low).astype(_F), "left")
@@ -195,8 +189,8 @@ class TripleSearch:
         for index, count in enumerate(looked_at.tolist()):
             part = database.moment_triangles[start[index] : start[index] + count]
             part = part[(part >= first[index]) & (part < last[index])]
-            if self.faces is not None:
-                part = part[self.faces[database.faces[part]]]
+            if self._hint is not None:
+                part = part[self._hint[2][database.faces[part]]]
             found.append(part)
         return found, looked_at
 
@@ -213,7 +207,7 @@ class TripleSearch:
 
         Also in which of the six orders, and the factors.
         """
-        fixed = self.fixed[self.database.stars[triangles].astype(np.intp)]
+        fixed = self._fixed[self._database.stars[triangles].astype(np.intp)]
         edges = fixed[:, _FROM] - fixed[:, _TO]
         known = np.maximum((edges * edges).sum(axis=2), 1)[:, _SIDES]  # (k, 6, 3)
         low = (np.maximum(sides - reach, 0) * FIXED)[owner, None].astype(np.float64) ** 2 / known
@@ -234,41 +228,46 @@ class TripleSearch:
         looked_at: NDArray[np.int_],
         near: NDArray[np.int_],
         stretch: float,
-    ) -> None:
-        """Charge and count triples (n,) and the attitudes (k,) that they suggested."""
+    ) -> float:
+        """Charge and count triples (n,) and the attitudes (k,) that they propose; return the
+        wrong ones to be expected among these."""
         self.triples += len(listed)
         self.matches += int(listed.sum())
-        self.by_chance += len(near) if stretch else WRONG_SHARE * int(listed.sum())
-        with self.meter.phase("triangles"):
-            Triangles.charge(len(listed), self.meter)
-        with self.meter.phase("search"):
+        meter = self._picture.meter
+        with meter.phase("triangles"):
+            MeasuredTriangles.charge(len(listed), meter)
+        with meter.phase("search"):
             count, looked, steps = len(listed), int(looked_at.sum()), int(listed.sum())
-            self.meter.charge(f32_add=8 * count, f32_mul=14 * count, f32_compare=16 * count)
-            self.meter.charge(ram_read=looked + 4 * count, i32_add=2 * looked, loop=looked)
+            meter.charge(f32_add=8 * count, f32_mul=14 * count, f32_compare=16 * count)
+            meter.charge(ram_read=looked + 4 * count, i32_add=2 * looked, loop=looked)
             # Three sides of integers; six orders of comparisons, most of which end at the first.
-            self.meter.charge(ram_read=12 * steps, i32_mul=9 * steps, i32_add=40 * steps)
-        with self.meter.phase("verification"):
+            meter.charge(ram_read=12 * steps, i32_mul=9 * steps, i32_add=40 * steps)
+        with meter.phase("verification"):
             for stars in near.tolist():
                 self._charge_look(stars)
+        return len(near) if stretch else WRONG_SHARE * int(listed.sum())
 
     @cached_property
-    def fixed(self) -> NDArray[np.int64]:
+    def _fixed(self) -> NDArray[np.int64]:
         """The catalogue's directions in integers, (n, 3)."""
-        return np.rint(self.database.vectors.astype(np.float64) * FIXED).astype(np.int64)
+        return np.rint(self._database.vectors.astype(np.float64) * FIXED).astype(np.int64)
 
     @cached_property
     def _map(self) -> Mask:
         """Which cells of the picture are within reach of a measured star."""
-        with self.meter.phase("verification"):
-            cells = np.zeros((self.field.rows // CELL + 1, self.field.columns // CELL + 1), bool)
-            span = int(self.reach_px // CELL) + 1
+        reach_px = self._picture.margin_rad / self._field.scale[1]
+        with self._picture.meter.phase("verification"):
+            cells = np.zeros((self._field.rows // CELL + 1, self._field.columns // CELL + 1), bool)
+            span = int(reach_px // CELL) + 1
             around = np.mgrid[-span : span + 1, -span : span + 1].reshape(2, -1).T
-            around = around[np.hypot(*(CELL * around).T) <= self.reach_px]
-            places = np.rint(self.points[:, ::-1] / CELL).astype(np.intp)
+            around = around[np.hypot(*(CELL * around).T) <= reach_px]
+            places = np.rint(self._points[:, ::-1] / CELL).astype(np.intp)
             rows, columns = (places[:, None] + around).reshape(-1, 2).T
             limit_y, limit_x = np.array(cells.shape) - 1
             cells[np.clip(rows, 0, limit_y), np.clip(columns, 0, limit_x)] = True
-            self.meter.charge(ram_write=cells.size // 32 + len(rows), i32_add=4 * len(rows))
+            self._picture.meter.charge(
+                ram_write=cells.size // 32 + len(rows), i32_add=4 * len(rows)
+            )
         return cells
 
     def _agreeing(self, turns: Floats, scales: Floats) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
@@ -278,13 +277,13 @@ class TripleSearch:
         """
         cells = self._map
         boresights = np.rint(turns[:, 2].astype(np.float64) * FIXED)
-        along = boresights @ self.fixed.T.astype(np.float64)
-        limit = (self.field.smallest_cosine - 1e-4) * float(FIXED) ** 2
+        along = boresights @ self._fixed.T.astype(np.float64)
+        limit = (self._field.smallest_cosine - 1e-4) * float(FIXED) ** 2
         which, stars = np.nonzero(along >= limit)
-        seen = np.einsum("nij,nj->ni", turns[which], self.database.vectors[stars])
+        seen = np.einsum("nij,nj->ni", turns[which], self._database.vectors[stars])
         across = seen[:, :2] / np.maximum(seen[:, 2:], _F(0.1))
         across *= scales[which, None]
-        x, y = (across / self.field.scale + self.field.centre).T
+        x, y = (across / self._field.scale + self._field.centre).T
         columns, rows = np.rint(x / CELL).astype(np.intp), np.rint(y / CELL).astype(np.intp)
         inside = (columns >= 0) & (rows >= 0) & (columns < cells.shape[1]) & (rows < cells.shape[0])
         hits = np.zeros(len(which), bool)
@@ -294,11 +293,11 @@ class TripleSearch:
 
     def _charge_look(self, near: int) -> None:
         """The attitude of three stars, products with all catalogue stars, and the map."""
-        count = len(self.database.numbers)
-        self.meter.charge(f32_mul=18 + 4 * 9 + 27, f32_add=15 + 4 * 4 + 18, f32_div=12, f32_sqrt=4)
-        self.meter.charge(ram_read=3 * count // 2, i32_mul=3 * count, i32_add=3 * count, loop=count)
-        self.meter.charge(f32_mul=11 * near, f32_add=8 * near, f32_div=2 * near, ram_read=5 * near)
-        self.meter.charge(f32_convert=2 * near, loop=near)
+        meter, count = self._picture.meter, len(self._database.numbers)
+        meter.charge(f32_mul=18 + 4 * 9 + 27, f32_add=15 + 4 * 4 + 18, f32_div=12, f32_sqrt=4)
+        meter.charge(ram_read=3 * count // 2, i32_mul=3 * count, i32_add=3 * count, loop=count)
+        meter.charge(f32_mul=11 * near, f32_add=8 * near, f32_div=2 * near, ram_read=5 * near)
+        meter.charge(f32_convert=2 * near, loop=near)
 
 
 def _sense(corners: NDArray[np.floating]) -> Mask:

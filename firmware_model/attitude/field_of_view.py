@@ -23,7 +23,7 @@ _CELLS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class FieldOfView:
     """The field of a camera.
 
     Attributes:
@@ -75,7 +75,7 @@ class Field:
 
 
 @lru_cache(maxsize=8)
-def field_of(camera: CameraParameters, columns: int, rows: int) -> Field:
+def field_of_view(camera: CameraParameters, columns: int, rows: int) -> FieldOfView:
     """The field of a camera with so many pixels; made when a camera's parameters change."""
     x, y = (
         np.array([-0.5, columns / 2 - 0.5, columns - 0.5]),
@@ -100,7 +100,7 @@ def field_of(camera: CameraParameters, columns: int, rows: int) -> Field:
     area = np.abs(right[..., 0] * down[..., 1] - right[..., 1] * down[..., 0])
     middle = (fine[1:, 1:] + fine[:-1, :-1]) / 2
     solid_angle = float((area / (1 + (middle**2).sum(axis=2)) ** 1.5).sum())
-    return Field(coefficients, np.float32((1 + largest) ** -0.5), solid_angle)
+    return FieldOfView(coefficients, np.float32((1 + largest) ** -0.5), solid_angle)
 
 
 def _tangents(

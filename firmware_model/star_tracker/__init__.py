@@ -1,0 +1,1 @@
+"""The extended star tracker: what its sensors share, from a picture to a confirmed attitude."""

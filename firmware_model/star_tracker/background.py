@@ -1,0 +1,131 @@
+"""The sky behind the stars: its level and noise in cells, interpolated between them.
+
+Of each cell of 32 x 32 px, every few pixels of every few rows are samples. The level is the mean of
+their middle half, which no star and no hot pixel reaches; the noise comes from the smaller three
+quarters of the differences between neighbouring samples of a row, which no gradient reaches. Both
+are found by counting in a histogram and are kept in 1/16 DN. Between the cells' middles they are
+interpolated, beyond the outer ones continued on a straight line.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+CELL = 32
+"""Width of a cell in px."""
+
+UNIT = 16
+"""Parts of a DN that levels are kept in."""
+
+BLOCK = 8
+"""Pixels of a row that share a threshold."""
+
+LEAST_NOISE = 5
+"""In 1/16 DN: what rounding to whole DN leaves of a sky without noise, 1 / sqrt(12) DN."""
+
+_QUARTILE_MEAN = 0.728
+"""Mean of |x - y| below its upper quartile, in standard deviations of x and y."""
+
+Ints = NDArray[np.int64]
+Marks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class SkyBackground:
+    """Levels and noises (cells down, cells across) in 1/16 DN; at least two cells each way.
+
+    Attributes:
+        saturated: share of the samples at the end of the scale, 0 to 1.
+        samples, differences: values that the histograms counted.
+        bins: bins that were added up to the quartiles.
+    """
+
+    levels: Ints
+    noises: Ints
+    saturated: float = 0.0
+    samples: int = 0
+    differences: int = 0
+    bins: int = 0
+
+    def interpolated(self, cells: Ints, rows: Ints, columns: Ints) -> Ints:
+        """Values of ``cells`` at rows and columns, broadcast."""
+        top, down = _between(rows, cells.shape[0])
+        left, across = _between(columns, cells.shape[1])
+        upper = cells[top, left] * (CELL - across) + cells[top, left + 1] * across
+        lower = cells[top + 1, left] * (CELL - across) + cells[top + 1, left + 1] * across
+        value: Ints = np.asarray(upper * (CELL - down) + lower * down, np.int64)
+        return value // (CELL * CELL)
+
+    def brighter(self, picture: NDArray[np.uint8], sigmas: float, least: int = 0) -> Marks:
+        """Which pixels (rows, columns) exceed the level by so many sigmas of the noise, and by
+        ``least`` 1/16 DN."""
+        height, width = picture.shape
+        y, x = np.arange(height)[:, None], np.arange(BLOCK // 2, width + BLOCK, BLOCK)[None, :]
+        above = np.maximum(sigmas * self.interpolated(self.noises, y, x), least)
+        levels = (self.interpolated(self.levels, y, x) + above) // UNIT
+        thresholds = np.repeat(np.clip(levels, 0, 255).astype(np.uint8), BLOCK, axis=1)
+        bright: Marks = picture > thresholds[:, :width]
+        return bright
+
+    def smoothed(self) -> Self:
+        """Each cell's values replaced by the medians of the cell and its eight neighbours, so that
+        a spot that fills a cell does not count."""
+        return replace(self, levels=_medians(self.levels), noises=_medians(self.noises))
+
+
+def _between(places: Ints, count: int) -> tuple[Ints, Ints]:
+    """The cell before each place, and the distance of the place from its middle in px."""
+    before = np.clip((places - CELL // 2) // CELL, 0, count - 2)
+    return before, places - CELL // 2 - before * CELL
+
+
+def _medians(cells: Ints) -> Ints:
+    padded = np.pad(cells, 1, mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
+    return np.asarray(np.median(around, axis=(2, 3)), np.int64)
+
+
+def cell_middles(size: int) -> Ints:
+    """Places of the cells' middles along a side of a picture, in the picture."""
+    return np.minimum(np.arange(max(2, -(-size // CELL))) * CELL + CELL // 2, size - 1)
+
+
+def sample_offsets(rows: int, columns: int, step: int) -> tuple[Ints, Ints]:
+    """Rows and columns of the samples in a region, ``step`` px apart.
+
+    A cell that reaches beyond the region repeats its last ones.
+    """
+    across = CELL // step
+    down, along = (
+        np.minimum(step // 2 + step * np.arange(across * max(2, -(-size // CELL))), size - 1)
+        for size in (rows, columns)
+    )
+    return down, along
+
+
+def estimate(
+    samples: NDArray[np.uint8], step: int, least_noise: float = LEAST_NOISE
+) -> SkyBackground:
+    """The background, of samples (rows, columns) at the places of ``sample_offsets``;
+    ``least_noise`` in 1/16 DN."""
+    side = CELL // step
+    count, pairs = side * side, side * (side - 1)
+    down, across = (size // side for size in samples.shape)
+    cells = samples.reshape(down, side, across, side).transpose(0, 2, 1, 3).astype(np.int16)
+    values = np.sort(cells.reshape(down, across, count))
+    differences = np.sort(np.abs(np.diff(cells)).reshape(down, across, pairs))
+    middle = values[..., count // 4 : 3 * count // 4].sum(axis=-1, dtype=np.int64)
+    smaller = differences[..., : 3 * pairs // 4].sum(axis=-1, dtype=np.int64)
+    to_sigma = round(256 * UNIT / (3 * pairs // 4 * _QUARTILE_MEAN))
+    bins = int(values[..., 3 * count // 4].sum() - values[..., 0].sum())
+    bins += int(differences[..., 3 * pairs // 4].sum()) + 2 * down * across
+    return SkyBackground(
+        middle * UNIT // (count // 2),
+        np.maximum(smaller * to_sigma >> 8, round(least_noise)),
+        float(np.mean(values == 255)),
+        samples.size,
+        differences.size,
+        bins,
+    )

@@ -1,0 +1,146 @@
+"""Connected regions of bright pixels: runs along the rows, joined where they touch, and moments."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+Reals = NDArray[np.float64]
+Marks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Runs of bright pixels: first offset and offset behind the last one, (n,) each."""
+
+    begins: Ints
+    ends: Ints
+
+    @classmethod
+    def of(cls, bright: Marks) -> Self:
+        """Runs of a mask (rows, columns) whose last column is False."""
+        edges = np.flatnonzero(np.diff(bright.reshape(-1).view(np.int8), prepend=np.int8(0)))
+        return cls(edges[::2], edges[1::2])
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return len(self.begins)
+
+    def __getitem__(self, which: Marks) -> "Runs":
+        """Those that are marked (n,)."""
+        return Runs(self.begins[which], self.ends[which])
+
+    @property
+    def lengths(self) -> Ints:
+        """Pixels (n,) of each."""
+        return self.ends - self.begins
+
+    def places(self) -> Ints:
+        """Offsets of the pixels, (p,)."""
+        lengths = self.lengths
+        first = np.cumsum(lengths) - lengths
+        places: Ints = np.arange(lengths.sum()) + np.repeat(self.begins - first, lengths)
+        return places
+
+    def without(self, places: Ints) -> "Runs":
+        """The runs with gaps at the ``places`` (p,)."""
+        steps = (np.concatenate([self.begins, places + 1]), np.concatenate([self.ends, places]))
+        begins, ends = (np.sort(step) for step in steps)
+        return Runs(begins, ends)[begins < ends]
+
+    def join(self, width: int) -> tuple[Ints, int]:
+        """Number of each run's region (n,), in the order of their first runs, and the number of
+        pairs of runs that touch, by sides or corners, in a picture of a ``width``."""
+        begins, ends = self.begins, self.ends
+        # Runs of the row below touch that end behind, and begin before, this one moved down by a
+        # row; corners count.
+        first = np.searchsorted(ends, begins + width, "left")
+        last = np.searchsorted(begins, ends + width, "right")
+        touching = np.maximum(last - first, 0)
+        above = np.repeat(np.arange(len(begins)), touching)
+        starts = np.cumsum(touching) - touching
+        below = np.arange(len(above)) - np.repeat(starts - first, touching)
+        labels = np.arange(len(begins))
+        while True:
+            low, high = labels[above], labels[below]
+            if np.array_equal(low, high):
+                break
+            low, high = np.minimum(low, high), np.maximum(low, high)
+            np.minimum.at(labels, high, low)
+            while not np.array_equal(labels, labels[labels]):
+                labels = labels[labels]
+        return np.unique(labels, return_inverse=True)[1].reshape(-1), len(above)
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Weighted moments of regions, (n,) each.
+
+    Attributes:
+        light: sum of the weights, 1 at least where ``of`` is given whole numbers.
+        x, y: mean place in px.
+        xx, yy, xy: variances and covariance in px^2.
+    """
+
+    light: Reals
+    x: Reals
+    y: Reals
+    xx: Reals
+    yy: Reals
+    xy: Reals
+
+    @classmethod
+    def of(
+        cls,
+        labels: Ints,
+        weights: Ints | Reals,
+        rows: Ints,
+        columns: Ints,
+        corners: tuple[Ints, Ints],
+        least: float = 1.0,
+    ) -> Self:
+        """Of pixels (p,) in regions ``labels``; sums count from the regions' ``corners``, rows and
+        columns (n,). ``least``: smallest sum of the weights."""
+        top, left = corners
+        count = len(top)
+        light = np.maximum(np.bincount(labels, weights, count), least)
+        y, x = rows - top[labels], columns - left[labels]
+
+        def mean(values: Ints) -> Reals:
+            weighted: Reals = np.bincount(labels, weights * values, count) / light
+            return weighted
+
+        mx, my = mean(x), mean(y)
+        return cls(
+            light,
+            left + mx,
+            top + my,
+            mean(x * x) - mx**2,
+            mean(y * y) - my**2,
+            mean(x * y) - mx * my,
+        )
+
+    @cached_property
+    def spread(self) -> Reals:
+        """Difference of the variances along and across each region, in px^2."""
+        spread: Reals = np.hypot(self.xx - self.yy, 2 * self.xy)
+        return spread
+
+    @cached_property
+    def along(self) -> Reals:
+        """Largest variance in any direction."""
+        return (self.xx + self.yy + self.spread) / 2
+
+    @cached_property
+    def across(self) -> Reals:
+        """Smallest variance in any direction."""
+        return (self.xx + self.yy - self.spread) / 2
+
+    @property
+    def doubled_angle(self) -> Reals:
+        """Twice the direction of the largest variance, -pi to pi."""
+        angle: Reals = np.arctan2(2 * self.xy, self.xx - self.yy)
+        return angle

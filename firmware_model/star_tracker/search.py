@@ -1,0 +1,157 @@
+"""Search for an attitude: triangles propose attitudes, and one is believed only beyond chance.
+
+A sensor's catalogue proposes triangles of measured and of catalogue stars, pass by pass. Each gives
+an attitude, which `observation` refines and rates by its expected false alarms. The first one with
+`sure` or fewer is taken at once. Where there is none, the search goes on for rivals, and the best
+below `largest` is taken unless another attitude, or the mirrored sky, is below it too.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from math import acos, degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cubestack.firmware_model.attitude.geometry import scaled
+from cubestack.firmware_model.star_tracker.confirmation import from_three, volume
+from cubestack.firmware_model.star_tracker.observation import Candidate, Observation
+
+Indices = NDArray[np.intp]
+
+STARS_OF_TRIANGLE = 3
+
+#: Attitudes further apart than this are rivals.
+_SAME_DEG = 0.5
+
+
+class MatchOutcome(Enum):
+    """How an identification ended."""
+
+    IDENTIFIED = "enough stars were identified"
+    TOO_FEW_CENTROIDS = "there were fewer centroids than an attitude needs"
+    TOO_FEW_MATCHED = "fewer stars agreed with each other than an attitude needs"
+    MIRRORED = "the stars agree with the mirror image of the sky only"
+    UNCONFIRMED = "no attitude is confirmed by more stars than chance would give"
+    AMBIGUOUS = "two attitudes are confirmed"
+    NO_TIME = "no time was left to try more attitudes"
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Triangles of measured stars that agree with triangles of the catalogue.
+
+    Attributes:
+        centroids, stars: (t, 3) measured stars, and those of the catalogue, in the order to try.
+        shares: (t,) of the wrong triangles by chance, those that agree as well.
+        factors: (t,) by which tangents of measured field angles are multiplied.
+        by_chance: triangles that chance gives, to be expected since the step before.
+    """
+
+    centroids: Indices
+    stars: Indices
+    shares: NDArray[np.floating]
+    factors: NDArray[np.floating]
+    by_chance: float
+
+
+@dataclass(frozen=True, eq=False)
+class SearchPass:
+    """One pass over an observation: steps of triangles, and None where it ends before all of
+    them; whether the observation is a mirrored one, which can only rule out what was found."""
+
+    observation: Observation
+    steps: Iterator[Triangles | None]
+    mirrored: bool = False
+
+
+@dataclass
+class AttitudeSearch:
+    """The search of one picture.
+
+    Attributes:
+        limit: cycles of the meter at which time is over.
+        largest: false alarms a picture, above which an attitude is not believed.
+        sure: false alarms at which it is taken at once.
+        fewest: stars that an attitude needs.
+        chance: triangles that chance gives, to be expected so far.
+        tried: attitudes tried.
+    """
+
+    limit: float
+    largest: float
+    sure: float
+    fewest: int = STARS_OF_TRIANGLE
+    chance: float = 0.0
+    tried: int = 0
+
+    def run(self, passes: Iterable[SearchPass]) -> Candidate | MatchOutcome:
+        """The attitude that is believed, or why there is none."""
+        weak: list[Candidate] = []
+        for each in passes:
+            if weak and not each.mirrored:
+                break
+            complete = True
+            seen: list[dict[int, int]] = []
+            for step in each.steps:
+                complete = step is not None
+                if step is None:
+                    break
+                self.chance += step.by_chance
+                believed = [
+                    candidate
+                    for candidate in self._candidates(step, each.observation, seen)
+                    if candidate.false_alarm <= self.largest and len(candidate.stars) >= self.fewest
+                ]
+                if believed and each.mirrored:
+                    return MatchOutcome.MIRRORED
+                weak += believed
+                best = min(weak, key=lambda one: one.false_alarm, default=None)
+                if best is not None and best.false_alarm <= self.sure:
+                    return best
+                if self._late(each.observation):
+                    break
+            if not weak and (not complete or self._late(each.observation)):
+                return MatchOutcome.NO_TIME
+        if weak:
+            best = min(weak, key=lambda one: one.false_alarm)
+            rivals = any(_apart_deg(best, other) > _SAME_DEG for other in weak)
+            return MatchOutcome.AMBIGUOUS if rivals else best
+        return MatchOutcome.UNCONFIRMED if self.tried else MatchOutcome.TOO_FEW_MATCHED
+
+    def _late(self, observation: Observation) -> bool:
+        return observation.meter.total >= self.limit
+
+    def _candidates(
+        self, step: Triangles, observation: Observation, seen: list[dict[int, int]]
+    ) -> Iterator[Candidate]:
+        """Attitudes of triangles, but of none that one of ``seen`` contains: the star of each
+        centroid, by the attitudes tried so far."""
+        meter = observation.meter
+        for row, (centroids, stars) in enumerate(zip(step.centroids, step.stars, strict=True)):
+            if self._late(observation):
+                return
+            here = observation.directions.take(centroids, axis=0)
+            there = observation.stars.vectors.take(stars, axis=0)
+            if (volume(here) < 0) != (volume(there) < 0):  # it turns the other way
+                continue
+            named = dict(zip(centroids.tolist(), stars.tolist(), strict=True))
+            if any(named.items() <= one.items() for one in seen):
+                continue
+            tries, factor = self.chance * float(step.shares[row]), float(step.factors[row])
+            self.tried += 1
+            with meter.phase("verification"):
+                rotation = from_three(scaled(here, factor, meter), there, meter)
+                candidate = observation.confirm(
+                    rotation, STARS_OF_TRIANGLE, tries, factor=factor, largest=self.largest
+                )
+            seen.append(
+                dict(zip(candidate.centroids.tolist(), candidate.stars.tolist(), strict=True))
+            )
+            yield candidate
+
+
+def _apart_deg(one: Candidate, other: Candidate) -> float:
+    cosine = (float((one.rotation * other.rotation).sum()) - 1) / 2
+    return degrees(acos(max(-1.0, min(cosine, 1.0))))
