@@ -29,13 +29,13 @@ from cubestack.firmware_model.aramis.solution import (
 )
 from cubestack.firmware_model.interface.aramis import Reason
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 from cubestack.firmware_model.star_tracker.background import (
     UNIT,
     cell_middles,
     estimate,
     sample_offsets,
 )
+from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 
 STEP = 2
 """Distance of the background's samples in px."""
@@ -191,20 +191,21 @@ def detect_locally(
     """
     _check_size(picture, field)
     with meter.phase("threshold"):
-        down, across = sample_offsets(*picture.shape, STEP)
+        rows, columns = picture.shape
+        down, across = sample_offsets(rows, columns, STEP)
         sky = estimate(picture[np.ix_(down, across)], STEP, LEAST_NOISE).smoothed()
         charges.charge_background(sky, meter)
         mask = sky.brighter(picture, settings.sigmas) & field.mask
         far = sky.brighter(picture, SPIKE_SIGMAS) & field.mask
         for _ in (mask, far):
-            charges.charge_thresholds(*picture.shape, meter)
+            charges.charge_thresholds(rows, columns, meter)
     large = remove_spikes(mask, settings.spikes, settings.needed, meter)
     spikes = int(np.count_nonzero(far & ~large))
     with meter.phase("centroids"):
         regions = find_regions(large & field.mask)
         charges.charge_regions(mask.size, regions, meter)
         regions = regions or NO_REGIONS
-        seen = field.mask[np.ix_(*(cell_middles(size) for size in picture.shape))]
+        seen = field.mask[np.ix_(cell_middles(rows), cell_middles(columns))]
         levels, noise = sky.levels[seen] / UNIT, float(np.median(sky.noises[seen])) / UNIT
         sizes = settings.min_pixels, settings.max_pixels
         spots = find_spots(picture, regions, noise, sizes)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +96,7 @@ class Moments:
     def of(
         cls,
         labels: Ints,
-        weights: Ints | Reals,
+        weights: NDArray[Any],
         rows: Ints,
         columns: Ints,
         corners: tuple[Ints, Ints],

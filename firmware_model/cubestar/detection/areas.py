@@ -74,6 +74,6 @@ def measure(runs: Runs, signal: Ints, width: int) -> Areas:
         sizes=np.bincount(owners, minlength=count),
         large=large,
         peaks=places[brightest] if len(places) else first,
-        tops=signal[brightest] if len(places) else moments.light,
+        tops=signal[brightest] if len(places) else np.ones(count, np.int64),
         moments=moments,
     )

@@ -22,11 +22,11 @@ from cubestack.firmware_model.cubestar.matching.identification import (
     NONE,
     CentroidPairs,
     Identification,
-    MatchOutcome,
     unidentified,
     verify,
 )
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 #: Search tolerance of section 4.3.5, about one pixel.
 DEFAULT_MARGIN_RAD = 0.001
