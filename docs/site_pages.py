@@ -105,7 +105,7 @@ def _text(found: Any) -> str:
         cycles = ", ".join(f"{name} {cycles}" for name, cycles in found.cycles.items())
         return f"{found.name} at {found.clock_hz / 1e6:g} MHz; cycles: {cycles}"
     if isinstance(found, partial):
-        kind = getattr(found.args[0], "name", found.args[0])
+        kind = found.keywords["type"] if "type" in found.keywords else found.args[0].name
         return f"A `{found.func.__name__.replace('_declare', 'Declaration')}` of type {kind}."
     if inspect.isclass(found) or inspect.isroutine(found) or isinstance(found, property):
         return str(inspect.getdoc(found))
