@@ -15,6 +15,7 @@ from mkdocs.structure.files import File, Files
 import cubestack
 import cubestack.sensor
 from cubestack.firmware_model.mcu.costs import CostTable
+from cubestack.hdl import blocks
 from cubestack.host.cli.main import make_parser
 from cubestack.host.cli.new_sensor import rendered
 
@@ -74,6 +75,9 @@ def sensor() -> str:
             found = getattr(cubestack.sensor, name)
             parts.append(f"\n### {name}\n\n{_described(name, found)}")
             parts += _members(found, "####") if inspect.isclass(found) else []
+    parts.append("\n## Blocks of `cubestack.hdl.blocks`\n")
+    for name in blocks.__all__:
+        parts.append(f"\n### {name}\n\n{_described(name, getattr(blocks, name))}")
     parts.append("\n## Files of `cubestack new-sensor glow`\n")
     for path, text in rendered("glow"):
         language = "toml" if path.endswith(".toml") else "python"

@@ -10,8 +10,8 @@ from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.emulator.sim.power import PowerTable
 from cubestack.emulator.sim.processor import Processor
+from cubestack.firmware_model.interface import checks
 from cubestack.firmware_model.mcu.costs import CostTable, Meter
-from cubestack.firmware_model.node import checks
 from cubestack.firmware_model.node.program import POWER_ON, NodeProgram
 
 ProgramT = TypeVar("ProgramT", bound=NodeProgram)

@@ -17,9 +17,9 @@ import simpy
 
 from cubestack.emulator.sim.fpga_port import FpgaPort, Transactions
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, CycleClock, Kernel
+from cubestack.firmware_model.interface.checks import shown_path
 from cubestack.firmware_model.mcu import requests
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.node.checks import shown_path
 
 LOOK_AHEAD_PS = 10 * PS_PER_MS
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, ClassVar, TypeAlias
 
+from cubestack.firmware_model.interface import checks
 from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.mcu.requests import Pay, Reset, Routine, Sleep
-from cubestack.firmware_model.node import checks
 from cubestack.firmware_model.node.hardware import NodeHardware
 from cubestack.firmware_model.node.identification import identification
 from cubestack.firmware_model.node.link import BusFlags, LinkFlags, QueueingLink

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    # The list of the names, by topic: read by `topics`, and by type checkers.
+    # The list of the names, by topic: read by `_topics`, and by type checkers.
     "Tables"
     from cubestack.firmware_model.interface.codec.field import Field as Field
     from cubestack.firmware_model.interface.codec.field import InterfaceError as InterfaceError
@@ -91,7 +91,7 @@ if TYPE_CHECKING:
     from cubestack.host.options import option as option
 
     "Device"
-    from cubestack.firmware_model.node.checks import SensorError as SensorError
+    from cubestack.firmware_model.interface.checks import SensorError as SensorError
     from cubestack.host.devices.device import VERSION as VERSION
     from cubestack.host.devices.device import BoardOption as BoardOption
     from cubestack.host.devices.device import ConformanceNotes as ConformanceNotes

@@ -48,7 +48,7 @@ def add_failed(commands: "argparse._SubParsersAction[Any]", name: str, error: st
     """Declare a command that ends with this error, whatever its options."""
     command = commands.add_parser(name, help="does not load")
     failed: Any = lambda *_: command.exit(2, f"{command.prog}: {error}\n")  # noqa: E731
-    command.parse_known_args = failed  # type: ignore[method-assign]
+    command.parse_known_args = failed
 
 
 def typed(kind: Kind[T]) -> Callable[[str], T]:

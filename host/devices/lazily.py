@@ -5,16 +5,15 @@ from functools import partial
 from pkgutil import resolve_name
 from typing import Any
 
+from cubestack.firmware_model.interface.checks import place_of
 from cubestack.host.errors import TargetError
 
 
 def load(what: str) -> Any:
-    """Load it; TargetError says, in one line, where that failed."""
+    """Load it; on failure, raises TargetError with file and line."""
     try:
         return resolve_name(what)
     except Exception as error:
-        from cubestack.firmware_model.node.checks import place_of
-
         place = place_of(error.__traceback__, what.split(".")[0].split(":")[0])
         kind = "" if isinstance(error, ValueError | ImportError) else f"{type(error).__name__}: "
         raise TargetError(f"{what} does not load: {place}{kind}{error}") from error

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
+from cubestack.firmware_model.interface.checks import check_address, check_interface
 from cubestack.host.devices.device import AnyDevice, Device
 from cubestack.host.devices.lazily import load
 from cubestack.host.errors import TargetError
@@ -52,8 +53,6 @@ def device(name: str) -> AnyDevice:
 
 
 def _check(found: AnyDevice, place: str) -> None:
-    from cubestack.firmware_model.node.checks import check_address, check_interface
-
     try:
         check_interface(found.interface)
         check_address(found.interface, [device(name).interface for name in BUILT_IN])

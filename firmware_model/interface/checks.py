@@ -1,8 +1,8 @@
-"""Mistakes in the declaration of a sensor, each reported in one line.
+"""Checks of the declaration of a sensor; each mistake is reported in one line.
 
-The line names the file, or the entry point, the message or field, and what is expected. What a
-declaration cannot express at all (two messages of one ID, limits beyond a type) is rejected by the
-declaration itself, with an `InterfaceError`.
+The line names the file or entry point, the message or field, and what is expected. The tables
+themselves reject the rest (two messages with one ID, a reset value beyond its limits) with an
+`InterfaceError`.
 """
 
 import ast
@@ -32,7 +32,7 @@ class SensorError(ValueError):
 
 
 def check_interface(interface: Interface) -> None:
-    """Every message and field has a meaning."""
+    """Require a meaning of every message and field."""
     for message in interface.messages:
         if not message.meaning:
             raise SensorError(f"{_titled(message)} has no meaning; add a phrase for a reader")
@@ -45,7 +45,7 @@ def check_interface(interface: Interface) -> None:
 
 
 def check_address(interface: Interface, others: Iterable[Interface]) -> None:
-    """No other device has its I2C address, and the bus has it."""
+    """Require an I2C address that no other device has, and that is not reserved."""
     address = f"{interface.name}: I2C address {interface.i2c_address:#04x}"
     if interface.i2c_address not in ADDRESSES:
         raise SensorError(f"{address} must be {ADDRESSES[0]:#04x} to {ADDRESSES[-1]:#04x}")
@@ -58,7 +58,7 @@ def check_address(interface: Interface, others: Iterable[Interface]) -> None:
 
 
 def check_class(owner: type[Any], **attributes: str) -> None:
-    """A class has these attributes, each with what it must be."""
+    """Require these attributes of a class; the values describe them."""
     for name, wanted in attributes.items():
         if not hasattr(owner, name):
             raise SensorError(f"{_file(owner)}: {owner.__name__} has no {name}: {wanted}")
@@ -67,7 +67,7 @@ def check_class(owner: type[Any], **attributes: str) -> None:
 def check_actions(
     owner: type[Any], interface: Interface, actions: Mapping[str, Callable[..., Any]]
 ) -> None:
-    """Actions are generator functions, and each is a telecommand's."""
+    """Require generator functions, each under the name of a telecommand."""
     known = [message.name for message in interface.telecommands]
     for name, action in actions.items():
         _check_name(f"{_file(owner)}: {owner.__name__}.actions()", name, "telecommand", known)
@@ -81,7 +81,10 @@ def check_actions(
 def check_sources(
     owner: type[Any], interface: Interface, sources: Mapping[str, Callable[[], dict[str, Any]]]
 ) -> None:
-    """Each telemetry has a source, whose values fit; reads those that nothing changes."""
+    """Require a source for each telemetry message, and values that fit.
+
+    Calls all sources, except those of messages that change something when they are read.
+    """
     at = f"{_file(owner)}: {owner.__name__}.sources()"
     known = [message.name for message in interface.telemetries]
     for name in sources:
@@ -97,7 +100,10 @@ def check_sources(
 
 
 def check_values(message: Message, values: Any, where: Callable[[], str]) -> None:
-    """``values`` are those of a telemetry's fields, and each fits; ``where`` is their source."""
+    """Require one value for each field of a telemetry message, and that each fits its type.
+
+    ``where`` returns the place of the source.
+    """
     names = [field.name for field in message.fields]
     if not isinstance(values, dict) or values.keys() != set(names):
         given = ", ".join(values) if isinstance(values, dict) else repr(values)
@@ -113,7 +119,10 @@ def check_values(message: Message, values: Any, where: Callable[[], str]) -> Non
 
 
 def check_charges(owner: type[Any], operations: Collection[str], processor: str) -> None:
-    """The operations that the modules of a program charge by name are those of its cost table."""
+    """Require that a cost table has the operations of every node, and those of a program.
+
+    The latter are the keywords with which the modules of its classes call `Meter.charge`.
+    """
     if missing := sorted({*NEEDED} - {*operations}):
         raise SensorError(
             f"{_file(owner)}: the costs of {processor} need {', '.join(missing)} for every node"
@@ -128,7 +137,7 @@ def check_charges(owner: type[Any], operations: Collection[str], processor: str)
 
 
 def check_supplies(owner: type[Any], states: Mapping[str, Collection[str]]) -> None:
-    """The power table has a part "processor" with the states that a program switches."""
+    """Require a part "processor" with the states of a running program, given states by part."""
     if not {"sleep", "run"} <= set(states.get("processor", ())):
         raise SensorError(
             f"{_file(owner)}: supplies of {owner.__name__} need a part 'processor' with the "
@@ -137,7 +146,7 @@ def check_supplies(owner: type[Any], states: Mapping[str, Collection[str]]) -> N
 
 
 def place_of(traceback: TracebackType | None, package: str) -> str:
-    """Where an error left the modules of ``package``: "file:line: ", or nothing."""
+    """The last line of ``package`` in a traceback, as "file:line: "; empty if there is none."""
     found = ""
     while traceback is not None:
         frame = traceback.tb_frame
@@ -148,7 +157,7 @@ def place_of(traceback: TracebackType | None, package: str) -> str:
 
 
 def shown_path(file: str) -> str:
-    """A file's path, from the current folder where it is below that."""
+    """A file's path, relative to the current folder if it is below that."""
     relative = os.path.relpath(file)
     return file if relative.startswith(os.pardir) else relative
 
@@ -167,7 +176,7 @@ def _is_foreign(owner: type[Any]) -> bool:
 
 
 def _charged(module: str) -> tuple[tuple[str, str], ...]:
-    """Operations that a module charges by keyword, each with its place."""
+    """Operations that a module charges by keyword, each with file and line."""
     try:
         source = inspect.getsource(sys.modules[module])
     except (OSError, TypeError, KeyError):
@@ -185,7 +194,7 @@ def _charged(module: str) -> tuple[tuple[str, str], ...]:
 
 
 def place(function: Callable[..., Any], owner: type[Any]) -> str:
-    """File and line of a function, or the file of its class."""
+    """File and line of a function; only the file of its class if it is not a sensor's own."""
     code = getattr(inspect.unwrap(function), "__code__", None)
     if code is None or not _is_foreign(owner):
         return _file(owner)
