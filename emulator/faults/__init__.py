@@ -1,1 +1,1 @@
-"""Faults on purpose: declared in one table, planned in TOML, injected at virtual times."""
+"""Fault injection: faults are declared in one table, planned in TOML, injected at virtual times."""

@@ -1,4 +1,4 @@
-"""Injects faults into a board: at once or at a virtual time, for a while or for ever."""
+"""Injects faults into a board, at once or at a virtual time, for a duration or permanently."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -15,21 +15,20 @@ from cubestack.emulator.faults.wire import BusFaults, LineFaults
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 
 LOG_LIMIT = 100_000
-"""Events kept in the log; all are counted."""
+"""Limit of the events stored in the log."""
 
 
 class Faults:
-    """A board's faults. What is not hit is not touched: nothing is in the way before.
+    """A board's faults. A target without faults is unchanged: its mechanism is created when needed.
 
     Attributes:
-        seed: of everything random about faults that are injected from now on.
-        log: what faults did, in the order in which it came out, at most ``LOG_LIMIT`` events.
-        events: how many events there were.
-        on_event: told about each one.
+        seed: seed of the faults that are injected from now on.
+        log: effects of faults, in the order of their reports, at most ``LOG_LIMIT``.
+        events: number of all effects.
+        on_event: called with each one.
     """
 
     def __init__(self, sites: Sites, seed: int = 0) -> None:
-        """Act on a board's ``sites``."""
         self._sites = sites
         self._env = sites.kernel
         self._mechanisms: dict[tuple[Site, str], Mechanism] = {}
@@ -41,11 +40,11 @@ class Faults:
         self.on_event: Callable[[FaultEvent], None] = lambda _event: None
 
     def targets(self, site: Site) -> tuple[str, ...]:
-        """Names of what faults of that site can hit here, the usual one first."""
+        """Targets of faults at ``site`` on this board, the default first."""
         return self._sites.targets(site)
 
     def kinds(self) -> dict[str, tuple[str, ...]]:
-        """Kinds that can be injected here, with their targets, the usual one first."""
+        """Kinds of faults that this board can have, with their targets, the default first."""
         engine = self._sites.engine
         refused: set[type[Fault]] = set()
         if engine is None:
@@ -67,23 +66,23 @@ class Faults:
         for_s: float | None = None,
         **parameters: object,
     ) -> Injection:
-        """Inject ``fault``: one of the table, or the kind of one and its ``parameters``.
+        """Inject ``fault``: an instance, or a kind with its ``parameters``.
 
         Args:
-            fault: what happens.
-            target: where; the first one of ``targets`` unless given.
-            at_s: virtual time since power-up; now unless given.
-            for_s: how long; until it is cleared unless given.
-            parameters: of a kind.
+            fault: fault or kind.
+            target: default: the first one of ``targets``.
+            at_s: virtual time since power-up; default: now.
+            for_s: duration; default: until it is cleared.
+            parameters: parameters of the kind.
 
         Raises:
-            FaultError: no such fault, parameter or target, or a time that is over.
-            ValueError: no such register, or none that the engine can turn over.
+            FaultError: unknown kind, parameter or target, or a time in the past.
+            ValueError: unknown register, or an engine without access to registers.
         """
         if isinstance(fault, str):
             fault = table.make_fault(fault, **parameters)
         elif parameters:
-            raise FaultError(f"{fault.kind} has its parameters: leave {', '.join(parameters)} out")
+            raise FaultError(f"{fault.kind} already has parameters; omit {', '.join(parameters)}")
         target = self._target(fault, target)
         start_ps, end_ps = self._times(fault, at_s, for_s)
         injection = Injection(self._count, fault, target, start_ps, end_ps, self.seed)
@@ -98,10 +97,7 @@ class Faults:
         return injection
 
     def inject_words(self, words: Sequence[str]) -> Injection:
-        """Inject what words say: ``KIND [TARGET] [PARAMETER=VALUE ...] [at_s=S] [for_s=S]``.
-
-        FaultError as for ``inject``.
-        """
+        """Parse and inject ``KIND [TARGET] [PARAMETER=VALUE ...] [at_s=S] [for_s=S]``."""
         kind, *rest = words
         given = dict(word.split("=", 1) for word in rest if "=" in word)
         targets = [word for word in rest if "=" not in word]
@@ -122,7 +118,7 @@ class Faults:
         )
 
     def load(self, plan: Plan) -> list[Injection]:
-        """Take over a plan's seed and inject its faults; the same errors as ``inject``."""
+        """Use a plan's seed and inject its faults; errors as for ``inject``."""
         self.seed = plan.seed
         injections = []
         for number, planned in enumerate(plan.faults, start=1):
@@ -136,14 +132,14 @@ class Faults:
         return injections
 
     def clear(self, injection: Injection | None = None) -> None:
-        """End an injected fault now, or all of them."""
+        """End an injected fault now, by default all."""
         for running in [injection] if injection is not None else list(self._running):
             if running in self._running:
                 running.end_ps = self._env.now
                 self._end(running, self._mechanism(running.fault.site, running.target))
 
     def report(self, time_ps: int, injection: Injection, text: str) -> None:
-        """Log what a fault did."""
+        """Log an effect of a fault."""
         injection.hits += 1
         event = FaultEvent(time_ps, injection.fault.kind, injection.target, text)
         self.events += 1
@@ -159,7 +155,7 @@ class Faults:
             return targets[0]
         if target not in targets:
             names = ", ".join(targets)
-            raise FaultError(f"{fault.kind}: no {fault.site.value} {target!r}; there are {names}")
+            raise FaultError(f"{fault.kind}: unknown {fault.site.value} {target!r}; known: {names}")
         return target
 
     def _times(
@@ -176,7 +172,7 @@ class Faults:
         if for_s is None:
             return start_ps, None
         if fault.momentary:
-            raise FaultError(f"{fault.kind} happens at one instant: it has no duration")
+            raise FaultError(f"{fault.kind} happens at one instant; omit for_s")
         return start_ps, start_ps + max(1, round(for_s * PS_PER_S))
 
     def _follow(self, injection: Injection, mechanism: Mechanism) -> Any:
@@ -236,7 +232,7 @@ class Faults:
 
     @cached_property
     def _pins(self) -> PinFaults:
-        """All pins of the FPGA: only one can stand before the processor."""
+        """Mechanism of all pins of the FPGA: the processor has only one FPGA port."""
         assert self._sites.engine is not None
         self._sites.processor.fpga = pins = PinFaults(
             self._env, self.report, self._sites.engine, self._sites.engine.wiring.data

@@ -22,13 +22,13 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 Steps = Generator[simpy.Event, Any, None]
 
 MOST_UPSETS_PER_S = 10_000.0
-"""Upsets of a memory that come one by one; what is more comes in ``BATCH_S``."""
+"""Rate of memory upsets above which they are applied in batches, every ``BATCH_S``."""
 
 BATCH_S = 1e-3
 
 
 class CameraFaults(Mechanism):
-    """A camera's faults: those of its output, and its death."""
+    """Faults of a camera: of its output, and its failure."""
 
     def __init__(
         self,
@@ -39,7 +39,6 @@ class CameraFaults(Mechanism):
         site: CameraSite,
         power: PowerModel,
     ) -> None:
-        """Stand between camera and FPGA."""
         super().__init__(env, report)
         self._engine, self._name, self._site, self._power = engine, name, site, power
         source = FaultySource(site.source, report, self.injections)
@@ -58,17 +57,16 @@ class CameraFaults(Mechanism):
         return bool(active(self.injections, table.CameraDead, self.env.now))
 
     def _now_ps(self) -> int:
-        """The engine may have run ahead."""
+        """Run the engine to the present, which it may be ahead of; returns its time."""
         now_ps = max(self.env.now, self._engine.now_ps)
         self._engine.run(now_ps)
         return now_ps
 
     def prepare(self, injection: Injection) -> None:
-        """Know of it ahead: lines are judged by their own time."""
+        """Store it, as the affected lines depend on its time."""
         self.injections.append(injection)
 
     def begin(self, injection: Injection) -> None:
-        """Act from now on."""
         now_ps = self._now_ps()
         if isinstance(injection.fault, table.CameraDead):
             self.report(now_ps, injection, "no clock, no answer")
@@ -76,7 +74,6 @@ class CameraFaults(Mechanism):
         self._engine.stream_changed(self._name)
 
     def end(self, injection: Injection) -> None:
-        """Act no longer."""
         now_ps = self._now_ps()
         super().end(injection)
         if isinstance(injection.fault, table.CameraDead) and not self._dead:
@@ -86,7 +83,7 @@ class CameraFaults(Mechanism):
 
 
 class MemoryFaults(Mechanism):
-    """Bits of one memory that turn over, or can not."""
+    """Flipped and stuck bits of one memory."""
 
     def __init__(
         self,
@@ -97,10 +94,9 @@ class MemoryFaults(Mechanism):
         pins: Callable[[], PinFaults] | None = None,
         changed: Callable[[int, int], None] = lambda _first, _count: None,
     ) -> None:
-        """Stand at ``memory``.
+        """``changed`` is called with the first changed byte and the number of bytes.
 
-        ``pins`` give what says when the FPGA's memories are read; None without an FPGA. ``changed``
-        is told of the first byte that was changed, and of how many.
+        ``pins`` returns the mechanism that reports reads of the FPGA's memories; None without FPGA.
         """
         super().__init__(env, report)
         self._memory = memory
@@ -109,12 +105,13 @@ class MemoryFaults(Mechanism):
         self._pins, self._changed = pins, changed
 
     def prepare(self, injection: Injection) -> None:
-        """Refuse stuck bits where no reading can be noticed; FaultError."""
+        """Reject stuck bits in a memory whose reads are not observable."""
         if isinstance(injection.fault, table.MemoryStuck) and self._pins is None:
-            raise FaultError("memory-stuck: only memories of a device with an FPGA can have it")
+            raise FaultError(
+                "memory-stuck: only a memory of a device with an FPGA can have stuck bits"
+            )
 
     def begin(self, injection: Injection) -> None:
-        """Act from now on."""
         self._advance()
         fault = injection.fault
         match fault:
@@ -131,7 +128,6 @@ class MemoryFaults(Mechanism):
                 self.env.process(self._upsets(injection, fault))
 
     def end(self, injection: Injection) -> None:
-        """Act no longer."""
         super().end(injection)
         if self._stuck.pop(injection, None) and not self._stuck and self._pins is not None:
             self._pins().around_reads.remove(self._hold)
@@ -139,7 +135,6 @@ class MemoryFaults(Mechanism):
     def _place(
         self, injection: Injection, fault: table.MemoryFlip | table.MemoryStuck
     ) -> tuple[int, int]:
-        """Byte and bit."""
         address = injection.drawn(fault.address, self._memory.size, 1)
         return address, injection.drawn(fault.bit, 8, 2)
 
@@ -183,91 +178,42 @@ class MemoryFaults(Mechanism):
 
 
 @dataclass(eq=False)
-class RegisterFaults(Mechanism):
-    """Bits of the FPGAs' registers in ``engine`` that turn over."""
-
-    engine: RtlEngine
-
-    def prepare(self, injection: Injection) -> None:
-        """Refuse a register that is none; ValueError."""
-        fault = injection.fault
-        if isinstance(fault, table.RegisterFlip):
-            self._place(injection, fault)
-        elif not self.engine.registers:
-            self.engine.flip("", 0)
-
-    def begin(self, injection: Injection) -> None:
-        """Act from now on."""
-        fault = injection.fault
-        if isinstance(fault, table.RegisterFlip):
-            self._flip(injection, *self._place(injection, fault))
-        elif isinstance(fault, table.RegisterUpsets):
-            self.injections.append(injection)
-            self.env.process(self._upsets(injection, fault))
-
-    def _place(self, injection: Injection, fault: table.RegisterFlip) -> tuple[str, int]:
-        registers, name, bit = self.engine.registers, fault.register, fault.bit
-        if name not in registers:
-            if name is not None or not registers:
-                self.engine.flip(name or "", 0)  # says what there is
-            name = list(registers)[injection.drawn(None, len(registers), 1)]
-        if bit is not None and bit >= registers[name]:
-            self.engine.flip(name, bit)
-        return name, injection.drawn(bit, registers[name], 2)
-
-    def _flip(self, injection: Injection, register: str, bit: int) -> None:
-        self.engine.run(max(self.env.now, self.engine.now_ps))
-        self.engine.flip(register, bit)
-        self.report(self.env.now, injection, f"{register}[{bit}]")
-
-    def _upsets(self, injection: Injection, fault: table.RegisterUpsets) -> Steps:
-        places = [
-            (name, bit) for name, bits in self.engine.registers.items() for bit in range(bits)
-        ]
-        while True:
-            wait_s = float(injection.generator.exponential(1 / (fault.rate * len(places))))
-            yield self.env.timeout(max(1, round(wait_s * PS_PER_S)))
-            if injection not in self.injections:
-                return
-            self._flip(injection, *places[int(injection.generator.integers(len(places)))])
-
-
-@dataclass(eq=False)
 class CoreFaults(Mechanism):
-    """Bits of a core's registers that turn over."""
+    """Flipped bits of a core's registers."""
 
     core: CoreSite
 
     def prepare(self, injection: Injection) -> None:
-        """Refuse a register that is none; FaultError."""
-        if isinstance(injection.fault, table.CoreFlip):
+        """Reject an unknown register; FaultError."""
+        if isinstance(injection.fault, table.CoreFlip | table.RegisterFlip):
             self._place(injection, injection.fault)
 
     def begin(self, injection: Injection) -> None:
-        """Act from now on."""
         fault = injection.fault
-        if isinstance(fault, table.CoreFlip):
+        if isinstance(fault, table.CoreFlip | table.RegisterFlip):
             self._flip(injection, *self._place(injection, fault))
-        elif isinstance(fault, table.CoreUpsets):
+        elif isinstance(fault, table.CoreUpsets | table.RegisterUpsets):
             self.injections.append(injection)
-            self.env.process(self._upsets(injection, fault))
+            self.env.process(self._upsets(injection, fault.rate))
 
-    def _place(self, injection: Injection, fault: table.CoreFlip) -> tuple[str, int]:
+    def _place(
+        self, injection: Injection, fault: table.CoreFlip | table.RegisterFlip
+    ) -> tuple[str, int]:
         registers, name = self.core.registers, fault.register
         if name is None:
             name = list(registers)[injection.drawn(None, len(registers), 1)]
         if name not in registers:
-            raise FaultError(f"core-flip: no register {name!r}, only {', '.join(registers)}")
+            raise FaultError(f"{fault.kind}: no register {name!r}, only {', '.join(registers)}")
         return name, injection.drawn(fault.bit, registers[name], 2)
 
     def _flip(self, injection: Injection, register: str, bit: int) -> None:
         self.core.flip(register, bit)
         self.report(self.env.now, injection, f"{register}[{bit}]")
 
-    def _upsets(self, injection: Injection, fault: table.CoreUpsets) -> Steps:
+    def _upsets(self, injection: Injection, rate: float) -> Steps:
         places = [(name, bit) for name, bits in self.core.registers.items() for bit in range(bits)]
         while True:
-            wait_s = float(injection.generator.exponential(1 / (fault.rate * len(places))))
+            wait_s = float(injection.generator.exponential(1 / (rate * len(places))))
             yield self.env.timeout(max(1, round(wait_s * PS_PER_S)))
             if injection not in self.injections:
                 return
@@ -275,13 +221,37 @@ class CoreFaults(Mechanism):
 
 
 @dataclass(eq=False)
+class RegisterFaults(CoreFaults):
+    """Flipped bits of the FPGAs' registers."""
+
+    core: RtlEngine
+
+    def prepare(self, injection: Injection) -> None:
+        """Reject an unknown register, and an engine without registers; ValueError."""
+        if not self.core.registers:
+            self.core.flip("", 0)  # raises the error
+        super().prepare(injection)
+
+    def _place(
+        self, injection: Injection, fault: table.CoreFlip | table.RegisterFlip
+    ) -> tuple[str, int]:
+        registers, name, bit = self.core.registers, fault.register, fault.bit
+        if name is not None and (bit or 0) not in range(registers.get(name, 0)):
+            self.core.flip(name, bit or 0)  # raises the error
+        return super()._place(injection, fault)
+
+    def _flip(self, injection: Injection, register: str, bit: int) -> None:
+        self.core.run(max(self.env.now, self.core.now_ps))
+        super()._flip(injection, register, bit)
+
+
+@dataclass(eq=False)
 class SupplyFaults(Mechanism):
-    """Latch-ups; switching off ends them."""
+    """Latch-ups, which end when the channel is switched off."""
 
     power: PowerModel
 
     def begin(self, injection: Injection) -> None:
-        """Strike."""
         fault = injection.fault
         assert isinstance(fault, table.LatchUp)
         on = "" if self.power.is_on(injection.target) else ", but it is off"
@@ -291,11 +261,10 @@ class SupplyFaults(Mechanism):
 
 @dataclass(eq=False)
 class ProcessorFaults(Mechanism):
-    """Resets for one reason."""
+    """Resets with one cause."""
 
     reset: Callable[[], None]
 
     def begin(self, injection: Injection) -> None:
-        """Strike."""
         self.report(self.env.now, injection, "resets the processor")
         self.reset()

@@ -1,6 +1,6 @@
-"""Faults between processor and FPGA: acknowledges that lie, and glitches on control pins.
+"""Faults between processor and FPGA: wrong acknowledges, and glitches on control pins.
 
-Stands where the processor looks for its FPGA and passes on everything else.
+The mechanism replaces the processor's FPGA port, and forwards everything else.
 """
 
 from collections.abc import Callable
@@ -19,14 +19,14 @@ PS_PER_NS = 1000
 
 
 class PinFaults(Mechanism, FpgaPort):
-    """An FPGA whose pins are not what they should be.
+    """An FPGA port with faults at its pins.
 
     Attributes:
-        around_reads: called before and after bytes are taken from the FPGA.
+        around_reads: called before and after bytes are read from the FPGA.
     """
 
     def __init__(self, env: Kernel, report: Report, engine: FpgaPort, data: str = "") -> None:
-        """Stand before ``engine``; ``data`` are the pins by which bytes are read one by one."""
+        """Replaces ``engine``; ``data`` are the pins for reading single bytes."""
         super().__init__(env, report)
         self._engine, self._data = engine, data
         self._forced: dict[str, int] = {}
@@ -35,7 +35,6 @@ class PinFaults(Mechanism, FpgaPort):
         self.around_reads: list[Callable[[], None]] = []
 
     def begin(self, injection: Injection) -> None:
-        """Act from now on."""
         if isinstance(injection.fault, ControlGlitch):
             self.env.process(self._glitch(injection, injection.fault))
             return
@@ -43,36 +42,33 @@ class PinFaults(Mechanism, FpgaPort):
         level = self._engine.get_pin(injection.target)
         self.report(self.env.now, injection, f"begins with the pin at {level}")
 
-    # --- what a processor calls -----------------------------------------------------------------
+    # --- FpgaPort -------------------------------------------------------------------------------
 
     @property
     def now_ps(self) -> int:
-        """Virtual time of the FPGA."""
         return self._engine.now_ps
 
     @property
     def running(self) -> int:
-        """Cameras whose clocks are made now."""
         return self._engine.running
 
     @property
     def driver(self) -> Driver | None:
-        """None while there are faults that nobody may go past."""
-        stands = self.injections or self._forced or self.around_reads
-        return None if stands else self._engine.driver
+        """None while a fault needs every access."""
+        needed = self.injections or self._forced or self.around_reads
+        return None if needed else self._engine.driver
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
-        """A burst of ``driver`` ended."""
         return self._engine.attend(reached_ps, end, camera, until_ps)
 
     def set_pin(self, name: str, value: int) -> None:
-        """Drive a pin; one that is in a glitch follows after it."""
+        """Drive a pin; during a glitch, the level takes effect after it."""
         self._driven[name] = value
         if name not in self._forced:
             self._engine.set_pin(name, value)
 
     def get_pin(self, name: str) -> int:
-        """Level of a pin as the processor sees it."""
+        """Level of a pin for the processor."""
         if name == self._data:
             for act in self.around_reads:
                 act()
@@ -93,7 +89,7 @@ class PinFaults(Mechanism, FpgaPort):
         return level
 
     def run(self, until_ps: int, stop_on: tuple[str, int] | None = None) -> int:
-        """Advance to ``until_ps``, or to where the processor sees ``stop_on``."""
+        """Advance to ``until_ps``, or until the processor sees ``stop_on``."""
         self._note_rises(until_ps)
         if stop_on is None or not self._on(stop_on[0]):
             return self._engine.run(until_ps, stop_on)
@@ -102,17 +98,15 @@ class PinFaults(Mechanism, FpgaPort):
             return self._engine.now_ps
         late = [fault for _, fault in self._on(pin) if isinstance(fault, AckLate)]
         if level and late and pin in self._rose_ps:
-            seen_ps = self._rose_ps[pin] + max(map(_delay_ps, late))
-            if seen_ps > self._engine.now_ps:  # else another fault hides it
-                until_ps = min(until_ps, seen_ps)
+            visible_ps = self._rose_ps[pin] + max(map(_delay_ps, late))
+            if visible_ps > self._engine.now_ps:  # else another fault hides it
+                until_ps = min(until_ps, visible_ps)
         return self._engine.run(until_ps)
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
-        """Run the transfer loop."""
         return self._around(lambda: self._engine.strobe_read(out, period, until_ps))
 
     def access(self, transactions: Transactions, until_ps: int) -> int:
-        """Make transactions on the external bus."""
         return self._around(lambda: self._engine.access(transactions, until_ps))
 
     def _around(self, take: Callable[[], int]) -> int:
@@ -135,7 +129,7 @@ class PinFaults(Mechanism, FpgaPort):
         ]
 
     def _note_rises(self, until_ps: int) -> None:
-        """Run up to where an acknowledge rises that is to be seen late, and keep the time."""
+        """Stop at the rise of a delayed acknowledge, and store its time."""
         for injection, _ in active(self.injections, AckLate, self.env.now):
             pin = injection.target
             if self._engine.get_pin(pin):

@@ -1,7 +1,7 @@
-"""Faults of a camera's output: a source of pixels that stands before the camera.
+"""Faults of a camera's output: a source of pixels in place of the camera.
 
-A line with a clock too few or too many becomes segments of its own, so that the FPGA gets exactly
-the edges that a real one would. At most one of these faults hits a line.
+A line with a missing or additional clock is sent as separate segments, so that the FPGA receives
+exactly the edges of real hardware. At most one of these faults hits a line.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ _PIXEL_FAULTS = (table.PixelHot, table.PixelDead, table.ColumnDefect, table.Bloo
 
 @dataclass(frozen=True)
 class _Piece(StreamSegment):
-    """A segment with a grid of its own; see PixelSource."""
+    """A segment with its own clock and line lengths; see PixelSource."""
 
     period: Fraction
     line_clocks: int
@@ -45,15 +45,14 @@ class _Hit(NamedTuple):
 
 
 class FaultySource:
-    """A camera's output with faults; otherwise what ``source`` says.
+    """The output of ``source`` with faults.
 
     Attributes:
-        period, line_clocks, active_columns: of the segment handed out last.
-        injections: faults that act or will act.
+        period, line_clocks, active_columns: those of the latest segment.
+        injections: present and future faults.
     """
 
     def __init__(self, source: PixelSource, report: Report, injections: list[Injection]) -> None:
-        """Stand before ``source``."""
         self._source = source
         self._report = report
         self.injections = injections
@@ -63,7 +62,7 @@ class FaultySource:
         self._cut: tuple[tuple[object, ...], list[_Piece]] | None = None
 
     def segment_at(self, time_ps: int) -> PixelSegment | None:
-        """What the source sends then, cut where a clock is lost or comes twice."""
+        """The source's segment, split at a missing or additional clock."""
         if active(self.injections, table.CameraDead, time_ps):
             return None
         base = self._source.segment_at(time_ps)
@@ -84,13 +83,13 @@ class FaultySource:
                 self.line_clocks = piece.line_clocks
                 self.active_columns = piece.active_columns
                 return piece
-        # Where a piece's start was rounded down, its end may be 1 ps early.
+        # The start of a piece is rounded down, so its end may be 1 ps early.
         return self.segment_at(base.start_ps + int(base.clocks * self._source.period))
 
-    # --- the picture ----------------------------------------------------------------------------
+    # --- pixels ---------------------------------------------------------------------------------
 
-    def _spoiled(self, base: PixelSegment, hits: list[_Hit]) -> Callable[[], Picture]:
-        """Renders the picture with its faults, once; the log then knows that it was needed."""
+    def _with_faults(self, base: PixelSegment, hits: list[_Hit]) -> Callable[[], Picture]:
+        """Renders the image with its faults, once; reports them only when it is rendered."""
         rendered: list[Picture] = []
         line_ps = self.line_clocks * self.period
 
@@ -103,7 +102,7 @@ class FaultySource:
                 if isinstance(injection.fault, _PIXEL_FAULTS):
                     lines = _lines(injection, base.start_ps, line_ps, base.rows)
                     if lines:
-                        text = _spoil(picture, lines, injection)
+                        text = _apply(picture, lines, injection)
                         self._report(base.start_ps + int(lines.start * line_ps), injection, text)
             for row, column, injection in hits:
                 line = isinstance(injection.fault, table.LineMissing)
@@ -114,16 +113,16 @@ class FaultySource:
 
         return render
 
-    # --- the clocks -----------------------------------------------------------------------------
+    # --- clocks ---------------------------------------------------------------------------------
 
     def _hits(self, base: PixelSegment) -> list[_Hit]:
-        """What hits the clocks of this frame, by line."""
+        """Faults of the clocks in this frame, ordered by line."""
         hits: dict[int, _Hit] = {}
         for injection in self.injections:
             fault = injection.fault
             if not isinstance(fault, _CLOCK_FAULTS) or not injection.active(base.start_ps):
                 continue
-            # By frame time, so that a frame nobody looked at does not change the next one's.
+            # By frame time, so that a frame's faults do not depend on earlier frames.
             key = base.start_ps
             if float(injection.generator_at(key).random()) >= fault.rate:
                 continue
@@ -136,7 +135,7 @@ class FaultySource:
 
     def _pieces(self, base: PixelSegment) -> list[_Piece]:
         hits = self._hits(base)
-        full = self._spoiled(base, hits)
+        full = self._with_faults(base, hits)
         pieces: list[_Piece] = []
         clocks, columns, period = self.line_clocks, self.active_columns, self.period
 
@@ -148,7 +147,7 @@ class FaultySource:
             step: Fraction = period,
             repeat: int = 1,
         ) -> None:
-            """``count`` clocks from clock ``first`` on, with some columns of some rows."""
+            """Add ``count`` clocks from clock ``first`` on, with columns ``part`` of ``rows``."""
             if count <= 0:
                 return
             start_ps = base.start_ps + int(first * period)
@@ -187,7 +186,7 @@ class FaultySource:
 
 
 def _lines(injection: Injection, start_ps: int, line_ps: Fraction, rows: int) -> range:
-    """Lines that are read out while a fault acts."""
+    """Lines that are read out while a fault is active."""
 
     def first_from(time_ps: int) -> int:
         return min(max(-((start_ps - time_ps) // line_ps), 0), rows)
@@ -196,8 +195,8 @@ def _lines(injection: Injection, start_ps: int, line_ps: Fraction, rows: int) ->
     return range(first_from(injection.start_ps), end)
 
 
-def _spoil(picture: Picture, lines: range, injection: Injection) -> str:
-    """Put a fault into some lines of ``picture``; returns what was done."""
+def _apply(picture: Picture, lines: range, injection: Injection) -> str:
+    """Apply a fault to some lines of ``picture``; returns a text for the log."""
     height, width = picture.shape
     fault = injection.fault
     match fault:

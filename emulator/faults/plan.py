@@ -1,4 +1,4 @@
-"""A plan of faults: a seed, and what happens where, when and for how long; a TOML file.
+"""A plan of faults: a TOML file with a seed, and the kind, target, time and duration of faults.
 
 ::
 
@@ -6,13 +6,13 @@
 
     [[fault]]
     kind = "uart-corrupt"
-    at_s = 2.0             # virtual time; from the start unless given
-    for_s = 0.5            # for ever unless given
+    at_s = 2.0             # virtual time; default: the start
+    for_s = 0.5            # duration; default: unlimited
     rate = 0.01            # parameters of the kind
 
     [[fault]]
     kind = "latch-up"
-    target = "memory"      # the usual one of the device unless given
+    target = "memory"      # default: the first one of the device
 """
 
 import tomllib
@@ -24,8 +24,8 @@ from cubestack.emulator.faults.declaration import TIMES, Fault, FaultError
 from cubestack.emulator.faults.table import make_fault
 from cubestack.firmware_model.values import REQUIRED, named, read_table, text, whole
 
-_SEED = whole(0, "of everything random", 0)
-_OWN = named({"kind": text(REQUIRED, "of fault"), "target": text(None, "what it hits"), **TIMES})
+_SEED = whole(0, "seed of the random numbers", 0)
+_OWN = named({"kind": text(REQUIRED, "kind of fault"), "target": text(None, "target"), **TIMES})
 
 
 @dataclass(frozen=True)
@@ -40,26 +40,20 @@ class PlannedFault:
 
 @dataclass(frozen=True)
 class Plan:
-    """Faults of one run.
+    """Faults of one run."""
 
-    Attributes:
-        seed: of everything random about them.
-        faults: in the order in which they are injected.
-        name: for messages.
-    """
-
-    seed: int = 0
-    faults: tuple[PlannedFault, ...] = ()
-    name: str = "plan"
+    seed: int = 0  # seed of their random numbers
+    faults: tuple[PlannedFault, ...] = ()  # in the order of injection
+    name: str = "plan"  # name in messages
 
 
 def load_plan(path: Path) -> Plan:
-    """Read a plan; FaultError names the file, and the fault that makes no sense."""
+    """Read a plan; FaultError names the file, and the invalid fault."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "no UTF-8 text"
-        raise FaultError(f"{path}: {reason}: a plan of faults is a TOML file") from None
+        reason = getattr(error, "strerror", None) or "not UTF-8 text"
+        raise FaultError(f"{path}: {reason}; a plan of faults is a TOML file") from None
     return parse_plan(text, str(path))
 
 
@@ -71,13 +65,15 @@ def parse_plan(text: str, name: str = "plan") -> Plan:
         raise FaultError(f"{name}: {error}") from None
     seed, entries = table.pop("seed", 0), table.pop("fault", [])
     if table:
-        raise FaultError(f"{name}: no key {next(iter(table))!r}; a plan has seed and [[fault]]")
+        raise FaultError(
+            f"{name}: unknown key {next(iter(table))!r}; a plan has seed and [[fault]]"
+        )
     try:
         _SEED.check(seed)
     except ValueError as error:
         raise FaultError(f"{name}: seed {error}") from None
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise FaultError(f"{name}: faults are written as [[fault]]")
+        raise FaultError(f"{name}: fault must be an array of tables, [[fault]]")
     faults = []
     for number, entry in enumerate(entries, start=1):
         try:

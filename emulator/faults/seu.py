@@ -1,15 +1,11 @@
-"""Upsets in memory: radiation turns bits over, each with the same probability."""
+"""Upsets in memory: radiation inverts bits, each with the same probability."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def flip_bits(memory: NDArray[np.uint8], rate: float, generator: np.random.Generator) -> int:
-    """Turn over each bit of ``memory`` with probability ``rate``, 0 to 1; returns how many.
-
-    Raises:
-        ValueError: for a rate that is no probability.
-    """
+    """Invert each bit of ``memory`` with probability ``rate``, 0..1; return their number."""
     if not 0 <= rate <= 1:
         raise ValueError(f"the rate of bit flips must be 0 to 1 per bit, not {rate:g}")
     bits = 8 * memory.size
@@ -20,5 +16,5 @@ def flip_bits(memory: NDArray[np.uint8], rate: float, generator: np.random.Gener
 
 
 def flip_bit(memory: NDArray[np.uint8], place: int) -> None:
-    """Turn over bit ``place``, counted from the lowest bit of the first byte."""
+    """Invert bit ``place``, counted from the lowest bit of the first byte."""
     memory[place // 8] ^= np.uint8(1 << place % 8)

@@ -1,4 +1,4 @@
-"""What a board offers to faults, by name."""
+"""Targets of faults on a board, by name."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -19,17 +19,11 @@ from cubestack.emulator.sim.virtual_time import Kernel
 
 @dataclass(frozen=True)
 class CameraSite:
-    """A camera.
+    """A camera."""
 
-    Attributes:
-        source: its output.
-        power: turns its supply on or off, at a time in ps.
-        channel: load switch that feeds it.
-    """
-
-    source: PixelSource
-    power: Callable[[bool, int], None]
-    channel: str
+    source: PixelSource  # its output
+    power: Callable[[bool, int], None]  # switches its supply, at a time in ps
+    channel: str  # its load switch
 
 
 class CoreSite(Protocol):
@@ -37,30 +31,14 @@ class CoreSite(Protocol):
 
     @property
     def registers(self) -> Mapping[str, int]:
-        """Bits of each register, by name."""
+        """Width of each register, by name."""
 
-    def flip(self, register: str, bit: int) -> None:
-        """Turn over a bit."""
+    def flip(self, register: str, bit: int) -> None: ...
 
 
 @dataclass(frozen=True)
 class Sites:
-    """Everything of a board that a fault can hit; its keys are the targets.
-
-    Attributes:
-        kernel: virtual time.
-        processor: it looks for its FPGA in ``processor.fpga``.
-        uarts: serial lines.
-        buses: I2C buses to the satellite.
-        supplies: all supply channels.
-        engine: the FPGAs; None without one.
-        controls: pins that command the FPGAs.
-        cameras: by their names at the engine.
-        resets: what resets the processor, by what brings it about.
-        memories: bytes of each memory, beside those at the FPGAs.
-        core: of a processor with own firmware; None for a modelled program.
-        changed: told of a memory, and of which bytes, that were changed: (name, first, count).
-    """
+    """The parts of a board that faults can hit; keys are the names of targets."""
 
     kernel: Kernel
     processor: Microcontroller
@@ -68,15 +46,16 @@ class Sites:
     buses: Mapping[str, I2cBus]
     supplies: PowerModel
     engine: RtlEngine | None = None
-    controls: tuple[str, ...] = ()
-    cameras: Mapping[str, CameraSite] = field(default_factory=dict)
-    resets: Mapping[str, Callable[[], None]] = field(default_factory=dict)
-    memories: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
-    core: CoreSite | None = None
+    controls: tuple[str, ...] = ()  # pins that command the FPGAs
+    cameras: Mapping[str, CameraSite] = field(default_factory=dict)  # by their names at the engine
+    resets: Mapping[str, Callable[[], None]] = field(default_factory=dict)  # by their causes
+    memories: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)  # not the FPGAs'
+    core: CoreSite | None = None  # of a processor with the user's firmware
+    # called with a memory's name, the first changed byte, and the number of bytes
     changed: Callable[[str, int, int], None] = lambda _name, _first, _count: None
 
     def targets(self, site: Site) -> tuple[str, ...]:
-        """Names of everything that faults of a kind can hit, the usual one first."""
+        """Names of the targets at ``site``, the default first."""
         names: dict[Site, Iterable[str]] = {
             Site.UART: self.uarts,
             Site.I2C: self.buses,
@@ -92,5 +71,4 @@ class Sites:
         return tuple(names.get(site, ()))
 
     def all_memories(self) -> dict[str, NDArray[np.uint8]]:
-        """Bytes of every memory."""
         return {**({} if self.engine is None else self.engine.memories), **self.memories}

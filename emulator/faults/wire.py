@@ -1,4 +1,4 @@
-"""Faults of the satellite's lines: what stands in a UART's line, and on an I2C bus."""
+"""Faults of the satellite's serial line and I2C bus."""
 
 import errno
 from collections.abc import Callable, Generator
@@ -16,16 +16,15 @@ Steps = Generator[simpy.Event, Any, None]
 
 
 class LineFaults(Mechanism):
-    """In a serial line: loses, changes and holds up bytes of both directions."""
+    """Loses, changes and delays bytes on a serial line, in both directions."""
 
     def __init__(self, env: Kernel, report: Report, uart: Uart) -> None:
-        """Get in between; the line is as before as long as no fault acts."""
         super().__init__(env, report)
         self._host_free_ps = self._device_free_ps = 0
         uart.fault_hook = self
 
     def prepare(self, injection: Injection) -> None:
-        """Know of a fault ahead, and after its end: a byte is judged by when it began."""
+        """Store it until after its end, as a byte is hit if the fault was active at its start."""
         past_ps = self.env.now - PS_PER_S
         self.injections = [
             known for known in self.injections if known.end_ps is None or known.end_ps > past_ps
@@ -33,12 +32,11 @@ class LineFaults(Mechanism):
         self.injections.append(injection)
 
     def end(self, injection: Injection) -> None:
-        """A byte may have begun before."""
+        """Kept: a byte may have begun before."""
 
     def to_host(
         self, data: bytes, first_ps: int, byte_ps: int, line: Callable[[bytes, int, int], None]
     ) -> None:
-        """Hand ``line`` what arrives of ``data``, of which the first byte ends at ``first_ps``."""
         last_ps = first_ps + (len(data) - 1) * byte_ps
         near = any(
             injection.start_ps <= last_ps
@@ -57,7 +55,6 @@ class LineFaults(Mechanism):
                 line(bytes([arrived]), arrival_ps, byte_ps)
 
     def to_device(self, byte: int, start_ps: int, hear: Callable[[int, int], None]) -> None:
-        """Tell ``hear`` what arrives of a byte that began at ``start_ps``, now or later."""
         arrived, delay_ps = self._disturb(byte, start_ps, "to-device")
         if arrived is None:
             return
@@ -77,7 +74,7 @@ class LineFaults(Mechanism):
         hear(byte, start_ps + held_ps)
 
     def _disturb(self, byte: int, start_ps: int, way: str) -> tuple[int | None, int]:
-        """What becomes of a byte, and by how much it is late."""
+        """The changed byte, or None, and its delay in ps."""
         delay_ps = 0
         for injection in self.injections:
             fault = injection.fault
@@ -100,19 +97,17 @@ class LineFaults(Mechanism):
 
 
 class BusFaults(Mechanism):
-    """On an I2C bus: refuses, stretches and holds lines; whole transfers fail as on Linux."""
+    """Missing acknowledges, stretched clocks and stuck lines; transfers fail as on Linux."""
 
     def __init__(self, env: Kernel, report: Report, bus: I2cBus) -> None:
-        """Listen to the bus."""
         super().__init__(env, report)
         bus.fault_hook = self
 
     def prepare(self, injection: Injection) -> None:
-        """Know of a fault ahead."""
         self.injections.append(injection)
 
     def before_start(self) -> Steps:
-        """Wait until both lines are high; EBUSY for one that is low for over 1 s."""
+        """Wait until both lines are high; EBUSY if one is low for over 1 s."""
         give_up_ps = self.env.now + LONGEST_STRETCH_PS
         while (held := self._stuck()) is not None:
             injection, fault = held
@@ -121,13 +116,13 @@ class BusFaults(Mechanism):
             yield from self._wait_for_end(injection, give_up_ps, error)
 
     def after_address(self, address: int) -> Steps:
-        """Fail as where nobody answers, or where a line is held."""
+        """Fail as without a target, or if a line is held."""
         yield from self._lines_free(address)
         if self._nack("address"):
             raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
 
     def after_byte(self, address: int, read: bool) -> Steps:
-        """Stretch the clock, or refuse a byte that the host writes."""
+        """Stretch the clock, or reject a byte from the host."""
         yield from self._lines_free(address)
         for injection, fault in active(self.injections, table.I2cStretch, self.env.now):
             if injection.strikes(fault.rate):
@@ -137,13 +132,13 @@ class BusFaults(Mechanism):
                 if stretch_ps > LONGEST_STRETCH_PS:
                     raise _timeout(address)
         if not read and self._nack("byte"):
-            raise I2cError(errno.EIO, f"I2C device {address:#04x} refused a byte")
+            raise I2cError(errno.EIO, f"I2C device {address:#04x} did not acknowledge a byte")
 
     def _stuck(self) -> tuple[Injection, table.I2cStuck] | None:
         return next(iter(active(self.injections, table.I2cStuck, self.env.now)), None)
 
     def _lines_free(self, address: int) -> Steps:
-        """Within a transfer: SCL held low stretches the clock, SDA held low is another host."""
+        """Within a transfer, SCL held low stretches the clock; SDA held low is another host."""
         give_up_ps = self.env.now + LONGEST_STRETCH_PS
         while (held := self._stuck()) is not None:
             injection, fault = held

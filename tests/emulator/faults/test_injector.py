@@ -124,7 +124,7 @@ def test_times_that_may_just_be(desk: Desk) -> None:
         ({"at_s": 1.999}, "uart-drop: at_s must be 2 to 1000000000 s, not 1.999"),
         ({"at_s": 1.1e9}, "uart-drop: at_s must be 2 to 1000000000 s, not 11"),
         ({"for_s": 0.0}, "uart-drop: for_s must be above 0 and at most 1000000000 s, not 0.0"),
-        ({"target": "other"}, "uart-drop: no serial line 'other'; there are uart"),
+        ({"target": "other"}, "uart-drop: unknown serial line 'other'; known: uart"),
     ],
 )
 def test_what_can_not_be_is_refused_and_nothing_is_left(
@@ -140,9 +140,9 @@ def test_what_can_not_be_is_refused_and_nothing_is_left(
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda f: f.inject("latch-up", for_s=1.0), "happens at one instant: it has no duration"),
+        (lambda f: f.inject("latch-up", for_s=1.0), "happens at one instant; omit for_s"),
         (lambda f: f.inject("i2c-nack"), "i2c-nack: this device has no I2C bus to hit"),
-        (lambda f: f.inject(UartDrop(), rate=0.5), "uart-drop has its parameters: leave rate out"),
+        (lambda f: f.inject(UartDrop(), rate=0.5), "uart-drop already has parameters; omit rate"),
         (lambda f: f.load(plan("i2c-nack")), "p.toml: fault 1: i2c-nack: this device has no"),
         (lambda f: f.load(plan("uart-drop", "i2c-stuck")), "p.toml: fault 2: i2c-stuck: this"),
     ],

@@ -55,15 +55,15 @@ def test_old_names_of_times_still_work_with_a_warning(recwarn: pytest.WarningsRe
     ("text", "message"),
     [
         ("seed = -1", "seed must be at least 0, not -1"),
-        ("speed = 1", "no key 'speed'; a plan has seed and"),
-        ("fault = 3", r"faults are written as \[\[fault\]\]"),
+        ("speed = 1", "unknown key 'speed'; a plan has seed and"),
+        ("fault = 3", r"fault must be an array of tables, \[\[fault\]\]"),
         ("seed = ", "plan: "),
         ("[[fault]]", "fault 1: needs the key kind"),
         ('[[fault]]\nkind = "ack-lost"\n[[fault]]\nkind = 3', "fault 2: kind must be text"),
-        ('[[fault]]\nkind = "smoke"', "fault 1: no fault 'smoke'; there are uart-drop"),
+        ('[[fault]]\nkind = "smoke"', "fault 1: unknown fault 'smoke'; known: uart-drop"),
         ('[[fault]]\nkind = "uart-drop"\nat_s = "noon"', "at_s must be a number, not 'noon'"),
         ('[[fault]]\nkind = "uart-drop"\nrate = 7', "uart-drop: rate must be 0 to 1, not 7"),
-        ('[[fault]]\nkind = "ack-lost"\nrate = 1', "no parameter 'rate'; it has no parameters"),
+        ('[[fault]]\nkind = "ack-lost"\nrate = 1', "unknown parameter 'rate'; known: none"),
     ],
 )
 def test_nonsense_is_refused_with_its_place(text: str, message: str) -> None:
@@ -75,7 +75,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(FaultError, match=r"none\.toml: No such file"):
         load_plan(tmp_path / "none.toml")
     (tmp_path / "noise").write_bytes(b"\xff\xfe")
-    with pytest.raises(FaultError, match="no UTF-8 text"):
+    with pytest.raises(FaultError, match="not UTF-8 text"):
         load_plan(tmp_path / "noise")
 
 

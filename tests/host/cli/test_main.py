@@ -311,8 +311,8 @@ def test_measure_follows_the_plan_of_faults(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (LATCH_UP + "target = 'radio'\n", "fault 1: latch-up: no supply channel 'radio'; there"),
-        ("[[fault]]\nkind = 'smoke'\n", "fault 1: no fault 'smoke'; there are uart-drop"),
+        (LATCH_UP + "target = 'radio'\n", "fault 1: latch-up: unknown supply channel 'radio'; "),
+        ("[[fault]]\nkind = 'smoke'\n", "fault 1: unknown fault 'smoke'; known: uart-drop"),
     ],
 )
 def test_a_wrong_plan_is_a_wrong_call(run: Run, tmp_path: Path, text: str, message: str) -> None:

@@ -64,7 +64,7 @@ def test_emulated_cubestar_with_a_script(shell, tmp_path):
         (["emulated:cubesense", "-c", "fault uart-drop rate=7"], 2, "rate"),
         (["emulated:cubesense", "-c", "fault uart-drop x y"], 2, "one target, not x y"),
         (["emulated:cubesense", "-c", "fault uart-drop for_s=long"], 2, "not 'long'"),
-        (["emulated:cubesense", "-c", "fault uart-drop fault=x"], 2, "no parameter 'fault'"),
+        (["emulated:cubesense", "-c", "fault uart-drop fault=x"], 2, "unknown parameter 'fault'"),
     ],
 )
 def test_failures_are_one_line(shell, arguments, code, error):

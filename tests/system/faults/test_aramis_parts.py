@@ -127,5 +127,5 @@ def test_a_latched_camera_draws_on_until_the_host_acts(active: Tracker, lasting:
 
 
 def test_a_bit_of_its_memories_can_not_stick(tracker: Tracker) -> None:
-    with pytest.raises(FaultError, match="only memories of a device with an FPGA"):
+    with pytest.raises(FaultError, match="only a memory of a device with an FPGA"):
         tracker.inject("memory-stuck")

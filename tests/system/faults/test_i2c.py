@@ -69,7 +69,7 @@ def test_a_byte_without_acknowledge_cuts_a_telecommand_short(bench: Bench) -> No
     spy = bench.spy()
     bench.inject("i2c-nack", on="byte", after_s=ADDRESS_S + 1.5 * BYTE_S)
     data = bytes([message.id]) + message.pack(**parameters)
-    with pytest.raises(OSError, match="refused a byte") as failure:
+    with pytest.raises(OSError, match="did not acknowledge a byte") as failure:
         bench.board.i2c().i2c_rdwr(i2c_msg.write(bench.interface.i2c_address, data))
     assert failure.value.errno == errno.EIO
     assert spy.seen == ["S w", f"{message.id:02x}", "P"]

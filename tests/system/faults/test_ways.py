@@ -89,7 +89,7 @@ def plan(seed: int, entries: list[dict[str, Any]]) -> str:
 
 def test_a_plan_takes_every_kind(bench: Bench) -> None:
     entries = [
-        {"kind": kind, "target": target, "at": 0.5}
+        {"kind": kind, "target": target, "at_s": 0.5}
         | ({} if FAULTS[kind].momentary else {"for": 0.25})
         | given(kind, bench.board)
         for kind, targets in bench.faults.kinds().items()
@@ -134,7 +134,7 @@ def all_kinds(bench: Bench) -> tuple[list[dict[str, Any]], float]:
         if kind in RATES:
             entry["rate"] = RATES[kind]
         elif not kind.startswith(("memory", "register")):
-            entry["at"] = at_s
+            entry["at_s"] = at_s
             at_s += STEP_S[bench.name]
             if not FAULTS[kind].momentary:
                 entry["for"] = 0.9 * STEP_S[bench.name]
@@ -177,11 +177,11 @@ def test_a_plan_of_every_kind_repeats_to_the_byte(device: str) -> None:
 
 def test_refusals_name_what_would_be_right(star: Star) -> None:
     cases: list[tuple[dict[str, Any], str]] = [
-        ({"fault": "pixel-hat"}, "no fault 'pixel-hat'; there are uart-drop"),
-        ({"fault": "pixel-hot", "target": "sun"}, "no camera 'sun'; there are imager"),
+        ({"fault": "pixel-hat"}, "unknown fault 'pixel-hat'; known: uart-drop"),
+        ({"fault": "pixel-hot", "target": "sun"}, "unknown camera 'sun'; known: imager"),
         ({"fault": "uart-drop", "rate": 2.0}, "rate must be 0 to 1, not 2.0"),
-        ({"fault": "uart-drop", "chance": 1}, "no parameter 'chance'; it has rate, direction"),
-        ({"fault": "latch-up", "for_s": 1.0}, "it has no duration"),
+        ({"fault": "uart-drop", "chance": 1}, "unknown parameter 'chance'; known: rate, direction"),
+        ({"fault": "latch-up", "for_s": 1.0}, "omit for_s"),
         ({"fault": "uart-drop", "at_s": -1.0}, "at_s must be 0.*s, not -1.0"),
         ({"fault": "register-flip", "register": "writer.ack", "bit": 3}, r"writer\.ack\[3\]"),
     ]
