@@ -8,6 +8,8 @@ from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
 from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
 from cubestack.host.clients.contract import DeviceClient
 
+WORD_START = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+
 
 def client_type(interface: Interface) -> type[DeviceClient]:
     """The class of a device's client, with methods in small letters: SetSamples is set_samples().
@@ -18,7 +20,7 @@ def client_type(interface: Interface) -> type[DeviceClient]:
     """
     methods: dict[str, Any] = {"__doc__": f"A {interface.name} as a program uses it."}
     for message in interface.messages:
-        name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", message.name).lower()
+        name = WORD_START.sub("_", message.name).lower()
         if message.supported and name not in methods and not hasattr(DeviceClient, name):
             is_command = message.kind is Kind.TELECOMMAND
             method = _command(message) if is_command else _telemetry(message)

@@ -6,12 +6,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import cubestack as library
 from cubestack.host.cli.new_sensor import rendered
+from cubestack.host.devices.registry import device
+from cubestack.host.ground import scenes
 
 from ..conftest import Run
 from .conftest import ROOT, Installed, installed, plugins
@@ -78,6 +81,15 @@ class TestEditedSensor:
                 glow.client.set_samples(1, 2)
             with pytest.raises(ValueError, match="SetSamples needs a value for Samples"):
                 glow.client.set_samples()
+
+    def test_its_scenes_have_a_form(self) -> None:
+        keys = scenes.keys(device("glow"))["kinds"]["light"]
+        assert (keys["lux"]["unit"], keys["lux"]["high"]) == ("lx", 150_000)
+        with library.open_device("glow") as glow:
+            glow.scene = replace(glow.scene, lux=3.0)
+            shown = scenes.present(glow)
+        assert shown["table"] == {"kind": "light", "lux": 3.0}
+        assert shown["sight"]["fields"] == []
 
     def test_refuses_what_it_does_not_have(self) -> None:
         with pytest.raises(ValueError, match="Glow has no FPGA; omit engine 'python'"):
