@@ -38,7 +38,7 @@ class Camera:
     p2: float = 0.0
 
     def cropped(self, left_px: float, top_px: float) -> "Camera":
-        """The same camera for a part of its picture that begins at (left, top)."""
+        """The same camera for a crop of its image that begins at (left, top)."""
         return replace(self, cx_px=self.cx_px - left_px, cy_px=self.cy_px - top_px)
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -51,23 +51,23 @@ class Camera:
         return np.stack([self.cx_px + self.f_px * x_d, self.cy_px + self.f_px * y_d], axis=-1)
 
     def directions(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Pixels (n, 2) of directions (n, 3) in camera axes that point ahead."""
+        """Pixels (n, 2) of directions (n, 3) in camera axes with z > 0."""
         return self.project(vectors[:, :2] / vectors[:, 2:])
 
     def unproject(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points X/Z, Y/Z (..., 2) of pixels (..., 2), by fixed-point iteration.
 
-        Raises ValueError when the distortion is too strong to be inverted there.
+        Raises ValueError if the distortion cannot be inverted there.
         """
         start = (pixels - [self.cx_px, self.cy_px]) / self.f_px
         points = start
-        with np.errstate(over="ignore", invalid="ignore"):  # a diverging model is told below
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging model is reported below
             for _ in range(INVERSION_STEPS):
                 points = points - (self.project(points) - pixels) / self.f_px
             error_px = np.abs(self.project(points) - pixels).max()
         if not error_px < INVERSION_TOLERANCE_PX:
             raise ValueError(
-                f"this distortion can not be inverted over the frame: k1 {self.k1:g}, "
+                f"this distortion cannot be inverted over the frame: k1 {self.k1:g}, "
                 f"k2 {self.k2:g}, p1 {self.p1:g}, p2 {self.p2:g} with f {self.f_px:g} px"
             )
         return points
@@ -106,8 +106,10 @@ def load_camera(path: Path) -> Camera:
 
 
 def save_camera(camera: Camera, path: Path) -> None:
-    """Write the file that `load_camera` reads; CameraFileError (a ValueError) where it can not."""
+    """Write a file for `load_camera`; raises CameraFileError (a ValueError) if it cannot."""
     try:
         path.write_text(json.dumps({"camera": asdict(camera)}, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
-        raise CameraFileError(f"{path}: {error.strerror}; a file is to be written here") from error
+        raise CameraFileError(
+            f"{path}: {error.strerror}; choose a path that can be written"
+        ) from error

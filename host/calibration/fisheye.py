@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 
 NOISE_PX, BELIEF_PX, RIM_PX = 0.15, 1.5, 0.05
-"""Errors of a measured place, of the lens at first, every 5 deg, and of its rim, whose radius is
-published (table 5.1): assumed. Where nothing was measured, the lens so stays as it was."""
+"""Assumed errors of a measured position, of the first lens every 5 deg, and of its rim, whose
+radius is published (table 5.1). They keep the lens as it was where nothing was measured."""
 
 ROUNDS = 8
 SCALE_PX = 100.0
 LEAST = 8
-"""Places that a fit needs."""
+"""Minimum number of positions for a fit."""
 
 
 @dataclass(frozen=True)
 class Fisheye:
-    """A lens as the sensor takes it.
+    """A lens in the sensor's parameters.
 
     Attributes:
         x_px, y_px: pixel of the optical axis.
@@ -48,7 +48,7 @@ class Fisheye:
 
 @dataclass(frozen=True, eq=False)
 class FisheyeFit:
-    """What a fit found: the lens, and root mean square residuals with that before, and after."""
+    """Result of a fit: the lens, and root mean square residuals before and after."""
 
     lens: Fisheye
     places: int
@@ -61,8 +61,8 @@ def fit_fisheye(
 ) -> FisheyeFit:
     """Fit to ``pixels`` (n, 2), whose angles (n, 2) are known.
 
-    ``angles`` gives them; of an ``outline`` they are where it crosses the azimuths (n,) that it is
-    given, in rad, so only distances from the axis count. Raises ValueError for too few places.
+    ``angles`` returns them. For an ``outline`` they are its crossings of the azimuths (n,) in rad,
+    so only distances from the axis count. Raises ValueError for too few positions.
     """
     if len(pixels) < LEAST:
         raise ValueError(f"a calibration needs {LEAST} places at least; {len(pixels)} were found")
@@ -77,7 +77,7 @@ def fit_fisheye(
         towards = known / theta[:, None]
         radii = np.vander(theta * lens.px_per_degree / SCALE_PX, len(powers), increasing=True)
         offsets = pixels - (lens.x_px, lens.y_px)
-        # Along the azimuth the axis and the polynomial count, across it the axis alone.
+        # Along the azimuth, axis and polynomial matter; across it, only the axis.
         rows = [np.hstack([towards, radii]) / NOISE_PX]
         values = [np.sum(offsets * towards, axis=1) / NOISE_PX]
         if not outline:
@@ -99,7 +99,7 @@ def fit_fisheye(
 
 
 def limb_angles(azimuths: Points, centres: Points, radius_deg: float) -> Points:
-    """Angles (n, 2) where circles in the sky cross azimuths (n,), rad, on their far sides.
+    """Angles (n, 2) of the far crossings of circles in the sky with azimuths (n,) in rad.
 
     ``centres`` (n, 2) are their angles alpha and beta; the axis lies within the circles.
     """

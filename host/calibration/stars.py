@@ -1,4 +1,4 @@
-"""A camera's parameters from stars whose directions are known, in any number of pictures.
+"""A camera's parameters from identified stars in any number of images.
 
 CubeStar thesis, section 5.4: the focal length from the distances of star pairs near the middle
 (equation 5.4.1); principal point and distortion there from a second lens and a checker board. Here
@@ -20,29 +20,29 @@ Points = NDArray[np.float64]
 PARAMETERS = tuple(field.name for field in fields(Camera))
 
 LEAST_STARS = 5
-"""Identified stars that a picture needs: with fewer, the identification may be another's."""
+"""Minimum number of identified stars in an image: with fewer, the identification may be wrong."""
 
 LEAST_PICTURES = 3
 AGREEMENT_PX = 20.0
-"""Error of a first camera from star to star, at most."""
+"""Largest error of the first camera between two stars."""
 
 STEPS = 50
 HALVINGS = 12
 CONVERGED = 1e-9
 OUTLIER = 5.0
-"""Residuals beyond so many deviations are no star's, the deviation being 1.48 medians."""
+"""Outlier limit in deviations; the deviation is 1.48 medians."""
 
 LEAST_OUTLIER_PX = 0.2
 ROUNDS = 5
 MIDDLE_PX = 250.0
-"""Distance from the principal point to which stars make pairs: the distortion is small there."""
+"""Largest distance from the principal point of stars in pairs: the distortion is small there."""
 
 _STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """The identified stars of one picture.
+    """The identified stars of one image.
 
     Attributes:
         pixels: centroids (n, 2), column and row.
@@ -55,17 +55,17 @@ class Sight:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a fit found.
+    """Result of a fit.
 
     Attributes:
         camera: the parameters.
-        pictures: that count.
-        sigma: their standard deviations by name; none for a parameter that was kept.
-        pairs_f_px: focal length by star pairs alone; None where no pair is near the middle.
-        before_px, after_px: root mean square distance of a star from where the camera puts it, of
-            the camera at first and of the fitted one, each picture at its best attitude.
-        places, residuals: (n, 2) px of the stars that count, and measured less predicted.
-        rejected: stars that were left out, those of unusable pictures too.
+        pictures: number of images used.
+        sigma: standard deviations of the parameters by name; fixed ones have none.
+        pairs_f_px: focal length from star pairs alone; None without a pair near the middle.
+        before_px, after_px: root mean square residual of the first and of the fitted camera, each
+            image at its best attitude.
+        places, residuals: (n, 2) px: positions of the stars used, and measured minus predicted.
+        rejected: number of stars left out, with those of unusable images.
     """
 
     camera: Camera
@@ -84,10 +84,10 @@ def fit_camera(
 ) -> Fit:
     """Fit the ``free`` parameters of ``guess`` to stars.
 
-    Stars that agree with few others of their picture are left out first, as misidentified, and
-    outliers of the fit. Where the stars are ``exact``, there are none, and one picture is enough.
+    Stars that agree with few others of their image are rejected first, as misidentified, and later
+    outliers of the fit. With ``exact`` stars none are rejected, and one image is enough.
 
-    Raises ValueError for too few pictures with enough stars, and where no fit is found.
+    Raises ValueError for too few images with enough stars, or if the fit fails.
     """
     agreed = sights if exact else [_agreeing(sight, guess) for sight in sights]
     usable = [sight for sight in agreed if len(sight.pixels) >= LEAST_STARS]
@@ -123,7 +123,7 @@ def fit_camera(
 def focal_by_pairs(sights: Sequence[Sight], camera: Camera) -> float | None:
     """Mean of equation 5.4.1 over pairs of stars near the principal point, px.
 
-    The tangent takes the place of the angle, as pixels are of a plane.
+    It uses the tangent for the angle, since pixels lie in a plane.
     """
     found = []
     for sight in sights:
@@ -136,7 +136,7 @@ def focal_by_pairs(sights: Sequence[Sight], camera: Camera) -> float | None:
 
 
 def _agreeing(sight: Sight, camera: Camera) -> Sight:
-    """The largest group of a picture's stars that the attitude by two of them puts in place."""
+    """The largest group of an image's stars that agree with the attitude from two of them."""
     seen = _directions(camera, sight.pixels)
     best = np.zeros(len(seen), bool)
     for pair in combinations(range(len(seen)), 2):
@@ -164,9 +164,9 @@ class _Problem:
     """Free parameters of a camera and three of each picture's attitude, by Gauss-Newton.
 
     Attributes:
-        camera: as it is fitted so far.
+        camera: the current fit.
         pixels: all stars (n, 2), picture by picture.
-        kept: (n,) which of them count.
+        kept: (n,) stars in use.
     """
 
     def __init__(self, sights: Sequence[Sight], camera: Camera, free: Sequence[str]) -> None:
@@ -181,11 +181,11 @@ class _Problem:
         self.kept = np.ones(len(self.pixels), bool)
 
     def residuals(self) -> Points:
-        """Measured less predicted places (n, 2) of all stars, px."""
+        """Measured minus predicted positions (n, 2) of all stars in px."""
         return self.pixels - _project(self.camera, self._body())
 
     def solve(self) -> Points:
-        """Iterate to the minimum; the covariance by unit variance, camera first."""
+        """Iterate to the minimum; returns the covariance for unit variance, camera first."""
         cost = self._cost()
         for _ in range(STEPS):
             jacobian = self._jacobian()
@@ -209,7 +209,7 @@ class _Problem:
         return np.asarray(np.linalg.pinv(jacobian.T @ jacobian))
 
     def reject(self) -> bool:
-        """Leave outliers out; whether that is a change."""
+        """Reject outliers; returns whether that changed anything."""
         distance = np.hypot(*self.residuals().T)
         limit = OUTLIER * 1.4826 * float(np.median(distance[self.kept]))
         kept = distance <= max(limit, LEAST_OUTLIER_PX)
@@ -228,7 +228,7 @@ class _Problem:
         return float(found @ found)
 
     def _jacobian(self) -> Points:
-        """Change of the kept stars' places by each parameter, (2 n, parameters)."""
+        """Jacobian of the kept stars' positions (2 n, parameters)."""
         body, kept = self._body(), self.kept
         places = _project(self.camera, body)
         own = len(self._free)

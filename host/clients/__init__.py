@@ -1,1 +1,1 @@
-"""Clients of the nodes: any bus, and one class for each sensor."""
+"""Clients of the nodes: any bus, one class per sensor."""

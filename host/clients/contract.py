@@ -1,4 +1,4 @@
-"""What a client of a node is, whatever the bus, and what the clients of all devices share."""
+"""The client of a node on any bus, and what all devices' clients share."""
 
 import math
 from abc import ABC, abstractmethod
@@ -30,20 +30,20 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-#: Called with (pieces done, pieces in all) during a transfer.
+#: Called with (blocks done, total) during a transfer.
 Progress = Callable[[int, int], None]
 
-#: A line of a log by the names of its columns; None where there is no value.
+#: A line of a log by column; None for no value.
 Columns = dict[str, bool | int | float | str | None]
 
 T = TypeVar("T")
 
-#: Time between two polls of a node: its tasks take tenths of a second.
+#: Time between polls of a node in s: its tasks take tenths of a second.
 POLL_PERIOD_S = 0.04
 
 
 class Closable(ABC):
-    """What is closed at the end of a ``with`` block."""
+    """Closed at the end of a ``with`` block."""
 
     @abstractmethod
     def close(self) -> None:
@@ -69,15 +69,15 @@ class Client(Closable):
 
     @cached_property
     def exchanges(self) -> Exchanges:
-        """What went over the wire by now."""
+        """Counts of exchanges so far."""
         return Exchanges()
 
     @abstractmethod
     def command(self, name: str, **parameters: object) -> None:
-        """Send a telecommand and return once the node has accepted it.
+        """Send a telecommand; returns when the node has accepted it.
 
-        Raises InterfaceError for a name or value that the tables do not have, CommandRefusedError,
-        NoAnswerError, TransportError.
+        Raises InterfaceError for an invalid name or value, CommandRefusedError, NoAnswerError,
+        TransportError.
         """
 
     @abstractmethod
@@ -89,10 +89,10 @@ class Client(Closable):
 
     @abstractmethod
     def pause(self, seconds: float) -> None:
-        """Let time pass on the node's side; what it sends meanwhile is lost."""
+        """Let time pass on the node's side; bytes that it sends meanwhile are lost."""
 
     def _asked(self, name: str) -> Message:
-        """The telemetry ``name`` means; NotSupportedError where no node answers with it."""
+        """The telemetry called ``name``; raises NotSupportedError if no node has it."""
         message = self.interface.telemetry(name)
         if not message.supported:
             raise NotSupportedError(f"telemetry {message.name} is not supported by the node")
@@ -101,10 +101,9 @@ class Client(Closable):
     def stream(self, name: str, count: int) -> Iterator[bytes]:
         """Send telecommand ``name``, then yield the payloads of ``count`` frames without requests.
 
-        Raises NoAnswerError when the stream ends early, and TypeError on a bus where the host asks
-        for every byte.
+        Raises NoAnswerError if the stream ends early, TypeError on I2C, where a node cannot stream.
         """
-        raise TypeError(f"{name}: a picture can be streamed over a UART only")
+        raise TypeError(f"{name}: an image can be streamed over a UART only")
 
     def wait_processed(self, timeout_s: float) -> dict[str, Value]:
         """Poll telemetry TcmdProcessed until every accepted telecommand is processed.
@@ -126,7 +125,7 @@ class Client(Closable):
         late: str,
         period_s: float = POLL_PERIOD_S,
     ) -> T:
-        """``read`` until it gives what is ``done``; NoAnswerError ``late`` after ``timeout_s``."""
+        """Repeat ``read`` until ``done``; raises NoAnswerError ``late`` after ``timeout_s``."""
         for number in range(math.ceil(timeout_s / period_s)):
             found = read()
             if done(found):
@@ -135,7 +134,7 @@ class Client(Closable):
         raise NoAnswerError(late)
 
     def _check_error(self, message: Message, error: int) -> None:
-        """Raise CommandRefusedError when an acknowledge's ``error`` code is one."""
+        """Raise CommandRefusedError for a non-zero ``error`` code of an acknowledge."""
         if error:
             self.exchanges.refused += 1
             known = {int(code): code for code in self.interface.ack_errors}
@@ -143,7 +142,7 @@ class Client(Closable):
 
 
 class FoundStar(Protocol):
-    """A centroid in a picture, and the star's Hipparcos number when it is identified."""
+    """A centroid in an image, with the Hipparcos number of an identified star."""
 
     @property
     def x_px(self) -> float:
@@ -155,21 +154,21 @@ class FoundStar(Protocol):
 
     @property
     def hipparcos(self) -> int | None:
-        """None when it is not identified."""
+        """Hipparcos number; None if not identified."""
 
 
 class DeviceClient(Closable):
-    """A device as a program uses it, through any client of its node.
+    """A device for programs, through any client of its node.
 
     Attributes:
-        client: its messages by name.
+        client: sends its messages by name.
     """
 
     picture_sources: tuple[str, ...] = ()
-    """Memories that ``picture`` can read, in small letters; none where there is one only."""
+    """Memories that ``picture`` can read, in lower case; empty if there is only one."""
 
     step_timeout_s = 10.0
-    """What a step of the node may take."""
+    """Time-out of a step of the node in s."""
 
     def __init__(self, client: Client) -> None:
         """Use ``client``, whose interface must be the device's."""
@@ -177,7 +176,7 @@ class DeviceClient(Closable):
         self._on_close = client.close
 
     def close_with(self, callback: Callable[[], None]) -> None:
-        """Let ``close`` release what ``callback`` does, in place of the client alone."""
+        """Have ``close`` call ``callback`` instead of closing the client alone."""
         self._on_close = callback
 
     def close(self) -> None:
@@ -187,69 +186,68 @@ class DeviceClient(Closable):
     def picture(
         self, source: str | None = None, progress: Progress | None = None
     ) -> "NDArray[np.uint8]":
-        """The picture (rows, columns) in the device's memory, or in the memory ``source``.
+        """The image (rows, columns) in the device's memory, or in the memory ``source``.
 
-        ``progress`` is told after each block how many of how many there are; what it raises ends
-        the download. Raises TargetError for a device or a line that carries no picture, and the
-        client's errors.
+        ``progress`` is called after each block; an exception from it ends the download. Raises
+        TargetError for a device or line without image download, and the client's errors.
         """
         raise TargetError(f"{self.client.interface.name} sends no picture")
 
     def upload(self, picture: "NDArray[np.uint8]", progress: Progress | None = None) -> None:
-        """Put grey values (rows, columns) into the device's memory in place of its own picture.
+        """Upload grey values (rows, columns) in place of the device's own image.
 
-        Raises TargetError for a device that takes none, ValueError for another shape, and the
+        Raises TargetError for a device without upload, ValueError for another shape, and the
         client's errors.
         """
-        raise TargetError(f"{self.client.interface.name} takes no picture by the wire")
+        raise TargetError(f"{self.client.interface.name} has no image upload")
 
     def stars(self) -> Sequence[FoundStar]:
-        """The stars of the latest picture.
+        """The stars of the latest image.
 
-        Raises TargetError for a device that looks for none, and the client's errors.
+        Raises TargetError for a device that detects none, and the client's errors.
         """
         raise TargetError(f"{self.client.interface.name} looks for no stars")
 
     def profile(self) -> Switches:
-        """The switches that the device runs with; their ``profile`` says of which one they are.
+        """The switches in use, with their profile.
 
         Raises InterfaceError for a device without switches, and the client's errors.
         """
         return read_switches(self.client.interface.switches, self.client.telemetry(SHOWN))
 
     def set_profile(self, profile: str) -> None:
-        """Run "published" or "extended" from the next picture on; the board's switches stay.
+        """Use profile "published" or "extended" from the next image on; board switches stay.
 
         Raises as ``Client.command`` does.
         """
         self.perform(SET_PROFILE, Profile=profile)
 
     def set_switch(self, switch: str, value: str) -> None:
-        """Set one switch, as `cubestack registers DEVICE --switches` lists them; see above."""
+        """Set a switch of `cubestack registers DEVICE --switches`; raises as ``Client.command``."""
         self.perform(SET_SWITCH, **switch_parameters(switch, value))
 
     def take_picture(self) -> None:
-        """Take a picture of the sky, whatever the device makes of it.
+        """Capture an image of the sky, whatever the result.
 
-        Raises TargetError for a device that is no star tracker, and the client's errors.
+        Raises TargetError unless the device is a star tracker, and the client's errors.
         """
-        raise TargetError(f"{self.client.interface.name} takes no picture of the sky")
+        raise TargetError(f"{self.client.interface.name} is no star tracker")
 
     def latest(self) -> Columns:
-        """The latest result, for a log; angles that are not valid are None.
+        """The latest result for a log; invalid angles are None.
 
-        Columns of angles end in "_deg"; "image_time_s" is the picture's time by the node's clock,
-        where it tells that. Raises TargetError for a device without, and the client's errors.
+        Columns of angles end in "_deg"; "image_time_s" is the image's time by the node's clock, if
+        known. Raises TargetError for a device without results, and the client's errors.
         """
-        raise TargetError(f"{self.client.interface.name} has no results that could be logged")
+        raise TargetError(f"{self.client.interface.name} has no results to log")
 
     def perform(self, name: str, **parameters: object) -> None:
-        """Send a telecommand and wait until it is done."""
+        """Send a telecommand and wait for its end."""
         self._send(name, **parameters)
         self.client.wait_processed(self.step_timeout_s)
 
     def _send(self, name: str, **parameters: object) -> None:
-        """Send a telecommand; when the node's buffer is full, wait and send it once more."""
+        """Send a telecommand; if the node's buffer is full, wait and retry once."""
         try:
             self.client.command(name, **parameters)
         except CommandRefusedError as refusal:
@@ -259,20 +257,20 @@ class DeviceClient(Closable):
             self.client.command(name, **parameters)
 
     def _stream(self, name: str, count: int, length: int, progress: Progress | None) -> bytes:
-        """What telecommand ``name`` streams: ``count`` blocks of ``length`` bytes."""
+        """The stream of telecommand ``name``: ``count`` blocks of ``length`` bytes."""
         blocks = []
         for block in self.client.stream(name, count):
             if len(block) != length:
-                raise BadAnswerError(f"picture stream: block of {len(block)} bytes, not {length}")
+                raise BadAnswerError(f"image stream: block of {len(block)} bytes, not {length}")
             blocks.append(block)
             if progress is not None:
                 progress(len(blocks), count)
         return b"".join(blocks)
 
     def _records(self, frame: str, count: int) -> dict[int, dict[str, Value]]:
-        """All ``count`` records of a telemetry frame that steps, in the order of star numbers."""
+        """All ``count`` records of a stepping telemetry frame, by star number."""
         records: dict[int, dict[str, Value]] = {}
-        reads = 2 * count  # one round, and another for records whose answer was lost
+        reads = 2 * count  # a second round reads records whose answer was lost
         for _ in range(reads):
             if len(records) == count:
                 break

@@ -1,4 +1,4 @@
-"""Why a node on a serial line gives no answer, found by asking it at other baud rates."""
+"""Diagnoses a node that does not answer on a serial line, by requests at other baud rates."""
 
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
 from cubestack.firmware_model.interface.codec.message import Interface
@@ -11,20 +11,20 @@ from cubestack.host.transport.streams import (
 )
 
 BAUDS = (57600, 115200, 9600, 19200, 38400, 230400, 460800, 921600, 4800, 2400)
-"""Those that are usual, the likeliest first."""
+"""Usual baud rates, most likely first."""
 
 SILENCE_S = 0.3
-"""Wall time after which no more of an answer comes."""
+"""Silence in s of wall time that ends an answer."""
 
 MOST_BYTES = 512
 
 
 def why_silent(line: Transport, interface: Interface) -> str:
-    """What is likely to be wrong with a line on which ``interface``'s node does not answer.
+    """The likely reason why ``interface``'s node does not answer on a line.
 
-    Asks for telemetry that changes nothing, at the line's baud rate and at others, and leaves the
-    rate as it was. Empty when it answers, and for lines that are no port: recordings, emulations in
-    this process. Raises TransportError.
+    It requests telemetry without side effects at the line's baud rate and others, then restores the
+    rate. Returns an empty text if the node answers, and for recordings and emulations in this
+    process. Raises TransportError.
     """
     port = port_of(line)
     if not isinstance(port, SerialTransport | TcpTransport):
@@ -49,14 +49,14 @@ def why_silent(line: Transport, interface: Interface) -> str:
 
 def _likely(heard: bytes, interface: Interface) -> str:
     if not heard:
-        return "nothing comes: is it powered, is this its port, are its two lines crossed?"
+        return "no byte arrives: is it powered, is this its port, are RX and TX crossed?"
     if heard == _request(interface):
-        return "what is sent comes back: nobody but an echo is there"
+        return "only an echo comes back"
     payload = _payload(heard)
     shown = (heard if payload is None else payload)[:8].hex(" ")
     if payload is not None:
         return f"a node answers, but not as {interface.name} does: is it another device? ({shown})"
-    return f"bytes come, but no frame: does it speak the node protocol at this rate? ({shown})"
+    return f"bytes arrive, but no frame: does it speak the node protocol at this rate? ({shown})"
 
 
 def _request(interface: Interface) -> bytes:
@@ -65,7 +65,7 @@ def _request(interface: Interface) -> bytes:
 
 def _ask(line: Transport, interface: Interface) -> bytes:
     """What comes after a request."""
-    read_answer(line, 1 << 20, 0.0)  # what came before
+    read_answer(line, 1 << 20, 0.0)  # drop earlier bytes
     line.write(_request(interface))
     return read_answer(line, MOST_BYTES, SILENCE_S)
 
@@ -76,7 +76,7 @@ def _answers(heard: bytes, interface: Interface) -> bool:
 
 
 def _payload(heard: bytes) -> bytes | None:
-    """Of the first whole frame; None without any."""
+    """Payload of the first whole frame, or None."""
     decoder = FrameDecoder(MOST_BYTES)
     whole = (decoder.payload for byte in heard if decoder.feed(byte) is FrameEvent.FRAME)
     return next(whole, None)

@@ -1,4 +1,4 @@
-"""What passed between a host and a device, counted as it goes over the wire."""
+"""Counters of the traffic between a host and a device."""
 
 from dataclasses import dataclass, fields
 from typing import Self
@@ -10,11 +10,11 @@ class Exchanges:
 
     Attributes:
         sent: requests: frames on a serial line, transfers on I2C.
-        answered: those that a whole frame followed, or that were acknowledged.
-        late: those that were not, in time.
-        repeated: those that asked for the same once more.
-        refused: telecommands that the device answered with an error.
-        streamed: frames of pictures, which come without a request each.
+        answered: requests with a whole answer or an acknowledge.
+        late: requests that timed out.
+        repeated: retries.
+        refused: telecommands answered with an error.
+        streamed: image frames, which come without requests.
     """
 
     sent: int = 0
@@ -25,7 +25,7 @@ class Exchanges:
     streamed: int = 0
 
     def ended(self, answered: bool) -> None:
-        """A request was answered, or its time is over."""
+        """Count a request as answered or timed out."""
         self.answered += answered
         self.late += not answered
 

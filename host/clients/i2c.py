@@ -1,9 +1,8 @@
 """Client of a node on I2C, through any object with smbus2's ``i2c_rdwr``.
 
-Telemetry is one transfer: write the ID, repeated start, read the data. A telecommand is one write;
-there is no error byte on this bus, so a node's refusal shows in telemetry only: in TcmdProcessed
-where that has an error code, else in ErrorFlags. What the tables forbid is therefore refused here,
-before it is sent.
+Telemetry is one transfer: write the ID, repeated start, read the data. A telecommand is one write
+without an error byte, so only telemetry shows a rejection: TcmdProcessed if it has an error code,
+else ErrorFlags. This client therefore rejects invalid telecommands before sending.
 """
 
 import time
@@ -37,9 +36,9 @@ def acknowledged(
     what: str,
     exchanges: Exchanges,
 ) -> T:
-    """Result of a ``transfer`` that is tried so many times; NoAnswerError ``what`` after them.
+    """Result of ``transfer`` after up to ``tries``; raises NoAnswerError ``what`` if all fail.
 
-    What goes over the wire is counted in ``exchanges``.
+    Counts the traffic in ``exchanges``.
     """
     failure = None
     for attempt in range(attempts):
@@ -75,8 +74,8 @@ class I2cClient(Client):
     ) -> None:
         """Talk to the node at 7-bit ``address`` (default: the interface's).
 
-        ``wait`` lets seconds pass between polls; a telecommand may take ``processing_timeout_s``.
-        Telemetry that is not acknowledged is asked for again up to ``retries`` times.
+        ``wait`` sleeps between polls; a telecommand may take ``processing_timeout_s``.
+        Unacknowledged telemetry requests are repeated up to ``retries`` times.
         """
         self.interface = interface
         self._bus = bus
@@ -100,7 +99,7 @@ class I2cClient(Client):
         self._check_error(message, int(values.get("Error", 0)))
 
     def telemetry(self, name: str) -> dict[str, Value]:
-        """Read a telemetry frame; one that steps may skip a record when a transfer broke off."""
+        """Read a telemetry frame; a stepping one may skip a record after an aborted transfer."""
         message = self._asked(name)
 
         def read() -> bytes:
@@ -118,4 +117,4 @@ class I2cClient(Client):
         self._wait(seconds)
 
     def close(self) -> None:
-        """Leave the bus to its owner, who opened it."""
+        """Do nothing: the caller closes the bus."""

@@ -1,7 +1,7 @@
 """Client of a node on a UART, node dialect of the CubeSpace family.
 
-A telemetry answer is data alone, with no ID; a telecommand is answered by one error byte. So an
-answer belongs to the request before it, and only one request is under way at a time.
+A telemetry answer has data but no ID; a telecommand's answer is one error byte. So an answer
+belongs to the request before it, and only one request is pending at a time.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from cubestack.host.transport.streams import Transport
 
 READ_BYTES = 4096
 
-#: Reads without a whole frame after which a babbling line counts as no answer.
+#: Reads without a whole frame until a babbling line counts as a time-out.
 MAX_READS = 1000
 
 
@@ -32,8 +32,8 @@ class NodeClient(Client):
     ) -> None:
         """Talk to the node of ``interface`` over ``transport``.
 
-        ``timeout_s`` is the longest silence before or within an answer. Telemetry is asked for
-        again up to ``retries`` times; a telecommand never is, as it may have been executed.
+        ``timeout_s`` is the longest silence before or within an answer. Telemetry requests are
+        repeated up to ``retries`` times; telecommands never, as they may have been executed.
         """
         self.interface = interface
         self._transport = transport
@@ -58,7 +58,7 @@ class NodeClient(Client):
         self._check_error(message, answer[0])
 
     def telemetry(self, name: str) -> dict[str, Value]:
-        """Ask for a telemetry frame; one that steps may skip a record when an answer was lost."""
+        """Request a telemetry frame; a stepping one may skip a record after a lost answer."""
         message = self._asked(name)
         answer = None
         for attempt in range(1 + self._retries):
@@ -76,11 +76,11 @@ class NodeClient(Client):
         )
 
     def request(self, payload: bytes) -> bytes | None:
-        """Send a frame and drop what came before; the next frame's payload, None without one."""
+        """Drop earlier bytes, send a frame; returns the next frame's payload, or None."""
         return self.exchange(encode_frame(payload))
 
     def exchange(self, wire: bytes, rest: bytes = b"") -> bytes | None:
-        """Send bytes as they are, ``rest`` in a piece of its own; returns as ``request`` does."""
+        """Send raw bytes, ``rest`` separately; returns as ``request`` does."""
         self._decoder.reset()
         self._unread = iter(b"")
         for _ in range(MAX_READS):
@@ -105,7 +105,7 @@ class NodeClient(Client):
             yield payload
 
     def _next_frame(self) -> bytes | None:
-        """Payload of the next whole frame; None when the line stays silent."""
+        """Payload of the next whole frame; None if the line stays silent."""
         for _ in range(MAX_READS):
             for byte in self._unread:
                 if self._decoder.feed(byte) is FrameEvent.FRAME:
@@ -117,7 +117,7 @@ class NodeClient(Client):
         return None
 
     def pause(self, seconds: float) -> None:
-        """Let time pass; ends early when the node sends something, which is lost."""
+        """Let time pass; ends early if the node sends something, which is lost."""
         self._transport.read(READ_BYTES, seconds)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""How good a star tracker says that its latest attitude is: what both have in common."""
+"""A star tracker's rating of its latest attitude, common to all star trackers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,19 +15,19 @@ from cubestack.host.errors import BadAnswerError
 
 @dataclass(frozen=True, kw_only=True)
 class AttitudeQuality:
-    """What a filter needs of an attitude, and why there is none.
+    """Inputs of an attitude filter, or why there are none.
 
     Attributes:
-        valid: the latest picture gave an attitude, and this rates it.
+        valid: the latest image gave an attitude, which this rates.
         reason: why there is none, or that there is one.
-        covariance: float64 (3, 3), rad^2: of the small rotation that separates true and reported
-            camera axes, about the camera's x, y and z.
-        false_alarm: expected number of attitudes that chance would confirm as well.
-        matched, expected: stars that the attitude rests on, and that it puts in the picture.
+        covariance: float64 (3, 3), rad^2, of the rotation from true to reported camera axes, about
+            the camera's x, y and z.
+        false_alarm: expected number of wrong attitudes that chance would confirm.
+        matched, expected: stars used, and stars expected in the image.
         residual_rad: root mean square of the stars' residuals in each axis.
-        scale: measured focal length over the one that is set.
+        scale: measured focal length over the configured one.
         background_dn, noise_dn: the sky's brightness, and the standard deviation of a pixel.
-        spikes: bright pixels that are no stars: hot ones, particles.
+        spikes: number of bright pixels that are not stars (hot pixels, particles).
     """
 
     valid: bool
@@ -49,7 +49,7 @@ class AttitudeQuality:
 
 
 def common(values: Mapping[str, Value]) -> dict[str, Any]:
-    """Attributes of ``AttitudeQuality`` but the reason, of a telemetry frame's fields.
+    """Attributes of ``AttitudeQuality`` except the reason, from a telemetry frame.
 
     Raises BadAnswerError for sigmas below 0 and correlations beyond 1.
     """

@@ -1,4 +1,4 @@
-"""Quaternions as star trackers report them: scalar last, of length 1 but for rounding."""
+"""Quaternions of star trackers: scalar last, unit length up to rounding."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ LENGTH_TOLERANCE = 0.01
 def unit_quaternion(values: Mapping[str, Value], prefix: str = "Q") -> NDArray[np.float64]:
     """The quaternion (4,) in the fields ``prefix`` 0 to 3, scaled to length 1.
 
-    Raises BadAnswerError when its length is more than 0.01 away from 1.
+    Raises BadAnswerError if its length differs from 1 by more than 0.01.
     """
     quaternion = np.array([float(values[f"{prefix}{index}"]) for index in range(4)])
     norm = float(np.linalg.norm(quaternion))
@@ -27,8 +27,8 @@ def unit_quaternion(values: Mapping[str, Value], prefix: str = "Q") -> NDArray[n
 def pointing_deg(quaternion: NDArray[np.float64]) -> tuple[float, float, float]:
     """Right ascension (0 to 360) and declination of the boresight, and roll (-180 to 180).
 
-    Roll is the angle of the picture's up direction, east of north; at a pole of the sky it is what
-    fits to the right ascension. Of an attitude (4,), inertial to camera.
+    All in degrees, of an attitude (4,) inertial to camera. Roll is the angle of the image's up
+    direction, east of north; at a pole it goes with the right ascension.
     """
     x, y, z, w = quaternion
     boresight = 2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z
@@ -42,7 +42,7 @@ def pointing_deg(quaternion: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def attitude_columns(quaternion: NDArray[np.float64] | None) -> dict[str, float | None]:
-    """Columns of a log: the quaternion, and where it points; None where there is no attitude."""
+    """Columns of a log: quaternion and pointing; None without an attitude."""
     names = ("q0", "q1", "q2", "q3", "ra_deg", "dec_deg", "roll_deg")
     if quaternion is None:
         return dict.fromkeys(names)

@@ -1,9 +1,9 @@
 """Client of a register-pointer protocol on I2C, through any object with smbus2's ``i2c_rdwr``.
 
-``RegisterLine`` is such an object for a serial line that has the same protocol.
+``RegisterLine`` is such an object for a serial line with the same protocol.
 
-Registers come from a map (CubeSense thesis, section 6.4.3). The slave can not refuse anything, so
-what the map forbids is refused here, before it is sent.
+Registers come from a map (CubeSense thesis, section 6.4.3). The slave cannot reject anything, so
+this client rejects what the map forbids before sending.
 """
 
 import time
@@ -19,19 +19,19 @@ from cubestack.host.clients.exchanges import Exchanges
 from cubestack.host.clients.i2c import I2cBus, T, acknowledged
 from cubestack.host.transport.streams import READ_BYTES, Transport
 
-#: Longest read that the Linux kernel's I2C_RDWR takes.
+#: Longest read of the Linux kernel's I2C_RDWR.
 CHUNK_BYTES = 8192
 
-#: Flag of a message that reads.
+#: Flag of a read message.
 I2C_READ = 1
 
 
 class RegisterClient:
-    """Reads and writes registers by name. The bus stays its owner's.
+    """Reads and writes registers by name; the caller closes the bus.
 
     Attributes:
         registers: the map.
-        exchanges: what went over the wire by now; of a register that streams, the whole of it.
+        exchanges: counts so far; a streaming register counts once.
     """
 
     def __init__(
@@ -45,8 +45,8 @@ class RegisterClient:
     ) -> None:
         """Talk to the slave at 7-bit ``address`` (default: the map's).
 
-        A transfer that is not acknowledged is repeated up to ``retries`` times, ``wait`` lets
-        seconds pass between; only a write is never repeated, as it may have been executed.
+        Unacknowledged reads are repeated up to ``retries`` times with ``wait`` between them; writes
+        never, as they may have been executed.
         """
         self.registers, self.exchanges = registers, Exchanges()
         self._bus = bus
@@ -56,7 +56,7 @@ class RegisterClient:
 
     @property
     def on_line(self) -> bool:
-        """Whether the bus is a serial line, where no byte comes without a register."""
+        """Whether the bus is a serial line, which answers only for existing registers."""
         return isinstance(self._bus, RegisterLine)
 
     def read(self, name: str) -> Value:
@@ -67,14 +67,14 @@ class RegisterClient:
     def read_stream(self, name: str, progress: Progress | None = None) -> bytes:
         """All bytes of a streaming register, in reads of at most 8192 bytes.
 
-        ``progress`` is called with (bytes done, bytes in all). Raises as ``read`` does.
+        ``progress`` is called with (bytes done, total). Raises as ``read`` does.
         """
         return self._fetch(self._readable(name), progress)
 
     def write(self, name: str, value: object) -> None:
         """Write a register: a number, or the name of a choice.
 
-        Raises InterfaceError for a name or value that the map does not allow, NoAnswerError.
+        Raises InterfaceError for an invalid name or value, NoAnswerError.
         """
         register = self.registers[name]
         if not register.writable:
@@ -85,7 +85,7 @@ class RegisterClient:
         self._attempt(lambda: self.write_raw(register.address, data), register, 1)
 
     def read_raw(self, address: int, count: int) -> bytes:
-        """Bytes behind any address, declared or not, in one transfer; raises OSError."""
+        """Bytes from any address, declared or not, in one transfer; raises OSError."""
         answer = i2c_msg.read(self._address, count)
         self._bus.i2c_rdwr(i2c_msg.write(self._address, [address]), answer)
         return bytes(answer)
@@ -101,13 +101,13 @@ class RegisterClient:
         return register
 
     def _fetch(self, register: PointerRegister, progress: Progress | None) -> bytes:
-        """All bytes of a register, from the beginning again when a transfer breaks off."""
+        """All bytes of a register; an aborted transfer starts again."""
 
         def fetch() -> bytes:
             data = bytearray()
             while len(data) < register.length:
                 answer = i2c_msg.read(self._address, min(CHUNK_BYTES, register.length - len(data)))
-                if data:  # without the pointer, a read goes on where the last one stopped
+                if data:  # without the pointer, a read continues where the last one stopped
                     self._bus.i2c_rdwr(answer)
                 else:
                     self._bus.i2c_rdwr(i2c_msg.write(self._address, [register.address]), answer)
@@ -127,7 +127,7 @@ class RegisterClient:
 
 @dataclass(eq=False)
 class RegisterLine:
-    """A serial line as the bus of a ``RegisterClient``.
+    """A serial line used as the bus of a ``RegisterClient``.
 
     A message is the slave's address with the direction in its lowest bit, the register's address
     and, to write, one data byte (CubeSense thesis, section 6.4.3). The line stays its owner's;
@@ -136,15 +136,15 @@ class RegisterLine:
 
     line: Transport
     timeout_s: float = 1.0
-    _ahead: bytearray = field(default_factory=bytearray, init=False)  # of a read that goes on
+    _ahead: bytearray = field(default_factory=bytearray, init=False)  # of a continued read
 
     def i2c_rdwr(self, *i2c_msgs: i2c_msg) -> None:
-        """A write, a read behind one, or a read that goes on; TimeoutError without an answer."""
+        """A write, a write and read, or a continued read; raises TimeoutError."""
         *_, last = i2c_msgs
         reads = bool(last.flags & I2C_READ)
         if len(i2c_msgs) > reads:
             self._ahead.clear()
-            while self.line.read(READ_BYTES, 0.0):  # what came late is no answer
+            while self.line.read(READ_BYTES, 0.0):  # drop late bytes
                 pass
             self.line.write(bytes([last.addr << 1 | reads]) + bytes(i2c_msgs[0]))
         if not reads:

@@ -1,1 +1,1 @@
-"""The protocol suite: what a device answers beside what its tables declare."""
+"""The protocol suite: a device's answers against its tables."""

@@ -1,7 +1,7 @@
-"""What the protocol suite's checks are made of: a run on one target and its results.
+"""The checks of the protocol suite: a run on one target and its results.
 
-The sources leave the times of answers open: one is late when it keeps a host waiting for longer
-than real hosts' poll period beside its own time on the wire.
+The sources don't specify answer times. An answer is late if, without its time on the wire, it takes
+longer than real hosts' poll period.
 """
 
 import time
@@ -19,12 +19,12 @@ from cubestack.host.errors import NoAnswerError, NodeError
 from cubestack.host.targets import Target
 
 LATE_S = 0.04
-"""What an answer may take beside its time on the wire: the poll period of real hosts."""
+"""Allowed time of an answer without its time on the wire: the poll period of real hosts."""
 
 ATTEMPTS = 3
 BITS_PER_BYTE = 10
 FRAMING_BYTES = 4
-I2C_HZ = 100_000  # standard mode: a host does not know better
+I2C_HZ = 100_000  # standard mode, the safe assumption of a host
 I2C_BITS_PER_BYTE = 9
 I2C_OVERHEAD_BYTES = 3  # two addresses and the ID
 
@@ -34,7 +34,7 @@ RESTART_POLL_S = 0.25
 
 
 class Verdict(Enum):
-    """What became of a check."""
+    """Result of a check."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -43,13 +43,13 @@ class Verdict(Enum):
 
 @dataclass
 class CheckResult:
-    """One check that has run, or was left out.
+    """A check that ran or was skipped.
 
     Attributes:
         name: unique within a run.
-        verdict: what became of it.
-        detail: why it failed or was skipped; else what was seen.
-        observed: what two targets are compared by.
+        verdict: its result.
+        detail: why it failed or was skipped, or what was observed.
+        observed: values by which two targets are compared.
     """
 
     name: str
@@ -59,11 +59,11 @@ class CheckResult:
 
 
 class FailedError(Exception):
-    """A check failed; the text says what was seen and what is declared."""
+    """A check failed; the text has the observed and the declared value."""
 
 
 class PassedError(Exception):
-    """A check passed; the text says what was seen, and is not compared."""
+    """A check passed; the text has the observation, which is not compared."""
 
 
 class SkippedError(Exception):
@@ -76,11 +76,11 @@ class CheckRun:
 
     Attributes:
         target: what is checked.
-        allow_write: whether the device may be changed.
-        notes: what must be known of the device beside its tables.
-        checks: those that have run.
-        on_check: called with each one as it ends.
-        latencies_s: times of answers beside their time on the wire, by telemetry frame.
+        allow_write: whether checks may change the device.
+        notes: the device's conformance notes.
+        checks: results so far.
+        on_check: called with each result.
+        latencies_s: answer times without the time on the wire, by telemetry frame.
     """
 
     target: Target
@@ -96,14 +96,14 @@ class CheckRun:
 
     @property
     def registers(self) -> RegisterClient:
-        """Client of the registers; SkippedError where they are not within reach."""
+        """Client of the registers; raises SkippedError without access to them."""
         if self.target.registers is None:
-            raise SkippedError("no I2C bus within reach")
+            raise SkippedError("no I2C bus available")
         return self.target.registers
 
     @contextmanager
     def check(self, name: str) -> Iterator[list[str]]:
-        """The block is a check; it may append to the list what it observes."""
+        """Run the block as a check; it may append observations to the list."""
         seen: list[str] = []
         result = CheckResult(name, Verdict.PASSED)
         try:
@@ -119,13 +119,13 @@ class CheckRun:
         self._add(result)
 
     def writing(self, name: str, body: Callable[[list[str]], None]) -> None:
-        """A check that changes the device: ``body`` runs where that is allowed."""
+        """A check that changes the device: ``body`` runs if that is allowed."""
         if self.may_write(name):
             with self.check(name) as seen:
                 body(seen)
 
     def may_write(self, name: str) -> bool:
-        """Whether check ``name``, which changes the device, may run; else it is left out."""
+        """Whether check ``name``, which changes the device, may run; else skips it."""
         if not self.allow_write:
             reason = "changes the device: needs --allow-write"
             self._add(CheckResult(name, Verdict.SKIPPED, reason))
@@ -137,13 +137,13 @@ class CheckRun:
 
     @property
     def node(self) -> NodeClient:
-        """Client on a serial line; SkippedError where there is none."""
+        """Client on a serial line; raises SkippedError without one."""
         if not isinstance(self.target.node, NodeClient):
             raise SkippedError("needs a serial line")
         return self.target.node
 
     def perform(self, name: str, values: Mapping[str, object]) -> None:
-        """Send a telecommand and wait until it is processed; after a restart, for an answer."""
+        """Send a telecommand and wait until it is processed, or for an answer after a restart."""
         node = self.target.node
         node.command(name, **values)
         try:
@@ -158,7 +158,7 @@ class CheckRun:
             raise FailedError(f"no answer for {RESTART_TIMEOUT_S:g} s after {name}") from None
 
     def expect_error(self, payload: bytes, error: str, what: str) -> None:
-        """A frame with ``payload`` is acknowledged with ``error``, else ``what`` has failed."""
+        """Fail ``what`` unless a frame with ``payload`` is acknowledged with ``error``."""
         codes = self.target.interface.ack_errors
         answer = self.node.request(payload)
         if answer is None:
@@ -170,7 +170,7 @@ class CheckRun:
             raise FailedError(f"{what}: {found}, declared {error}")
 
     def telemetry(self, message: Message) -> dict[str, Value]:
-        """A telemetry frame, its time taken: the best of three, as hosts have hiccups."""
+        """A telemetry frame, timed: best of three, since hosts have delays."""
         values, latency_s = self._timed(message)
         for _ in range(ATTEMPTS - 1):
             if latency_s <= LATE_S or message.has_side_effect:
@@ -190,6 +190,6 @@ class CheckRun:
         return values, max(0.0, self.now_s() - start_s - wire_s)
 
     def now_s(self) -> float:
-        """The device's time where it is emulated here, else the wall's."""
+        """The device's virtual time if emulated here, else wall time."""
         controls = self.target.controls
         return time.monotonic() if controls is None else controls.time_s()

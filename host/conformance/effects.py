@@ -1,6 +1,6 @@
-"""Checks of telecommands whose success takes more to see than a setting that is read back.
+"""Checks of telecommands whose effect is more than a setting to read back.
 
-For devices whose tables have the messages named here; each one says which of them it has.
+For devices whose tables have the messages named here.
 """
 
 from cubestack.firmware_model.interface.codec.field import Value
@@ -19,15 +19,15 @@ from cubestack.host.conformance.contract import CheckRun, FailedError
 from cubestack.host.errors import CommandRefusedError
 
 UPLOADED = 3
-"""Number of the block that is uploaded."""
+"""Number of the uploaded block."""
 
 AHEAD_BLOCKS = 16
 BITS_PER_BLOCK = 1400
-"""So much time passes at once in an emulation; what comes meanwhile is kept."""
+"""Step of virtual time in s; bytes that arrive in it are kept."""
 
 
 def check_stream(run: CheckRun, message: Message, seen: list[str], *, picture_bytes: int) -> None:
-    """A picture of ``picture_bytes`` comes, in blocks that are the same when asked for singly."""
+    """An image of ``picture_bytes`` is streamed; its blocks equal those requested singly."""
     node, controls, interface = run.node, run.target.controls, run.target.interface
     length = interface.telemetry("ImageBlock").length
     count = picture_bytes // length
@@ -41,12 +41,12 @@ def check_stream(run: CheckRun, message: Message, seen: list[str], *, picture_by
     node.wait_processed(1.0)
     for number, block in ((0, first), (count - 1, last)):
         if _block(run, number) != block:
-            raise FailedError(f"block {number} of the stream is another one when it is asked for")
+            raise FailedError(f"block {number} of the stream differs from the one requested singly")
     seen.append(f"{count} blocks")
 
 
 def check_upload(run: CheckRun, message: Message, seen: list[str]) -> None:
-    """A block arrives where it belongs, and is counted."""
+    """An uploaded block arrives at its address and is counted."""
     interface = run.target.interface
     length = interface.telemetry("ImageBlock").length
     data = bytes((17 * index + 5) % 256 for index in range(length))
@@ -62,7 +62,7 @@ def check_upload(run: CheckRun, message: Message, seen: list[str]) -> None:
 
 
 def check_watchdog(run: CheckRun, message: Message, seen: list[str]) -> None:
-    """The device goes on until its watchdog resets it, which it counts."""
+    """The watchdog resets the device, which counts the reset."""
     node = run.target.node
     before = int(node.telemetry("ExtendedIdentification")["WDGResetCount"])
     run.perform(message.name, {})
@@ -81,7 +81,7 @@ def check_watchdog(run: CheckRun, message: Message, seen: list[str]) -> None:
 def check_camera_register(
     run: CheckRun, message: Message, seen: list[str], *, address: int
 ) -> None:
-    """A camera register that the firmware sets up anew is read back as written, and put back."""
+    """A camera register reads back as written; it is restored."""
     before = _camera_register(run, address)
     for value in (before ^ 1, before):
         run.perform(message.name, {"Address": address, "Value": value})
@@ -92,7 +92,7 @@ def check_camera_register(
 
 
 def check_profile(run: CheckRun, message: Message, seen: list[str]) -> None:
-    """Each profile is shown once it is set; the switches are put back."""
+    """Each profile reads back after it is set; the switches are restored."""
     changes = _Changes(run)
     before = changes.now
     for profile in PROFILES:
@@ -105,7 +105,7 @@ def check_profile(run: CheckRun, message: Message, seen: list[str]) -> None:
 
 
 def check_switch(run: CheckRun, message: Message, seen: list[str]) -> None:
-    """Each value of a switch is shown once it is set, and alone; those of the board are refused."""
+    """Each value of a switch reads back and changes no other; board switches are rejected."""
     changes = _Changes(run)
     for place, (name, one) in enumerate(changes.now.declared().items()):
         if one.hardware:
@@ -116,7 +116,7 @@ def check_switch(run: CheckRun, message: Message, seen: list[str]) -> None:
     changes.tell(seen)
 
 
-#: Checks of the telecommands that every device with switches has.
+#: Checks of the switch telecommands.
 OF_SWITCHES = {SET_PROFILE: check_profile, SET_SWITCH: check_switch}
 
 
@@ -125,9 +125,9 @@ def _switches(run: CheckRun) -> Switches:
 
 
 class _Changes:
-    """Sets switches, and holds what is shown then.
+    """Sets switches and checks the telemetry.
 
-    A firmware of one profile alone refuses all that would change anything, and nothing else.
+    Firmware with one profile must reject every change and nothing else.
     """
 
     def __init__(self, run: CheckRun) -> None:
@@ -135,7 +135,7 @@ class _Changes:
         self._made = self._refused = 0
 
     def make(self, message: Message, **parameters: str) -> None:
-        """One telecommand, after which telemetry must show the switches as they are to be then."""
+        """Send a telecommand; telemetry must then show the expected switches."""
         wanted = apply_command(self.now, message.name, message.unpack(message.pack(**parameters)))
         try:
             self._run.perform(message.name, parameters)
@@ -151,7 +151,7 @@ class _Changes:
             raise FailedError(f"{parameters} was set, {text}")
 
     def tell(self, seen: list[str]) -> None:
-        """That all is well; not so if some changes were refused and some were made."""
+        """Fail if some changes were rejected and others made."""
         if self._refused and self._made:
             raise FailedError(f"{self._refused} changes were refused, {self._made} were made")
         seen.append("the present one alone" if self._refused else "read back")

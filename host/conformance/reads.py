@@ -1,4 +1,4 @@
-"""Checks that change nothing but counters and error flags: telemetry, framing, registers, times."""
+"""Checks that change only counters and error flags: telemetry, framing, registers, times."""
 
 from statistics import median
 
@@ -9,11 +9,11 @@ from cubestack.host.conformance import contract
 from cubestack.host.conformance.contract import CheckRun, FailedError
 
 UNKNOWN_SAMPLES = 3
-"""Unknown telemetry IDs that are tried: each costs a time-out."""
+"""Number of unknown telemetry IDs to try: each costs a time-out."""
 
 
 MEASURED_UNITS = {"s", "ms", "us", "mA", "C", "deg C", "degC"}
-"""Units of fields whose values two devices need not share."""
+"""Units of fields that may differ between two devices."""
 
 
 def check_reads(run: CheckRun) -> None:
@@ -33,7 +33,7 @@ def _check_telemetry(run: CheckRun, message: Message) -> None:
     if message.starts_measurement and not run.may_write(name):
         return
     with run.check(name) as seen:
-        values = run.telemetry(message)  # of the declared length, else it raises
+        values = run.telemetry(message)  # raises unless it has the declared length
         seen += [
             f"{f.name}={f.label(values[f.name])}"
             for f in message.fields
@@ -79,7 +79,7 @@ def _check_framing(run: CheckRun) -> None:
 
 
 def _expect(run: CheckRun, wire: bytes, message: Message, rest: bytes = b"") -> None:
-    """The node answers the request in ``wire``, ``rest`` following separately."""
+    """The node answers the request in ``wire``, with ``rest`` sent separately."""
     answer = run.node.exchange(wire, rest)
     if answer is None or len(answer) != message.length:
         found = "no answer" if answer is None else f"an answer of {len(answer)} bytes"
@@ -114,11 +114,11 @@ def _check_registers(run: CheckRun, registers: PointerMap) -> None:
 def _check_times(run: CheckRun) -> None:
     with run.check("times of answers"):
         if not run.latencies_s:
-            raise contract.SkippedError("no telemetry was answered")
+            raise contract.SkippedError("no telemetry request was answered")
         slowest = max(run.latencies_s, key=lambda name: run.latencies_s[name])
         worst_ms = 1000 * run.latencies_s[slowest]
         middle_ms = 1000 * median(run.latencies_s.values())
-        text = f"median {middle_ms:.1f} ms, {slowest} {worst_ms:.1f} ms beside the wire"
+        text = f"median {middle_ms:.1f} ms, {slowest} {worst_ms:.1f} ms without the wire"
         if worst_ms > 1000 * contract.LATE_S:
             raise FailedError(f"{text}: more than {1000 * contract.LATE_S:g} ms")
         raise contract.PassedError(text)

@@ -1,8 +1,8 @@
-"""The protocol suite: what a device answers beside what its interface tables declare.
+"""The protocol suite: a device's answers against its interface tables.
 
-Every declared telemetry frame, telecommand, register and bench letter is walked, and every error
-path: lengths, ranges, effects by reading them back, times. What may change a device, and that are
-all telecommands, even such as must be refused, is left out unless writing is allowed.
+It checks every declared telemetry frame, telecommand, register and bench letter, and every error
+path: lengths, ranges, effects read back, times. Without permission to write it skips everything
+that could change the device: all telecommands, even invalid ones.
 """
 
 from collections.abc import Callable
@@ -19,10 +19,9 @@ def run_suite(
     allow_write: bool = False,
     on_check: Callable[[CheckResult], None] = lambda _check: None,
 ) -> CheckRun:
-    """Run everything on ``target``; raises TransportError when the connection ends.
+    """Run all checks on ``target``; raises TransportError if the connection ends.
 
-    Without ``allow_write``, what may change the device is left out. ``on_check`` gets each result
-    as it comes.
+    ``on_check`` is called with each result.
     """
     notes = ConformanceNotes() if target.device is None else target.device.conformance
     run = CheckRun(target, allow_write, notes, on_check=on_check)
@@ -32,7 +31,7 @@ def run_suite(
 
 
 def compare(first: CheckRun, second: CheckRun) -> str | None:
-    """The first difference between two runs, in words; None without any."""
+    """The first difference between two runs in words, or None."""
     others = {check.name: check for check in second.checks}
     one, other = first.target.name, second.target.name
     for check in first.checks:

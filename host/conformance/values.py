@@ -1,4 +1,4 @@
-"""What the protocol suite tries for a telecommand."""
+"""Parameter values that the protocol suite tries for a telecommand."""
 
 from collections.abc import Iterator
 
@@ -49,7 +49,7 @@ def _raw_limits(field: Field) -> tuple[float, float]:
 
 
 def violations(message: Message) -> Iterator[tuple[Field, bytes]]:
-    """A field and parameters in which it alone is out of range, for each field that can be."""
+    """For each field with limits: the field, and parameters with only this field out of range."""
     reset = message.reset_values()
     for field in message.fields:
         if field.type.startswith("bytes"):

@@ -1,6 +1,6 @@
 """Checks that change the device: telecommands, their errors and effects, registers, bench letters.
 
-A setting that can be read back is put back to what it was.
+A setting that can be read back is restored.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ LETTER_TIMEOUT_S = 3.0
 
 
 def check_writes(run: CheckRun) -> None:
-    """Run them all; without permission each is reported as left out."""
+    """Run all; without permission each is reported as skipped."""
     interface = run.target.interface
     run.writing("unknown telecommand IDs", lambda seen: _check_unknown(run, seen))
     for message in interface.telecommands:
@@ -70,7 +70,7 @@ def _check_lengths(run: CheckRun, message: Message, seen: list[str]) -> None:
 def _check_range(
     run: CheckRun, message: Message, field: Field, data: bytes, seen: list[str]
 ) -> None:
-    """``field`` at a value that its limits forbid, the others at their reset values."""
+    """``field`` at a forbidden value, the others at their reset values."""
     before = _shown(run, message)
     what = f"{field.name} = {field.label(message.unpack(data)[field.name])}"
     run.expect_error(bytes([message.id]) + data, "BAD_PARAMETER", what)
@@ -108,7 +108,7 @@ def _check_effect(run: CheckRun, message: Message, seen: list[str]) -> None:
 
 
 def _perform_any(run: CheckRun, message: Message) -> None:
-    """Perform it with the first values that the node takes: not all go together with its state."""
+    """Perform it with the first values that the node accepts in its state."""
     refusal: CommandRefusedError | None = None
     for values in values_to_try(message):
         try:
@@ -121,7 +121,7 @@ def _perform_any(run: CheckRun, message: Message) -> None:
 
 
 def _shown(run: CheckRun, message: Message) -> dict[str, Value] | None:
-    """What telemetry shows of a telecommand's fields; None when not all are there."""
+    """A telecommand's fields in telemetry; None unless all are there."""
     places = read_back(run.target.interface, message, run.notes)
     if not places:
         return None
@@ -197,5 +197,5 @@ def _check_no_letter(run: CheckRun, protocol: LetterProtocol, seen: list[str]) -
 
 def _service_port(run: CheckRun) -> Transport:
     if run.target.service_port is None:
-        raise SkippedError("no line with the bench protocol within reach")
+        raise SkippedError("no line with the bench protocol")
     return run.target.service_port

@@ -1,1 +1,1 @@
-"""An interface for readers and other programs: text, Markdown, JSON, C header."""
+"""Exports of an interface for people and programs."""

@@ -16,10 +16,10 @@ PER_LINE = 8
 
 
 def c_arrays(prefix: str, arrays: Mapping[str, NDArray[np.generic]], about: str) -> str:
-    """A file's text: each array (n,) as ``prefix_name``, and ``PREFIX_NAME_COUNT``; compiles alone.
+    """Text of a C file with each array (n,) as ``prefix_name`` and ``PREFIX_NAME_COUNT``.
 
-    Floats carry the digits that give the same float again. Raises ValueError for an array of a
-    type that is not in ``TYPES``, or of another shape.
+    Floats have enough digits to read back exactly. Raises ValueError for an array of another shape
+    or of a type not in ``TYPES``.
     """
     lines = [f"/* {about} */", "#include <stdint.h>"]
     for name, array in arrays.items():

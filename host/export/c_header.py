@@ -1,7 +1,7 @@
 """A C header (C99) from an interface: IDs, lengths, named numbers, field offsets and accessors.
 
-Nothing in it depends on how a compiler packs structures or on the processor's byte order: fields
-are read and written in a byte buffer, at their offsets. Names keep the printed spelling.
+It does not depend on a compiler's packing or the processor's byte order: accessors read and write
+fields at their offsets in a byte buffer. Names keep the printed spelling.
 """
 
 import re
@@ -74,7 +74,7 @@ static inline void {p}_put_f32(uint8_t *data, unsigned offset, float value)
 
 
 def c_header(interface: Interface) -> str:
-    """The header's text; it compiles alone as C99."""
+    """Text of the header, which compiles alone as C99."""
     prefix = interface.name.lower()
     upper = prefix.upper()
     lines = [

@@ -1,7 +1,7 @@
 """OpenC3 COSMOS command and telemetry definitions from an interface: one file of ``cmd_tlm``.
 
-For each telemetry frame there is a command ``REQUEST_…`` that asks for it. Answers carry no ID, so
-the target's interface has to tell COSMOS which packet it has asked for.
+Each telemetry frame has a command ``REQUEST_…``. Answers carry no ID, so the target's interface
+must tell COSMOS which packet it requested.
 """
 
 from collections.abc import Iterator
@@ -56,7 +56,7 @@ def _place(field: Field, header_bits: int) -> str:
 
 
 def _endian(field: Field) -> str:
-    """A single bit is the same in either, and its offset is unambiguous in the other one."""
+    """A single bit has the same value in both byte orders, and a clear offset in big endian."""
     return "BIG_ENDIAN" if field.type == "bool1" else "LITTLE_ENDIAN"
 
 
@@ -71,7 +71,7 @@ def _range(field: Field) -> str:
         ends = f"{low / field.scale:.10g}", f"{high / field.scale:.10g}"
     limits = zip(ends, field.ends, strict=True)
     least, largest = (end if limit is None else f"{limit:.10g}" for end, limit in limits)
-    if field.also is not None:  # allowed beyond the limits, which COSMOS can not say
+    if field.also is not None:  # allowed beyond the limits, which COSMOS cannot express
         least, largest = ends
     return f"{least} {largest} {float(field.reset or 0):.10g}"
 

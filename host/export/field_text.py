@@ -1,10 +1,10 @@
-"""One field of an interface as text for readers, and as data for other programs."""
+"""One field of an interface as text and as data."""
 
 from cubestack.firmware_model.interface.codec.field import Choices, Field
 
 
 def field_type(field: Field) -> str:
-    """Type, and what a raw count is divided by."""
+    """Type and scale."""
     return field.type if field.scale == 1 else f"{field.type} / {field.scale:g}"
 
 

@@ -1,4 +1,4 @@
-"""Renders an interface for readers: text table, Markdown, and JSON."""
+"""Renders an interface as text, Markdown and JSON."""
 
 import json
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from cubestack.host.export.side_protocols import side_json, side_markdown, side_
 
 
 def _table(interface: Interface) -> str:
-    """Plain text, one line for each message and one for each field."""
+    """Plain text, one line per message and per field."""
     lines = [_summary(interface)]
     for kind in Kind:
         lines += ["", f"{kind.value.upper()}  (bit offset, type, name, meaning)"]
@@ -81,7 +81,7 @@ def _json(interface: Interface) -> str:
     return json.dumps(content, indent=1) + "\n"
 
 
-#: Format to the function that makes it.
+#: Renderer by format.
 FORMATS: dict[str, Callable[[Interface], str]] = {
     "table": _table,
     "markdown": _markdown,

@@ -12,7 +12,7 @@ MISSING = 'Parquet needs pyarrow: pip install "cubestack[parquet]"'
 
 
 def missing() -> str:
-    """Why there can be no such file; empty where there can."""
+    """Why no Parquet file can be written; empty if it can."""
     return "" if find_spec("pyarrow") else MISSING
 
 
@@ -28,10 +28,10 @@ def arrow() -> Any:
 def parquet_file(
     columns: Mapping[str, Sequence[Cell]], numbers: Collection[str] | None = None
 ) -> bytes:
-    """A file with these columns, which are of one length.
+    """Write a file with these columns, all of one length.
 
-    Those that ``numbers`` names are float64 and the others text; without it, a column of numbers is
-    float64, one of truth values bool, and any other text. None is nothing in each.
+    Columns in ``numbers`` are float64, the others text. Without it, the type follows from the
+    values: float64, bool or text. None is null.
 
     Raises ValueError for columns of several lengths, and without pyarrow.
     """

@@ -1,4 +1,4 @@
-"""Renders a processor's registers, and what its pins lead to: table, Markdown, JSON, C header."""
+"""Renders a processor's registers and pin connections: table, Markdown, JSON, C header."""
 
 import json
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ def processor_header(tables: Processor) -> str:
 
 
 def _rows(tables: Processor) -> Iterator[tuple[str, int, Register, bool]]:
-    """Peripheral, address, register and whether it does anything, in the order of addresses."""
+    """Peripheral, address, register, and whether it is modelled, by address."""
     rows = (
         (instance.name, instance.base + register.offset, register, layout.modelled)
         for layout in tables.layouts

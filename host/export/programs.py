@@ -1,4 +1,4 @@
-"""What other programs read: each format is made of the tables that firmware and host share."""
+"""Formats for other programs, generated from the interface tables."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ from cubestack.host.export.svd import svd
 from cubestack.host.export.wireshark import wireshark
 from cubestack.host.export.xtce import xtce
 
-#: Format to the function that makes it of an interface.
+#: Exporter of an interface by format.
 OF_INTERFACE: dict[str, Callable[[Interface], str]] = {
     "c": c_header,
     "python": python_module,
@@ -21,5 +21,5 @@ OF_INTERFACE: dict[str, Callable[[Interface], str]] = {
     "wireshark": wireshark,
 }
 
-#: Format to the function that makes it of a processor's registers.
+#: Exporter of a processor's registers by format.
 OF_PROCESSOR: dict[str, Callable[[Processor], str]] = {"processor-c": processor_header, "svd": svd}

@@ -1,4 +1,4 @@
-"""A Python module from an interface: a dataclass for each message, with nothing of this project."""
+"""A standalone Python module from an interface: a dataclass per message."""
 
 from collections.abc import Iterator
 from enum import IntEnum

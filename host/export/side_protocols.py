@@ -1,7 +1,7 @@
-"""What a device speaks beside its node protocol, for readers and programs.
+"""Exports of a device's protocols besides the node protocol.
 
-Registers behind a pointer on I2C and one-letter requests on a serial line, both from the interface
-tables; nothing for a device that has none.
+Register-pointer protocol on I2C and one-letter requests on a serial line; empty for a device
+without them.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ _UART = (
 
 
 def side_table(interface: Interface) -> Iterator[str]:
-    """Plain text, one line for each register and letter."""
+    """Plain text, one line per register and letter."""
     if interface.registers is not None:
         yield from ("", f"REGISTERS at {_address(interface.registers)}  (address, access, type)")
         if interface.registers.note:

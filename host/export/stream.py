@@ -1,4 +1,4 @@
-"""A message as a stream of bits, most significant first, as formats of others walk through it."""
+"""A message as a stream of bits, most significant first, as other formats need it."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ from cubestack.firmware_model.interface.codec.message import Message
 
 
 def slots(message: Message) -> Iterator[tuple[Field | None, int]]:
-    """Fields and their bits, in the stream's order; None for bits that nothing uses.
+    """Fields and their bits, in the stream's order; None for unused bits.
 
     Flags, which are numbered from a byte's lowest bit, come highest first.
     """

@@ -1,4 +1,4 @@
-"""CMSIS-SVD of a processor's registers, for debuggers and for tools that generate code."""
+"""CMSIS-SVD of a processor's registers, for debuggers and code generators."""
 
 from xml.etree import ElementTree as Xml
 
@@ -15,7 +15,7 @@ WORD_BYTES = 4
 
 
 def svd(tables: Processor) -> str:
-    """The document's text; instances after the first are derived from it."""
+    """Text of the document; further instances derive from the first."""
     root = Xml.Element(
         "device",
         {

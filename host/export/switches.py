@@ -10,7 +10,7 @@ FIELDS = ("meaning", "published", "extended", "source", "reason", "choices", "ha
 
 
 def render_switches(title: str, switches: type[Switches], format_name: str) -> str:
-    """The switches of the sensor that is called ``title``."""
+    """The switches of the sensor called ``title``."""
     declared = switches.declared()
     if format_name == "json":
         shown = {name: picked(one, *FIELDS) for name, one in declared.items()}

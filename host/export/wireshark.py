@@ -1,6 +1,6 @@
 """A Wireshark dissector in Lua from an interface: its node protocol, as a TCP port carries it.
 
-Answers carry no ID, so the dissector remembers what was asked for last in each conversation.
+Answers carry no ID, so the dissector remembers the last request of each conversation.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Inte
 from cubestack.host.export.field_text import field_details
 
 PORT = 5000
-"""Default of the dissector's preference; what `emulate --tcp` listens at is the user's choice."""
+"""Default port of the dissector's preference."""
 
 TYPES = {"u8": "uint8", "enum8": "uint8", "u16": "uint16", "u32": "uint32"}
 TYPES |= {"i16": "int16", "f32": "float"}

@@ -85,11 +85,11 @@ class Desk:
         if self._overlay is None:
             missing["found"] = f"{interface.name} does not tell what it found in a picture"
         if not self._has("latest"):
-            missing["results"] = f"{interface.name} has no results that could be logged"
+            missing["results"] = f"{interface.name} has no results to log"
         if not self._has("picture"):
             missing["download"] = f"{interface.name} sends no picture"
         if not self._has("upload"):
-            missing["upload"] = f"{interface.name} takes no picture by the wire"
+            missing["upload"] = f"{interface.name} has no image upload"
         if self.played is not None:
             for what in ("send", "download", "upload", "found", "sensor_registers"):
                 missing[what] = f"{target.name} is a recording, which takes no telecommand"

@@ -151,7 +151,7 @@ def test_the_first_and_the_last_address_are_good(address: str) -> None:
 
 def test_what_a_device_does_not_do_is_told_by_its_name(node: FakeCubeStar) -> None:
     client = DeviceClient(NodeClient(UartLink(node), INTERFACE))
-    with pytest.raises(TargetError, match="CubeStar takes no picture by the wire"):
+    with pytest.raises(TargetError, match="CubeStar has no image upload"):
         client.upload(np.zeros((2, 2), np.uint8))
     with pytest.raises(TargetError, match="CubeStar looks for no stars"):
         client.stars()

@@ -1,4 +1,4 @@
-"""AraMiS' star tracker as a program uses it: the thesis' use cases through any client.
+"""AraMiS' star tracker for programs: the thesis' use cases through any client.
 
 AraMiS thesis, section 2.2. Axes: x right, y down, z out of the lens. Quaternions are scalar last
 and turn inertial vectors into camera vectors, v_camera = q v_inertial q*; pixel coordinates count
@@ -22,7 +22,7 @@ from cubestack.host.clients.quaternions import attitude_columns, unit_quaternion
 from cubestack.host.errors import StepFailedError, TargetError
 
 PROGRAM_TIMEOUT_S = 300.0
-"""Longer than erasing and writing all of the catalogue's flash."""
+"""Longer than erasing and writing the whole catalogue flash takes."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Attitude:
 
     Attributes:
         quaternion: float64 (4,), unit length; None before the first attitude.
-        valid: the latest measurement gave it; else it is an older one.
+        valid: the latest measurement computed it; otherwise it is older.
         outcome, reason, mode: of the latest measurement.
-        matched: stars that the quaternion rests on.
+        matched: stars used for the quaternion.
         detected: stars in the latest picture.
-        frame: number of that picture.
+        frame: number of that image.
         image_uptime_s: its mid-exposure, since power-up.
-        julian_date: the same as Julian date, in days; None while the clock is not set.
+        julian_date: the same as a Julian date in days; None until the clock is set.
     """
 
     quaternion: NDArray[np.float64] | None
@@ -54,13 +54,13 @@ class Attitude:
 
 @dataclass(frozen=True)
 class Star:
-    """A star of the latest picture.
+    """A star of the latest image.
 
     Attributes:
-        number: from 0, the brightest first.
+        number: from 0, brightest first.
         x_px, y_px: centroid.
         brightness: sum of its grey levels.
-        hipparcos: Hipparcos number; None when it is not identified.
+        hipparcos: Hipparcos number; None if not identified.
     """
 
     number: int
@@ -72,12 +72,12 @@ class Star:
 
 @dataclass(frozen=True, kw_only=True)
 class Quality(AttitudeQuality):
-    """What the latest attitude is worth, and what its picture was like.
+    """Quality of the latest attitude and of its image.
 
     Attributes:
-        spread_dn: how far the level of the sky changes over the field.
-        blind: part of the field that is too bright for stars, 0 to 1.
-        rejected: regions that are no stars by their shape.
+        spread_dn: range of the sky's level over the field.
+        blind: part of the field too bright for stars, 0 to 1.
+        rejected: regions rejected by their shape.
     """
 
     spread_dn: float
@@ -86,18 +86,17 @@ class Quality(AttitudeQuality):
 
 
 class Aramis(DeviceClient):
-    """A star tracker behind a client. Errors are those of the client, and the ones named here.
+    """A star tracker behind a client; methods raise the client's errors and those named.
 
-    A step's time-out is longer than three of the longest frames, loading the catalogue, and the
-    processing.
+    A step's time-out exceeds three of the longest frames, loading the catalogue and processing.
     """
 
     # --- use cases --------------------------------------------------------------------------------
 
     def activate(self) -> CatalogueState:
-        """Start camera and catalogue; returns the catalogue's state, which may be a bad one.
+        """Start camera and catalogue; returns the catalogue's state, which may be an error.
 
-        Raises StepFailedError when the star tracker does not get ready.
+        Raises StepFailedError if the star tracker does not become ready.
         """
         self.perform("Activate")
         status = self.client.telemetry("SensorStatus")
@@ -111,13 +110,13 @@ class Aramis(DeviceClient):
         self.perform("Deactivate")
 
     def set_time(self, julian_date: float) -> None:
-        """Set the clock to a Julian date in days; a float holds it to 0.05 ms."""
+        """Set the clock to a Julian date in days (a float resolves 0.05 ms)."""
         day, part = divmod(julian_date, 1)
         whole, millisecond = divmod(round(part * MS_PER_DAY), MS_PER_DAY)
         self._send("SetSystemTime", JulianDay=int(day) + whole, Millisecond=millisecond)
 
     def julian_date(self) -> float | None:
-        """The star tracker's clock, in days; None while it is not set."""
+        """The star tracker's clock, a Julian date in days; None until it is set."""
         return _julian_date(self.client.telemetry("SystemTime"))
 
     def measure(
@@ -129,10 +128,10 @@ class Aramis(DeviceClient):
             near: rough inertial unit vector (3,) of the boresight.
             near_rad: the same as right ascension and declination in rad.
 
-        With neither, the star tracker is lost in space; both raise ValueError.
+        Neither means lost in space; both raise ValueError.
         """
         if near is not None and near_rad is not None:
-            raise ValueError("a rough direction is a vector or two angles: give one of them")
+            raise ValueError("pass the rough direction as near or as near_rad, not both")
         if near is not None:
             x, y, z = (float(part) for part in np.asarray(near, np.float64))
             self.perform("GetAttitudeNearVector", X=x, Y=y, Z=z)
@@ -144,12 +143,12 @@ class Aramis(DeviceClient):
         return self.attitude()
 
     def take_picture(self) -> None:
-        """Start the star tracker, if need be, and measure once."""
+        """Start the star tracker if necessary, and measure once."""
         self.activate()
         self.measure()
 
     def attitude(self) -> Attitude:
-        """The latest attitude; raises BadAnswerError when it is no rotation."""
+        """The latest attitude; raises BadAnswerError if it is not a rotation."""
         values = self.client.telemetry("Attitude")
         return Attitude(
             quaternion=_quaternion(values),
@@ -196,9 +195,9 @@ class Aramis(DeviceClient):
         self.perform("LatchUpAction", Step=aramis.LatchUpStep.ON)
 
     def load_catalogue(self, image: bytes, progress: Progress | None = None) -> CatalogueState:
-        """Load a catalogue's ``image``, write it to flash and use it; returns its state.
+        """Upload a catalogue's ``image``, write it to flash and use it; returns its state.
 
-        Raises StepFailedError when blocks are missing or the star tracker refuses the contents.
+        Raises StepFailedError if blocks are missing or the star tracker rejects the contents.
         """
         blocks = -(-len(image) // BLOCK_BYTES)
         self._send("BeginCatalogue", Length=len(image), Checksum=crc32(image))
@@ -215,15 +214,15 @@ class Aramis(DeviceClient):
         self._send("CommitCatalogue")
         self.client.wait_processed(PROGRAM_TIMEOUT_S)
         if self.client.telemetry("ErrorFlags")["UploadError"]:
-            raise StepFailedError("catalogue refused: its checksum or its contents are wrong")
+            raise StepFailedError("catalogue rejected: its checksum or contents are wrong")
         return CatalogueState(int(self.client.telemetry("CatalogueStatus")["State"]))
 
     # --- reports ----------------------------------------------------------------------------------
 
     def stars(self) -> list[Star]:
-        """The stars of the latest picture, the brightest first; stop the loop before.
+        """The stars of the latest image, brightest first; stop the loop first.
 
-        Raises BadAnswerError when the records do not make a whole list.
+        Raises BadAnswerError if the list is incomplete.
         """
         detected = int(self.client.telemetry("DetectionSummary")["Detected"])
         return [
@@ -238,7 +237,7 @@ class Aramis(DeviceClient):
         ]
 
     def quality(self) -> Quality:
-        """What the latest attitude is worth, and what its picture was like."""
+        """Quality of the latest attitude and of its image."""
         values = self.client.telemetry("Quality")
         return Quality(
             **common(values),
@@ -249,15 +248,15 @@ class Aramis(DeviceClient):
         )
 
     def phase_times(self) -> dict[str, float]:
-        """Time of each step of the latest measurement in ms, by its name in small letters."""
+        """Duration of each step of the latest measurement in ms, by its lower-case name."""
         values = self.client.telemetry("PhaseTimes")
         return {name.lower(): int(value) / 1000 for name, value in values.items()}
 
     def image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
-        """The latest picture, (1024, 1280), as one stream of blocks: over a UART only.
+        """The latest image, (1024, 1280), as one stream of blocks; UART only.
 
-        A lost block can not be asked for again: raises BadAnswerError or NoAnswerError then, and
-        TypeError on I2C.
+        A lost block cannot be repeated: raises BadAnswerError or NoAnswerError then, and TypeError
+        on I2C.
         """
         data = self._stream(
             "StreamDownImage", aramis.IMAGE_BYTES // BLOCK_BYTES, BLOCK_BYTES, progress
@@ -267,11 +266,11 @@ class Aramis(DeviceClient):
     def picture(
         self, source: str | None = None, progress: Progress | None = None
     ) -> NDArray[np.uint8]:
-        """The latest picture, as ``image`` gives it; TargetError on I2C."""
+        """The latest image, as ``image``; raises TargetError on I2C."""
         try:
             return self.image(progress)
         except TypeError:
-            raise TargetError("AraMiS sends its picture over a serial line only") from None
+            raise TargetError("AraMiS sends its image over a serial line only") from None
 
 
 def _julian_date(values: dict[str, Value]) -> float | None:
@@ -280,5 +279,5 @@ def _julian_date(values: dict[str, Value]) -> float | None:
 
 
 def _quaternion(values: dict[str, Value]) -> NDArray[np.float64] | None:
-    """The quaternion of a frame; None before the first attitude, when all is zero."""
+    """The quaternion of a frame; None if all zero, before the first attitude."""
     return unit_quaternion(values) if any(values[f"Q{index}"] for index in range(4)) else None

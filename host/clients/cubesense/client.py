@@ -1,4 +1,4 @@
-"""CubeSense as a program uses it: Sun and nadir directions, settings, supply; through any client.
+"""CubeSense for programs: Sun and nadir directions, settings, supply, through any client.
 
 CubeSpace family with two cameras, interface generation 2, with this project's extensions. Axes of
 each camera: x right, y down, z out of the lens. Pixel coordinates count from the middle of the
@@ -21,18 +21,18 @@ from cubestack.host.clients.contract import POLL_PERIOD_S, Columns, DeviceClient
 from cubestack.host.clients.cubesense.download import download_image, picture_of
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
-#: What a capture is given; a lens that was set before it is worked out first, in about 1 s.
+#: Time-out of a capture; a new lens is computed first, in about 1 s.
 CAPTURE_TIMEOUT_S = 3.0
 
-#: What a detection is given after its capture; assumed: the longest takes 14 s, where a nadir
-#: picture crosses the link of FPGAs with one search each.
+#: Time-out of a detection after its capture (assumed). The longest takes 14 s: a nadir image over
+#: the link of FPGAs with one search each.
 DETECT_TIMEOUT_S = 20.0
 
 
 def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:
     """Unit vector (3,) in camera axes of a measurement's two angles.
 
-    Both are parts of the field angle: it is their root of squares, towards (alpha, beta).
+    The field angle is their root sum of squares, in the direction (alpha, beta).
     """
     theta = math.radians(math.hypot(alpha_deg, beta_deg))
     phi = math.atan2(beta_deg, alpha_deg)
@@ -43,13 +43,13 @@ def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a camera measured.
+    """A camera's measurement.
 
     Attributes:
         camera: the camera.
-        alpha_deg, beta_deg: parts of the field angle along x and y; they count when ``detected``.
-        capture: what became of the capture.
-        detect: what became of the detection.
+        alpha_deg, beta_deg: parts of the field angle along x and y; valid if ``detected``.
+        capture: result of the capture.
+        detect: result of the detection.
     """
 
     camera: Camera
@@ -60,12 +60,12 @@ class Measurement:
 
     @property
     def detected(self) -> bool:
-        """Whether the angles are a measurement."""
+        """Whether the angles are valid."""
         return self.detect is codes.DetectResult.SUCCESS
 
     @property
     def pending(self) -> bool:
-        """Whether the node still works on it."""
+        """Whether the node is still processing."""
         return self.capture is CaptureResult.PENDING or self.detect is codes.DetectResult.PENDING
 
     @property
@@ -76,13 +76,13 @@ class Measurement:
 
 @dataclass(frozen=True)
 class DirectionQuality:
-    """How sure a camera's latest measurement is, and why there is none.
+    """Quality of a camera's latest measurement.
 
     Attributes:
-        sigma_deg: standard deviations of alpha and beta; 0: not known.
-        rms_px: of the edges' distances from the circle of the Earth, undistorted.
-        found: edges that the search found, or Sun pixels.
-        reason: why the detection ended so.
+        sigma_deg: standard deviations of alpha and beta; 0 if unknown.
+        rms_px: root mean square distance of the edges from the Earth's circle, undistorted.
+        found: number of edges found, or of Sun pixels.
+        reason: why the detection ended as it did.
     """
 
     sigma_deg: tuple[float, float]
@@ -113,7 +113,7 @@ class Mask:
 
 @dataclass(frozen=True)
 class Power:
-    """Supply currents in mA, and whether each memory drew too much since its flag was cleared."""
+    """Supply currents in mA, and each memory's over-current flag."""
 
     current_3v3_ma: float
     current_sram_ma: tuple[float, float]
@@ -121,33 +121,33 @@ class Power:
     over_current: tuple[bool, bool]
 
 
-#: What an area without a mask reads as.
+#: Value of an area without a mask.
 _NO_MASK = Mask(0, 0, 0, 0)
 
 
 class CubeSense(DeviceClient):
-    """A CubeSense behind a client. Errors are those of the client, and the ones named here."""
+    """A CubeSense behind a client; methods raise the client's errors and those named."""
 
     picture_sources = tuple(sram.name.lower() for sram in Sram)
 
     def picture(
         self, source: str | None = None, progress: Progress | None = None
     ) -> NDArray[np.uint8]:
-        """The picture (480, 640) in memory ``source``; default: the Sun camera's, sram1."""
+        """The image (480, 640) in memory ``source``; default: the Sun camera's, sram1."""
         sram = Sram[(source or Sram.SRAM1.name).upper()]
         return picture_of(download_image(self.client, sram, codes.ImageSize.SIDE_1024, progress))
 
     def capture_and_detect(self, camera: Camera, sram: Sram | None = None) -> Measurement:
-        """Take a picture into ``sram`` (default: the camera's own) and measure in it.
+        """Capture into ``sram`` (default: the camera's own) and detect.
 
-        Returns what became of it, which may be a failure. Raises NoAnswerError when the result
-        stays pending.
+        Returns the measurement, which may be a failure. Raises NoAnswerError if the result stays
+        pending.
         """
         self.client.command("CaptureAndDetect", Camera=camera, Sram=_own(camera, sram))
         return self.wait_measured(camera)
 
     def capture(self, camera: Camera, sram: Sram | None = None) -> CaptureResult:
-        """Take a picture into ``sram`` (default: the camera's own); returns what became of it."""
+        """Capture into ``sram`` (default: the camera's own); returns the result."""
         self.client.command(
             "CaptureOnly", Camera=camera, Sram=_own(camera, sram), Location=codes.ImageLocation.TOP
         )
@@ -158,7 +158,7 @@ class CubeSense(DeviceClient):
         return self._measurement(camera, RESULTS[camera])
 
     def latest(self) -> Columns:
-        """Both cameras' latest angles, and what became of their captures and detections."""
+        """Both cameras' latest measurements."""
         columns: Columns = {"uptime_s": self.uptime_s()}
         for camera in Camera:
             found, name = self.result(camera), camera.name.lower()
@@ -177,9 +177,9 @@ class CubeSense(DeviceClient):
         return self._measurement(camera, identifier)
 
     def wait_measured(self, camera: Camera) -> Measurement:
-        """Poll until a camera's measurement is no longer pending; NoAnswerError when it stays so.
+        """Poll until a camera's measurement is done; raises NoAnswerError if it stays pending.
 
-        A measurement that is under way may follow a result that has been read to schedule it.
+        A scheduled measurement may already be running.
         """
         found = self._wait_captured(camera)
         for _ in range(math.ceil(DETECT_TIMEOUT_S / POLL_PERIOD_S)):
@@ -197,7 +197,7 @@ class CubeSense(DeviceClient):
         self.client.command(f"DetectionThreshold{camera + 1}", Threshold=threshold)
 
     def set_auto_adjust(self, camera: Camera, enabled: bool) -> None:
-        """Let a camera adjust its exposure and gain, or not."""
+        """Enable or disable automatic exposure and gain."""
         self.client.command(f"AutoAdjust{camera + 1}", Enabled=int(enabled))
 
     def set_camera(self, camera: Camera, settings: CameraSettings) -> None:
@@ -217,7 +217,7 @@ class CubeSense(DeviceClient):
     def set_distortion(self, camera: Camera, factors: Sequence[float]) -> None:
         """Set r_d = sum of factors[k] r_u^k, radii in px; the factors carry about 4 digits.
 
-        Raises ValueError for another number of factors, or one beyond +-32767.
+        Raises ValueError for another number of factors or one beyond +-32767.
         """
         if len(factors) != DISTORTION_TERMS:
             raise ValueError(f"a distortion has {DISTORTION_TERMS} factors, not {len(factors)}")
@@ -228,7 +228,7 @@ class CubeSense(DeviceClient):
         self.client.command(f"Distortion{camera + 1}", **parameters)
 
     def set_mask(self, camera: Camera, area: int, mask: Mask | None) -> None:
-        """Let detection ignore ``mask`` as area 1 to 5 of a camera; None takes the area away."""
+        """Set ``mask`` as area 1 to 5 of a camera that detection ignores; None removes it."""
         limits = mask or _NO_MASK
         self.client.command(
             f"Mask{camera + 1}",
@@ -240,7 +240,7 @@ class CubeSense(DeviceClient):
         )
 
     def masks(self, camera: Camera) -> list[Mask | None]:
-        """A camera's five areas; None where there is no mask."""
+        """A camera's five masked areas; None for an unused one."""
         values = self.client.telemetry(f"Masks{camera + 1}")
         areas = [
             Mask(*(int(values[f"{name}{area}"]) for name in ("XMin", "XMax", "YMin", "YMax")))
@@ -253,11 +253,11 @@ class CubeSense(DeviceClient):
         return int(self.client.telemetry("Configuration")[f"Threshold{camera + 1}"])
 
     def auto_adjust(self, camera: Camera) -> bool:
-        """Whether a camera adjusts its exposure and gain."""
+        """Whether a camera's automatic exposure and gain are on."""
         return bool(self.client.telemetry("Configuration")[f"AutoAdjust{camera + 1}"])
 
     def camera(self, camera: Camera) -> CameraSettings:
-        """A camera's exposure and gains, as they were set."""
+        """A camera's exposure and gains as set."""
         values = self.client.telemetry("Configuration")
         names = ("Exposure", "Gain", "BlueGain", "RedGain")
         return CameraSettings(*(int(values[f"{name}{camera + 1}"]) for name in names))
@@ -273,7 +273,7 @@ class CubeSense(DeviceClient):
         )
 
     def clear_over_current(self, selection: codes.SramSelection = codes.SramSelection.BOTH) -> None:
-        """Clear over-current flags, so that the node switches those memories on again."""
+        """Clear over-current flags; the node then switches those memories on again."""
         self.client.command("ClearOverCurrent", Selection=selection)
 
     def reset(self, target: codes.ResetTarget) -> None:
@@ -286,7 +286,7 @@ class CubeSense(DeviceClient):
         return int(values["RuntimeSeconds"]) + int(values["RuntimeMilliseconds"]) / 1000.0
 
     def serial_number(self) -> str:
-        """The node's serial number; raises BadAnswerError when it is no ASCII text."""
+        """The node's serial number; raises BadAnswerError if it is not ASCII."""
         value = self.client.telemetry("SerialNumber")["SerialNumber"]
         assert isinstance(value, bytes)
         try:
@@ -302,13 +302,13 @@ class CubeSense(DeviceClient):
         return {name.lower(): int(value) / 1000.0 for name, value in values.items()}
 
     def details(self, camera: Camera) -> dict[str, Value]:
-        """What a camera's latest measurement rests on: the fields of telemetry Details."""
+        """Telemetry Details of a camera's latest measurement."""
         return self.client.telemetry(f"Details{camera + 1}")
 
     def quality(self, camera: Camera) -> DirectionQuality:
-        """How sure a camera's latest measurement is: always 0 of the published program.
+        """Quality of a camera's latest measurement; zeros in profile ``published``.
 
-        Raises BadAnswerError for a reason that there is not.
+        Raises BadAnswerError for an unknown reason.
         """
         values = self.client.telemetry(f"Quality{camera + 1}")
         try:
@@ -323,9 +323,9 @@ class CubeSense(DeviceClient):
         )
 
     def edges(self) -> NDArray[np.float64]:
-        """Pixels (n, 2), column and row, of the edges that the latest nadir search found.
+        """Pixels (n, 2), column and row, of the edges of the latest nadir search.
 
-        Raises BadAnswerError when there are more than both frames hold.
+        Raises BadAnswerError for more edges than both frames hold.
         """
         parts = [self.client.telemetry(f"NadirEdges{part}") for part in (1, 2)]
         count, most = int(parts[0]["Count"]), len(parts) * codes.EDGES_PER_FRAME

@@ -1,7 +1,7 @@
-"""Picture download from a CubeSense in frames of 128 bytes.
+"""Image download from a CubeSense in frames of 128 bytes.
 
-CubeSpace family with two cameras, interface generation 2: a frame is prepared by a telecommand,
-telemetry ImageFrameInfo is polled until it is ready, then it is read and its checksum compared.
+CubeSpace family with two cameras, interface generation 2: a telecommand prepares a frame; telemetry
+ImageFrameInfo is polled until it is ready; then the frame is read and its checksum compared.
 """
 
 import math
@@ -18,17 +18,17 @@ from cubestack.host.errors import BadAnswerError, HostError, NoAnswerError
 POLL_PERIOD_S = 0.04
 FRAME_TIMEOUT_S = 2.0
 
-#: Reads of a frame whose checksum does not fit, and requests of one whose acknowledge is lost.
+#: Retries for a wrong checksum, and for a lost acknowledge.
 ATTEMPTS = 3
 
 
 def download_image(
     client: Client, sram: Sram, size: ImageSize, progress: Progress | None = None
 ) -> NDArray[np.uint8]:
-    """The square (side, side) of ``size`` with the picture in ``sram``, first row on top.
+    """The square image (side, side) of ``size`` in ``sram``, first row on top.
 
-    ``picture_of`` cuts the picture out. Raises NoAnswerError when a frame is not ready in time,
-    BadAnswerError when it comes damaged three times, and the errors of ``client``.
+    ``picture_of`` crops it. Raises NoAnswerError if a frame is not ready in time, BadAnswerError if
+    it is damaged three times, and the errors of ``client``.
     """
     client.command("StartImageDownload", Sram=sram, Location=codes.ImageLocation.TOP, Size=size)
     square = np.empty((size.frames, codes.FRAME_BYTES), np.uint8)
@@ -42,9 +42,9 @@ def download_image(
 
 
 def picture_of(square: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The picture within a downloaded square (side, side): 480 x 640 for the largest.
+    """The image within a downloaded square (side, side): 480 x 640 for the largest.
 
-    Raises ValueError for an array that is no such square.
+    Raises ValueError for another shape.
     """
     for size in ImageSize:
         if square.shape == (size.side, size.side):
@@ -55,7 +55,7 @@ def picture_of(square: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _prepare(client: Client, number: int) -> None:
-    """Ask for a frame; again when the acknowledge is lost, because twice does no harm."""
+    """Request a frame; retries after a lost acknowledge, as a repeated request does no harm."""
     for attempt in range(ATTEMPTS):
         try:
             client.command("NextImageFrame", Frame=number)

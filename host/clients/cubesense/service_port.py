@@ -14,7 +14,7 @@ READ_BYTES = 4096
 
 
 class ServicePortClient:
-    """A bench computer at the serial line, which the caller opens and closes."""
+    """A bench computer on the serial line; the caller opens and closes that."""
 
     def __init__(self, transport: Transport, *, timeout_s: float = 2.0) -> None:
         """Use ``transport``; ``timeout_s`` is the longest silence before or within an answer."""
@@ -22,7 +22,7 @@ class ServicePortClient:
         self._timeout_s = timeout_s
 
     def take(self, camera: Camera) -> None:
-        """Take a picture and return once it is stored; raises NoAnswerError, BadAnswerError."""
+        """Capture an image; returns when it is stored. Raises NoAnswerError, BadAnswerError."""
         letter = CAPTURES[camera]
         answer = self._ask(letter)
         if answer != letter.answer:
@@ -31,17 +31,17 @@ class ServicePortClient:
             )
 
     def download(self, camera: Camera, progress: Progress | None = None) -> NDArray[np.uint8]:
-        """The picture (480, 640) in the camera's own memory, first row on top.
+        """The image (480, 640) in the camera's own memory, first row on top.
 
-        ``progress`` is called with (bytes done, bytes in all). Raises NoAnswerError when the line
-        falls silent before the end.
+        ``progress`` is called with (bytes done, total). Raises NoAnswerError if the line falls
+        silent before the end.
         """
         data = self._ask(DOWNLOADS[camera], progress)
         return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
     def _ask(self, letter: Letter, progress: Progress | None = None) -> bytes:
         while self._transport.read(READ_BYTES, 0.0):
-            pass  # what an earlier request left behind
+            pass  # drop the rest of an earlier answer
         self._transport.write(letter.request)
         answer = bytearray()
         while len(answer) < letter.length:

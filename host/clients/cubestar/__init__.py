@@ -1,1 +1,1 @@
-"""CubeStar's client, and what its operator does on the ground."""
+"""CubeStar's client and operator procedures."""

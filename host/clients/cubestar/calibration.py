@@ -1,10 +1,10 @@
-"""Fits CubeStar's undistortion to a camera that is described the other way round.
+"""Fits CubeStar's undistortion to a camera model in the opposite direction.
 
-Calibration tools give the model of Brown as undistorted to pixel; CubeStar's firmware evaluates it
-as pixel to undistorted (CubeStar thesis, equations 4.1.3 to 4.1.5), and then divides by its focal
-length (equation 4.1.6). The exact inverse of one is not of the other's form, but close to it. The
-firmware's model is linear in its coefficients, so that linear least squares over the frame give
-the best ones.
+Calibration tools fit Brown's model from undistorted points to pixels; CubeStar's firmware evaluates
+it from pixels to undistorted points (CubeStar thesis, equations 4.1.3 to 4.1.5), and then divides
+by its focal length (equation 4.1.6). The inverse of one is not exactly of the other's form, but
+close. The firmware's model is linear in its coefficients, so linear least squares over the frame
+give the best ones.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Calibration:
 def calibrate(camera: Camera) -> Calibration:
     """Fit the firmware's parameters to ``camera`` over a frame of 1024 x 512 px.
 
-    Raises ValueError when the camera's distortion can not be inverted over the frame.
+    Raises ValueError if the camera's distortion cannot be inverted over the frame.
     """
     columns, rows = np.meshgrid(
         np.linspace(0, COLUMNS - 1, COLUMNS // GRID_STEP_PX),
@@ -49,7 +49,7 @@ def calibrate(camera: Camera) -> Calibration:
     along_x = np.stack([x, x * r2, x * r2 * r2, 2 * x * y, r2 + 2 * x * x], axis=-1)
     along_y = np.stack([y, y * r2, y * r2 * r2, r2 + 2 * y * y, 2 * x * y], axis=-1)
     design = np.concatenate([along_x, along_y])
-    # The first coefficient scales all: the focal length of the unit vectors takes it over.
+    # The first coefficient scales all; the focal length of the unit vectors absorbs it.
     coefficients = np.linalg.lstsq(design, np.concatenate([true[:, 0], true[:, 1]]), rcond=None)[0]
     scale = float(coefficients[0])
     k1, k2, p1, p2 = (float(value) / scale for value in coefficients[1:])

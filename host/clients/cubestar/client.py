@@ -1,4 +1,4 @@
-"""CubeStar as a program uses it: pictures, attitude, stars and times through any client.
+"""CubeStar for programs: images, attitude, stars and times, through any client.
 
 Interface of the CubeSpace family, version 3, with this project's extensions. Axes: x right, y
 down, z out of the lens. Quaternions are scalar last and turn inertial vectors into camera vectors,
@@ -31,10 +31,10 @@ class Attitude:
 
     Attributes:
         quaternion: float64 (4,), unit length.
-        valid: the latest picture gave it; else it is an older one, or none at all.
-        matched: stars that it rests on.
+        valid: the latest image gave it; otherwise it is older, or none.
+        matched: stars used.
         mode: mode that identified them.
-        frame: number of the picture since power-up.
+        frame: number of the image since power-up.
         image_time_s: uptime at mid-exposure.
     """
 
@@ -47,7 +47,7 @@ class Attitude:
 
     @property
     def boresight(self) -> NDArray[np.float64]:
-        """Inertial unit vector (3,) of the direction that the camera looks in."""
+        """Inertial unit vector (3,) of the boresight."""
         x, y, z, w = self.quaternion
         return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z])
 
@@ -64,15 +64,15 @@ class Attitude:
 
 @dataclass(frozen=True, kw_only=True)
 class Quality(AttitudeQuality):
-    """How good the latest picture's attitude is, as the node rates it (profile ``extended``).
+    """Quality of the latest image's attitude as the node rates it (profile ``extended``).
 
-    Where nothing is known, the covariance has pi^2 on its diagonal.
+    An unknown covariance has pi^2 on its diagonal.
 
     Attributes:
-        frame: number of the picture since power-up.
-        background_range_dn: largest difference of the sky's brightness.
-        saturated: share of the picture at the end of the scale, 0 to 1.
-        elongated: areas drawn out to streaks.
+        frame: number of the image since power-up.
+        background_range_dn: range of the sky's brightness over the image.
+        saturated: share of saturated pixels, 0 to 1.
+        elongated: areas elongated to streaks.
     """
 
     frame: int
@@ -91,7 +91,7 @@ class Star:
         x_undistorted_px, y_undistorted_px: the same without distortion.
         pixels: pixels of its area.
         intensity: sum over the centroiding window in DN.
-        hipparcos: Hipparcos number; None when it is not identified.
+        hipparcos: Hipparcos number; None if not identified.
     """
 
     number: int
@@ -105,10 +105,9 @@ class Star:
 
 
 class CubeStar(DeviceClient):
-    """A CubeStar behind a client. Errors are those of the client, and the ones named here.
+    """A CubeStar behind a client; methods raise the client's errors and those named.
 
-    A step's time-out is longer than two frames at the lowest frame rate, a transfer and the
-    processing.
+    A step's time-out exceeds two frames at the lowest frame rate, a transfer and the processing.
     """
 
     def configure(self, settings: Mapping[str, Mapping[str, object]]) -> None:
@@ -117,28 +116,28 @@ class CubeStar(DeviceClient):
             self.perform(name, **parameters)
 
     def capture(self) -> None:
-        """Capture a picture; raises StepFailedError when none arrived."""
+        """Capture an image; raises StepFailedError if none arrived."""
         self.perform("CaptureImage")
         status = self.task_status()
         if status is not TaskStatus.CAPTURED:
-            raise StepFailedError(f"no picture captured: task status {status.name}")
+            raise StepFailedError(f"no image captured: task status {status.name}")
 
     def take_picture(self) -> None:
         """As ``capture`` does."""
         self.capture()
 
     def capture_and_process(self) -> TaskStatus:
-        """Capture a picture, detect, identify and estimate; returns how far it came."""
+        """Capture an image, detect, identify and estimate; returns the last step reached."""
         self.perform("CaptureAndProcess")
         return self.task_status()
 
     def process_image(self) -> TaskStatus:
-        """Detect, identify and estimate with the picture in memory; returns how far it came."""
+        """Detect, identify and estimate with the image in memory; returns the last step reached."""
         self.perform("ProcessImage")
         return self.task_status()
 
     def task_status(self) -> TaskStatus:
-        """What the node last did; raises BadAnswerError for an unknown status."""
+        """The node's last task; raises BadAnswerError for an unknown status."""
         value = int(self.client.telemetry("TaskStatus")["taskStatus"])
         try:
             return TaskStatus(value)
@@ -148,7 +147,7 @@ class CubeStar(DeviceClient):
     def picture(
         self, source: str | None = None, progress: Progress | None = None
     ) -> NDArray[np.uint8]:
-        """The picture in memory, as ``download_image`` gives it; there is one memory only."""
+        """The image in memory, as ``download_image``; there is only one memory."""
         return self.download_image(progress)
 
     def upload(self, picture: NDArray[np.uint8], progress: Progress | None = None) -> None:
@@ -156,10 +155,10 @@ class CubeStar(DeviceClient):
         self.upload_image(picture, progress)
 
     def download_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
-        """The picture in memory, (512, 1024) with the first row on top.
+        """The image in memory, (512, 1024) with the first row on top.
 
-        In blocks of 128 bytes: as one read carries one block, a lost answer can be asked for
-        again, which blocks of 256 bytes with their two reads would not allow.
+        It uses blocks of 128 bytes. One read carries one block, so a lost answer can be repeated;
+        blocks of 256 bytes take two reads and could not.
         """
         size = ImageBlockSize.BYTES_128
         image = np.empty((cubestar.IMAGE_BYTES // size.length, size.length), np.uint8)
@@ -173,24 +172,24 @@ class CubeStar(DeviceClient):
         return image.reshape(ROWS, COLUMNS)
 
     def stream_image(self, progress: Progress | None = None) -> NDArray[np.uint8]:
-        """The picture in memory, (512, 1024), as one stream of blocks: quicker, over a UART only.
+        """The image in memory, (512, 1024), as one stream of blocks: faster, UART only.
 
-        A lost block can not be asked for again: raises BadAnswerError or NoAnswerError then, and
-        TypeError on I2C.
+        A lost block cannot be repeated: raises BadAnswerError or NoAnswerError then, and TypeError
+        on I2C.
         """
         length = ImageBlockSize.BYTES_128.length
         data = self._stream("StreamDownImage", cubestar.IMAGE_BYTES // length, length, progress)
         return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
 
     def upload_image(self, image: NDArray[np.uint8], progress: Progress | None = None) -> None:
-        """Put ``image``, uint8 (512, 1024), in the picture memory.
+        """Upload ``image``, uint8 (512, 1024), to the image memory.
 
-        Black blocks are not sent: the upload begins with a cleared memory. Raises ValueError for
-        another shape or type, StepFailedError when the node received another number of blocks.
+        It clears the memory first and sends no black blocks. Raises ValueError for another shape or
+        type, StepFailedError if blocks were lost.
         """
         if image.shape != (ROWS, COLUMNS) or image.dtype != np.uint8:
             raise ValueError(
-                f"an uploaded picture is uint8 {(ROWS, COLUMNS)}, not {image.dtype} {image.shape}"
+                f"an uploaded image is uint8 {(ROWS, COLUMNS)}, not {image.dtype} {image.shape}"
             )
         self.perform("UploadImage")
         blocks = image.reshape(-1, cubestar.UPLOAD_BLOCK_BYTES)
@@ -205,7 +204,7 @@ class CubeStar(DeviceClient):
             raise StepFailedError(f"upload: {received} blocks arrived of {len(lit)}")
 
     def attitude(self) -> Attitude:
-        """The latest attitude in full precision; raises BadAnswerError when it is no rotation."""
+        """The latest attitude in full precision; raises BadAnswerError if it is not a rotation."""
         values = self.client.telemetry("AttitudeQuaternion")
         return Attitude(
             quaternion=unit_quaternion(values),
@@ -217,7 +216,7 @@ class CubeStar(DeviceClient):
         )
 
     def quality(self) -> Quality:
-        """How good the latest picture's attitude is; raises BadAnswerError for what none can be."""
+        """Quality of the latest image's attitude; raises BadAnswerError for impossible values."""
         values = self.client.telemetry("Quality")
         return Quality(
             **common(values),
@@ -229,7 +228,7 @@ class CubeStar(DeviceClient):
         )
 
     def latest(self) -> Columns:
-        """The latest attitude and its picture's time, the state of the task and its stars."""
+        """The latest attitude with its image's time, the task's state and the stars."""
         found = self.attitude()
         return {
             "valid": found.valid,
@@ -242,7 +241,7 @@ class CubeStar(DeviceClient):
         }
 
     def coarse_quaternion(self) -> NDArray[np.float64]:
-        """The latest quaternion (4,) of published telemetry, in steps of 1e-4.
+        """The latest quaternion (4,) of the published telemetry, in steps of 1e-4.
 
         For a node without this project's extensions.
         """
@@ -250,9 +249,9 @@ class CubeStar(DeviceClient):
         return unit_quaternion(values, "Qbar")
 
     def stars(self) -> list[Star]:
-        """The stars of the latest picture, in order of detection; stop the loop before.
+        """The stars of the latest image in order of detection; stop the loop first.
 
-        Raises BadAnswerError when the records do not make a whole list.
+        Raises BadAnswerError if the list is incomplete.
         """
         detected = int(self.client.telemetry("DetectionSummary")["NumStarsDetected"])
         identified = int(self.client.telemetry("NumIdStars")["numIdStars"])
@@ -273,7 +272,7 @@ class CubeStar(DeviceClient):
         ]
 
     def phase_times(self) -> dict[str, float]:
-        """Latest time of each phase in ms.
+        """Latest duration of each phase in ms.
 
         Keys: idle, discard, capture, transfer, detect, match, attitude, loop_total.
         """

@@ -1,8 +1,8 @@
-"""What a ground operator does by hand: find a detection threshold for a new sky.
+"""A ground operator's procedure: find a detection threshold for a new sky.
 
 CubeStar thesis, section 5.3.3: a threshold of 6 suits semi-urban skies; brighter ones need a higher
-one. Section 5.3.4 says what shows a good one: the weights are similar, and close to the maximum.
-Only telecommands and telemetry are used.
+one. Section 5.3.4: with a good one the weights are similar, and close to the maximum. It uses only
+telecommands and telemetry.
 """
 
 from collections.abc import Iterable
@@ -10,16 +10,16 @@ from collections.abc import Iterable
 from cubestack.firmware_model.interface.cubestar import IdMode
 from cubestack.host.clients.cubestar.client import CubeStar
 
-#: Thresholds in DN that are tried, about a quarter apart where that is more than one.
+#: Thresholds to try in DN, about a quarter apart but at least one.
 LADDER = (1, 2, 3, 4, 5, 6, 8, 10, 13, 16, 20, 25, 32, 40, 50, 63, 80, 100, 125, 160, 200)
 
 
 def find_threshold(cubestar: CubeStar, views: Iterable[object] = (None,)) -> int | None:
-    """Process pictures with each threshold, lost in space, and set the best one, in DN.
+    """Process images with each threshold, lost in space, and set the best; returns it in DN.
 
-    The best is the one by which most stars are identified that confirm each other, the higher one
-    in a tie. A picture is captured as soon as ``views`` gives something, so it can point elsewhere.
-    Returns None, and leaves the setting as it was, when none gives an attitude.
+    The best identifies most stars that confirm each other; a tie goes to the higher one. An image
+    is captured at each step of ``views``, which can change the pointing. Returns None, and restores
+    the setting, if none gives an attitude.
     """
     client = cubestar.client
     before = client.telemetry("DetectionThresholdValues")

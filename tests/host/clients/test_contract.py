@@ -62,5 +62,5 @@ def test_a_quaternion_that_is_no_rotation_is_told(wrong: dict[str, float]) -> No
 def test_a_device_without_a_picture_says_so(node: FakeNode) -> None:
     with pytest.raises(TargetError, match="CubeStar sends no picture"):
         DeviceClient(NodeClient(UartLink(node), CUBESTAR)).picture()
-    with pytest.raises(TargetError, match="AraMiS sends its picture over a serial line only"):
+    with pytest.raises(TargetError, match="AraMiS sends its image over a serial line only"):
         Aramis(over_i2c(FakeNode(ARAMIS))).picture()

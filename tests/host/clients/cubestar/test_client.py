@@ -177,7 +177,7 @@ def test_capture_tells_a_failure(cubestar: CubeStar, node: Any) -> None:
     node.values["TaskStatus"] = {"taskStatus": TaskStatus.CAPTURED}
     cubestar.capture()
     node.values["TaskStatus"] = {"taskStatus": TaskStatus.CAPTURE_FAILED}
-    with pytest.raises(StepFailedError, match="no picture captured: task status CAPTURE_FAILED"):
+    with pytest.raises(StepFailedError, match="no image captured: task status CAPTURE_FAILED"):
         cubestar.capture()
     node.values["TaskStatus"] = {"taskStatus": 99}
     with pytest.raises(BadAnswerError, match="unknown status 99"):
