@@ -53,5 +53,5 @@ def test_a_part_of_a_picture_has_the_same_camera() -> None:
 
 def test_a_distortion_that_can_not_be_inverted_is_told() -> None:
     camera = Camera(1000.0, 0.0, 0.0, k1=-3.0)
-    with pytest.raises(ValueError, match=r"can not be inverted over the frame: k1 -3, k2 0"):
+    with pytest.raises(ValueError, match=r"cannot be inverted over the frame: k1 -3, k2 0"):
         camera.unproject(np.array([[900.0, 0.0]]))

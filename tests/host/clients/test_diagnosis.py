@@ -51,10 +51,10 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
     ("answer", "told"),
     [
         (lambda _data: encode_frame(bytes(IDENTIFICATION.length)), ""),
-        (lambda _data: b"", "nothing comes: is it powered"),
-        (lambda data: data, "what is sent comes back"),
+        (lambda _data: b"", "no byte arrives: is it powered"),
+        (lambda data: data, "only an echo comes back"),
         (lambda _data: encode_frame(b"abc"), "not as CubeSense does: is it another device? (61 "),
-        (lambda _data: b"login: ", "bytes come, but no frame: .* (6c 6f 67 69 6e 3a 20)"),
+        (lambda _data: b"login: ", "bytes arrive, but no frame: .* (6c 6f 67 69 6e 3a 20)"),
     ],
 )
 def test_what_comes_tells_what_it_is(answer: Callable[[bytes], bytes], told: str) -> None:
@@ -104,10 +104,12 @@ def test_a_line_between_two_terminals_with_nobody_there(
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     ends = [f"pty,raw,echo=0,link={end}" for end in (ours, theirs)]
     with subprocess.Popen(["socat", "-d", "-d", *ends], stderr=subprocess.PIPE) as cable:
-        assert cable.stderr is not None
-        assert any(b"data transfer loop" in line for line in cable.stderr)
-        line = SerialTransport(str(ours), 57600)
-        assert why_silent(line, INTERFACE).startswith("nothing comes")
-        assert line.baud == 57600
-        line.close()
-        cable.terminate()
+        try:
+            assert cable.stderr is not None
+            assert any(b"data transfer loop" in line for line in cable.stderr)
+            line = SerialTransport(str(ours), 57600)
+            assert why_silent(line, INTERFACE).startswith("no byte arrives")
+            assert line.baud == 57600
+            line.close()
+        finally:
+            cable.terminate()

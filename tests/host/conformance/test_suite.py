@@ -223,7 +223,7 @@ def test_a_firmware_that_refuses_some_switches_is_found(good, uart, monkeypatch,
 @pytest.mark.parametrize(
     ("change", "detail"),
     [
-        (lambda sent: bytes([*sent[:10], sent[10] ^ 1, *sent[11:]]), "of the stream is another"),
+        (lambda sent: bytes([*sent[:10], sent[10] ^ 1, *sent[11:]]), "of the stream differs"),
         (lambda sent: encode_frame(bytes(127)) + sent, "block 0 has 127 bytes, declared 128"),
     ],
 )

@@ -162,7 +162,7 @@ def test_a_catalogue_arrives_whole(node: FakeAramis, aramis: Aramis) -> None:
 
 def test_a_refused_or_incomplete_catalogue(node: FakeAramis, aramis: Aramis) -> None:
     node.values["ErrorFlags"]["UploadError"] = True
-    with pytest.raises(StepFailedError, match="refused"):
+    with pytest.raises(StepFailedError, match="rejected"):
         aramis.load_catalogue(b"x" * 10)
     node.execute = lambda name, values: None  # type: ignore[method-assign]
     with pytest.raises(StepFailedError, match="1 blocks arrived of 3"):

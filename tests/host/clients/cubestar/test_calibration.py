@@ -99,7 +99,7 @@ def test_a_crop_moves_the_principal_point() -> None:
 
 
 def test_a_distortion_that_folds_is_told() -> None:
-    with pytest.raises(ValueError, match="can not be inverted over the frame: k1 -3"):
+    with pytest.raises(ValueError, match="cannot be inverted over the frame: k1 -3"):
         calibrate(Camera(1000.0, 512.0, 256.0, k1=-3.0))
 
 
