@@ -22,7 +22,7 @@ from cubestack.hdl.proofs.prover import Proof
 from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
 from cubestack.host.cli.arguments import Parser
 from cubestack.host.cli.waveform import find, show
-from cubestack.host.devices.registry import devices
+from cubestack.host.devices.registry import merged_tables
 from cubestack.host.terminal import progress, tell
 
 Entry = TypeVar("Entry")
@@ -68,11 +68,11 @@ examples:
 
 
 def _all_tops() -> TopTable:
-    return {name: top for device in devices() for name, top in device.tops().items()}
+    return merged_tables(lambda device: device.tops())
 
 
 def _all_proofs() -> Mapping[str, Proof]:
-    return {name: proof for device in devices() for name, proof in device.proofs().items()}
+    return merged_tables(lambda device: device.proofs())
 
 
 def add_arguments(

@@ -4,14 +4,18 @@ Another distribution registers a device by an entry point in the group ``cubesta
 name is the device's, its value leads to a ``Device``.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from typing import TypeVar
 
 from cubestack.firmware_model.interface.checks import check_address, check_interface
 from cubestack.host.devices.device import AnyDevice, Device
 from cubestack.host.devices.lazily import load
 from cubestack.host.errors import TargetError
+
+V = TypeVar("V")
 
 GROUP = "cubestack.devices"
 
@@ -67,3 +71,12 @@ def devices() -> Iterator[AnyDevice]:
             yield device(name)
         except TargetError:
             continue
+
+
+def merged_tables(table: Callable[[AnyDevice], Mapping[str, V]]) -> dict[str, V]:
+    """The entries of a table that each device has; leaves out tables that do not load."""
+    found: dict[str, V] = {}
+    for one in devices():
+        with suppress(TargetError):
+            found |= table(one)
+    return found

@@ -9,7 +9,8 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from cubestack.host.devices import registry
-from cubestack.host.devices.registry import device, device_names, devices
+from cubestack.host.devices.lazily import get
+from cubestack.host.devices.registry import device, device_names, devices, merged_tables
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.errors import TargetError
 
@@ -74,6 +75,15 @@ def test_a_wrong_registration_is_told_by_name_and_left_out_of_lists(
     assert "other" not in [one.name for one in devices()]
     with pytest.raises(TargetError, match=message):
         device("other")
+
+
+def test_a_table_that_does_not_load_leaves_the_others() -> None:
+    tables = {
+        "cubestar": get("nowhere:TOPS"),
+        "aramis": lambda: {"a": 1},
+        "cubesense": lambda: {"b": 2},
+    }
+    assert merged_tables(lambda one: tables[one.name]()) == {"a": 1, "b": 2}
 
 
 def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]) -> None:
