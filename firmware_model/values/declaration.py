@@ -285,7 +285,7 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, bool | int | float | str) else None
 
 
-def _declare(
+def declare(
     kind: ValueKind,
     default: Any,
     meaning: str,
@@ -294,18 +294,19 @@ def _declare(
     unit: str = "",
     **more: Any,
 ) -> Any:
+    """A value of a kind; ``more`` are keywords of `Declaration`."""
     return Declaration(
         kind=kind, default=default, meaning=meaning, low=low, high=high, unit=unit, **more
     )
 
 
 # Each takes (default, meaning), then (low, high, unit) for numbers, then keywords of `Declaration`.
-number: Callable[..., Any] = partial(_declare, NUMBER)
-whole: Callable[..., Any] = partial(_declare, WHOLE)
-flag: Callable[..., Any] = partial(_declare, FLAG)
-text: Callable[..., Any] = partial(_declare, TEXT)
-moment: Callable[..., Any] = partial(_declare, MOMENT)
-positive: Callable[..., Any] = partial(_declare, NUMBER, low=0, exclusive=True)
+number: Callable[..., Any] = partial(declare, NUMBER)
+whole: Callable[..., Any] = partial(declare, WHOLE)
+flag: Callable[..., Any] = partial(declare, FLAG)
+text: Callable[..., Any] = partial(declare, TEXT)
+moment: Callable[..., Any] = partial(declare, MOMENT)
+positive: Callable[..., Any] = partial(declare, NUMBER, low=0, exclusive=True)
 
 
 def choice(default: Any, meaning: str, choices: Any, **more: Any) -> Any:

@@ -87,8 +87,6 @@ if TYPE_CHECKING:
     from cubestack.host.clients.contract import Progress as Progress
     from cubestack.host.experiments.opener import MeasureOptions as MeasureOptions
     from cubestack.host.experiments.scene_experiment import SceneExperiment as SceneExperiment
-    from cubestack.host.options import between as between
-    from cubestack.host.options import option as option
 
     "Device"
     from cubestack.firmware_model.interface.checks import SensorError as SensorError

@@ -3,14 +3,12 @@
 import argparse
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import Field
 from importlib.metadata import metadata
 from typing import Any, NoReturn, TypeVar
 
-from cubestack.host import options
-from cubestack.host.options import Kind, Option, Options, flag
+from cubestack.firmware_model.values import FLAG, Declaration, ListDeclaration
+from cubestack.host.options import Options, option_string
 
-T = TypeVar("T")
 OptionsT = TypeVar("OptionsT", bound=Options)
 
 
@@ -51,41 +49,38 @@ def add_failed(commands: "argparse._SubParsersAction[Any]", name: str, error: st
     command.parse_known_args = failed
 
 
-def typed(kind: Kind[T]) -> Callable[[str], T]:
-    """The type of an argument of this kind; its error says what would be right."""
+def add_value(parser: argparse._ActionsContainer, name: str, one: Any, **how: Any) -> None:
+    """Declare a value as an option; ``how`` is given to the parser besides."""
+    part = one.part if isinstance(one, ListDeclaration) else one
+    how = {"dest": name, "default": one.default, "help": one.meaning, **how}
+    if part.kind.name == FLAG.name:
+        how |= {"action": "store_const", "const": True}
+    else:
+        metavar = one.metavar or "|".join(part.choices) or part.unit.upper().replace("/", "_")
+        how |= {"type": _read(part), "choices": part.choices or None, "metavar": metavar or None}
+        if part is not one:
+            how |= {"action": "append", "default": []}
+    parser.add_argument(option_string(name), **how)
 
-    def read(text: str) -> T:
+
+def _read(one: Declaration) -> Callable[[str], Any]:
+    def read(text: str) -> Any:
         try:
-            return kind(text)
+            return one.parse(text)
         except ValueError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
 
     return read
 
 
-def whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Type of a whole number in ``least``..``most``."""
-    return typed(options.whole(least, most))
-
-
 def add_options(parser: argparse.ArgumentParser, *declared: type[Options]) -> None:
     """Declare the options of these classes; one that several have is as the first has it."""
     groups = defaultdict[str, argparse._ActionsContainer](parser.add_mutually_exclusive_group)
-    fields: dict[str, Field[Any]] = {}
+    own: dict[str, Declaration] = {}
     for each in declared:
-        fields |= {name: field for name, field in each.declared().items() if name not in fields}
-    for name, field in fields.items():
-        option: Option = field.metadata["option"]
-        place = parser if option.group is None else groups[option.group]
-        how: dict[str, Any] = {"default": field.default, "help": option.help}
-        if option.kind is None and not option.choices:
-            place.add_argument(flag(name), action="store_true", **how)
-            continue
-        how["type"] = None if option.kind is None else typed(option.kind)
-        how |= {"choices": option.choices or None, "metavar": option.metavar}
-        if option.many:
-            how |= {"action": "append", "default": []}
-        place.add_argument(flag(name), **how)
+        own = {**each.declared(), **own}
+    for name, one in own.items():
+        add_value(groups[one.group] if one.group else parser, name, one)
 
 
 def chosen(args: argparse.Namespace, declared: type[OptionsT]) -> OptionsT:

@@ -6,13 +6,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
 from cubestack.host.devices.registry import devices
 from cubestack.host.emulation.emulated import AnyEmulated, check_options
 from cubestack.host.emulation.insight import InsightFiles, open_gdb
 from cubestack.host.emulation.records import create_file, start_recorder, start_trace
-from cubestack.host.options import flag
+from cubestack.host.options import option_string
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def add_start_arguments(
     seed_help: str = "seed of everything random (default 0)",
 ) -> None:
     """Declare the options for the seed, whose default is ``seed``, for faults and the engine."""
-    parser.add_argument("--seed", type=whole(0), default=seed, help=seed_help)
+    add_value(parser, "seed", whole(seed, seed_help, 0))
     parser.add_argument(
         "--faults", type=Path, metavar="FILE", help="TOML fault plan (docs/faults.md)"
     )
@@ -56,21 +57,7 @@ def add_board_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_option(parser: argparse.ArgumentParser, option: BoardOption, prefix: str = "") -> None:
     """Declare one of them; ``prefix`` goes before its help."""
-    text = prefix + option.help
-    if option.metavar:
-        parser.add_argument(option.flag, dest=option.name, metavar=option.metavar, help=text)
-    elif option.choices:
-        parser.add_argument(
-            option.flag,
-            dest=option.name,
-            choices=option.choices,
-            metavar="|".join(option.choices),
-            help=text,
-        )
-    else:
-        parser.add_argument(
-            option.flag, dest=option.name, action="store_const", const=True, help=text
-        )
+    add_value(parser, option.name, option, default=None, help=prefix + option.meaning)
 
 
 def given_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -82,7 +69,7 @@ def given_options(args: argparse.Namespace) -> dict[str, Any]:
 def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any]:
     """The same for a device; ValueError for another one's."""
     options = given_options(args)
-    check_options(device, options, flag)
+    check_options(device, options, option_string)
     return options
 
 
@@ -130,11 +117,16 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options about firmware of the user's own."""
-    parser.add_argument(
-        "--gdb",
-        type=whole(0, 0xFFFF),
-        metavar="PORT",
-        help="serve gdb on this port of this machine, for --firmware (docs/own-firmware.md)",
+    add_value(
+        parser,
+        "gdb",
+        whole(
+            None,
+            "serve gdb on this port of this machine, for --firmware (docs/own-firmware.md)",
+            0,
+            0xFFFF,
+            metavar="PORT",
+        ),
     )
     parser.add_argument(
         "--gdb-wait",

@@ -32,15 +32,16 @@ from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.scene.orbit_file import load_orbit
 from cubestack.firmware_model.formats.linux_i2c import socket_path
 from cubestack.firmware_model.formats.setup import Setup
+from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
-from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.ports import LAST_PORT, add_port_arguments, check_linux, open_ports
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, power_up
 from cubestack.host.emulation.history import History
 from cubestack.host.emulation.orbit import follow
 from cubestack.host.emulation.remote_controls import TOKEN
-from cubestack.host.options import flag
+from cubestack.host.options import option_string
 from cubestack.host.recording.setups import emulated_setup
 from cubestack.host.terminal import busy, progress, say
 
@@ -79,10 +80,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="TOML orbit of the satellite that all devices are on (docs/orbit.md)",
     )
     add_port_arguments(parser)
-    parser.add_argument(
-        "--i2c", type=whole(0, 255), metavar="BUS", help="I2C bus, for cubestack run --attach"
+    add_value(
+        parser, "i2c", whole(None, "I2C bus, for cubestack run --attach", 0, 255, metavar="BUS")
     )
-    parser.add_argument("--baud", type=whole(1), help="of the node protocol; default 57600")
+    add_value(parser, "baud", whole(None, "of the node protocol; default 57600", 1))
     device_options.add_start_arguments(parser)
     device_options.add_board_arguments(parser)
     parser.add_argument(
@@ -91,13 +92,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="real",
         help="real: virtual time follows wall time; fast: as fast as possible",
     )
-    parser.add_argument(
-        "--control",
-        type=whole(0, LAST_PORT),
-        metavar="PORT",
-        help=f"HTTP port for control (docs/control.md); token in ${TOKEN}, or a new one",
+    add_value(
+        parser,
+        "control",
+        whole(
+            None,
+            f"HTTP port for control (docs/control.md); token in ${TOKEN}, or a new one",
+            0,
+            LAST_PORT,
+            metavar="PORT",
+        ),
     )
-    parser.add_argument("--lifeline", type=whole(0), help=argparse.SUPPRESS)
+    add_value(parser, "lifeline", whole(None, argparse.SUPPRESS, 0))
     device_options.add_record_arguments(parser)
     device_options.add_insight_arguments(parser)
 
@@ -164,7 +170,9 @@ def _check(args: argparse.Namespace) -> None:
         for name in ONE_DEVICE:
             value = getattr(args, name)
             if value not in (None, "") and value is not False:
-                raise ValueError(f"{flag(name)} applies to one device, but several are given")
+                raise ValueError(
+                    f"{option_string(name)} applies to one device, but several are given"
+                )
     if args.i2c is not None:
         check_linux()
 
@@ -225,7 +233,7 @@ def _history(
     args: argparse.Namespace, opened: list[AnyEmulated], setups: Sequence[Setup], stack: ExitStack
 ) -> History | str:
     """The history that the control port can go back in, or why there is none."""
-    given = [flag(name) for name in FORWARD_ONLY if getattr(args, name) is not None]
+    given = [option_string(name) for name in FORWARD_ONLY if getattr(args, name) is not None]
     if args.control is None or given:
         if len(opened) == 1:
             device_options.record(args, opened[0], stack, setups[0])

@@ -21,7 +21,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.device_options import add_board_arguments, given_options
 from cubestack.host.cli.ports import LAST_PORT
 from cubestack.host.devices.registry import device_names
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--device", choices=device_names(), help="needed if TARGET does not name it"
     )
-    parser.add_argument("--baud", type=whole(1), help="baud rate of the serial line")
+    add_value(parser, "baud", whole(None, "baud rate of the serial line", 1))
     parser.add_argument("--bench", metavar="TARGET", help="serial line with the bench protocol")
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
@@ -55,14 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="record the session with a device that is not emulated here",
     )
     parser.add_argument("--scene", metavar="FILE", help="for an emulated device")
-    parser.add_argument("--seed", type=whole(0), help="for an emulated device")
+    add_value(parser, "seed", whole(None, "for an emulated device", 0))
     add_board_arguments(parser)
-    parser.add_argument(
-        "--port",
-        type=whole(0, LAST_PORT),
-        default=0,
-        help="port of the page (default: any free one)",
-    )
+    add_value(parser, "port", whole(0, "port of the page (default: any free one)", 0, LAST_PORT))
     parser.add_argument("--json", action="store_true", help="print the address as a JSON object")
 
 

@@ -15,12 +15,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
+from cubestack.firmware_model.values import whole
 from cubestack.hdl.flow.area_report import area_json, area_table, areas
 from cubestack.hdl.flow.top import TopTable, counted, tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.hdl.proofs.prover import Proof
 from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
-from cubestack.host.cli.arguments import Parser
+from cubestack.host.cli.arguments import Parser, add_value
 from cubestack.host.cli.waveform import find, show
 from cubestack.host.devices.registry import merged_tables
 from cubestack.host.terminal import progress, tell
@@ -115,9 +116,7 @@ def add_arguments(
     wave.add_argument(
         "--text", action="store_true", help="print text even if a viewer is installed"
     )
-    wave.add_argument(
-        "--last", type=_count, default=20, metavar="N", help="number of changes in the text"
-    )
+    add_value(wave, "last", whole(20, "number of changes in the text", 1, metavar="N"))
     wave.add_argument(
         "--internal", action="store_true", help="include internal signals in the text"
     )
@@ -164,12 +163,6 @@ def _prove(args: argparse.Namespace) -> int:
     if args.json:
         print(verdict_json(done))
     return 0 if all(verdict.good for verdict in done) else 1
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1 on, not {text!r}")
-    return int(text)
 
 
 def _wave(args: argparse.Namespace) -> int:

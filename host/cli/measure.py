@@ -20,7 +20,8 @@ from typing import Any
 
 from rich.table import Table
 
-from cubestack.host.cli.arguments import add_failed, add_options, chosen, typed
+from cubestack.firmware_model.values import number
+from cubestack.host.cli.arguments import add_failed, add_options, add_value, chosen
 from cubestack.host.cli.device_options import (
     add_engine_arguments,
     add_insight_arguments,
@@ -35,10 +36,8 @@ from cubestack.host.devices.registry import device_names
 from cubestack.host.errors import TargetError
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import between
 from cubestack.host.terminal import progress, say, show, tell
 
-PERCENT = between(0, 100, "a number of percent in 0..100")
 SHOWN = 40
 """Rows of a table."""
 
@@ -46,12 +45,10 @@ SHOWN = 40
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the devices, each with options of its own."""
     for command in add_devices(parser, lambda device: device.experiment and device.experiment()):
-        command.add_argument(
-            "--min-right",
-            type=typed(PERCENT),
-            metavar="PCT",
-            help="exit status 1 if fewer percent of the results are right",
+        percent = number(
+            None, "exit status 1 if fewer percent of the results are right", 0, 100, metavar="PCT"
         )
+        add_value(command, "min_right", percent)
 
 
 def add_devices(

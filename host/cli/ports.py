@@ -11,7 +11,8 @@ from cubestack.emulator.ports.pseudo_terminal import PtyEndpoint
 from cubestack.emulator.ports.rfc2217 import Rfc2217Endpoint
 from cubestack.emulator.ports.serial_port import SerialPort
 from cubestack.emulator.ports.tcp import TcpEndpoint
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.devices.registry import device_names
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.terminal import say
@@ -30,14 +31,19 @@ def add_port_arguments(parser: argparse.ArgumentParser) -> None:
         help="link to a pseudo-terminal; for several devices, the prefix of their links; "
         "default: " + ", ".join(f"./tty{name.upper()}" for name in device_names()),
     )
-    where.add_argument(
-        "--tcp", type=whole(0, LAST_PORT), metavar="PORT", help="serial line on a local TCP port"
+    add_value(
+        where, "tcp", whole(None, "serial line on a local TCP port", 0, LAST_PORT, metavar="PORT")
     )
-    where.add_argument(
-        "--rfc2217",
-        type=whole(0, LAST_PORT),
-        metavar="PORT",
-        help="the same with RFC 2217: clients set the baud rate; a wrong one garbles",
+    add_value(
+        where,
+        "rfc2217",
+        whole(
+            None,
+            "the same with RFC 2217: clients set the baud rate; a wrong one garbles",
+            0,
+            LAST_PORT,
+            metavar="PORT",
+        ),
     )
     parser.add_argument(
         "--strict-line",

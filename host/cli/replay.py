@@ -21,12 +21,12 @@ from pathlib import Path
 
 from cubestack.emulator.recording.replay import SETTLE_PS, Replay
 from cubestack.firmware_model.formats.recording import load_recording
-from cubestack.host.cli.arguments import typed
+from cubestack.firmware_model.values import number
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.device_options import add_record_arguments, add_start_arguments, record
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.emulation.history import Recipe
 from cubestack.host.emulation.records import create_file, start_trace
-from cubestack.host.options import between
 from cubestack.host.recording.setups import setup_for
 from cubestack.host.terminal import busy, say
 
@@ -38,9 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="replaces the recorded one")
     add_start_arguments(parser, seed=None, seed_help="replaces the recorded one")
     add_record_arguments(parser)
-    time = typed(between(0.0, LATEST_S, "a time in s"))
-    parser.add_argument("--trace-from", type=time, metavar="S", help="where --trace begins")
-    parser.add_argument("--trace-to", type=time, metavar="S", help="where --trace ends")
+    for name, what in (("trace_from", "begins"), ("trace_to", "ends")):
+        add_value(parser, name, number(None, f"where --trace {what}", 0, LATEST_S, "s"))
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object with all differences"
     )

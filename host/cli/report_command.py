@@ -7,7 +7,7 @@ from cubestack.host.cli.measure import add_board, run_experiment
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.experiment import AnyExperiment
 from cubestack.host.experiments.measure import board_options
-from cubestack.host.options import flag
+from cubestack.host.options import option_string
 
 
 class ReportCommand:
@@ -38,7 +38,6 @@ class ReportCommand:
                     raise ValueError(f"{declared.flag} is an option of {other.name} alone")
             for name, option in theirs.options.declared().items():
                 if name not in own and getattr(args, name) != option.default:
-                    raise ValueError(
-                        f"{flag(name)} has no effect for {device.name}; it is {other.name}'s"
-                    )
+                    whose = f"has no effect for {device.name}; it is {other.name}'s"
+                    raise ValueError(f"{option_string(name)} {whose}")
         return run_experiment(args, device, experiment)

@@ -24,8 +24,9 @@ from cubestack.emulator.i2cdev.guest_process import RouteError
 from cubestack.emulator.i2cdev.running import HostBus, attached_bus, emulated_bus, run_program
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.formats.linux_i2c import socket_path
+from cubestack.firmware_model.values import whole
 from cubestack.host.cli import device_options
-from cubestack.host.cli.arguments import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.ports import check_linux
 from cubestack.host.devices.registry import device, device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
@@ -41,9 +42,7 @@ NACK_ERRORS = ("ENXIO", "EREMOTEIO", "EIO", "ETIMEDOUT")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--bus", type=whole(0, 255), default=DEFAULT_BUS, metavar="N", help="/dev/i2c-N (default 7)"
-    )
+    add_value(parser, "bus", whole(DEFAULT_BUS, "/dev/i2c-N (default 7)", 0, 255, metavar="N"))
     parser.add_argument(
         "--attach",
         nargs="?",
@@ -70,12 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     device_options.add_start_arguments(parser)
     device_options.add_board_arguments(parser)
-    parser.add_argument(
-        "--hz",
-        type=whole(1),
-        default=STANDARD_HZ,
-        help="bus clock in bits per second (default 100000)",
-    )
+    add_value(parser, "hz", whole(STANDARD_HZ, "bus clock in bits per second (default 100000)", 1))
     parser.add_argument(
         "--pace",
         choices=("real", "fast"),

@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.device_options import add_board_arguments, given_options, show_notices
 from cubestack.host.devices.registry import device_names
 from cubestack.host.emulation.remote_controls import TOKEN
@@ -21,9 +22,9 @@ def add_target_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--backup", action="store_true", help="the serial line speaks the register protocol"
     )
-    parser.add_argument("--baud", type=whole(1), help="baud rate of the serial line")
+    add_value(parser, "baud", whole(None, "baud rate of the serial line", 1))
     parser.add_argument("--scene", type=Path, metavar="FILE", help="for an emulated device")
-    parser.add_argument("--seed", type=whole(0), default=0, help="for an emulated device")
+    add_value(parser, "seed", whole(0, "for an emulated device", 0))
     parser.add_argument(
         "--control", metavar="URL", help=f"control port of the emulation; its token is in ${TOKEN}"
     )

@@ -6,7 +6,7 @@ does not load it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from keyword import iskeyword
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, TypeVar
 from cubestack.firmware_model.interface.cameras.registers import CameraRegisterMap
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES, Switches
+from cubestack.firmware_model.values import TEXT, Declaration, ValueKind
 from cubestack.host.clients.contract import Client, DeviceClient
+from cubestack.host.options import SWITCH, option_string
 
 if TYPE_CHECKING:
     from cubestack.emulator.boards.contract import Board
@@ -43,30 +45,37 @@ FILE = "FILE"
 """``metavar`` of an option that names a file."""
 
 
+def _file(given: Any) -> Any:
+    if not isinstance(given, str | Path):
+        raise TypeError
+    return given
+
+
 @dataclass(frozen=True)
-class BoardOption:
+class BoardOption(Declaration):
     """An option that one device's board has, beside those of all.
 
+    Its name is the keyword of ``Device.open_board`` and that in recordings. With choices it is one
+    of these texts, with a metavar any text, else a flag.
+
     Attributes:
-        name: keyword of ``Device.open_board``, and its name in recordings; ``--name`` on the
-            command line, with dashes.
-        help: one phrase for a user.
-        choices: what it may be, as typed; empty for a flag or any text.
-        default: what it is when it is not given: one of ``choices``, a text, or False.
         notice: what a user must know of a value, or None.
-        metavar: what stands for any text in the help; empty where it is none.
         known: texts that have a meaning of their own.
         unset: what it means when it is empty, a word or two for lists.
     """
 
     name: str
-    help: str
+    meaning: str
     choices: tuple[str, ...] = ()
     default: str | bool = False
+    _: KW_ONLY
     notice: Callable[[str], str | None] = lambda _value: None
-    metavar: str = ""
     known: tuple[str, ...] = ()
     unset: str = ""
+
+    def __post_init__(self) -> None:
+        kind = ValueKind("file", "a file", _file, str) if self.is_file else TEXT
+        object.__setattr__(self, "kind", kind if self.choices or self.metavar else SWITCH)
 
     @property
     def is_file(self) -> bool:
@@ -76,7 +85,7 @@ class BoardOption:
     @property
     def flag(self) -> str:
         """As the command line has it."""
-        return "--" + self.name.replace("_", "-")
+        return option_string(self.name)
 
 
 #: Options of every device that has switches.

@@ -201,10 +201,10 @@ def check_options(
             ]
             whose = f"an option of {', '.join(owners)}, not" if owners else "no option"
             raise ValueError(f"{shown(name)} is {whose} of {device.name}")
-        choices = own[name].choices or (False, True)
-        if value not in choices and not own[name].metavar:
-            known = ", ".join(map(str, choices))
-            raise ValueError(f"{name} of {device.name} must be one of {known}, not {value!r}")
+        try:
+            own[name].check(value)
+        except ValueError as error:
+            raise ValueError(f"{name} of {device.name} {error}") from None
 
 
 def scene_options(device: AnyDevice, scene: Any) -> dict[str, str]:

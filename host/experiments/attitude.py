@@ -22,13 +22,14 @@ from cubestack.emulator.scene.attitude import (
 )
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.values import number, whole
 from cubestack.host.clients.quality import AttitudeQuality
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result, Section
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.options import ANGLE, CORNER, NUMBER, PATH, SCENE, option, whole
+from cubestack.host.options import corner, file_option, path_option, switch
 from cubestack.host.pictures.campaigns import sky_map
 
 RIGHT_CROSS_DEG = 0.1
@@ -42,27 +43,22 @@ SAME_STAR_DEG = 0.2
 class SkyOptions(MeasureOptions):
     """Options of every star tracker; without scene and image each frame has a random sky."""
 
-    scene: Any = option(
-        None, "TOML scene; default: random sky", SCENE, metavar="FILE", group="light"
-    )
-    image: Path | None = option(
-        None, "use an image file in place of the sky", PATH, metavar="FILE", group="light"
-    )
+    scene: Any = file_option(None, "TOML scene; default: random sky", group="light")
+    image: Path | None = path_option(None, "use an image file in place of the sky", group="light")
     mode: str = "lis"
-    hint_error: float = option(0.0, "largest error of the hint", ANGLE, metavar="DEG")
-    mag_limit: float | None = option(
+    hint_error: float = number(0.0, "largest error of the hint", 0, 180, "deg")
+    mag_limit: float | None = number(
         None,
         "leave out stars fainter than this; default: none that the camera can see",
-        NUMBER,
         metavar="V",
     )
-    false_stars: int = option(
-        0, "number of stars that are in no catalogue, at random places", whole(0), metavar="N"
+    false_stars: int = whole(
+        0, "number of stars that are in no catalogue, at random places", 0, metavar="N"
     )
-    no_noise: bool = option(False, "turn the sensor's noise off")
+    no_noise: bool = switch("turn the sensor's noise off")
     hazard: tuple[hazards.Asked, ...] = hazards.hazard_option()
-    crop: tuple[int, int] = option(
-        (0, 0), "with --image: left upper corner of the part that is seen", CORNER, metavar="X,Y"
+    crop: tuple[int, int] = corner(
+        (0, 0), "with --image: left upper corner of the part that is seen"
     )
 
     @property

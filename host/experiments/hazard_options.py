@@ -22,7 +22,7 @@ from cubestack.emulator.scene.hazards import (
 )
 from cubestack.emulator.scene.hazards.hazard import Hazard
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.options import Kind, option
+from cubestack.firmware_model.values import REQUIRED, ValueKind, declare, many
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,27 @@ class Asked:
 
 
 def _asked(given: Any) -> Asked:
-    if isinstance(given, Asked):
-        return given
+    if not isinstance(given, Asked):
+        raise TypeError
+    return given
+
+
+def _parsed(given: str) -> Asked:
     name, equals, strength = given.partition("=")
     return Asked(name, float(strength) if equals else None)
 
 
+ASKED = ValueKind("hazard", "NAME or NAME=STRENGTH, as in moon or gradient=60", _asked, _parsed)
+
+
 def hazard_option() -> Any:
-    """The field of an experiment's options that takes hazards; ``check`` knows their names."""
-    return option(
+    """The option of an experiment that takes hazards; ``check`` knows their names."""
+    return many(
         (),
         "add a hazard to every random frame, e.g. moon or gradient=60; repeatable "
         "(see docs/hazards.md)",
-        Kind("NAME or NAME=STRENGTH, as in moon or gradient=60", _asked),
+        declare(ASKED, REQUIRED, ""),
         metavar="NAME[=STRENGTH]",
-        many=True,
     )
 
 

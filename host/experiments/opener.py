@@ -7,21 +7,20 @@ from typing import Any, Generic
 
 from cubestack.emulator.faults.plan import Plan, load_plan
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, Switches
+from cubestack.firmware_model.values import whole
 from cubestack.host.devices.device import BoardT_co, ClientT_co, Device, Engine, Shown
 from cubestack.host.emulation.emulated import EmulatedDevice, power_up
-from cubestack.host.options import PLAN, SCENE, Options, option, whole
+from cubestack.host.options import Options, file_option
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureOptions(Options):
     """Options of everything that ``measure`` measures."""
 
-    scene: Any = option(None, "TOML scene; default: a random one", SCENE, metavar="FILE")
-    frames: int = option(1, "number of frames (default 1)", whole(1))
-    seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    faults: Path | Plan | None = option(
-        None, "TOML fault plan (docs/faults.md)", PLAN, metavar="FILE"
-    )
+    scene: Any = file_option(None, "TOML scene; default: a random one")
+    frames: int = whole(1, "number of frames (default 1)", 1)
+    seed: int = whole(0, "seed of everything random (default 0)", 0)
+    faults: Path | Plan | None = file_option(None, "TOML fault plan (docs/faults.md)")
 
 
 def _silent(items: Iterable[Any], _total: int, _label: str) -> Iterator[Any]:

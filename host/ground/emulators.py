@@ -16,7 +16,7 @@ from cubestack.host.emulation.remote_controls import TOKEN, ControlClient, Remot
 from cubestack.host.errors import HostError, PortOpenError, TargetError
 from cubestack.host.ground.guard import new_token
 from cubestack.host.ground.scenes import text_of
-from cubestack.host.options import flag
+from cubestack.host.options import option_string
 from cubestack.host.targets import Target, open_target
 
 _CONTROL = re.compile(r"control on (\S+), token ")
@@ -92,7 +92,7 @@ class Emulator:
         now = self.options.get(option.name, chosen.get(option.name, option.default))
         return {
             "name": option.name,
-            "help": option.help,
+            "help": option.meaning,
             "choices": list(option.choices),
             "known": list(option.known),
             "file": option.is_file,
@@ -156,9 +156,9 @@ def words(options: Mapping[str, Any]) -> list[str]:
     found: list[str] = []
     for name, value in options.items():
         if value is True:
-            found.append(flag(name))
+            found.append(option_string(name))
         elif value is not None and value is not False and value != "":
-            found += [flag(name), str(value)]
+            found += [option_string(name), str(value)]
     return found
 
 

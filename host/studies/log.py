@@ -19,27 +19,23 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from cubestack.host.cli.arguments import typed, whole
+from cubestack.firmware_model.values import number, whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.shell import split_commands
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.clients.contract import Columns
 from cubestack.host.devices.result_table import log_lines, scatter
 from cubestack.host.emulation.records import create_file
 from cubestack.host.errors import TargetError
-from cubestack.host.options import between
 from cubestack.host.shell.language import Shell
 from cubestack.host.terminal import say
-
-SECONDS = between(0, 86_400, "a number of seconds in 0..86400")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_target_arguments(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="default: standard output")
-    parser.add_argument("--count", type=whole(1), metavar="N", help="lines; default: until Ctrl-C")
-    parser.add_argument(
-        "--interval", type=typed(SECONDS), default=1.0, metavar="S", help="of the lines (default 1)"
-    )
+    add_value(parser, "count", whole(None, "lines; default: until Ctrl-C", 1, metavar="N"))
+    add_value(parser, "interval", number(1.0, "of the lines (default 1)", 0, 86_400, "s"))
     for option, name, when in (("-c", "first", "the first line"), ("--each", "each", "every line")):
         text = f"shell commands before {when}, separated by semicolons"
         parser.add_argument(option, dest=name, default="", metavar="COMMANDS", help=text)

@@ -19,11 +19,11 @@ from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.host.cli.arguments import typed, whole
+from cubestack.firmware_model.values import number, whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.options import between
 from cubestack.host.pictures.images import save_picture
 from cubestack.host.pictures.stretch import SKY, stretched
 from cubestack.host.terminal import say
@@ -38,11 +38,10 @@ ANGLES = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("device", choices=device_names())
     for name, (low, high, meaning) in ANGLES.items():
-        angle = between(low, high, f"an angle in {low}..{high} degrees")
-        parser.add_argument(f"--{name}", type=typed(angle), metavar="DEG", help=meaning)
+        add_value(parser, name, number(None, meaning, low, high, "deg"))
     parser.add_argument("--scene", type=Path, metavar="FILE", help="TOML scene; its pose counts")
     parser.add_argument("--mag-limit", type=float, metavar="V", help="only brighter stars")
-    parser.add_argument("--seed", type=whole(0), default=0, help="of the noise (default 0)")
+    add_value(parser, "seed", whole(0, "of the noise (default 0)", 0))
     parser.add_argument(
         "--stretched", action="store_true", help="lift faint stars for the eye; not for uploads"
     )

@@ -297,7 +297,7 @@ def test_the_commands_say_what_can_not_be_built(measure: Measure, emulate: Emula
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ("measure cubestar --layout 4", "invalid choice: 4 (choose from 1, 2, 3, two-boards)"),
+        ("measure cubestar --layout 4", "must be one of 1, 2, 3, two-boards, not 4"),
         ("emulate cubesense --tcp 0 --layout 2", "option of cubestar, not of"),
     ],
 )

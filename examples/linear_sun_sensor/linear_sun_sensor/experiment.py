@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.sensor import MeasureOptions, SceneExperiment, between, option
+from cubestack.sensor import MeasureOptions, SceneExperiment, number
 from linear_sun_sensor.scene import SlitScene
 
 
@@ -20,9 +20,7 @@ from linear_sun_sensor.scene import SlitScene
 class SunOptions(MeasureOptions):
     """Options of `cubestack measure sunslit`."""
 
-    reach: float = option(
-        40.0, "largest angle (40)", between(0, 90, "an angle in 0..90 degrees"), metavar="DEG"
-    )
+    reach: float = number(40.0, "largest angle (40)", 0, 90, "deg")
 
 
 def random_scene(rng: np.random.Generator, options: SunOptions) -> SlitScene:

@@ -35,12 +35,22 @@ from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras import mt9m001
+from cubestack.firmware_model.values import (
+    NUMBER,
+    REQUIRED,
+    ValueKind,
+    choice,
+    declare,
+    many,
+    number,
+    positive,
+)
 from cubestack.host.clients.aramis.client import Aramis, Star
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import ANGLE, CORNER, NUMBER, POSITIVE, Kind, between, option
+from cubestack.host.options import corner
 
 AramisOpener: TypeAlias = "Opener[AramisBoard, Aramis]"
 _Emulated: TypeAlias = "EmulatedDevice[AramisBoard, Aramis]"
@@ -56,12 +66,17 @@ PHASE_S = 0.2
 
 
 def _magnitudes(given: Any) -> tuple[float, float]:
-    brightest, faintest = given.split(",") if isinstance(given, str) else given
-    return NUMBER(brightest), NUMBER(faintest)
+    brightest, faintest = map(NUMBER.read, given)
+    if not brightest <= faintest:
+        raise ValueError
+    return brightest, faintest
 
 
-MAGNITUDES = Kind(
-    "V,V, the brightest first, as in 4.5,6", _magnitudes, lambda pair: pair[0] <= pair[1]
+MAGNITUDES = ValueKind(
+    "magnitudes",
+    "V,V, the brightest first, as in 4.5,6",
+    _magnitudes,
+    lambda text: _magnitudes(map(float, text.split(","))),
 )
 
 
@@ -69,38 +84,38 @@ MAGNITUDES = Kind(
 class AramisOptions(attitudes.SkyOptions):
     """Options of `cubestack measure aramis`."""
 
-    mode: str = option(
-        "lis", "lost in space (default), or near a rough direction", choices=("lis", "assisted")
+    mode: str = choice(
+        "lis", "lost in space (default), or near a rough direction", ("lis", "assisted")
     )
-    field: float = option(
+    field: float = number(
         FIELD_DEG,
         "field of view of lens and catalogue (default 21.5346, the published one)",
-        between(5, 40, "a field of view in 5..40 degrees"),
-        metavar="DEG",
+        5,
+        40,
+        "deg",
     )
-    exposure: float | None = option(None, "exposure (default 200)", POSITIVE, metavar="MS")
-    gain: float | None = option(
-        None, "gain, 1 to 15 (default 15)", between(1, 15, "a gain in 1..15"), metavar="X"
-    )
-    rate: float = option(0.0, "body rate across the boresight", ANGLE, metavar="DEG_S")
-    roll_rate: float = option(0.0, "body rate about it", ANGLE, metavar="DEG_S")
-    false_mags: tuple[float, float] = option(
+    exposure: float | None = positive(None, "exposure (default 200)", unit="ms")
+    gain: float | None = number(None, "gain, 1 to 15 (default 15)", 1, 15, metavar="X")
+    rate: float = number(0.0, "body rate across the boresight", 0, 180, "deg/s")
+    roll_rate: float = number(0.0, "body rate about it", 0, 180, "deg/s")
+    false_mags: tuple[float, float] = declare(
+        MAGNITUDES,
         (4.5, 6.0),
         "brightest and faintest magnitude of the false stars (default 4.5,6)",
-        MAGNITUDES,
         metavar="V,V",
     )
-    without: tuple[str, ...] = option(
-        (), "leave out a term of the noise; repeatable", choices=NOISE_TERMS, many=True
+    without: tuple[str, ...] = many(
+        (), "leave out a term of the noise; repeatable", choice(REQUIRED, "", NOISE_TERMS)
     )
-    bit_flips: float = option(
+    bit_flips: float = number(
         0.0,
         "flip each bit of the catalogue's flash with this probability before each frame",
-        between(0, 1, "a probability in 0..1"),
+        0,
+        1,
         metavar="RATE",
     )
-    crop: tuple[int, int] = option(
-        (0, 0), "with --image: left upper corner of the 1280 x 1024 part", CORNER, metavar="X,Y"
+    crop: tuple[int, int] = corner(
+        (0, 0), "with --image: left upper corner of the 1280 x 1024 part"
     )
 
     def check(self) -> None:

@@ -24,12 +24,13 @@ from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
 from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
+from cubestack.firmware_model.values import choice, number, positive, whole
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
 from cubestack.host.devices.experiment import Experiment, Mark, Result
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import MeasureOptions, Opener
-from cubestack.host.options import ANGLE, POSITIVE, SCENE, flag, option, whole
+from cubestack.host.options import file_option, option_string, switch
 
 CubeSenseOpener: TypeAlias = "Opener[CubeSenseBoard, CubeSense]"
 
@@ -54,38 +55,34 @@ POSE = ("tilt", "sun_angle", "altitude", "bloom", "no_noise", "hazard")
 class CubeSenseOptions(MeasureOptions):
     """Options of `cubestack measure cubesense`."""
 
-    scene: Any = option(None, "TOML scene; default: random poses", SCENE, metavar="FILE")
-    frames: int = option(1, "results of each sensor (default 1)", whole(1))
-    sensor: str = option("both", "default: both", choices=("both", "sun", "nadir"))
-    memory: str = option(
+    scene: Any = file_option(None, "TOML scene; default: random poses")
+    frames: int = whole(1, "results of each sensor (default 1)", 1)
+    sensor: str = choice("both", "default: both", ("both", "sun", "nadir"))
+    memory: str = choice(
         "own",
         "SRAM that stores the images: the camera's own (default), or the other half's",
-        choices=("own", "other"),
+        ("own", "other"),
     )
-    search: str = option(
+    search: str = choice(
         "lines",
         "how edges are searched: along lines (published); around samples, by halves or "
         "stepping from pixel to pixel, with FPGAs that let the processor choose addresses",
-        choices=tuple(SEARCHES),
+        tuple(SEARCHES),
     )
-    tilt: float | None = option(
-        None, "random pose: largest tilt to nadir (30)", ANGLE, metavar="DEG"
+    tilt: float | None = number(None, "random pose: largest tilt to nadir (30)", 0, 180, "deg")
+    sun_angle: float | None = number(
+        None, "random pose: largest angle to the Sun (90)", 0, 180, "deg"
     )
-    sun_angle: float | None = option(
-        None, "random pose: largest angle to the Sun (90)", ANGLE, metavar="DEG"
-    )
-    altitude: float | None = option(None, "random pose: altitude (750)", POSITIVE, metavar="KM")
-    bloom: float | None = option(
-        None, "random pose: radius of the Sun's image (7)", POSITIVE, metavar="PX"
-    )
-    no_noise: bool = option(False, "random pose: ideal cameras")
+    altitude: float | None = positive(None, "random pose: altitude (750)", unit="km")
+    bloom: float | None = positive(None, "random pose: radius of the Sun's image (7)", unit="px")
+    no_noise: bool = switch("random pose: ideal cameras")
     hazard: tuple[hazards.Asked, ...] = hazards.hazard_option()
 
     def check(self) -> None:
         """Options of the random pose need one; a search reads the camera's own memory."""
         hazards.check(self.hazard, earth=True)
         if self.scene is not None and self.given(*POSE):
-            names = ", ".join(map(flag, POSE))
+            names = ", ".join(map(option_string, POSE))
             raise ValueError(f"{names} belong to the random poses; a scene file has keys for them")
         if self.search != "lines" and self.memory == "other":
             raise ValueError(

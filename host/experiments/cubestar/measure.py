@@ -36,6 +36,7 @@ from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode, MatchMode, TaskStatus
 from cubestack.firmware_model.interface.cubestar.codes import Reason
+from cubestack.firmware_model.values import REQUIRED, ValueKind, choice, declare, number, whole
 from cubestack.host.calibration.camera import load_camera
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
@@ -46,7 +47,7 @@ from cubestack.host.errors import CameraFileError
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import ANGLE, CORNER, PATH, Kind, option, whole
+from cubestack.host.options import corner, path_option
 
 CubeStarOpener: TypeAlias = "Opener[CubeStarBoard, CubeStar]"
 CubeStarEmulated: TypeAlias = "EmulatedDevice[CubeStarBoard, CubeStar]"
@@ -73,9 +74,12 @@ EXPOSED_S = 0.3
 LIMITS_MS = {"detect": 220.0, "match": 250.0, "attitude": 30.0}
 """The 1 Hz loop leaves 500 ms for all of them (section 5.3.6; with idle time and capture)."""
 
-_DN = whole(1, 255)
-THRESHOLD = Kind(
-    f"{_DN.what} DN, or {SEARCH}", lambda given: given if given == SEARCH else _DN(given)
+_DN = whole(REQUIRED, "", 1, 255, "DN")
+THRESHOLD = ValueKind(
+    "threshold",
+    f"{_DN.limits}, or {SEARCH}",
+    lambda given: given if given == SEARCH else _DN.read(given),
+    lambda text: text if text == SEARCH else _DN.parse(text),
 )
 
 
@@ -83,32 +87,26 @@ THRESHOLD = Kind(
 class CubeStarOptions(attitudes.SkyOptions):
     """Options of `cubestack measure cubestar`."""
 
-    mode: str = option(
-        "lis",
-        "lost in space (default), assisted match, or tracking",
-        choices=tuple(MODE_NAMES.values()),
+    mode: str = choice(
+        "lis", "lost in space (default), assisted match, or tracking", tuple(MODE_NAMES.values())
     )
-    hint_error: float = option(
+    hint_error: float = number(
         0.0,
         "largest error of the hint (assisted) or of the last attitude (tracking)",
-        ANGLE,
-        metavar="DEG",
+        0,
+        180,
+        "deg",
     )
-    threshold: int | str | None = option(
+    threshold: int | str | None = declare(
+        THRESHOLD,
         None,
         "detection threshold, or 'search' (default where all stars are in view, without --scene "
         "and --faults)",
-        THRESHOLD,
         metavar="DN",
     )
-    crop: tuple[int, int] = option(
-        (0, 0), "with --image: left upper corner of the 1024 x 512 part", CORNER, metavar="X,Y"
-    )
-    camera: Path | None = option(
-        None,
-        "with --image: JSON with the camera's f_px, cx_px, cy_px, k1, k2, p1, p2",
-        PATH,
-        metavar="FILE",
+    crop: tuple[int, int] = corner((0, 0), "with --image: left upper corner of the 1024 x 512 part")
+    camera: Path | None = path_option(
+        None, "with --image: JSON with the camera's f_px, cx_px, cy_px, k1, k2, p1, p2"
     )
 
     def check(self) -> None:

@@ -16,28 +16,23 @@ from cubestack.emulator.boards.aramis.catalogue import (
     CatalogueParameters,
     cached_database,
 )
+from cubestack.firmware_model.values import number, whole
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Lookup
-from cubestack.host.options import NUMBER, PATH, YEAR, Options, option, whole
+from cubestack.host.options import Options, path_option
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueOptions(Options):
     """What the catalogue is compiled for; None as it is flown."""
 
-    mag_limit: float | None = option(
-        None, "faintest star, included; default 6", NUMBER, metavar="V"
-    )
-    epoch: float = option(2026.0, "default 2026", YEAR, metavar="YEAR")
-    fov: float | None = option(None, "diameter of the field, default 21.53", NUMBER, metavar="DEG")
-    stars_per_field: int | None = option(
-        None, "brightest kept, default 6", whole(3, 50), metavar="N"
-    )
-    step: float | None = option(None, "of the scan, default 1", NUMBER, metavar="DEG")
-    longest_side: float | None = option(
-        None, "of a triangle, default: the field", NUMBER, metavar="DEG"
-    )
-    output: Path | None = option(None, "write the flash image", PATH, metavar="FILE")
+    mag_limit: float | None = number(None, "faintest star, included; default 6", metavar="V")
+    epoch: float = number(2026.0, "default 2026", 1800, 2200, metavar="YEAR")
+    fov: float | None = number(None, "diameter of the field, default 21.53", unit="deg")
+    stars_per_field: int | None = whole(None, "brightest kept, default 6", 3, 50, metavar="N")
+    step: float | None = number(None, "of the scan, default 1", unit="deg")
+    longest_side: float | None = number(None, "of a triangle, default: the field", unit="deg")
+    output: Path | None = path_option(None, "write the flash image")
 
     def parameters(self) -> CatalogueParameters:
         """As the compiler of the catalogue takes them; ValueError for what it can not do."""

@@ -20,12 +20,13 @@ from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.picture import PictureScene, load_picture
 from cubestack.emulator.scene.sky import SkyScene
+from cubestack.firmware_model.values import whole
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
 from cubestack.host.clients.contract import DeviceClient, FoundStar
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import PATH, Options, option, whole
+from cubestack.host.options import Options, path_option
 from cubestack.host.pictures.residuals import save_residuals
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
@@ -37,31 +38,24 @@ GRID = (33, 17)
 class CalibrateOptions(Options):
     """Options of every star tracker's calibration."""
 
-    scene: Any = option(
-        None, "with --emulated: TOML scene whose camera the unit has", PATH, metavar="FILE"
+    scene: Any = path_option(None, "with --emulated: TOML scene whose camera the unit has")
+    seed: int = whole(0, "seed of everything random (default 0)", 0)
+    images: Path | None = path_option(
+        None, "a picture, or a folder of them", metavar="PATH", group="pictures"
     )
-    seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    images: Path | None = option(
-        None, "a picture, or a folder of them", PATH, metavar="PATH", group="pictures"
-    )
-    emulated: int | None = option(
+    emulated: int | None = whole(
         None,
         f"pictures of random skies, taken by an emulated unit (default: {DEFAULT_PICTURES})",
-        whole(1),
+        1,
         metavar="N",
         group="pictures",
     )
-    camera: Path | None = option(
-        None,
-        "JSON with a rough f_px, cx_px, cy_px, k1, k2, p1, p2; default: the device's tables",
-        PATH,
-        metavar="FILE",
+    camera: Path | None = path_option(
+        None, "JSON with a rough f_px, cx_px, cy_px, k1, k2, p1, p2; default: the device's tables"
     )
-    rounds: int = option(
-        2, "times that stars are identified, each with the camera found before", whole(1)
-    )
-    out: Path | None = option(
-        None, "camera file to be written, and beside it a .png of residuals", PATH, metavar="FILE"
+    rounds: int = whole(2, "times that stars are identified, each with the camera found before", 1)
+    out: Path | None = path_option(
+        None, "camera file to be written, and beside it a .png of residuals"
     )
 
     def check(self) -> None:

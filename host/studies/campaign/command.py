@@ -22,7 +22,8 @@ from pathlib import Path
 
 from rich.table import Table
 
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.campaign import parquet, report, statistics
 from cubestack.host.studies.campaign import run as campaigns
@@ -58,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--resume", action="store_true", help="continue with the rows in the folder"
     )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    add_value(
+        where, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")
     )
     where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster")
     parser.add_argument(
@@ -68,12 +69,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="for report: an earlier campaign of the same skies",
     )
-    parser.add_argument(
-        "--worst",
-        type=whole(0),
-        default=WORST,
-        metavar="N",
-        help=f"for report: number of worst cases measured again and shown (default {WORST})",
+    add_value(
+        parser,
+        "worst",
+        whole(
+            WORST,
+            f"for report: number of worst cases measured again and shown (default {WORST})",
+            0,
+            metavar="N",
+        ),
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object per point")
 

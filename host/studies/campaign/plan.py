@@ -18,9 +18,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from cubestack.firmware_model.values import REQUIRED, whole
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import MEASURE, board_options, experiment_of, measure
-from cubestack.host.options import whole
+from cubestack.host.options import Options
 
 FRAMES = 100
 """Frames of a block: a device is powered up, and its threshold searched, once for so many."""
@@ -55,36 +56,28 @@ class Block:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class Plan(Options):
     """A campaign; attributes are keys of its file.
 
     Attributes:
         device: what is measured.
-        frames: at each point of the grid.
         command: `measure`, or another one of the device that takes ``frames`` and ``seed``.
-        seed: of everything random.
-        block: frames for which the device is powered up once.
         options: of the command, for all frames.
         grid: values of options; every combination is measured.
         random: options drawn anew for each block: uniform from ``low`` to ``high``, or one ``of``.
     """
 
     device: str
-    frames: int
+    frames: int = whole(REQUIRED, "at each point of the grid", 1)
     command: str = MEASURE
-    seed: int = 0
-    block: int = FRAMES
+    seed: int = whole(0, "of everything random", 0)
+    block: int = whole(FRAMES, "frames for which the device is powered up once", 1)
     options: Values = field(default_factory=dict)
     grid: Mapping[str, list[Any]] = field(default_factory=dict)
     random: Mapping[str, Values] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
         """Refuse what can not be measured; ValueError names the key."""
-        for name, least in (("frames", 1), ("seed", 0), ("block", 1)):
-            try:
-                object.__setattr__(self, name, whole(least)(getattr(self, name)))
-            except ValueError as error:
-                raise ValueError(f"{name}: {error}") from None
         for name in ("options", "grid", "random"):
             if not isinstance(getattr(self, name), dict):
                 raise ValueError(f"{name} must be a table of options")
@@ -188,7 +181,7 @@ def _with_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
     files = {
         name
         for name, declared in experiment.options.declared().items()
-        if declared.metadata["option"].metavar == "FILE"
+        if declared.metavar == "FILE"
     }
     files |= {
         name for name, one in board_options(device, experiment).items() if one.metavar == "FILE"

@@ -18,9 +18,10 @@ import numpy as np
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.ball import ball_scene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
+from cubestack.firmware_model.values import number, whole
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.cubesense.measure import FRAME_S, CubeSenseOpener
-from cubestack.host.options import Options, between, option, whole
+from cubestack.host.options import Options
 
 DIRECTIONS = {"right": (1, 0), "left": (-1, 0), "down": (0, 1), "up": (0, -1)}
 """Where the ball goes in the picture; figure 7.1 does not say which of its four parts is which."""
@@ -36,17 +37,12 @@ PUBLISHED = "offset 0.12, 0.16, 0.13, 0.15 deg in the four directions; sigma bel
 class BallOptions(Options):
     """Options of `cubestack ball`."""
 
-    step: float = option(
-        5.0, "of the stage (default 5)", between(0.5, 30, "an angle in 0.5..30 degrees")
+    step: float = number(5.0, "of the stage (default 5)", 0.5, 30, "deg")
+    samples: int = whole(10, "pictures at each angle (default 10)", 2, metavar="N")
+    off_axis: float = number(
+        0.0, "distance of the optic point in front of the stage's axis (default 0)", -30, 30, "mm"
     )
-    samples: int = option(10, "pictures at each angle (default 10)", whole(2), metavar="N")
-    off_axis: float = option(
-        0.0,
-        "distance of the optic point in front of the stage's axis (default 0)",
-        between(-30, 30, "a length in -30..30 mm"),
-        metavar="MM",
-    )
-    seed: int = option(0, "seed of everything random (default 0)", whole(0))
+    seed: int = whole(0, "seed of everything random (default 0)", 0)
 
     @property
     def angles(self) -> list[float]:

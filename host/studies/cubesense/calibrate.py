@@ -27,6 +27,7 @@ from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.picture import load_picture
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera, Sram
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
+from cubestack.firmware_model.values import choice, whole
 from cubestack.host.calibration.fisheye import Fisheye, FisheyeFit, Points, fit_fisheye, limb_angles
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.experiment import Experiment, Result
@@ -37,7 +38,7 @@ from cubestack.host.experiments.cubesense.measure import (
     random_view,
     view_of,
 )
-from cubestack.host.options import PATH, Options, option, whole
+from cubestack.host.options import Options, path_option
 
 FIELD = (PIXELS_PER_DEGREE, 95.0)
 """Pixels for a degree, undistorted, and the largest field angle, deg."""
@@ -63,22 +64,20 @@ FAINTEST = 20
 class CalibrateOptions(Options):
     """Options of `cubestack calibrate cubesense`."""
 
-    scene: Any = option(None, "TOML scene whose cameras the unit has", PATH, metavar="FILE")
-    seed: int = option(0, "the unit's serial number, and seed of all else (default 0)", whole(0))
-    sensor: str = option("both", "default: both", choices=("both", "sun", "nadir"))
-    emulated: int | None = option(
-        None, "poses at the emulated bench (default 60)", whole(8), metavar="N", group="pictures"
+    scene: Any = path_option(None, "TOML scene whose cameras the unit has")
+    seed: int = whole(0, "the unit's serial number, and seed of all else (default 0)", 0)
+    sensor: str = choice("both", "default: both", ("both", "sun", "nadir"))
+    emulated: int | None = whole(
+        None, "poses at the emulated bench (default 60)", 8, metavar="N", group="pictures"
     )
-    images: Path | None = option(
-        None, "a folder of pictures, a light in each", PATH, metavar="PATH", group="pictures"
+    images: Path | None = path_option(
+        None, "a folder of pictures, a light in each", metavar="PATH", group="pictures"
     )
-    angles: Path | None = option(
-        None, "with --images: where the lights were, a CSV file", PATH, metavar="FILE"
+    angles: Path | None = path_option(None, "with --images: where the lights were, a CSV file")
+    check_poses: int = whole(
+        30, "random poses measured before and after (default 30)", 1, metavar="N"
     )
-    check_poses: int = option(
-        30, "random poses measured before and after (default 30)", whole(1), metavar="N"
-    )
-    out: Path | None = option(None, "JSON file to be written", PATH, metavar="FILE")
+    out: Path | None = path_option(None, "JSON file to be written")
 
     def check(self) -> None:
         """Pictures need their angles and one sensor, the bench none."""

@@ -14,18 +14,19 @@ from cubestack.firmware_model.cubesense.memory import CAPACITY, budget, report, 
 from cubestack.firmware_model.interface.codec.switches import DEFAULT_PROFILE, PROFILES
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches
 from cubestack.firmware_model.mcu.memory_budget import Buffer
+from cubestack.firmware_model.values import choice, text
 from cubestack.host.devices.device import Shown
 from cubestack.host.experiments.facts import Facts, Lookup
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import Kind, Options, option
+from cubestack.host.options import Options
 
 
 @dataclass(frozen=True, kw_only=True)
 class MemoryOptions(Options):
     """Options of `cubestack memory cubesense`."""
 
-    profile: str = option(DEFAULT_PROFILE, f"default: {DEFAULT_PROFILE}", choices=PROFILES)
-    set: str = option("", "switches that differ", Kind("text", str), metavar="SWITCH=VALUE,...")
+    profile: str = choice(DEFAULT_PROFILE, f"default: {DEFAULT_PROFILE}", PROFILES)
+    set: str = text("", "switches that differ", metavar="SWITCH=VALUE,...")
 
     def check(self) -> None:
         CubeSenseSwitches.of(self.profile, self.set)

@@ -29,10 +29,10 @@ from cubestack.firmware_model.interface.cubesense.switches import (
     DEFAULT_SWITCHES,
     CubeSenseSwitches,
 )
+from cubestack.firmware_model.values import choice
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
-from cubestack.host.options import option
 from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
 
@@ -77,10 +77,10 @@ def _state(engine: RtlEngine) -> str:
 class CubeSenseUpsetOptions(UpsetOptions):
     """Options of `cubestack upsets cubesense`."""
 
-    gateware: str = option(
+    gateware: str = choice(
         DEFAULT_SWITCHES.gateware,
         "of both FPGAs (default as-flown)",
-        choices=CubeSenseSwitches.declared()["gateware"].choices,
+        CubeSenseSwitches.declared()["gateware"].choices,
     )
 
 

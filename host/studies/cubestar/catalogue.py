@@ -13,21 +13,22 @@ from pathlib import Path
 from typing import Any
 
 from cubestack.emulator.boards.cubestar import catalogue as flown
+from cubestack.firmware_model.values import number
 from cubestack.host.devices.device import Shown
 from cubestack.host.emulation.records import create_file
 from cubestack.host.experiments.facts import Lookup
 from cubestack.host.export.c_arrays import c_arrays
-from cubestack.host.options import NUMBER, PATH, YEAR, Options, option
+from cubestack.host.options import Options, path_option
 
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueOptions(Options):
     """What the catalogue is compiled for; None as it is flown."""
 
-    mag_limit: float | None = option(None, "faintest star; default 3.8", NUMBER, metavar="V")
-    epoch: float = option(2026.0, "default 2026", YEAR, metavar="YEAR")
-    pair_limit: float | None = option(None, "default: as flown", NUMBER, metavar="DEG")
-    c: Path | None = option(None, "write star list and pair list as C arrays", PATH, metavar="FILE")
+    mag_limit: float | None = number(None, "faintest star; default 3.8", metavar="V")
+    epoch: float = number(2026.0, "default 2026", 1800, 2200, metavar="YEAR")
+    pair_limit: float | None = number(None, "default: as flown", unit="deg")
+    c: Path | None = path_option(None, "write star list and pair list as C arrays")
 
 
 class _Catalogue(Lookup[CatalogueOptions]):

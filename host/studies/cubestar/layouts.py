@@ -24,10 +24,11 @@ from cubestack.emulator.boards.cubestar.board import CubeStarBoard
 from cubestack.emulator.boards.cubestar.layouts import BOARDS, fpga_of
 from cubestack.firmware_model.cubestar.state import ATTITUDE_PAGE, Attitude
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.firmware_model.values import whole
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.attitude import errors, is_right
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
-from cubestack.host.options import SCENE, Options, option, whole
+from cubestack.host.options import Options, file_option
 
 SETTLING = 2
 """Attitudes before the measurement."""
@@ -80,9 +81,9 @@ class LayoutResult(Result):
 class LayoutOptions(Options):
     """Options of `cubestack layouts`."""
 
-    scene: Any = option(None, "TOML scene; default: Orion, V < 3.8", SCENE, metavar="FILE")
-    seconds: int = option(10, "of virtual time each (default 10)", whole(2, 3600))
-    seed: int = option(0, "seed of everything random (default 0)", whole(0))
+    scene: Any = file_option(None, "TOML scene; default: Orion, V < 3.8")
+    seconds: int = whole(10, "of virtual time each (default 10)", 2, 3600)
+    seed: int = whole(0, "seed of everything random (default 0)", 0)
 
 
 class _Layouts(Experiment["CubeStarOpener", LayoutOptions, LayoutResult]):

@@ -11,19 +11,20 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from cubestack.emulator.iss.insight.memory_report import MemoryUse, memory_use
+from cubestack.firmware_model.values import positive, whole
 from cubestack.host.emulation.insight import own_firmware
 from cubestack.host.experiments.facts import Facts, Telling
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import POSITIVE, Options, option, whole
+from cubestack.host.options import Options, switch
 
 
 @dataclass(frozen=True, kw_only=True)
 class MemoryOptions(Options):
     """Options of `cubestack memory cubestar`."""
 
-    seconds: float = option(2.0, "virtual time to run for (default 2)", POSITIVE)
-    seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    capture: bool = option(False, "send a telecommand that captures and processes an image")
+    seconds: float = positive(2.0, "virtual time to run for (default 2)")
+    seed: int = whole(0, "seed of everything random (default 0)", 0)
+    capture: bool = switch("send a telecommand that captures and processes an image")
 
 
 class _Memory(Telling[MemoryOptions]):

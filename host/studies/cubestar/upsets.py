@@ -24,11 +24,11 @@ from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.firmware_model.interface.cubestar.layouts import Layout
 from cubestack.firmware_model.interface.cubestar.pins import BOARD_PREFIXES, ENABLE, RNW
+from cubestack.firmware_model.values import choice
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar.measure import wait_started
-from cubestack.host.options import option
 from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
 from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
 
@@ -82,10 +82,10 @@ def _state(engine: RtlEngine) -> str:
 class CubeStarUpsetOptions(UpsetOptions):
     """Options of `cubestack upsets cubestar`."""
 
-    layout: str = option(
+    layout: str = choice(
         Layout.COPIED.value,
         "memory layout, and the gateware for it (default 1, the published one)",
-        choices=tuple(layout.value for layout in Layout),
+        tuple(layout.value for layout in Layout),
     )
 
 

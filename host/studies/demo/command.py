@@ -10,7 +10,8 @@ folder has any; a sun and nadir sensor at the Sun, and at the Earth from 750 km.
 import argparse
 from pathlib import Path
 
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.cli.device_options import add_option, given_options
 from cubestack.host.devices.device import PROFILE_OPTIONS
 from cubestack.host.devices.registry import devices
@@ -26,9 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder with JPEG photographs of the sky and their truth.json",
     )
-    parser.add_argument(
-        "--seed", type=whole(0), default=1, help="seed of the sensors' noise (default 1)"
-    )
+    add_value(parser, "seed", whole(1, "seed of the sensors' noise (default 1)", 0))
     for option in PROFILE_OPTIONS:
         add_option(parser, option)
 

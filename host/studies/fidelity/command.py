@@ -20,7 +20,8 @@ import time
 from pathlib import Path
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.devices.registry import devices
 from cubestack.host.studies.fidelity import table as fidelity
 from cubestack.host.studies.workers import cores
@@ -39,9 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--profile", choices=PROFILES, help="default: both")
     parser.add_argument("--quick", action="store_true", help="a few pictures of each kind")
-    parser.add_argument("--frames", type=whole(1), metavar="N", help="pictures of each kind")
-    parser.add_argument(
-        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    add_value(parser, "frames", whole(None, "pictures of each kind", 1, metavar="N"))
+    add_value(
+        parser, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object per row")
     parser.add_argument("--markdown", action="store_true", help="print the tables of the pages")

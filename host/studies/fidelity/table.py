@@ -16,7 +16,7 @@ from cubestack.host.devices.experiment import Result
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import measure
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.options import flag
+from cubestack.host.options import option_string
 from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Row, Trial
 from cubestack.host.studies.workers import performed
 
@@ -190,7 +190,7 @@ def measured(
         return Trial(run, frames, quick, seconds)
     words = ["measure", device, "--frames", str(frames), "--seed", str(seed)]
     for name, value in options.items():
-        words += [flag(name)] if value is True else [flag(name), str(value)]
+        words += [option_string(name)] if value is True else [option_string(name), str(value)]
     return Trial(run, frames, quick, seconds, " ".join(words))
 
 

@@ -18,7 +18,8 @@ from pathlib import Path
 from rich.table import Table
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
-from cubestack.host.cli.arguments import whole
+from cubestack.firmware_model.values import whole
+from cubestack.host.cli.arguments import add_value
 from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.hazards import album, curves
@@ -33,13 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "again",
     )  # fmt: skip
     parser.add_argument("--list", action="store_true", help="list hazards and their strengths")
-    parser.add_argument(
-        "--frames", type=whole(1), default=20, metavar="N", help="of each strength (default 20)"
-    )
-    parser.add_argument("--seed", type=whole(0), default=0, metavar="N", help="default 0")
+    add_value(parser, "frames", whole(20, "of each strength (default 20)", 1, metavar="N"))
+    add_value(parser, "seed", whole(0, "default 0", 0, metavar="N"))
     parser.add_argument("--profile", choices=PROFILES, default="extended", help="default: extended")
-    parser.add_argument(
-        "--workers", type=whole(1), metavar="N", help="processes (default: one for each core)"
+    add_value(
+        parser, "workers", whole(None, "processes (default: one for each core)", 1, metavar="N")
     )
     parser.add_argument(
         "--out",

@@ -12,11 +12,12 @@ import numpy as np
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.cxxrtl.engine import CompiledEngine
 from cubestack.emulator.rtl.wiring import Wiring
+from cubestack.firmware_model.values import positive, text, whole
 from cubestack.host.devices.experiment import Experiment, Section
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.options import POSITIVE, TEXT, Options, option, whole
+from cubestack.host.options import Options
 from cubestack.host.pictures.upsets import effects
 from cubestack.host.studies.upsets.atlas import HEAD, atlas, lines, rows
 from cubestack.host.studies.upsets.clean import PS_PER_S, CleanLoop, Interval, clean_loop, render
@@ -47,28 +48,20 @@ SCENES = 200
 class UpsetOptions(Options):
     """Options of `cubestack upsets DEVICE`."""
 
-    frames: int = option(1, "upsets of each bit in each phase (default 1)", whole(1))
-    seed: int = option(0, "seed of everything random (default 0)", whole(0))
-    registers: str = option(
-        "*", "only registers whose path matches, e.g. 'writer.*'", TEXT, metavar="PATTERN"
+    frames: int = whole(1, "upsets of each bit in each phase (default 1)", 1)
+    seed: int = whole(0, "seed of everything random (default 0)", 0)
+    registers: str = text(
+        "*", "only registers whose path matches, e.g. 'writer.*'", metavar="PATTERN"
     )
-    memories: str = option(
-        "",
-        "memories to hit, e.g. 'ram,flash' (default: those that hold images)",
-        TEXT,
-        metavar="NAMES",
+    memories: str = text(
+        "", "memories to hit, e.g. 'ram,flash' (default: those that hold images)", metavar="NAMES"
     )
-    memory_bits: int = option(
-        8, "random bits of each memory, besides all bits of the registers (default 8)", whole(0)
+    memory_bits: int = whole(
+        8, "random bits of each memory, besides all bits of the registers (default 8)", 0
     )
-    flux: float = option(
-        1.0, "particles per cm2 and second (default 1), for rates per day", POSITIVE
-    )
-    cross_section: float = option(
-        1e-13,
-        "cross-section of a bit in cm2 (default 1e-13), for rates per day",
-        POSITIVE,
-        metavar="CM2",
+    flux: float = positive(1.0, "particles per cm2 and second (default 1), for rates per day")
+    cross_section: float = positive(
+        1e-13, "cross-section of a bit in cm2 (default 1e-13), for rates per day", metavar="CM2"
     )
 
 

@@ -14,11 +14,12 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.native.compiler import CompilerError
+from cubestack.firmware_model.values import whole
 from cubestack.host.cli import main as entry
 from cubestack.host.cli import measure
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.options import Options, option, whole
+from cubestack.host.options import Options
 from cubestack.host.studies.campaign import command as campaign
 from cubestack.host.studies.campaign.statistics import Change
 from cubestack.host.studies.hazards import command as hazards
@@ -132,7 +133,7 @@ def test_the_version_is_told(run: Run) -> None:
 class Wanted(Options):
     """How many."""
 
-    frames: int = option(1, "number", whole(1))
+    frames: int = whole(1, "number", 1)
 
 
 @dataclass(frozen=True)

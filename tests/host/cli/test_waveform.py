@@ -89,7 +89,7 @@ def test_viewer_is_opened_where_there_is_a_screen(
         (["none"], 1, "no waveform of 'none'; there are cubestar_top.stores-8-4-1.whole_frame, o"),
         (["r"], 2, "'r' fits cubestar_top.stores-8-4-1.whole_frame, other; say which"),
         (["missing.vcd"], 1, "there is no waveform missing.vcd"),
-        (["whole_frame", "--last", "0"], 2, "must be a whole number from 1 on, not '0'"),
+        (["whole_frame", "--last", "0"], 2, "must be at least 1, not 0"),
     ],
 )
 def test_wrong_calls(arguments: list[str], code: int, error: str, folder: Path, run: Run) -> None:

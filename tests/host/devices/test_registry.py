@@ -97,7 +97,7 @@ def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]
         ("aramis", {"layout": "2"}, "layout is an option of cubestar, not of aramis"),
         ("cubestar", {"layuot": "2"}, "layuot is no option of cubestar"),
         ("cubestar", {"layout": "4"}, "layout of cubestar must be one of 1, 2, 3, two-boards"),
-        ("cubesense", {"mcu_addressing": "yes"}, "must be one of False, True, not 'yes'"),
+        ("cubesense", {"mcu_addressing": "yes"}, "must be true or false, not 'yes'"),
     ],
 )
 def test_options_that_make_no_sense(name: str, options: dict[str, object], message: str) -> None:

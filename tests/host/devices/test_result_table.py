@@ -115,8 +115,8 @@ def test_lines_before_the_first_result_are_written_with_it(
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [
-        (["emulated:cubesense", "--count", "0"], "'0' is not a whole number of at least 1"),
-        (["emulated:cubesense", "--interval", "-1"], "is not a number of seconds in 0..86400"),
+        (["emulated:cubesense", "--count", "0"], "--count: must be at least 1, not 0"),
+        (["emulated:cubesense", "--interval", "-1"], "--interval: must be 0 to 86400 s, not -1"),
         (["emulated:cubesense", "-c", "read nothing"], "nothing is called 'nothing'"),
         (["emulated:cubesense", "--count", "1", "--out", "/no/such/x.csv"], "can not write"),
     ],

@@ -27,7 +27,7 @@ def test_a_hazard_is_a_name_and_perhaps_a_strength() -> None:
     ("given", "message"),
     [
         ("mooon", "hazard: there is no 'mooon'; known: .*moon"),
-        ("gradient=steep", "hazard: 'gradient=steep' is not NAME or NAME=STRENGTH"),
+        ("gradient=steep", "hazard must be NAME or NAME=STRENGTH"),
         ("gradient=-1", "hazard: gradient goes from 0 to .*, not -1"),
     ],
 )

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from cubestack.firmware_model.values import REQUIRED, choice, many, number, whole
 from cubestack.host.cli.arguments import add_options, chosen
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.devices.registry import device, devices
@@ -14,19 +15,19 @@ from cubestack.host.errors import TargetError
 from cubestack.host.experiments import measure as measuring
 from cubestack.host.experiments.facts import fact_lines
 from cubestack.host.experiments.measure import measure
-from cubestack.host.options import ANGLE, CORNER, Options, option, whole
+from cubestack.host.options import Options, corner, switch
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted(Options):
-    frames: int = option(1, "number of frames", whole(1, 9))
-    corner: tuple[int, int] = option((0, 0), "part", CORNER, metavar="X,Y")
-    tilt: float | None = option(None, "largest tilt", ANGLE)
-    way: str = option("up", "where to", choices=("up", "down"))
-    skip: tuple[str, ...] = option((), "left out", choices=("a", "b"), many=True)
-    quick: bool = option(False, "be quick")
-    left: int | None = option(None, "one side", whole(0), group="side")
-    right: int | None = option(None, "the other", whole(0), group="side")
+    frames: int = whole(1, "number of frames", 1, 9)
+    corner: tuple[int, int] = corner((0, 0), "part")
+    tilt: float | None = number(None, "largest tilt", 0, 180, "deg")
+    way: str = choice("up", "where to", ("up", "down"))
+    skip: tuple[str, ...] = many((), "left out", choice(REQUIRED, "", ("a", "b")))
+    quick: bool = switch("be quick")
+    left: int | None = whole(None, "one side", 0, group="side")
+    right: int | None = whole(None, "the other", 0, group="side")
 
     def check(self) -> None:
         if self.quick and self.given("tilt"):
@@ -77,13 +78,9 @@ def test_results_come_one_by_one_with_progress() -> None:
     [
         ({"frame": 3}, "no option 'frame' for cubestar; known: frames, corner, tilt"),
         ({"layout": "2"}, "no option 'layout'"),  # the experiment's own decision
-        ({"frames": 0}, "frames: 0 is not a whole number in 1..9"),
-        ({"frames": 2.5}, "frames: 2.5 is not a whole number"),
-        ({"corner": (1, 2, 3)}, "is not X,Y, as in 0,256"),
-        ({"tilt": 181}, "tilt: 181 is not an angle in 0..180 degrees"),
-        ({"way": "left"}, "way: 'left' is none of up, down"),
-        ({"skip": ("a", "c")}, "skip: 'c' is none of a, b"),
-        ({"quick": 2}, "quick: 2 is none of False, True"),
+        ({"frames": "0"}, "frames must be 1 to 9, not 0"),
+        ({"corner": (1, 2, 3)}, r"corner must be X,Y, as in 0,256, not \(1, 2, 3\)"),
+        ({"skip": ("a", "c")}, "skip must be one of a, b, not 'c'"),
         ({"left": 0, "right": 1}, "--left and --right exclude each other"),
         ({"quick": True, "tilt": 1}, "--tilt takes its time"),
     ],
@@ -129,9 +126,9 @@ def test_the_command_line_takes_what_programs_give() -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("--frames", "0"), "argument --frames: '0' is not a whole number in 1..9"),
+        (("--frames", "0"), "argument --frames: must be 1 to 9, not 0"),
         (("--left", "0", "--right", "1"), "not allowed with argument --left"),
-        (("--way", "left"), "invalid choice: 'left'"),
+        (("--way", "left"), "argument --way: must be one of up, down, not 'left'"),
     ],
 )
 def test_wrong_arguments(

@@ -64,7 +64,7 @@ def test_stretched_lifts_faint_stars_and_without_it_values_stay(run: Run, tmp_pa
         (("cubestar", "--ra", "1"), "a pose needs both --ra and --dec"),
         (("cubestar", "--roll", "1"), "a pose needs both --ra and --dec"),
         (("cubestar",), "needs a pose, --ra and --dec, or --scene FILE"),
-        (("cubestar", "--ra", "1", "--dec", "91"), "an angle in -90..90 degrees"),
+        (("cubestar", "--ra", "1", "--dec", "91"), "--dec: must be -90 to 90 deg, not 91"),
         (("cubesense", "--ra", "1", "--dec", "2"), "cubesense is no star tracker"),
         (("cubestar", "--scene", "none.toml"), "none.toml can not be read"),
         (("cubestar", "--ra", "1", "--dec", "2", "--out", "x.jpg"), "--out must end in .png"),

@@ -122,12 +122,7 @@ def test_a_table_for_readers(run: Run) -> None:
         ({"scene": "x.toml", "rate": 1}, "belong to the random sky"),
         ({"scene": "x.toml", "image": "x.png"}, "--scene and --image exclude each other"),
         ({"image": "x.png", "mode": "assisted"}, "x.png"),
-        ({"mode": "tracking"}, "'tracking' is none of lis, assisted"),
-        ({"field": 4}, "field: 4 is not a field of view in 5..40 degrees"),
-        ({"gain": 16}, "a gain in 1..15"),
-        ({"bit_flips": 2}, "a probability in 0..1"),
         ({"false_mags": (6, 4.5)}, "the brightest first"),
-        ({"without": ("shot", "salt")}, "'salt' is none of shot, dark"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(options: dict[str, Any], complaint: str) -> None:

@@ -84,7 +84,7 @@ def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
         ('device = "cubestar"', "frames is missing"),
         ("frames = 1", "device is missing"),
         ('device = "nobody"\nframes = 1', "no device 'nobody'; known: cubestar"),
-        ('device = "cubestar"\nframes = 0', "frames: 0 is not a whole number of at least 1"),
+        ('device = "cubestar"\nframes = 0', "frames must be at least 1, not 0"),
         ('device = "cubestar"\nframe = 1', "no key 'frame' here; known: device, frames"),
         ('device = "cubestar"\nframes = 1\n[grid]\nfalse_star = [1]', "no option 'false_star'"),
         ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = [1, -2]', "false_stars = -2"),
