@@ -15,7 +15,7 @@ import numpy as np
 import cubestack
 from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.scene.attitude import attitude_error_deg
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.orbit_file import load_orbit
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult
@@ -34,7 +34,7 @@ def off_deg(sense: Any, camera: Camera) -> float | None:
     measured = sense.client.capture_and_detect(camera)
     if measured.detect != DetectResult.SUCCESS:
         return None
-    target = Target.SUN if camera == Camera.SUN else Target.NADIR
+    target = CameraTarget.SUN if camera == Camera.SUN else CameraTarget.NADIR
     truth = scene_of(sense).truth(target, round(sense.time_s * PS_PER_S))
     a, b = (
         np.radians([measured.alpha_deg, measured.beta_deg]),

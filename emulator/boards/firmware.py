@@ -10,7 +10,7 @@ from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat, Parity
 from cubestack.emulator.bus.uart import Uart, UartTap
 from cubestack.emulator.camera.common.star_sensor import StarSensor
 from cubestack.emulator.iss.machine import REGISTERS, Machine
-from cubestack.emulator.iss.outcome import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.emulator.sim.firmware_processor import FirmwareProcessor
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.efm32gg.serial import LEUART, USART
@@ -168,16 +168,16 @@ class CameraWire:
             return
         unit = one.unit & 0xFF
         match one.kind:
-            case Kind.I2C_START:
+            case OutgoingKind.I2C_START:
                 self._finish(one.time_ps)
                 machine.i2c_answer(unit, self._start(one.value, one.time_ps))
-            case Kind.I2C_WRITE:
+            case OutgoingKind.I2C_WRITE:
                 if self._written is not None:
                     self._written.append(one.value & 0xFF)
                 machine.i2c_answer(unit, self._written is not None)
-            case Kind.I2C_READ:
+            case OutgoingKind.I2C_READ:
                 machine.i2c_answer(unit, True, self._next(one.time_ps))
-            case Kind.I2C_STOP:
+            case OutgoingKind.I2C_STOP:
                 self._finish(one.time_ps)
 
     def _start(self, address_byte: int, now_ps: int) -> bool:

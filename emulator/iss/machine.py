@@ -17,7 +17,7 @@ from cubestack.emulator.iss.binding import (
     simulator,
 )
 from cubestack.emulator.iss.image import Image
-from cubestack.emulator.iss.outcome import Kind, Outgoing, Stop, StopReason, Watch, WatchHit
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind, Stop, StopReason, Watch, WatchHit
 
 FLASH_BASE = 0x0000_0000
 RAM_BASE = 0x2000_0000
@@ -184,7 +184,9 @@ class Machine:
         while count := self._library.iss_take(self.handle, self._outgoing, len(self._outgoing)):
             for one in self._outgoing[:count]:
                 text = one.text.decode("utf-8", "replace")
-                yield Outgoing(Kind(one.kind), one.unit, one.value, one.extra, one.time_ps, text)
+                yield Outgoing(
+                    OutgoingKind(one.kind), one.unit, one.value, one.extra, one.time_ps, text
+                )
 
     # Registers and memory
 

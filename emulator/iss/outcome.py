@@ -33,7 +33,7 @@ class Stop(NamedTuple):
     sends: bool = False
 
 
-class Kind(IntEnum):
+class OutgoingKind(IntEnum):
     """Kinds of messages; numbers and values as in outbox.h."""
 
     PIN = 0
@@ -65,7 +65,7 @@ class Outgoing(NamedTuple):
         text: of text messages.
     """
 
-    kind: Kind
+    kind: OutgoingKind
     unit: int
     value: int
     extra: int

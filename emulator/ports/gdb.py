@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 
 from cubestack.emulator.iss.gdb.session import Session
-from cubestack.emulator.iss.gdb.target import Target
+from cubestack.emulator.iss.gdb.target import DebugTarget
 from cubestack.emulator.ports.endpoint import HUNG_UP, Endpoint, poll_now
 from cubestack.emulator.ports.tcp import listen
 
@@ -29,7 +29,7 @@ class GdbEndpoint(Endpoint):
         on_close: called at the end of ``close``.
     """
 
-    def __init__(self, port: int, target: Target) -> None:
+    def __init__(self, port: int, target: DebugTarget) -> None:
         """Listen on ``port`` (0: any free one) of this machine; raises PortError."""
         self._server = listen(LOOPBACK, port)
         self.address: tuple[str, int] = self._server.getsockname()

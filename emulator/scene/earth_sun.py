@@ -38,7 +38,7 @@ HIGHEST_KM = 1e6
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
-class Target(IntEnum):
+class CameraTarget(IntEnum):
     """What a camera is there to see, which tells a satellite's two cameras apart."""
 
     SUN = 0
@@ -90,8 +90,8 @@ class Reflection(DeclaredValues):
 
     error = SceneError
 
-    camera: Target = choice(
-        REQUIRED, "that sees it", {camera.name.lower(): camera for camera in Target}
+    camera: CameraTarget = choice(
+        REQUIRED, "that sees it", {camera.name.lower(): camera for camera in CameraTarget}
     )
     alpha_deg: float = number(REQUIRED, "of its centre")
     beta_deg: float = number(REQUIRED, "of its centre")
@@ -190,13 +190,13 @@ class EarthSunScene(DeclaredValues):
         shine = clouds[-1] if clouds else None
         return Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed, shine)
 
-    def axes(self, camera: Target, time_ps: int) -> NDArray[np.float64]:
+    def axes(self, camera: CameraTarget, time_ps: int) -> NDArray[np.float64]:
         """Rotation (3, 3) from scene axes to a camera's axes at a time."""
-        mounting = self.sun_camera if camera == Target.SUN else self.nadir_camera
+        mounting = self.sun_camera if camera == CameraTarget.SUN else self.nadir_camera
         turned = propagate(_IDENTITY, self.rate_deg_s, time_ps / PS_PER_S)
         return mounting.matrix @ matrix_from_quaternion(turned)
 
-    def seen(self, direction: ArrayLike, camera: Target, time_ps: int) -> NDArray[np.float64]:
+    def seen(self, direction: ArrayLike, camera: CameraTarget, time_ps: int) -> NDArray[np.float64]:
         """``direction`` (3,) of scene axes in a camera's axes at a time."""
         return self.axes(camera, time_ps) @ np.asarray(direction, np.float64)
 
@@ -205,12 +205,12 @@ class EarthSunScene(DeclaredValues):
         cosine = float(np.dot(np.asarray(direction, np.float64), np.asarray(self.nadir)))
         return cosine > float(np.cos(np.radians(angular_radius_deg(self.altitude_km))))
 
-    def truth(self, camera: Target, time_ps: int, field_deg: float = 180.0) -> SensorTruth:
+    def truth(self, camera: CameraTarget, time_ps: int, field_deg: float = 180.0) -> SensorTruth:
         """What the sensor of ``camera`` should measure at a time.
 
         ``field_deg`` is the largest angle from the boresight that its lens images.
         """
-        of_sun = camera == Target.SUN
+        of_sun = camera == CameraTarget.SUN
         vector = self.seen(self.sun if of_sun else self.nadir, camera, time_ps)
         alpha, beta = angles_from_vector(vector)
         reach = field_deg if of_sun else field_deg + angular_radius_deg(self.altitude_km)

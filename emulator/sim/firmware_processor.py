@@ -16,7 +16,7 @@ import simpy
 from cubestack.emulator.iss.insight.fault_report import fault_report, last_fault, unhandled
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import NEVER, Machine
-from cubestack.emulator.iss.outcome import Kind, Outgoing, Stop, StopReason
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind, Stop, StopReason
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling
 from cubestack.emulator.sim.fpga_port import FpgaPort
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S, PS_PER_US, Kernel
@@ -36,7 +36,7 @@ QUIET_AWAKE_PS = 5 * PS_PER_S
 FAULT_CHECK_PS = 10 * PS_PER_MS
 """Period of the check whether the program hangs in a fault handler."""
 
-INWARD = frozenset({Kind.SLEEP, Kind.LOG})
+INWARD = frozenset({OutgoingKind.SLEEP, OutgoingKind.LOG})
 """Outputs that do not count as activity visible outside."""
 
 logger = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ class FirmwareProcessor:
     machine: Machine
     _: KW_ONLY
     power_on: int = 1
-    handlers: Mapping[Kind, Callable[[Outgoing], None]] = field(default_factory=dict)
+    handlers: Mapping[OutgoingKind, Callable[[Outgoing], None]] = field(default_factory=dict)
     causes: Mapping[int, int] = field(default_factory=dict)
     couple: Callable[[FpgaPort], FpgaCoupling] | None = None
     look_ahead_ps: int = LOOK_AHEAD_PS
@@ -276,25 +276,25 @@ class FirmwareProcessor:
         if one.kind not in INWARD:
             self._active_ps = one.time_ps
         match one.kind:
-            case Kind.SLEEP:
+            case OutgoingKind.SLEEP:
                 self.energy_mode = one.value
                 awake = one.value == 0
                 if awake != self._awake:
                     self._awake = awake
                     self.on_activity(awake)
-            case Kind.RESET:
+            case OutgoingKind.RESET:
                 self.resets += 1
                 self._locked_up = False
                 self._reported_faults = 0
                 if one.text:
                     self._report_reset(one.text)
-            case Kind.ITM:
+            case OutgoingKind.ITM:
                 self._print(one.unit, one.value.to_bytes(8, "little")[: max(1, one.extra)])
-            case Kind.SEMIHOSTING:
+            case OutgoingKind.SEMIHOSTING:
                 self._print(-1, one.text.encode())
-            case Kind.LOG:
+            case OutgoingKind.LOG:
                 logger.warning("%s", one.text)
-            case Kind.FAULT:
+            case OutgoingKind.FAULT:
                 self.on_fault(one.text)
         handler = self.handlers.get(one.kind)
         if handler is not None:

@@ -13,7 +13,7 @@ from functools import cache
 
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
-from cubestack.firmware_model.cubesense.state import CameraSettings, Result, State
+from cubestack.firmware_model.cubesense.state import CameraResult, CameraSettings, State
 from cubestack.firmware_model.cubesense.vision import distortion, sun_centroid
 from cubestack.firmware_model.cubesense.vision.edges import EdgeConfig, EdgeList, NadirLines
 from cubestack.firmware_model.cubesense.vision.nadir import NadirConfig, find_nadir
@@ -105,7 +105,7 @@ class Measurement:
 
     def measure(self, camera: codes.Camera, sram: codes.Sram, *, detect: bool) -> Routine[None]:
         """Store an image of ``camera`` in ``sram`` and, with ``detect``, measure in it."""
-        result = self._state.results[camera] = Result()
+        result = self._state.results[camera] = CameraResult()
         self._state.schedule(camera, sram, detect=detect)
         if detect:
             yield from self._update_table(camera)
@@ -129,7 +129,7 @@ class Measurement:
                 result.capture = codes.CaptureResult.SRAM_OVER_CURRENT
                 result.detect = codes.DetectResult.NONE_SCHEDULED
 
-    def _measure_nadir(self, result: Result, started: int) -> Routine[bool]:
+    def _measure_nadir(self, result: CameraResult, started: int) -> Routine[bool]:
         """The Earth's direction; False if the memory was cut off."""
         settings, switches = self._state.cameras[codes.Camera.NADIR], self._state.switches.now
         config = EdgeConfig(
@@ -166,7 +166,7 @@ class Measurement:
         result.detect = found.detect
         return True
 
-    def _find_edges(self, result: Result, config: EdgeConfig) -> Routine[EdgeList | None]:
+    def _find_edges(self, result: CameraResult, config: EdgeConfig) -> Routine[EdgeList | None]:
         acquisition, sram = self._acquisition, result.sram
         between = BETWEEN.get(self._state.nadir_search)
         if between is not None and acquisition.can_address(codes.Camera.NADIR, sram):
@@ -183,7 +183,7 @@ class Measurement:
         result.pixels_read = SCANNED_PIXELS
         return lines.edges
 
-    def _measure_sun(self, result: Result, started: int) -> Routine[bool]:
+    def _measure_sun(self, result: CameraResult, started: int) -> Routine[bool]:
         """The Sun's direction; False if the memory was cut off."""
         settings = self._state.cameras[codes.Camera.SUN]
         stored = yield from read_ticks()

@@ -70,7 +70,7 @@ class CameraSettings:
 
 
 @dataclass(eq=False)
-class Result:
+class CameraResult:
     """The latest measurement of one camera."""
 
     #: capture, detect: outcome
@@ -119,7 +119,7 @@ class State(NodeState):
         super().__init__(ERROR_FLAGS)
         self.switches = RunningSwitches(switches)
         self.cameras = {camera: CameraSettings.at_reset(camera) for camera in codes.Camera}
-        self.results = {camera: Result(sram=codes.Sram(camera)) for camera in codes.Camera}
+        self.results = {camera: CameraResult(sram=codes.Sram(camera)) for camera in codes.Camera}
         self.over_current = dict.fromkeys(codes.Sram, False)
         self.nadir_search = codes.NadirSearch.LINES
         self.image_sram = codes.Sram.SRAM1

@@ -8,7 +8,7 @@ from bisect import bisect_right
 
 from cubestack.firmware_model.formats.recording import BusTransfer, Recording
 from cubestack.firmware_model.interface.codec.frames import ESCAPE, FrameDecoder
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 
 LONGEST_PAYLOAD = 4096
 
@@ -32,7 +32,7 @@ def name_answer_byte(interface: Interface, recording: Recording, port: str, inde
     if message is None:
         return f"{place}, answer to unknown ID {payload[0]}"
     offset = payload_offset(answers, index)
-    if message.kind is Kind.TELECOMMAND:
+    if message.kind is MessageKind.TELECOMMAND:
         what = "error code" if offset == 0 else _framing(offset, 1)
         return f"{place}, acknowledge of telecommand {message.name}, {what}"
     return f"{place}, telemetry {message.name}, {_part(message, offset)}"

@@ -15,7 +15,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.codec.message import TELEMETRY_BIT, Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import (
+    TELEMETRY_BIT,
+    Interface,
+    Message,
+    MessageKind,
+)
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.hardware import NodeHardware
@@ -233,7 +238,7 @@ class SatelliteLink(ABC):
     def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
         """Queue a telecommand, or return its error."""
         message = self._interface.find(identifier)
-        if message is None or message.kind is not Kind.TELECOMMAND:
+        if message is None or message.kind is not MessageKind.TELECOMMAND:
             self._raise(self._flags.unknown_command)
             return AckError.INVALID_ID
         if len(parameters) != message.length:

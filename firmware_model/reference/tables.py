@@ -14,7 +14,7 @@ from cubestack.firmware_model.cubestar.tasks import TASKS
 from cubestack.firmware_model.interface.cameras import mlx75412
 from cubestack.firmware_model.interface.codec import switch_messages
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Kind, Message
+from cubestack.firmware_model.interface.codec.message import Message, MessageKind
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
@@ -202,7 +202,7 @@ def _times_shown() -> Iterator[str]:
 
 def _rules(message: Message, ranges: list[str]) -> Iterator[str]:
     """Every rule of a telecommand, from the declaration's decision on each raw value."""
-    assert message.kind is Kind.TELECOMMAND
+    assert message.kind is MessageKind.TELECOMMAND
     for field in message.fields:
         if field.type.startswith("bytes"):
             continue

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from cubestack.hdl.proofs.prover import Proof, ProofResult, prove
 
 
-class Verdict(NamedTuple):
+class ProofVerdict(NamedTuple):
     """Outcome of a proof, and of the same with a fault planted."""
 
     name: str
@@ -21,12 +21,12 @@ class Verdict(NamedTuple):
         return self.result.proved and self.planted.counterexample
 
 
-def verdicts(proofs: Mapping[str, Proof]) -> Iterator[Verdict]:
+def verdicts(proofs: Mapping[str, Proof]) -> Iterator[ProofVerdict]:
     for name, proof in proofs.items():
-        yield Verdict(name, proof, prove(proof), prove(proof, planted=True))
+        yield ProofVerdict(name, proof, prove(proof), prove(proof, planted=True))
 
 
-def verdict_text(verdict: Verdict) -> str:
+def verdict_text(verdict: ProofVerdict) -> str:
     name, proof, result, planted = verdict
     seconds = f"{result.seconds + planted.seconds:.1f} s"
     outcome = f"proved, induction over {result.steps}" if result.proved else "NOT PROVED"
@@ -40,7 +40,7 @@ def verdict_text(verdict: Verdict) -> str:
     )
 
 
-def verdict_json(done: Iterable[Verdict]) -> str:
+def verdict_json(done: Iterable[ProofVerdict]) -> str:
     return json.dumps(
         {
             verdict.name: {

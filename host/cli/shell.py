@@ -24,7 +24,7 @@ from pathlib import Path
 
 from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.errors import HostError
-from cubestack.host.shell.language import Result, Shell
+from cubestack.host.shell.language import CommandResult, Shell
 from cubestack.host.terminal import say
 
 PROMPT = "{}> "
@@ -95,13 +95,13 @@ def split_commands(text: str) -> Iterator[str]:
     yield command
 
 
-def _show_text(result: Result) -> None:
+def _show_text(result: CommandResult) -> None:
     width = max((len(name) for name, _ in result.rows), default=0)
     for name, text in result.rows:
         print(f"{name:<{width}}  {text}" if name else text)
 
 
-def _interactive(shell: Shell, show: Callable[[Result], None]) -> int:
+def _interactive(shell: Shell, show: Callable[[CommandResult], None]) -> int:
     """Ask for commands until the end of the input; errors are told and change nothing else."""
     say(f"{shell.target.interface.name} at {shell.target.name}; Tab completes, help lists")
     with _line_editor(shell):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.clients.contract import DeviceClient
 
 WORD_START = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
@@ -22,7 +22,7 @@ def client_type(interface: Interface) -> type[DeviceClient]:
     for message in interface.messages:
         name = WORD_START.sub("_", message.name).lower()
         if message.supported and name not in methods and not hasattr(DeviceClient, name):
-            is_command = message.kind is Kind.TELECOMMAND
+            is_command = message.kind is MessageKind.TELECOMMAND
             method = _command(message) if is_command else _telemetry(message)
             method.__name__, method.__doc__ = name, message.meaning
             methods[name] = method

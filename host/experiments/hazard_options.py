@@ -12,7 +12,7 @@ from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.ov7620.light import looking_with
 from cubestack.emulator.camera.ov7620.view import EarthSunView
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.hazards import (
     EARTH_HAZARDS,
     SKY_HAZARDS,
@@ -124,7 +124,7 @@ def with_hazards(
 
 
 def around_earth(
-    view: EarthSunView, camera: Target, asked: Sequence[Asked], rng: np.random.Generator
+    view: EarthSunView, camera: CameraTarget, asked: Sequence[Asked], rng: np.random.Generator
 ) -> EarthSunView:
     """The view of Earth and Sun with these hazards, as far as they concern ``camera``."""
     if not asked:

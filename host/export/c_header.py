@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.export.side_protocols import side_c
 
 _ACCESSORS = """
@@ -111,7 +111,7 @@ def _enumeration(prefix: str, choices: type[IntEnum]) -> Iterator[str]:
 
 
 def _message(upper: str, message: Message) -> Iterator[str]:
-    kind = "TC" if message.kind is Kind.TELECOMMAND else "TLM"
+    kind = "TC" if message.kind is MessageKind.TELECOMMAND else "TLM"
     name = f"{upper}_{kind}_{message.name}"
     yield f"/* {message.meaning}{' (extension)' if message.extension else ''} */"
     yield f"#define {name} {message.id}"

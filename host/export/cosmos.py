@@ -7,7 +7,7 @@ must tell COSMOS which packet it requested.
 from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.export.field_text import field_details
 
 TYPES = {"bool1": "UINT", "u8": "UINT", "u16": "UINT", "u32": "UINT", "enum8": "UINT"}
@@ -25,7 +25,7 @@ def cosmos(interface: Interface) -> str:
 
 def _packet(target: str, message: Message) -> Iterator[str]:
     name, meaning = message.name.upper(), _quoted(message.meaning)
-    if message.kind is Kind.TELEMETRY:
+    if message.kind is MessageKind.TELEMETRY:
         yield f"COMMAND {target} REQUEST_{name} LITTLE_ENDIAN {_quoted(f'Ask for {message.name}')}"
         yield _id(message)
         yield f"TELEMETRY {target} {name} LITTLE_ENDIAN {meaning}"

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 from inspect import cleandoc
 
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.export import field_text
 from cubestack.host.export.side_protocols import side_json, side_markdown, side_table
 
@@ -12,7 +12,7 @@ from cubestack.host.export.side_protocols import side_json, side_markdown, side_
 def _table(interface: Interface) -> str:
     """Plain text, one line per message and per field."""
     lines = [_summary(interface)]
-    for kind in Kind:
+    for kind in MessageKind:
         lines += ["", f"{kind.value.upper()}  (bit offset, type, name, meaning)"]
         for message in (m for m in interface.messages if m.kind is kind):
             lines.append(f"{message.id:4d} {message.name}, {message.length} B: {_meaning(message)}")

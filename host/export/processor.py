@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
-from cubestack.firmware_model.interface.efm32gg.table import Field, Processor, Register
+from cubestack.firmware_model.interface.efm32gg.table import Processor, Register, RegisterField
 
 
 def render_processor(tables: Processor, format_name: str) -> str:
@@ -28,7 +28,7 @@ def _rows(tables: Processor) -> Iterator[tuple[str, int, Register, bool]]:
     yield from sorted(rows, key=lambda row: row[1])
 
 
-def _bits(field: Field) -> str:
+def _bits(field: RegisterField) -> str:
     if field.width == 1:
         return f"{field.name}[{field.lsb}]"
     return f"{field.name}[{field.lsb + field.width - 1}:{field.lsb}]"

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from enum import IntEnum
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 
 _HEAD = '''\
 """{name}, interface version {version}: its messages as dataclasses. Generated; needs Python 3.11.
@@ -126,7 +126,9 @@ def _enumeration(choices: type[IntEnum]) -> Iterator[str]:
 
 
 def _class(message: Message, known: set[str]) -> Iterator[str]:
-    kind, base = ("Tc", "Telecommand") if message.kind is Kind.TELECOMMAND else ("Tlm", "Telemetry")
+    kind, base = (
+        ("Tc", "Telecommand") if message.kind is MessageKind.TELECOMMAND else ("Tlm", "Telemetry")
+    )
     yield "@dataclasses.dataclass"
     yield f"class {kind}{message.name}({base}):"
     yield f"    {f'{message.name}: {message.meaning}.'!r}"

@@ -3,11 +3,11 @@
 from xml.etree import ElementTree as Xml
 
 from cubestack.firmware_model.interface.efm32gg.table import (
-    Field,
     Instance,
     Layout,
     Processor,
     Register,
+    RegisterField,
 )
 
 WORD_BITS = 32
@@ -67,7 +67,7 @@ def _register(parent: Xml.Element, register: Register) -> None:
             _field(fields, field)
 
 
-def _field(parent: Xml.Element, field: Field) -> None:
+def _field(parent: Xml.Element, field: RegisterField) -> None:
     own = Xml.SubElement(parent, "field")
     _texts(own, name=field.name, bitOffset=field.lsb, bitWidth=field.width)
     _texts(own, access=_access(field.readable, field.writable))

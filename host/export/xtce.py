@@ -7,7 +7,7 @@ its own, to be chosen by the request. A telecommand begins with its ID byte.
 from xml.etree import ElementTree as Xml
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.export.field_text import field_details
 from cubestack.host.export.stream import slots
 
@@ -20,10 +20,11 @@ def xtce(interface: Interface) -> str:
     root = Xml.Element("SpaceSystem", {"xmlns": NAMESPACE, "name": interface.name})
     _text(root, "LongDescription", f"{interface.name}, interface version {interface.version}.")
     of_kind = {
-        kind: [message for message in interface.messages if message.kind is kind] for kind in Kind
+        kind: [message for message in interface.messages if message.kind is kind]
+        for kind in MessageKind
     }
-    _telemetry(Xml.SubElement(root, "TelemetryMetaData"), of_kind[Kind.TELEMETRY])
-    _commands(Xml.SubElement(root, "CommandMetaData"), of_kind[Kind.TELECOMMAND])
+    _telemetry(Xml.SubElement(root, "TelemetryMetaData"), of_kind[MessageKind.TELEMETRY])
+    _commands(Xml.SubElement(root, "CommandMetaData"), of_kind[MessageKind.TELECOMMAND])
     Xml.indent(root)
     return Xml.tostring(root, "unicode", xml_declaration=True) + "\n"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.interface.codec.field import Value
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.clients.contract import Client
 from cubestack.host.devices.registry import device
 from cubestack.host.errors import NoAnswerError, PortOpenError, TargetError
@@ -33,7 +33,7 @@ class PlayedClient(Client):
         self.interface, self._now = interface, now
         self._told = defaultdict[str, list[Said]](list)
         for one in said(recording, interface):
-            if one.kind == Kind.TELEMETRY.value and one.values and not one.error:
+            if one.kind == MessageKind.TELEMETRY.value and one.values and not one.error:
                 self._told[one.name].append(one)
         self.end_s = recording.end_ps / 1e12
         self._at_s, self._since = 0.0, now()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from cubestack.firmware_model.formats.recording import BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 
 PS_PER_S = 10**12
 
@@ -105,7 +105,7 @@ def _exchange(asked: _Asked, answer: bytes | None, interface: Interface) -> Said
     message = interface.find(asked.payload[0]) if asked.payload else None
     if message is None:
         return _unknown(asked.time_s, LINE, asked.payload[:1])
-    if message.kind is Kind.TELEMETRY:
+    if message.kind is MessageKind.TELEMETRY:
         return _told(asked.time_s, LINE, message, answer or b"", "" if answer else "no answer")
     error = "no acknowledge"
     if answer is not None and len(answer) == 1:
@@ -127,7 +127,7 @@ def _on_the_bus(transfer: BusTransfer, interface: Interface) -> Said | None:
     message = interface.find(written[0])
     if message is None:
         return _unknown(time_s, transfer.port, written[:1])
-    answer = read if message.kind is Kind.TELEMETRY else written[1:]
+    answer = read if message.kind is MessageKind.TELEMETRY else written[1:]
     return _told(time_s, transfer.port, message, answer, error if transfer.errno else "")
 
 

@@ -4,7 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cubestack.host.emulation.controls import Controls
-from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
+from cubestack.host.shell.result import (
+    CommandResult,
+    ShellCommand,
+    ShellError,
+    check_count,
+    to_number,
+)
 from cubestack.host.targets import Target
 
 ON_OFF = ("on", "off")
@@ -38,22 +44,24 @@ class ControlCommands:
             ShellCommand(PEEK, "show memory of the processor with own firmware", self._peek, True),
         ]
 
-    def _scene(self, words: list[str]) -> Result:
+    def _scene(self, words: list[str]) -> CommandResult:
         check_count(SCENE, words, 1, 1)
         self._controls.scene(Path(words[0]))
-        return Result([("", f"scene {words[0]}")], {"scene": words[0]})
+        return CommandResult([("", f"scene {words[0]}")], {"scene": words[0]})
 
-    def _fault(self, words: list[str]) -> Result:
+    def _fault(self, words: list[str]) -> CommandResult:
         controls = self._controls
         if not words:
-            return Result([("", fault) for fault in controls.faults], {"faults": controls.faults})
+            return CommandResult(
+                [("", fault) for fault in controls.faults], {"faults": controls.faults}
+            )
         if words == [LOG]:
             log = controls.fault_log()
-            return Result([("", line) for line in log], {"log": log})
+            return CommandResult([("", line) for line in log], {"log": log})
         controls.fault(words)
-        return Result([("", f"fault: {' '.join(words)}")], {"fault": " ".join(words)})
+        return CommandResult([("", f"fault: {' '.join(words)}")], {"fault": " ".join(words)})
 
-    def _power(self, words: list[str]) -> Result:
+    def _power(self, words: list[str]) -> CommandResult:
         controls = self._controls
         if words:
             if len(words) != 2 or words[1] not in ON_OFF:
@@ -61,21 +69,21 @@ class ControlCommands:
             controls.switch(words[0], words[1] == "on")
         currents = controls.currents()
         rows = [(name, f"{current:.1f} mA") for name, current in currents.items()]
-        return Result(rows, {"currents_ma": currents})
+        return CommandResult(rows, {"currents_ma": currents})
 
-    def _time(self, words: list[str]) -> Result:
+    def _time(self, words: list[str]) -> CommandResult:
         check_count(TIME, words, 0, 1)
         controls = self._controls
         if words:
             controls.advance(to_number("time", words[0], 0))
         now_s = controls.time_s()
-        return Result([("time", f"{now_s:.6f} s")], {"time_s": now_s})
+        return CommandResult([("time", f"{now_s:.6f} s")], {"time_s": now_s})
 
-    def _peek(self, words: list[str]) -> Result:
+    def _peek(self, words: list[str]) -> CommandResult:
         check_count(PEEK, words, 1, 1)
         found = self._controls.peek(words[0])
         rows = [(name, text) for name, (_, text) in found.items()]
-        return Result(rows, {"values": {name: value for name, (value, _) in found.items()}})
+        return CommandResult(rows, {"values": {name: value for name, (value, _) in found.items()}})
 
     @property
     def _controls(self) -> Controls:

@@ -1,8 +1,8 @@
 """The register shell's language: one command per line, with names from the tables.
 
-Every command returns a ``Result``: rows for people, data for programs. ``complete`` completes a
-line. An invalid line raises ShellError (a ValueError) before anything is sent; a device's failure
-raises the client's errors.
+Every command returns a ``CommandResult``: rows for people, data for programs. ``complete``
+completes a line. An invalid line raises ShellError (a ValueError) before anything is sent; a
+device's failure raises the client's errors.
 """
 
 import shlex
@@ -10,17 +10,17 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from cubestack.firmware_model.interface.codec.field import suggestion
-from cubestack.firmware_model.interface.codec.message import Kind
+from cubestack.firmware_model.interface.codec.message import MessageKind
 from cubestack.host.clients.diagnosis import why_silent
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.shell.controls import LOG, ON_OFF, ControlCommands
 from cubestack.host.shell.names import Names
 from cubestack.host.shell.ports import PortCommands
 from cubestack.host.shell.registers import RegisterCommands
-from cubestack.host.shell.result import Result, ShellCommand, ShellError
+from cubestack.host.shell.result import CommandResult, ShellCommand, ShellError
 from cubestack.host.targets import Target
 
-__all__ = ["Result", "Shell", "ShellError"]
+__all__ = ["CommandResult", "Shell", "ShellError"]
 
 T = TypeVar("T")
 
@@ -39,7 +39,7 @@ class Shell:
         self._names = Names(target)
         self._answered = False
         self._silent_because: str | None = None
-        self.on_row: Callable[[Result], None] = lambda _result: None
+        self.on_row: Callable[[CommandResult], None] = lambda _result: None
         commands = [
             *RegisterCommands(target, self._names, lambda row: self.on_row(row)).commands(),
             *PortCommands(target).commands(),
@@ -48,7 +48,7 @@ class Shell:
         ]
         self.commands = {command.name: command for command in commands}
 
-    def execute(self, line: str) -> Result | None:
+    def execute(self, line: str) -> CommandResult | None:
         """Run one command; None for an empty line or a comment (#).
 
         Raises ShellError, InterfaceError, TransportError, NodeError. If the node has never
@@ -95,12 +95,12 @@ class Shell:
         known = _arguments(self.target, self._names, before) if before else list(self.commands)
         return [found for found in known if found.lower().startswith(word.lower())]
 
-    def _help(self, _words: list[str]) -> Result:
+    def _help(self, _words: list[str]) -> CommandResult:
         rows = [
             (command.usage, command.meaning + (" (emulated:)" if command.emulated_only else ""))
             for command in self.commands.values()
         ]
-        return Result(rows, {"commands": list(self.commands)})
+        return CommandResult(rows, {"commands": list(self.commands)})
 
 
 def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
@@ -109,10 +109,10 @@ def _arguments(target: Target, names: Names, before: list[str]) -> list[str]:
     if command in ("read", "watch", "write", "list") and not arguments:
         return names.of(command)
     if command == "read" and len(arguments) == 1:
-        return [f.name for f in names.fields(arguments[0], Kind.TELEMETRY)]
+        return [f.name for f in names.fields(arguments[0], MessageKind.TELEMETRY)]
     if command == "write":
         given = {word.partition("=")[0].lower() for word in arguments[1:]}
-        fields = names.fields(arguments[0], Kind.TELECOMMAND)
+        fields = names.fields(arguments[0], MessageKind.TELECOMMAND)
         return [
             f"{f.name}={v}"
             for f in fields

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Kind, Message
+from cubestack.firmware_model.interface.codec.message import Message, MessageKind
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.shell.result import ShellError
 from cubestack.host.targets import Target
@@ -55,7 +55,7 @@ class Names:
         registers = self.target.registers
         return [] if registers is None else list(registers.registers)
 
-    def find(self, word: str, *kinds: Kind) -> Found | None:
+    def find(self, word: str, *kinds: MessageKind) -> Found | None:
         """The message of one of ``kinds``, or register, called ``word``; or None."""
         if word.startswith(ADDRESS):
             address = _integer(word.removeprefix(ADDRESS))
@@ -66,7 +66,7 @@ class Names:
                 return message
         return next((found for found in self.registers if found.name.lower() == name), None)
 
-    def need(self, command: str, word: str, *kinds: Kind) -> Found:
+    def need(self, command: str, word: str, *kinds: MessageKind) -> Found:
         """As ``find``, but raises ShellError with suggestions."""
         found = self.find(word, *kinds)
         if found is not None:
@@ -81,14 +81,14 @@ class Names:
         near = _near_names(word, self.of(command))
         raise ShellError(f"{command}: nothing is called {word!r}; {near}")
 
-    def fields(self, word: str, kind: Kind) -> tuple[Field, ...]:
+    def fields(self, word: str, kind: MessageKind) -> tuple[Field, ...]:
         """Fields of the message or register called ``word``; empty if there is none."""
         found = self.find(word, kind)
         if found is None:
             return ()
         return found.fields if isinstance(found, Message) else (found.field,)
 
-    def _near_numbers(self, number: int, *kinds: Kind) -> str:
+    def _near_numbers(self, number: int, *kinds: MessageKind) -> str:
         known = [m for m in self.target.interface.messages if m.kind in kinds and m.supported]
         nearest = sorted(known, key=lambda message: abs(message.id - number))[:NEAR]
         return "near: " + ", ".join(f"{number_of(m)} ({m.name})" for m in nearest)

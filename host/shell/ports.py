@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cubestack.host.errors import TargetError
 from cubestack.host.pictures.images import save_picture
-from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count
+from cubestack.host.shell.result import CommandResult, ShellCommand, ShellError, check_count
 from cubestack.host.targets import Target
 from cubestack.host.transport.streams import READ_BYTES, read_answer
 
@@ -39,7 +39,7 @@ class PortCommands:
             ShellCommand(RAW, "send bytes, show the answer", self._raw),
         ]
 
-    def _image(self, words: list[str]) -> Result:
+    def _image(self, words: list[str]) -> CommandResult:
         check_count(IMAGE, words, 1, 2)
         path = Path(words[0])
         if path.suffix.lower() != ".png":
@@ -48,7 +48,7 @@ class PortCommands:
         save_picture(picture, path)
         rows, columns = picture.shape
         data = {"file": str(path), "columns": columns, "rows": rows}
-        return Result([("", f"{path}: {columns} x {rows}")], data)
+        return CommandResult([("", f"{path}: {columns} x {rows}")], data)
 
     def _download(self, source: str | None) -> "NDArray[np.uint8]":
         """The image in memory, or in ``source``; raises TargetError if it sends none."""
@@ -66,7 +66,7 @@ class PortCommands:
         except TargetError as error:
             raise TargetError(f"image: {error}") from None
 
-    def _bench(self, words: list[str]) -> Result:
+    def _bench(self, words: list[str]) -> CommandResult:
         check_count(BENCH, words, 1, 1)
         protocol, line = self.target.interface.service_port, self.target.service_port
         if protocol is None:
@@ -84,11 +84,11 @@ class PortCommands:
         shown = whole and len(answer) <= SHORT_ANSWER
         text = repr(answer.decode("latin-1")) if shown else f"{len(answer)} bytes"
         note = "" if whole else f" of {letter.length}"
-        return Result(
+        return CommandResult(
             [(letter.name, text + note)], {"letter": letter.letter, "answer": answer.hex()}
         )
 
-    def _raw(self, words: list[str]) -> Result:
+    def _raw(self, words: list[str]) -> CommandResult:
         line = self.target.line
         if line is None:
             raise ShellError(f"raw: {self.target.name} is no serial line")
@@ -100,4 +100,4 @@ class PortCommands:
             raise ShellError(f"usage: {RAW}")
         line.write(data)
         answer = b"".join(iter(lambda: line.read(READ_BYTES, RAW_TIMEOUT_S), b""))
-        return Result([("", answer.hex(" ") or "(nothing)")], {"answer": answer.hex()})
+        return CommandResult([("", answer.hex(" ") or "(nothing)")], {"answer": answer.hex()})

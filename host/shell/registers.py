@@ -5,12 +5,18 @@ from dataclasses import dataclass
 from itertools import count
 
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value
-from cubestack.firmware_model.interface.codec.message import Kind, Message
+from cubestack.firmware_model.interface.codec.message import Message, MessageKind
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
 from cubestack.host.shell.names import Names, number_of
-from cubestack.host.shell.result import Result, ShellCommand, ShellError, check_count, to_number
+from cubestack.host.shell.result import (
+    CommandResult,
+    ShellCommand,
+    ShellError,
+    check_count,
+    to_number,
+)
 from cubestack.host.targets import Target
 
 WATCH_PERIOD_S = 1.0
@@ -35,7 +41,7 @@ class RegisterCommands:
 
     target: Target
     names: Names
-    on_row: Callable[[Result], None]
+    on_row: Callable[[CommandResult], None]
 
     def commands(self) -> list[ShellCommand]:
         return [
@@ -48,19 +54,19 @@ class RegisterCommands:
             ShellCommand(LIST, "list all names, or the fields of one", self._list),
         ]
 
-    def _read(self, words: list[str]) -> Result:
+    def _read(self, words: list[str]) -> CommandResult:
         check_count(READ, words, 1, 2)
-        found = self.names.need("read", words[0], Kind.TELEMETRY)
+        found = self.names.need("read", words[0], MessageKind.TELEMETRY)
         if isinstance(found, PointerRegister):
             return self._read_register(found)
         values = self.target.node.telemetry(found.name)
         fields = (found.field(words[1]),) if len(words) == 2 else found.fields
-        return Result(
+        return CommandResult(
             [(f.name, f.label(values[f.name])) for f in fields],
             {"name": found.name, "values": {f.name: _plain(values[f.name]) for f in fields}},
         )
 
-    def _read_register(self, register: PointerRegister) -> Result:
+    def _read_register(self, register: PointerRegister) -> CommandResult:
         assert self.target.registers is not None
         if register.streams:
             data: Value = self.target.registers.read_stream(register.name)
@@ -69,12 +75,12 @@ class RegisterCommands:
             data = self.target.registers.read(register.name)
             text = register.field.label(data)
         values = {register.name: _plain(data)}
-        return Result([(register.name, text)], {"name": register.name, "values": values})
+        return CommandResult([(register.name, text)], {"name": register.name, "values": values})
 
-    def _write(self, words: list[str]) -> Result:
+    def _write(self, words: list[str]) -> CommandResult:
         if not words:
             raise ShellError(f"usage: {WRITE}")
-        found = self.names.need("write", words[0], Kind.TELECOMMAND)
+        found = self.names.need("write", words[0], MessageKind.TELECOMMAND)
         values = words[1:]
         if isinstance(found, PointerRegister):
             check_count(f"write {found.name} VALUE", values, 1, 1)
@@ -85,11 +91,11 @@ class RegisterCommands:
             self.target.node.command(found.name, **parse_values(found, values))
             if any(m.name == "TcmdProcessed" for m in self.target.interface.telemetries):
                 self.target.node.wait_processed(PROCESSING_TIMEOUT_S)
-        return Result([("", f"{found.name}: done")], {"name": found.name, "done": True})
+        return CommandResult([("", f"{found.name}: done")], {"name": found.name, "done": True})
 
-    def _watch(self, words: list[str]) -> Result:
+    def _watch(self, words: list[str]) -> CommandResult:
         check_count(WATCH, words, 1, 3)
-        found = self.names.need("watch", words[0], Kind.TELEMETRY)
+        found = self.names.need("watch", words[0], MessageKind.TELEMETRY)
         times = to_number("watch", words[1], 1) if len(words) > 1 else WATCH_COUNT
         period_s = to_number("watch", words[2], 0) if len(words) > 2 else WATCH_PERIOD_S
         readings = []
@@ -98,13 +104,13 @@ class RegisterCommands:
             readings.append(result.data["values"])
             self.on_row(result)
             if number >= times:
-                return Result([], {"name": found.name, "readings": readings})
+                return CommandResult([], {"name": found.name, "readings": readings})
             self.target.node.pause(period_s)
         raise AssertionError
 
-    def _dump(self, words: list[str]) -> Result:
+    def _dump(self, words: list[str]) -> CommandResult:
         check_count(DUMP, words, 0, 0)
-        result = Result()
+        result = CommandResult()
         frames: dict[str, object] = {}
         registers: dict[str, object] = {}
         for message in self.target.interface.telemetries:
@@ -128,16 +134,16 @@ class RegisterCommands:
         result.data = {"telemetry": frames, "registers": registers}
         return result
 
-    def _list(self, words: list[str]) -> Result:
+    def _list(self, words: list[str]) -> CommandResult:
         check_count(LIST, words, 0, 1)
         if words:
             return self._list_one(words[0])
         found = self.names.all_of("list")
         rows = [(number_of(one), one.name) for one in found]
-        return Result(rows, {"names": [one.name for one in found]})
+        return CommandResult(rows, {"names": [one.name for one in found]})
 
-    def _list_one(self, name: str) -> Result:
-        found = self.names.need("list", name, Kind.TELEMETRY, Kind.TELECOMMAND)
+    def _list_one(self, name: str) -> CommandResult:
+        found = self.names.need("list", name, MessageKind.TELEMETRY, MessageKind.TELECOMMAND)
         if isinstance(found, PointerRegister):
             what = f"register {found.address:#04x}, {found.access.value}"
             fields: tuple[Field, ...] = (found.field,)
@@ -145,7 +151,9 @@ class RegisterCommands:
             what = f"{found.kind.value} {found.id}, {found.length} bytes: {found.meaning}"
             fields = found.fields
         rows = [(f.name, f"{field_type(f)}: {field_details(f)}") for f in fields]
-        return Result([("", what), *rows], {"name": found.name, "fields": [f.name for f in fields]})
+        return CommandResult(
+            [("", what), *rows], {"name": found.name, "fields": [f.name for f in fields]}
+        )
 
 
 def _plain(value: Value) -> object:

@@ -13,7 +13,7 @@ class ShellError(ValueError):
 
 
 @dataclass
-class Result:
+class CommandResult:
     """What a command found.
 
     Attributes:
@@ -31,7 +31,7 @@ class ShellCommand:
 
     usage: str
     meaning: str
-    run: Callable[[list[str]], Result]
+    run: Callable[[list[str]], CommandResult]
     emulated_only: bool = False
 
     @property

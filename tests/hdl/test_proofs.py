@@ -16,7 +16,7 @@ from cubestack.hdl.flow.tools import have_yosys
 from cubestack.hdl.proofs import cubesense, cubestar
 from cubestack.hdl.proofs.properties import idle_is_reset
 from cubestack.hdl.proofs.prover import Proof, ProofResult, StuckWire, UnknownWireError, prove
-from cubestack.hdl.proofs.verdicts import Verdict, verdict_text
+from cubestack.hdl.proofs.verdicts import ProofVerdict, verdict_text
 from tests.tiers import quick
 
 pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
@@ -96,11 +96,11 @@ def test_verdict_says_what_went_wrong() -> None:
     good, bad = ProofResult(True, False, 1, 0.5), ProofResult(False, False, 4, 0.5)
     refuted = ProofResult(False, True, 3, 0.5)
     scan = "sun-scan", PROOFS["sun-scan"]
-    text = verdict_text(Verdict(*scan, good, refuted))
+    text = verdict_text(ProofVerdict(*scan, good, refuted))
     assert "proved" in text
     assert "reader.scan.line_ends stuck at 0) found after 3 steps" in text
-    assert "NOT PROVED" in verdict_text(Verdict(*scan, bad, refuted))
-    assert "REFUTED after 3 steps" in verdict_text(Verdict(*scan, refuted, refuted))
-    assert "NOT FOUND" in verdict_text(Verdict(*scan, good, bad))
-    assert Verdict(*scan, good, refuted).good
-    assert not any(Verdict(*scan, *pair).good for pair in [(bad, refuted), (good, good)])
+    assert "NOT PROVED" in verdict_text(ProofVerdict(*scan, bad, refuted))
+    assert "REFUTED after 3 steps" in verdict_text(ProofVerdict(*scan, refuted, refuted))
+    assert "NOT FOUND" in verdict_text(ProofVerdict(*scan, good, bad))
+    assert ProofVerdict(*scan, good, refuted).good
+    assert not any(ProofVerdict(*scan, *pair).good for pair in [(bad, refuted), (good, good)])

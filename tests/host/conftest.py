@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent, encode_frame
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES, INTERFACE, AckError
 from cubestack.host.clients.i2c import I2cClient
@@ -44,7 +44,7 @@ class FakeNode:
         message = self.interface.find(payload[0])
         if message is None:
             return None if payload[0] & 0x80 else bytes([AckError.INVALID_ID])
-        if message.kind is Kind.TELEMETRY:
+        if message.kind is MessageKind.TELEMETRY:
             fields = message.reset_values() | self.telemetry(message.name)
             answer = message.pack(**fields)
         elif len(payload) != 1 + message.length:

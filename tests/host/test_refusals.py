@@ -25,7 +25,7 @@ from cubestack.host.recording.setups import read_document
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.result import ShellError
 from cubestack.host.studies import workers
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.fidelity.table import fidelity_of, rewritten
 from cubestack.host.studies.hazards import album
 from cubestack.host.studies.upsets import experiment as upsets
@@ -228,7 +228,7 @@ def test_a_hint_needs_a_truth(name: str, mode: str, told: str, tmp_path: Path) -
 @pytest.mark.parametrize("name", ["options", "grid", "random"])
 def test_tables_of_a_plan_are_tables(name: str) -> None:
     with pytest.raises(ValueError, match=f"{name} must be a table of options"):
-        Plan(device="cubestar", frames=1, **{name: [1]})  # type: ignore[arg-type]
+        CampaignPlan(device="cubestar", frames=1, **{name: [1]})  # type: ignore[arg-type]
 
 
 def test_a_device_without_figures_or_command(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ from cubestack.emulator.faults.sites import CameraSite, Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.emulator.rtl.factory import EngineKind, make_engine
 from cubestack.emulator.rtl.wiring import Wiring
-from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, SensorTruth
 from cubestack.emulator.sim.processor import Processor
 from cubestack.emulator.sim.virtual_time import PS_PER_US
 from cubestack.firmware_model.cubesense.program import CubeSenseProgram
@@ -110,7 +110,7 @@ class CubeSenseBoard(Board):
             Camera[target.name]: Ov7620(
                 scene, target, lens=drawn_lens(target, self.seed) if drawn else NOMINAL
             )
-            for target in Target
+            for target in CameraTarget
         }
         if uart == "registers":
             rate = baud or REGISTERS.baud or INTERFACE.baud
@@ -191,7 +191,7 @@ class CubeSenseBoard(Board):
         if shutter is None:
             return None
         middle_ps = shutter.mid_exposure_ps((ROWS - 1) / 2)
-        return self.scene.truth(Target[camera.name], middle_ps, FIELD_DEG)
+        return self.scene.truth(CameraTarget[camera.name], middle_ps, FIELD_DEG)
 
     def truths(self) -> dict[str, NDArray[np.float64]]:
         found = {camera.name.lower(): self.truth(camera) for camera in self.cameras}

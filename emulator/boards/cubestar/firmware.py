@@ -18,7 +18,7 @@ from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.iss.image import Image
 from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Machine
-from cubestack.emulator.iss.outcome import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.emulator.rtl.factory import EngineKind
 from cubestack.emulator.scene.sky import Scene
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling, FpgaPin
@@ -102,12 +102,22 @@ class CubeStarFirmwareBoard(CubeStarStack):
         self._camera_wire = CameraWire(self.camera, wired.CAMERA_I2C.pin("SDA"))
         self._set_analog()
         bus = dict.fromkeys(
-            (Kind.I2C_START, Kind.I2C_WRITE, Kind.I2C_READ, Kind.I2C_STOP), self._camera_bus
+            (
+                OutgoingKind.I2C_START,
+                OutgoingKind.I2C_WRITE,
+                OutgoingKind.I2C_READ,
+                OutgoingKind.I2C_STOP,
+            ),
+            self._camera_bus,
         )
         self.processor = FirmwareProcessor(
             self.kernel,
             self.machine,
-            handlers={Kind.PIN: self._pin, **bus, Kind.UART: lambda one: self._serial.sent(one)},
+            handlers={
+                OutgoingKind.PIN: self._pin,
+                **bus,
+                OutgoingKind.UART: lambda one: self._serial.sent(one),
+            },
             causes=CAUSES,
             couple=partial(self._couple, compiled=not callbacks),
             look_ahead_ps=LineFormat(baud).character_ps * 9 // 10,

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.camera.common.residual import displaced, restored
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 
@@ -124,12 +124,12 @@ class FieldOfView:
     lit: NDArray[np.float32]
 
 
-LENSES = {Target.SUN: Fisheye(369, 250), Target.NADIR: Fisheye(371, 236)}
+LENSES = {CameraTarget.SUN: Fisheye(369, 250), CameraTarget.NADIR: Fisheye(371, 236)}
 """Boresight of each camera (table 5.1)."""
 
 
 @lru_cache(maxsize=8)
-def lens_of(camera: Target, error: LensError = NOMINAL) -> Fisheye:
+def lens_of(camera: CameraTarget, error: LensError = NOMINAL) -> Fisheye:
     """The lens of ``camera`` with ``error``; cached, as computing its field takes time."""
     if error == NOMINAL:
         return LENSES[camera]

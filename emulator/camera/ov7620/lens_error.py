@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.residual import Residual
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import REQUIRED, DeclaredValues, many, number, vector
 
@@ -135,12 +135,12 @@ class LensError(DeclaredValues):
 NOMINAL = LensError()
 
 
-def drawn_lens(camera: Target, serial: int) -> LensError:
+def drawn_lens(camera: CameraTarget, serial: int) -> LensError:
     """The lens of ``camera`` of the unit with that serial number."""
     rng = np.random.default_rng([serial, camera])
     centre_x, centre_y = rng.uniform(-0.5, 0.5, 2)
     p1, p2 = rng.normal(0, DECENTRING_SIGMA_DEG, 2)
-    if camera is Target.SUN:
+    if camera is CameraTarget.SUN:
         share = rng.uniform(*SUN_SHARE)
         radial = [(angle, share * offset) for angle, offset in SUN_OFFSETS_DEG]
     else:

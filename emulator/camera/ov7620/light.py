@@ -30,13 +30,13 @@ from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, Lens
 from cubestack.emulator.camera.ov7620.luminance import SPOT_PX
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.emulator.scene.hazards import Ghosts, Looking, Moon, SkyHazard
 from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE, Depth, Vectors
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 
-USUAL_EXPOSURE = {Target.SUN: 1, Target.NADIR: 4}
+USUAL_EXPOSURE = {CameraTarget.SUN: 1, CameraTarget.NADIR: 4}
 """Counts of the exposure register for the published levels.
 
 Sun: 127 us (published). Nadir: "set once", to an unpublished value; assumed.
@@ -49,7 +49,7 @@ The whole Earth, from 750 km with the Sun behind the satellite, then has the pub
 119 above black.
 """
 
-FILTER = {Target.SUN: 1e-4, Target.NADIR: 1.0}
+FILTER = {CameraTarget.SUN: 1e-4, CameraTarget.NADIR: 1.0}
 """Transmission (published)."""
 
 SUN_EDGE = 65.0
@@ -71,7 +71,11 @@ Light = NDArray[np.float32]
 
 
 def scene_light(
-    scene: EarthSunScene, camera: Target, bloom_px: float, time_ps: int, error: LensError = NOMINAL
+    scene: EarthSunScene,
+    camera: CameraTarget,
+    bloom_px: float,
+    time_ps: int,
+    error: LensError = NOMINAL,
 ) -> Light:
     """Grey values (480, 640) above black per line time of exposure of ``camera``.
 
@@ -81,7 +85,7 @@ def scene_light(
     lens = lens_of(camera, error)
     light = np.zeros((ROWS, COLUMNS), np.float32)
     sun = scene.seen(scene.sun, camera, time_ps)
-    earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(Target.NADIR)
+    earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(CameraTarget.NADIR)
     lit, radiance = scene.earth.radiance(
         lens.field.vectors,
         lens.field.pixel_rad,
@@ -102,7 +106,7 @@ def scene_light(
     return light
 
 
-def looking_with(scene: EarthSunScene, camera: Target, time_ps: int) -> Looking:
+def looking_with(scene: EarthSunScene, camera: CameraTarget, time_ps: int) -> Looking:
     """The state of ``camera`` for hazards, with the nominal lens."""
     return Looking(
         scene.axes(camera, time_ps),
@@ -114,18 +118,18 @@ def looking_with(scene: EarthSunScene, camera: Target, time_ps: int) -> Looking:
     )
 
 
-def _usual_lines(camera: Target) -> int:
+def _usual_lines(camera: CameraTarget) -> int:
     return USUAL_EXPOSURE[camera] * EXPOSURE_LINES
 
 
 def _add_sun(
-    light: Light, lens: Fisheye, bloom_px: float, camera: Target, vector: NDArray[np.float64]
+    light: Light, lens: Fisheye, bloom_px: float, camera: CameraTarget, vector: NDArray[np.float64]
 ) -> None:
     centre = lens.project(vector)
     if centre is None:
         return
     peak = SUN_EDGE * math.exp(1 / (2 * SUN_SPOT**2))
-    unfiltered = peak / FILTER[Target.SUN] / _usual_lines(Target.SUN)
+    unfiltered = peak / FILTER[CameraTarget.SUN] / _usual_lines(CameraTarget.SUN)
     transmission = _slant_transmission(FILTER[camera], math.dist(centre, (lens.cx, lens.cy)))
     _add_spot(light, centre, SUN_SPOT * bloom_px, unfiltered * float(transmission))
 
@@ -173,7 +177,7 @@ def _hazards(scene: EarthSunScene) -> list[SkyHazard]:
 
 
 def _add_hazards(
-    light: Light, lens: Fisheye, scene: EarthSunScene, camera: Target, time_ps: int
+    light: Light, lens: Fisheye, scene: EarthSunScene, camera: CameraTarget, time_ps: int
 ) -> None:
     hazards = _hazards(scene)
     if not hazards:
@@ -182,7 +186,7 @@ def _add_hazards(
     looking = looking_with(scene, camera, time_ps)
     radius = math.radians(angular_radius_deg(scene.altitude_km))
     earth = _Disc(nadir=tuple(np.asarray(scene.nadir).tolist()), radius_rad=radius)
-    level = EARTH_LEVEL / _usual_lines(Target.NADIR) / EARTH_RADIANCE
+    level = EARTH_LEVEL / _usual_lines(CameraTarget.NADIR) / EARTH_RADIANCE
     vectors = field.vectors.astype(np.float64) @ looking.axes
     for hazard in hazards:
         points = hazard.lights(looking)

@@ -10,7 +10,7 @@ from cubestack.emulator.camera.ov7620.scene_file import earth_sun_keys
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting, Reflection
 from cubestack.emulator.scene.form import (
     WRITTEN_DIGITS,
     CameraField,
@@ -65,7 +65,7 @@ def _table(view: EarthSunView) -> Table:
     table |= differing(scene, usual, "nadir", "sun", "moon", "rate_deg_s")
     seed = table.get("seed", 0)
     table |= differing(condition, FisheyeCondition(), "seed")
-    for camera in Target:
+    for camera in CameraTarget:
         name = camera.name.lower()
         mounting: Mounting = getattr(scene, f"{name}_camera")
         if not np.allclose(mounting.matrix, getattr(usual, f"{name}_camera").matrix):
@@ -96,14 +96,14 @@ def _sight(view: EarthSunView, now_ps: int) -> Sight:
     known = {one.name for one in bodies}
     return Sight(
         TITLE,
-        tuple(_camera(scene, camera, 0) for camera in Target),
-        tuple(_camera(scene, camera, now_ps) for camera in Target) if moved else (),
+        tuple(_camera(scene, camera, 0) for camera in CameraTarget),
+        tuple(_camera(scene, camera, now_ps) for camera in CameraTarget) if moved else (),
         (*bodies, *(one for one in bodies_of(scene.hazards) if one.name not in known)),
         MARKS,
         turn=TURN,
     )
 
 
-def _camera(scene: EarthSunScene, camera: Target, time_ps: int) -> CameraField:
+def _camera(scene: EarthSunScene, camera: CameraTarget, time_ps: int) -> CameraField:
     axes: Matrix = scene.axes(camera, time_ps)
     return CameraField(f"{camera.name.lower()} camera", axes, RIM @ axes)

@@ -41,7 +41,7 @@ from cubestack.emulator.camera.ov7620.luminance import (
 )
 from cubestack.emulator.camera.ov7620.sccb import SccbSlave
 from cubestack.emulator.camera.ov7620.view import IN_FOCUS, EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.firmware_model.interface.cameras import ov7620 as chip
 
 FRAME_CLOCKS = chip.LINES_PER_FRAME * chip.CLOCKS_PER_LINE
@@ -93,7 +93,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def __init__(
         self,
         scene: EarthSunScene | EarthSunView,
-        camera: Target,
+        camera: CameraTarget,
         condition: FisheyeCondition | None = None,
         lens: LensError = NOMINAL,
     ) -> None:
@@ -112,7 +112,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
     def lens(self) -> LensError:
         """Deviation of the lens: that of the condition, else the unit's, with hazards."""
         condition = self.condition
-        given = condition.sun_lens if self.camera is Target.SUN else condition.nadir_lens
+        given = condition.sun_lens if self.camera is CameraTarget.SUN else condition.nadir_lens
         own = self._own_lens if given is None else given
         basics = self._basics
         if basics.scale == 1 and not basics.residuals:

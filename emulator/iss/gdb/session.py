@@ -9,7 +9,7 @@ from functools import partial
 
 from cubestack.emulator.iss.gdb import packets
 from cubestack.emulator.iss.gdb.description import TARGET_XML, memory_map
-from cubestack.emulator.iss.gdb.target import Stop, Target, WatchKind
+from cubestack.emulator.iss.gdb.target import DebugTarget, Stop, WatchKind
 
 OK, ERROR, UNKNOWN = b"OK", b"E01", b""
 THREAD = b"1"
@@ -32,7 +32,7 @@ class Session:
         ended: whether the client has detached or killed the target.
     """
 
-    def __init__(self, target: Target) -> None:
+    def __init__(self, target: DebugTarget) -> None:
         self.output = bytearray()
         self.ended = False
         self._target = target

@@ -41,7 +41,7 @@ class MemoryRegion:
     block: int = 0
 
 
-class Target(Protocol):
+class DebugTarget(Protocol):
     """A processor and its memories. All but ``halted`` and ``halt`` require that it is halted."""
 
     @property

@@ -65,7 +65,7 @@ REPORTED_FRAMES = 12
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultRecord:
     """``FaultRecord`` of system.h."""
 
     exception: int
@@ -90,11 +90,11 @@ def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType
     return EXCEPTIONS.get(number, f"exception {number}")
 
 
-def last_fault(machine: Machine) -> Fault:
+def last_fault(machine: Machine) -> FaultRecord:
     """The last fault; its ``count`` is 0 if there was none since power-on."""
-    values = (ctypes.c_int64 * len(fields(Fault)))()
+    values = (ctypes.c_int64 * len(fields(FaultRecord)))()
     insight_library().insight_fault(machine.handle, values)
-    return Fault(*values)
+    return FaultRecord(*values)
 
 
 def unhandled(machine: Machine) -> bool:
@@ -119,7 +119,7 @@ def reasons(cfsr: int, hfsr: int) -> list[str]:
     return words
 
 
-def _lines(machine: Machine, symbols: Symbols, fault: Fault, time_ps: int) -> Iterator[str]:
+def _lines(machine: Machine, symbols: Symbols, fault: FaultRecord, time_ps: int) -> Iterator[str]:
     where = f"at {time_ps / 1e12:.9f} s"
     values = {number: machine.register(f"r{number}") for number in range(16)}
     values[PSP] = machine.register("psp")
@@ -157,7 +157,7 @@ def _lines(machine: Machine, symbols: Symbols, fault: Fault, time_ps: int) -> It
         yield f"    #{number} {symbols.describe(frame.address, frame.place)}{note}"
 
 
-def _frame(machine: Machine, symbols: Symbols, fault: Fault) -> Iterator[str]:
+def _frame(machine: Machine, symbols: Symbols, fault: FaultRecord) -> Iterator[str]:
     if not fault.frame:
         yield "  no stacked frame: stacking failed"
         return

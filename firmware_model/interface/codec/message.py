@@ -27,7 +27,7 @@ from cubestack.firmware_model.interface.codec.switches import Switches
 TELEMETRY_BIT = 0x80
 
 
-class Kind(Enum):
+class MessageKind(Enum):
     """Direction of a message."""
 
     TELECOMMAND = "telecommand"
@@ -91,7 +91,7 @@ class Message:
         related += [other for other, _ in dependent]
         for name in related:
             self.field(name)
-        if self.kind is Kind.TELECOMMAND:
+        if self.kind is MessageKind.TELECOMMAND:
             wrong = self.violations(self.reset_values())
             if wrong:
                 raise InterfaceError(
@@ -103,8 +103,8 @@ class Message:
         return dataclasses.replace(self, fields=fields, ordered=ordered)
 
     @property
-    def kind(self) -> Kind:
-        return Kind.TELEMETRY if self.id & TELEMETRY_BIT else Kind.TELECOMMAND
+    def kind(self) -> MessageKind:
+        return MessageKind.TELEMETRY if self.id & TELEMETRY_BIT else MessageKind.TELECOMMAND
 
     @property
     def has_side_effect(self) -> bool:
@@ -133,7 +133,7 @@ class Message:
         missing = [field.name for field in self.fields if field.name not in values]
         if missing:
             raise InterfaceError(f"{self.name} needs a value for {', '.join(missing)}")
-        saturate = self.kind is Kind.TELEMETRY
+        saturate = self.kind is MessageKind.TELEMETRY
         whole = 0
         for field in self.fields:
             try:
@@ -194,8 +194,8 @@ class Interface:
 
     def __post_init__(self) -> None:
         for messages, kind in (
-            (self.telecommands, Kind.TELECOMMAND),
-            (self.telemetries, Kind.TELEMETRY),
+            (self.telecommands, MessageKind.TELECOMMAND),
+            (self.telemetries, MessageKind.TELEMETRY),
         ):
             for message in messages:
                 if message.kind is not kind:

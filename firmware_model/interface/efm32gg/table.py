@@ -27,7 +27,7 @@ class RegisterTableError(ValueError):
 
 
 @dataclass(frozen=True)
-class Field:
+class RegisterField:
     """Adjacent bits of a register."""
 
     name: str
@@ -48,7 +48,7 @@ class Register:
     offset: int
     name: str
     reset: int
-    fields: tuple[Field, ...]
+    fields: tuple[RegisterField, ...]
     action: bool = False
     modelled: bool = True
 
@@ -138,15 +138,15 @@ def _registers(layout: str, line: str) -> Iterator[Register]:
         raise RegisterTableError(f"{layout}: {error}: {line.strip()!r}") from None
 
 
-def _fields(word: str, access: str) -> Iterator[Field]:
+def _fields(word: str, access: str) -> Iterator[RegisterField]:
     if word == "*":
-        yield Field("", 0, 32, "r" in access, "w" in access)
+        yield RegisterField("", 0, 32, "r" in access, "w" in access)
         return
     name, lsb, *rest = word.split(":")
     width = int(rest[0]) if rest and rest[0] else 1
     own = rest[1] if len(rest) > 1 else access
     for index, one in enumerate(_names(name)):
-        yield Field(one, int(lsb) + index * width, width, "r" in own, "w" in own)
+        yield RegisterField(one, int(lsb) + index * width, width, "r" in own, "w" in own)
 
 
 def _names(name: str) -> Iterator[str]:

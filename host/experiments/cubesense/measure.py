@@ -22,7 +22,7 @@ import numpy as np
 
 from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.earth_sun import EarthSunScene, SensorTruth, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, SensorTruth
 from cubestack.firmware_model.interface.cubesense.codes import Camera, NadirSearch, Sram
 from cubestack.firmware_model.values import choice, number, positive, whole
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
@@ -291,7 +291,7 @@ def random_view(
         seed=int(rng.integers(1 << 31)),
     )
     view = view_of(sensor, angles, condition, _or(options.altitude, 750.0))
-    return hazards.around_earth(view, Target(sensor), options.hazard, rng)
+    return hazards.around_earth(view, CameraTarget(sensor), options.hazard, rng)
 
 
 def view_of(

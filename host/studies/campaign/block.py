@@ -14,7 +14,7 @@ from cubestack.emulator.native.compiler import CompilerError
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import experiment_of, measure
 from cubestack.host.experiments.rates import outcome, why_refused
-from cubestack.host.studies.campaign.plan import Block, Values
+from cubestack.host.studies.campaign.plan import FrameBlock, Values
 
 WALL = "wall_ms"
 """The one value of a result that another run does not give again."""
@@ -48,7 +48,7 @@ class Row:
         return self.block, self.row
 
 
-def rows_of(block: Block) -> int:
+def rows_of(block: FrameBlock) -> int:
     """How many rows it makes: of devices with several cameras, one for each in a frame."""
     experiment = experiment_of(registered(block.device), block.command)
     own = experiment.options.declared()
@@ -56,19 +56,19 @@ def rows_of(block: Block) -> int:
     return int(experiment.count(experiment.options(frames=block.frames, seed=0, **options)))
 
 
-def measured(block: Block, frames: int, seed: int, **more: Any) -> Iterator[Any]:
+def measured(block: FrameBlock, frames: int, seed: int, **more: Any) -> Iterator[Any]:
     """Results from one power-up on; ``more`` as ``measure`` has it."""
     options = {"frames": frames, "seed": seed, **block.options}
     return measure(block.device, command=block.command, **options, **more)
 
 
-def frames_of(block: Block, seed: int) -> int:
+def frames_of(block: FrameBlock, seed: int) -> int:
     """How many frames were to be measured from the power-up with that seed on."""
     seeds = [block.seed, *(_seed(block.seed, frame) for frame in range(1, block.frames))]
     return block.frames - seeds.index(seed)
 
 
-def perform(block: Block) -> list[Row]:
+def perform(block: FrameBlock) -> list[Row]:
     rows = list[Row]()
     a_frame, frame = rows_of(block) // block.frames, 0
     while frame < block.frames:
@@ -80,7 +80,7 @@ def perform(block: Block) -> list[Row]:
 
 
 def _measured(
-    block: Block, results: Iterator[Any], before: int, seed: int, a_frame: int
+    block: FrameBlock, results: Iterator[Any], before: int, seed: int, a_frame: int
 ) -> Iterator[Row]:
     """Rows from one power-up on, up to the first frame that fails."""
     after = 0

@@ -28,7 +28,7 @@ from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.campaign import parquet, report, statistics
 from cubestack.host.studies.campaign import run as campaigns
 from cubestack.host.studies.campaign.folder import Folder
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
 from cubestack.host.studies.campaign.statistics import Change, compared
 from cubestack.host.studies.campaign.worst import worst
@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     if len(args.words) > 1:
         raise ValueError(f"one plan at a time, not {' '.join(args.words)}")
     path = plan_file(args.words[0])
-    plan = Plan.read(path)
+    plan = CampaignPlan.read(path)
     folder = Folder.begun(args.out or campaigns.default_folder(path), plan, resume=args.resume)
     total, done = campaigns.count(plan), 0
     before = sum(1 for _ in folder.rows())

@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from cubestack.host.studies.campaign.block import Row
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 
 PLAN, ROWS = "campaign.json", "rows.jsonl"
 
@@ -37,14 +37,14 @@ class Folder:
         self.path = path
         try:
             told = json.loads((path / PLAN).read_text("utf-8"))
-            self.plan, self.version = Plan(**told["plan"]), str(told["version"])
+            self.plan, self.version = CampaignPlan(**told["plan"]), str(told["version"])
         except FileNotFoundError:
             raise FolderError(f"{path} is no campaign's folder: it has no {PLAN}") from None
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise FolderError(f"{path / PLAN}: {error}") from None
 
     @classmethod
-    def begun(cls, path: Path, plan: Plan, *, resume: bool) -> "Folder":
+    def begun(cls, path: Path, plan: CampaignPlan, *, resume: bool) -> "Folder":
         """The folder for a plan: a new one or, to ``resume``, the one that it has.
 
         Raises:

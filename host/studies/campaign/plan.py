@@ -33,7 +33,7 @@ Values = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Block:
+class FrameBlock:
     """Frames that one worker measures one after the other; what it gives hangs on nothing else.
 
     Attributes:
@@ -56,7 +56,7 @@ class Block:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(Options):
+class CampaignPlan(Options):
     """A campaign; attributes are keys of its file.
 
     Attributes:
@@ -130,7 +130,7 @@ class Plan(Options):
             dict(zip(self.grid, values, strict=True)) for values in product(*self.grid.values())
         ]
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[FrameBlock]:
         at_a_point = -(-self.frames // self.block)
         for where, point in enumerate(self.points):
             for index in range(at_a_point):
@@ -140,7 +140,7 @@ class Plan(Options):
                 options = dict(self.options) | swept
                 number = where * at_a_point + index
                 what = options, swept, frames, seed, self.command
-                yield Block(number, self.device, *what)
+                yield FrameBlock(number, self.device, *what)
 
     def _drawn(self, index: int) -> tuple[int, dict[str, Any]]:
         generator = np.random.default_rng([self.seed, index])
@@ -169,7 +169,7 @@ def _check_draw(name: str, draw: Any) -> None:
         )
 
 
-def _where(block: Block, error: str) -> str:
+def _where(block: FrameBlock, error: str) -> str:
     swept = ", ".join(f"{name} = {value!r}" for name, value in block.swept.items())
     return f"{error} (with {swept})" if swept else error
 

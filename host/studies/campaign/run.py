@@ -8,7 +8,7 @@ from typing import Any
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.studies.campaign.block import Row, frames_of, measured, perform, rows_of
 from cubestack.host.studies.campaign.folder import Folder, FolderError
-from cubestack.host.studies.campaign.plan import Block, Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 from cubestack.host.studies.workers import performed
 
 
@@ -34,7 +34,7 @@ def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[
         folder.sort()
 
 
-def count(plan: Plan) -> int:
+def count(plan: CampaignPlan) -> int:
     """How many rows a campaign has."""
     return sum(map(rows_of, plan.blocks()))
 
@@ -54,7 +54,7 @@ def again(
     folder: Folder, row: Row, opened: Callable[[AnyEmulated], object] = lambda _emulated: None
 ) -> dict[str, Any]:
     """The result of a row's frame, measured again; ``opened`` is told of the device."""
-    block: Block = next(each for each in folder.plan.blocks() if each.number == row.block)
+    block: FrameBlock = next(each for each in folder.plan.blocks() if each.number == row.block)
     results = measured(block, frames_of(block, row.seed), row.seed, opened=opened)
     found: dict[str, Any] = next(islice(results, row.after, None)).as_dict()
     return found

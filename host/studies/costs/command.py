@@ -17,7 +17,7 @@ from rich.table import Table
 
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
-from cubestack.host.studies.costs.contract import CostReport, Measurement
+from cubestack.host.studies.costs.contract import CostMeasurement, CostReport
 from cubestack.host.terminal import busy, show, tell
 
 _BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
@@ -71,7 +71,7 @@ def _known(option: str, wanted: list[str] | None, known: tuple[str, ...]) -> tup
     return tuple(wanted or known)
 
 
-def _show(report: CostReport, found: list[Measurement]) -> None:
+def _show(report: CostReport, found: list[CostMeasurement]) -> None:
     """Operations, a column a build, beside what is charged."""
     first = [one for one in found if one.timing == found[0].timing]
     table = Table("operation", "charged", *(one.build for one in first))

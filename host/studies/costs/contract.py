@@ -7,7 +7,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Measurement:
+class CostMeasurement:
     """Of one build.
 
     Attributes:
@@ -36,9 +36,9 @@ class CostReport:
 
     levels: tuple[str, ...]
     precisions: tuple[str, ...]
-    measure: Callable[[Sequence[str], Sequence[str]], Iterator[Measurement]]
-    as_data: Callable[[Sequence[Measurement]], dict[str, Any]]
+    measure: Callable[[Sequence[str], Sequence[str]], Iterator[CostMeasurement]]
+    as_data: Callable[[Sequence[CostMeasurement]], dict[str, Any]]
     file: Path
-    page: Callable[[Sequence[Measurement]], str]
+    page: Callable[[Sequence[CostMeasurement]], str]
     document: str
     table: Mapping[str, float]

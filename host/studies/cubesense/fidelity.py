@@ -9,7 +9,7 @@ from cubestack.emulator.boards.cubesense.power import CUBESENSE_POWER
 from cubestack.emulator.camera.ov7620 import fisheye, lens_error, light
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM, angular_radius_deg
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.emulator.sim.power import PowerModel
 from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
@@ -175,13 +175,13 @@ def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
 def _light(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """Grey value of the Earth at noon, its threshold, and the Sun's radius in px."""
     bloom_px, space = FisheyeCondition().bloom_px, 34
-    lines = light.USUAL_EXPOSURE[Target.NADIR] * EXPOSURE_LINES
-    grey = lines * light.scene_light(_scene(Camera.NADIR, 0.0), Target.NADIR, bloom_px, 0)
+    lines = light.USUAL_EXPOSURE[CameraTarget.NADIR] * EXPOSURE_LINES
+    grey = lines * light.scene_light(_scene(Camera.NADIR, 0.0), CameraTarget.NADIR, bloom_px, 0)
     level = float(grey[grey > grey.max() / 3].mean()) + space
     figures = {"earth": level, "threshold": space + 0.3 * (level - space)}
-    lines = light.USUAL_EXPOSURE[Target.SUN] * EXPOSURE_LINES
+    lines = light.USUAL_EXPOSURE[CameraTarget.SUN] * EXPOSURE_LINES
     for name, angle in (("centre", 0.0), ("edge", 90.0)):
-        spot = lines * light.scene_light(_scene(Camera.SUN, angle), Target.SUN, bloom_px, 0)
+        spot = lines * light.scene_light(_scene(Camera.SUN, angle), CameraTarget.SUN, bloom_px, 0)
         figures[f"sun_{name}"] = float(np.sqrt((spot > light.SUN_EDGE).sum() / np.pi))
     return figures
 

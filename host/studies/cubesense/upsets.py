@@ -34,7 +34,7 @@ from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, is_right, random_view
 from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
-from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
+from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, UpsetVerdict
 
 LINKED, READING = "linked", "reading"
 
@@ -51,17 +51,17 @@ def _start(sram: Sram, emulated: EmulatedDevice[CubeSenseBoard, CubeSense]) -> N
         emulated.client.client.command("CaptureAndDetect", Camera=camera, Sram=sram)
 
 
-def _judge(emulated: EmulatedDevice[CubeSenseBoard, CubeSense]) -> Verdict:
+def _judge(emulated: EmulatedDevice[CubeSenseBoard, CubeSense]) -> UpsetVerdict:
     reasons = []
     for camera in Camera:
         measured = emulated.client.wait_measured(camera)
         right = is_right(emulated, camera, measured)
         if measured.detected and not right:
-            return Verdict("wrong")
+            return UpsetVerdict("wrong")
         if not measured.detected:
             told = measured.detect if measured.capture.stored else measured.capture
             reasons.append(f"{camera.name.lower()}: {told.name.lower().replace('_', ' ')}")
-    return Verdict("refused", ", ".join(reasons)) if reasons else Verdict("right")
+    return UpsetVerdict("refused", ", ".join(reasons)) if reasons else UpsetVerdict("right")
 
 
 def _state(engine: RtlEngine) -> str:

@@ -25,7 +25,7 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import power_up
-from cubestack.host.studies.costs.contract import CostReport, Measurement
+from cubestack.host.studies.costs.contract import CostMeasurement, CostReport
 from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 
 PUBLISHED_MS = 320.0
@@ -90,7 +90,7 @@ def generated() -> dict[str, str]:
     return {**catalogue_tables(), "defaults.h": default_settings(), "efm32gg.h": c_header(LAYOUTS)}
 
 
-def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
+def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[CostMeasurement]:
     compiler_version()
     pixels, sources, images = picture(), generated(), {}
     for case in _cases(levels, precisions):
@@ -100,10 +100,10 @@ def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measur
         phases = run(calls, pixels).cycles
         cycles = operations.measure(calls, double=case.build.precision == "double")
         calls.machine.close()
-        yield Measurement(str(case.build), str(case.timing), cycles, phases)
+        yield CostMeasurement(str(case.build), str(case.timing), cycles, phases)
 
 
-def page(found: Sequence[Measurement], clock_hz: int) -> str:
+def page(found: Sequence[CostMeasurement], clock_hz: int) -> str:
     """The table of builds, in ms, beside what the Python program charges and what is published."""
     lines = [
         f"| build | memory | {' | '.join(COLUMNS)} | sum, ms |",
@@ -122,7 +122,7 @@ def page(found: Sequence[Measurement], clock_hz: int) -> str:
     return "\n".join(lines)
 
 
-def as_data(found: Sequence[Measurement]) -> dict[str, Any]:
+def as_data(found: Sequence[CostMeasurement]) -> dict[str, Any]:
     return {"compiler": compiler_version(), "builds": [asdict(one) for one in found]}
 
 

@@ -30,7 +30,7 @@ from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar.measure import wait_started
 from cubestack.host.studies.upsets.experiment import UpsetExperiment, UpsetOptions
-from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, Verdict
+from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, Subject, UpsetVerdict
 
 READING = "reading"
 
@@ -58,16 +58,16 @@ def _start(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> None:
     emulated.client.client.command("CaptureAndProcess")
 
 
-def _judge(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> Verdict:
+def _judge(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> UpsetVerdict:
     cubestar = emulated.client
     cubestar.client.wait_processed(TIMEOUT_S)
     status = cubestar.task_status()
     attitude = cubestar.attitude()
     if not attitude.valid:
-        return Verdict("refused", status.name.lower().replace("_", " "))
+        return UpsetVerdict("refused", status.name.lower().replace("_", " "))
     truth = emulated.board.truth()
     right = truth is not None and attitudes.is_right(*attitudes.errors(attitude.quaternion, truth))
-    return Verdict("right" if right else "wrong")
+    return UpsetVerdict("right" if right else "wrong")
 
 
 def _state(engine: RtlEngine) -> str:

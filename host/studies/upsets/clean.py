@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cubestack.emulator.faults.sites import Sites
 from cubestack.emulator.rtl.contract import RtlEngine
 from cubestack.host.emulation.emulated import AnyEmulated
-from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Subject, Verdict
+from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Subject, UpsetVerdict
 from cubestack.host.studies.upsets.watch import PortWatch
 
 PS_PER_S = 10**12
@@ -67,7 +67,7 @@ class CleanLoop:
     intervals: list[Interval]
     over_ps: int
     snapshot: Snapshot
-    verdict: Verdict
+    verdict: UpsetVerdict
 
     @property
     def start_ps(self) -> int:

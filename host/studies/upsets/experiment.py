@@ -27,9 +27,9 @@ from cubestack.host.studies.upsets.sample import (
     EFFECTS,
     Outcome,
     Running,
-    Target,
     Upset,
     UpsetResult,
+    UpsetTarget,
     followed,
 )
 from cubestack.host.studies.upsets.subject import Rig, Subject
@@ -147,11 +147,11 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
         yield Section("what they do", png=figure)
 
 
-def _targets(rig: Rig, options: UpsetOptions) -> list[Target]:
+def _targets(rig: Rig, options: UpsetOptions) -> list[UpsetTarget]:
     """Every bit of every register, and places for bits of memories, not yet drawn."""
     known = _registers(rig.wiring)
     registers = [
-        Target(name, bit)
+        UpsetTarget(name, bit)
         for name, bits in known.items()
         if fnmatchcase(name, options.registers)
         for bit in range(bits)
@@ -159,7 +159,7 @@ def _targets(rig: Rig, options: UpsetOptions) -> list[Target]:
     if not registers:
         raise ValueError(f"no register is like {options.registers!r}; there are {', '.join(known)}")
     return registers + [
-        Target(name, 0, memory=True)
+        UpsetTarget(name, 0, memory=True)
         for name in (options.memories.split(",") if options.memories else rig.memories)
         for _ in range(options.memory_bits)
     ]
@@ -218,7 +218,7 @@ def _registers(wiring: Callable[[], Wiring]) -> Mapping[str, int]:
         engine.close()
 
 
-def _check(targets: Sequence[Target], sizes: Mapping[str, int]) -> None:
+def _check(targets: Sequence[UpsetTarget], sizes: Mapping[str, int]) -> None:
     for target in targets:
         if target.name not in sizes:
             raise ValueError(f"there is no memory {target.name!r}; there are {', '.join(sizes)}")
@@ -233,7 +233,7 @@ def _moment(intervals: Sequence[Interval], phase: str, rng: np.random.Generator)
     return int(rng.integers(chosen.start_ps, chosen.end_ps))
 
 
-def _drawn(target: Target, sizes: Mapping[str, int], rng: np.random.Generator) -> Target:
+def _drawn(target: UpsetTarget, sizes: Mapping[str, int], rng: np.random.Generator) -> UpsetTarget:
     if not target.memory:
         return target
     return replace(target, bit=int(rng.integers(sizes[target.name])))

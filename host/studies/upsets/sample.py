@@ -11,7 +11,7 @@ from cubestack.host.devices.experiment import Result
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.errors import HostError
 from cubestack.host.studies.upsets.clean import CleanLoop, Snapshot, take
-from cubestack.host.studies.upsets.subject import Answer, Subject, Verdict
+from cubestack.host.studies.upsets.subject import Answer, Subject, UpsetVerdict
 from cubestack.host.studies.upsets.watch import PortWatch
 
 AHEAD_PS = 2_000_000
@@ -32,7 +32,7 @@ after the loop, and was never seen; "late" is right, but not at its time."""
 
 
 @dataclass(frozen=True)
-class Target:
+class UpsetTarget:
     """A bit: of a register of the FPGAs, or anywhere in a memory.
 
     Attributes:
@@ -51,7 +51,7 @@ class UpsetResult(Result):
     """Attributes are those of the JSON output.
 
     Attributes:
-        target, bit, memory: as ``Target`` has them.
+        target, bit, memory: as ``UpsetTarget`` has them.
         phase: of the loop, in which it was hit.
         time_s: virtual time of the upset.
         effect: one of `EFFECTS`.
@@ -109,7 +109,7 @@ class Upset:
 
     time_ps: int
     phase: str
-    target: Target
+    target: UpsetTarget
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Outcome:
     """What became of an upset; attributes as ``UpsetResult`` has them."""
 
     effect: Effect
-    verdict: Verdict
+    verdict: UpsetVerdict
     recovered: int | None
 
 
@@ -178,7 +178,7 @@ def _out_of_sight(found: Snapshot, running: Running) -> bool:
     )
 
 
-def _judged(running: Running, *, again: bool = False) -> Verdict:
+def _judged(running: Running, *, again: bool = False) -> UpsetVerdict:
     """On the loop that is under way, or on the next one."""
     kernel, clean = running.emulated.board.kernel, running.clean
     try:
@@ -189,7 +189,7 @@ def _judged(running: Running, *, again: bool = False) -> Verdict:
         kernel.advance_to(end_ps)  # asked before that, it would answer that it is at work
         return running.subject.judge(running.emulated)
     except HostError as error:
-        return Verdict("refused", type(error).__name__)
+        return UpsetVerdict("refused", type(error).__name__)
 
 
 def effect_of(found: Snapshot, clean: Snapshot, row_bytes: int) -> Effect:

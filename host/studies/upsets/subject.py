@@ -21,7 +21,7 @@ BETWEEN = "between"
 
 
 @dataclass(frozen=True)
-class Verdict:
+class UpsetVerdict:
     """What the device answered after a loop, beside the truth; ``reason`` of a refusal."""
 
     answer: Answer
@@ -44,7 +44,7 @@ class Subject:
 
     scene: Callable[[np.random.Generator], Any]
     start: Callable[[Any], None]
-    judge: Callable[[Any], Verdict]
+    judge: Callable[[Any], UpsetVerdict]
     state: Callable[[RtlEngine], str]
     row_bytes: int
     period_s: float = 1.0

@@ -8,7 +8,7 @@ from cubestack.emulator.boards.firmware import FRAMES, CameraWire, Core, SerialW
 from cubestack.emulator.bus.line_format import FASTEST_BAUD, LineFormat
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.camera.mt9m001.sensor import Mt9m001
-from cubestack.emulator.iss.outcome import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 
@@ -71,7 +71,7 @@ class Bus:
         self.camera = Mt9m001(SkyScene.pointing(80.0, 0.0))
         self.wire = CameraWire(self.camera, SDA)
 
-    def say(self, kind: Kind, value: int = 0, unit: int = SDA << 8 | 1) -> Any:
+    def say(self, kind: OutgoingKind, value: int = 0, unit: int = SDA << 8 | 1) -> Any:
         """What the machine is told of it; nothing for nothing."""
         del self.machine.given[:]
         self.wire.handle(self.machine, Outgoing(kind, unit, value, 0, 5))
@@ -83,17 +83,17 @@ class Bus:
         return tuple(rest)
 
     def read(self, count: int) -> list[int]:
-        assert self.say(Kind.I2C_START, CAMERA << 1 | 1) == (True,)
-        found = [self.say(Kind.I2C_READ) for _ in range(count)]
+        assert self.say(OutgoingKind.I2C_START, CAMERA << 1 | 1) == (True,)
+        found = [self.say(OutgoingKind.I2C_READ) for _ in range(count)]
         assert all(acknowledged for acknowledged, _ in found)
-        self.say(Kind.I2C_STOP)
+        self.say(OutgoingKind.I2C_STOP)
         return [byte for _, byte in found]
 
     def write(self, *data: int, stop: bool = True) -> list[tuple[bool]]:
-        answers = [self.say(Kind.I2C_START, CAMERA << 1)]
-        answers += [self.say(Kind.I2C_WRITE, byte) for byte in data]
+        answers = [self.say(OutgoingKind.I2C_START, CAMERA << 1)]
+        answers += [self.say(OutgoingKind.I2C_WRITE, byte) for byte in data]
         if stop:
-            assert self.say(Kind.I2C_STOP) is None
+            assert self.say(OutgoingKind.I2C_STOP) is None
         return answers
 
 
@@ -114,25 +114,27 @@ def test_a_write_takes_effect_at_its_end_and_once() -> None:
     bus = Bus()
     bus.write(0x09, 0x55, 0xAA, stop=False)
     assert bus.camera.registers.peek(9) == 0x0419
-    bus.say(Kind.I2C_STOP)
+    bus.say(OutgoingKind.I2C_STOP)
     assert bus.camera.registers.peek(9) == 0x55AA
     bus.camera.registers.store("SHUTTER_WIDTH", 7)
-    bus.say(Kind.I2C_STOP)
+    bus.say(OutgoingKind.I2C_STOP)
     assert bus.camera.registers.peek(9) == 7
 
 
 def test_others_on_the_bus_and_a_camera_without_power_do_not_answer() -> None:
     bus = Bus()
     for address_byte in (0x40, 0x41):
-        assert bus.say(Kind.I2C_START, address_byte) == (False,)
-    assert bus.say(Kind.I2C_WRITE, 1) == (False,)
-    bus.say(Kind.I2C_STOP)
-    assert bus.say(Kind.I2C_START, CAMERA << 1, unit=(SDA + 1) << 8 | 1) is None  # other pins
-    assert bus.say(Kind.PIN, 1) is None
+        assert bus.say(OutgoingKind.I2C_START, address_byte) == (False,)
+    assert bus.say(OutgoingKind.I2C_WRITE, 1) == (False,)
+    bus.say(OutgoingKind.I2C_STOP)
+    assert (
+        bus.say(OutgoingKind.I2C_START, CAMERA << 1, unit=(SDA + 1) << 8 | 1) is None
+    )  # other pins
+    assert bus.say(OutgoingKind.PIN, 1) is None
     bus.camera.power(False, 0)
-    assert bus.say(Kind.I2C_START, CAMERA << 1) == (False,)
-    assert bus.say(Kind.I2C_START, CAMERA << 1 | 1) == (False,)
-    assert bus.say(Kind.I2C_READ) == (True, 0xFF)  # the pulled-up line
+    assert bus.say(OutgoingKind.I2C_START, CAMERA << 1) == (False,)
+    assert bus.say(OutgoingKind.I2C_START, CAMERA << 1 | 1) == (False,)
+    assert bus.say(OutgoingKind.I2C_READ) == (True, 0xFF)  # the pulled-up line
 
 
 class Line:
@@ -149,7 +151,7 @@ class Line:
         self.memory[FRAMES[0][0]] = 0x1005  # 8N1
 
     def send(self, byte: int, bits: int, baud: float, unit: int = 0, pin: int = TX) -> None:
-        one = Outgoing(Kind.UART, pin << 8 | unit, byte, round(bits * PS_PER_S / baud), 0)
+        one = Outgoing(OutgoingKind.UART, pin << 8 | unit, byte, round(bits * PS_PER_S / baud), 0)
         self.wire.sent(one)
 
 

@@ -5,12 +5,12 @@ import pytest
 
 from cubestack.emulator.scene.ball import ball_scene
 from cubestack.emulator.scene.earth import angular_radius_deg
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 
 
 def angles(**place: object) -> tuple[float, float]:
-    truth = ball_scene(**place).truth(Target.NADIR, 0)  # type: ignore[arg-type]
+    truth = ball_scene(**place).truth(CameraTarget.NADIR, 0)  # type: ignore[arg-type]
     return truth.alpha_deg, truth.beta_deg
 
 

@@ -2,20 +2,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting
 from cubestack.emulator.scene.file import SceneError
 
-SUN, NADIR = Target.SUN, Target.NADIR
+SUN, NADIR = CameraTarget.SUN, CameraTarget.NADIR
 S = 10**12
 
 
-def angles(scene: EarthSunScene, camera: Target) -> tuple[float, float]:
+def angles(scene: EarthSunScene, camera: CameraTarget) -> tuple[float, float]:
     truth = scene.truth(camera, 0)
     return truth.alpha_deg, truth.beta_deg
 
 
 def test_both_cameras_look_at_their_object_by_default() -> None:
-    for camera in Target:
+    for camera in CameraTarget:
         truth = EarthSunScene().truth(camera, 0)
         np.testing.assert_allclose(truth.vector, [0, 0, 1], atol=1e-15)
         assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((0, 0), abs=1e-12)

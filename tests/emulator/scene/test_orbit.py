@@ -14,7 +14,7 @@ from cubestack.emulator.scene.attitude import (
     propagate,
     quaternion_from_pointing,
 )
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.orbit import (
     DISTURBING,
@@ -245,8 +245,8 @@ def test_the_satellites_cameras_see_earth_and_sun(at: float) -> None:
         around, time_ps = own.around(later), round(later * PS_PER_S)
         body, _ = own.body(later)
         for target, mounting, direction in (
-            (Target.SUN, scene.sun_camera, around.sun),
-            (Target.NADIR, scene.nadir_camera, around.nadir),
+            (CameraTarget.SUN, scene.sun_camera, around.sun),
+            (CameraTarget.NADIR, scene.nadir_camera, around.nadir),
         ):
             truth = scene.truth(target, time_ps)
             expected = mounting.matrix @ body @ direction

@@ -13,7 +13,7 @@ from cubestack.firmware_model.cubesense.jobs import JobQueue
 from cubestack.firmware_model.cubesense.links.bench import BenchLink
 from cubestack.firmware_model.cubesense.links.node import NodeLink
 from cubestack.firmware_model.cubesense.links.registers import RegisterLink
-from cubestack.firmware_model.cubesense.state import Result, State
+from cubestack.firmware_model.cubesense.state import CameraResult, State
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.interface.cubesense import INTERFACE, codes, pins
 from cubestack.firmware_model.mcu.pic18 import PIC18F45K20
@@ -134,7 +134,7 @@ class Links(Runner, HostSide):
         self.done.append(("measure", camera, sram, detect))
         detected = codes.DetectResult.SUCCESS if detect else codes.DetectResult.NONE_SCHEDULED
         yield Pay()
-        self.state.results[camera] = Result(self.outcome, detected, 1234, -567, sram=sram)
+        self.state.results[camera] = CameraResult(self.outcome, detected, 1234, -567, sram=sram)
 
     # --- main loop --------------------------------------------------------------------------------
 

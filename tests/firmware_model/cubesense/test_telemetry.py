@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubesense.state import Result
+from cubestack.firmware_model.cubesense.state import CameraResult
 from cubestack.firmware_model.cubesense.telemetry import NODE_TYPE
 from cubestack.firmware_model.cubesense.vision.masks import Mask
 from cubestack.firmware_model.interface.codec.node_codes import AckError
@@ -38,7 +38,7 @@ def no_two_alike(node: Links) -> None:
             Mask(base + area, base + area + 10, base + area + 20, base + area + 30)
             for area in range(5)
         ]
-        state.results[camera] = Result(
+        state.results[camera] = CameraResult(
             capture=codes.CaptureResult.STORED_OTHER_SRAM,
             detect=codes.DetectResult(codes.DetectResult.BAD_FIT + camera),
             alpha=1000 + base,

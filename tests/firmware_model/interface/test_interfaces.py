@@ -3,7 +3,7 @@
 import pytest
 
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.firmware_model.interface.cubestar import INTERFACE as CUBESTAR
 
@@ -24,7 +24,7 @@ def test_every_message_and_field_is_explained_and_round_trips(message: Message) 
     for byte in (0x00, 0x55, 0xAA, 0x1F):
         values = message.unpack(bytes([byte]) * message.length)
         assert message.unpack(message.pack(**values)) == values
-    if message.kind is Kind.TELECOMMAND:
+    if message.kind is MessageKind.TELECOMMAND:
         assert message.violations(message.reset_values()) == []
 
 
@@ -39,4 +39,4 @@ def test_every_range_flag_is_an_error_flag(interface: Interface) -> None:
 def test_error_codes_are_listed_once(interface: Interface) -> None:
     assert interface.ack_errors not in interface.choices
     assert [int(code) for code in interface.ack_errors] == [0, 1, 2, 3, 4]
-    assert all(message.kind is Kind.TELECOMMAND for message in interface.telecommands)
+    assert all(message.kind is MessageKind.TELECOMMAND for message in interface.telecommands)

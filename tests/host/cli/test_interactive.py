@@ -12,7 +12,7 @@ import pytest
 
 from cubestack.host.cli import shell
 from cubestack.host.errors import NoAnswerError
-from cubestack.host.shell.result import Result, ShellError
+from cubestack.host.shell.result import CommandResult, ShellError
 from tests.conftest import Run
 
 
@@ -29,12 +29,12 @@ class Asked:
         self.closed = False
         self.interface = SimpleNamespace(name="CubeStar")
         self.target, self.name = self, "fake"
-        self.on_row: Callable[[Result], None] = lambda _result: None
+        self.on_row: Callable[[CommandResult], None] = lambda _result: None
 
     def close(self) -> None:
         self.closed = True
 
-    def execute(self, line: str) -> Result | None:
+    def execute(self, line: str) -> CommandResult | None:
         line = line.strip()
         self.lines.append(line)
         if line == "nothing":
@@ -44,8 +44,8 @@ class Asked:
         if line == "silent":
             raise NoAnswerError("no answer")
         if line == "rows":
-            self.on_row(Result([("row", "1")], {"row": 1}))
-        return Result([("a", "1"), ("longer", "2"), ("", "alone")], {"line": line})
+            self.on_row(CommandResult([("row", "1")], {"row": 1}))
+        return CommandResult([("a", "1"), ("longer", "2"), ("", "alone")], {"line": line})
 
     def complete(self, line: str) -> list[str]:
         return {"re": ["read", "reset"], "write A ": ["Gain=", "B"]}.get(line, [])

@@ -13,7 +13,7 @@ from cubestack.emulator.camera.common.view import View
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.angles import angles_from_vector
 from cubestack.emulator.scene.attitude import attitude_error_deg, quaternion_from_matrix
-from cubestack.emulator.scene.earth_sun import Mounting, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, Mounting
 from cubestack.emulator.scene.orbit import Inertial
 from cubestack.emulator.scene.orbit_file import load_orbit
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -52,7 +52,7 @@ def test_what_they_see_goes_on_with_virtual_time(satellite: tuple[Any, Any, Any]
         camera = orbit.mountings["cubestar"].matrix @ orbit.body(until)[0]
         found = scene_of(star).truth(time_ps)
         assert max(map(abs, attitude_error_deg(found, quaternion_from_matrix(camera)))) < 2e-3
-        truth = scene_of(sense).truth(Target.NADIR, time_ps)
+        truth = scene_of(sense).truth(CameraTarget.NADIR, time_ps)
         assert truth.vector == pytest.approx((0, 0, 1), abs=1e-4)
 
 

@@ -6,7 +6,7 @@ import pytest
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
@@ -47,9 +47,11 @@ def test_every_hazard_goes_where_it_belongs_at_every_strength(name: str) -> None
         assert VIEW.scene.hazards == VIEW.condition.hazards == ()
 
 
-@pytest.mark.parametrize("camera", Target)
+@pytest.mark.parametrize("camera", CameraTarget)
 @pytest.mark.parametrize("name", sorted(known()))
-def test_around_the_earth_every_hazard_goes_where_it_belongs(name: str, camera: Target) -> None:
+def test_around_the_earth_every_hazard_goes_where_it_belongs(
+    name: str, camera: CameraTarget
+) -> None:
     kind = known()[name]
     view = random_view(CubeSenseOptions(), Camera(camera), np.random.default_rng(1))
     concerned = camera.name.lower() in getattr(kind, "cameras", ("nadir", "sun"))

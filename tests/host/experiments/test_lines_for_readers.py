@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.experiments.attitude import (
     AttitudeExperiment,
@@ -330,7 +330,7 @@ def test_a_pose_is_within_its_angles_and_lit_from_behind() -> None:
         for camera in Camera:
             view = cubesense.random_view(options, camera, rng)
             scene: Any = view.scene
-            truth = scene.truth(Target(camera), 0)
+            truth = scene.truth(CameraTarget(camera), 0)
             found[camera].append(float(np.hypot(truth.alpha_deg, truth.beta_deg)))
             assert np.allclose(np.asarray(scene.sun), -np.asarray(scene.nadir))
             assert (view.condition.bloom_px, view.condition.noise) == (3.0, False)

@@ -7,7 +7,7 @@ import pytest
 
 from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.mlx75412.lens import CONDITION
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, random_view
@@ -20,7 +20,7 @@ def test_without_a_hazard_nothing_is_drawn_or_changed() -> None:
     view = SkyView(SkyScene.pointing(84, -1), CONDITION)
     assert with_hazards(view, (), RNG) is view
     earth = random_view(CubeSenseOptions(), Camera.SUN, np.random.default_rng(1))
-    assert around_earth(earth, Target.SUN, (), RNG) is earth
+    assert around_earth(earth, CameraTarget.SUN, (), RNG) is earth
     check(())
 
 

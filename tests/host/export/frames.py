@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from cubestack.firmware_model.interface.codec.field import Field
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.devices.registry import devices
 from tests.tiers import quick
 
@@ -19,7 +19,7 @@ EACH = pytest.mark.parametrize("interface", INTERFACES, ids=lambda interface: in
 COUNTS = pytest.mark.parametrize("count", quick([10, 1000], 1))
 
 
-def messages(interface: Interface, kind: Kind) -> list[Message]:
+def messages(interface: Interface, kind: MessageKind) -> list[Message]:
     return [message for message in interface.messages if message.kind is kind]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.export.cosmos import cosmos
 from tests.host.export.frames import EACH, frames, messages, same
 
@@ -77,7 +77,7 @@ def parse(text: str) -> Packets:
 @EACH
 def test_every_telemetry_frame_is_taken_as_our_client_does(interface: Interface) -> None:
     packets = parse(cosmos(interface))
-    for message in messages(interface, Kind.TELEMETRY):
+    for message in messages(interface, MessageKind.TELEMETRY):
         items = packets["TELEMETRY", message.name.upper()]
         assert len(items) == len(message.fields)
         for data, values in frames(message, 20):
@@ -92,9 +92,9 @@ def test_every_telemetry_frame_is_taken_as_our_client_does(interface: Interface)
 @EACH
 def test_commands_carry_what_the_node_reads(interface: Interface) -> None:
     packets = parse(cosmos(interface))
-    assert len(packets) == len(interface.messages) + len(messages(interface, Kind.TELEMETRY))
+    assert len(packets) == len(interface.messages) + len(messages(interface, MessageKind.TELEMETRY))
     for message in interface.messages:
-        telemetry = message.kind is Kind.TELEMETRY
+        telemetry = message.kind is MessageKind.TELEMETRY
         items = packets["COMMAND", "REQUEST_" * telemetry + message.name.upper()]
         assert items["ID"].numbers == [str(message.id)] * 3
         assert items["ID"].value(bytes([message.id])) == message.id

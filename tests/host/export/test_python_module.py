@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.export.python_module import python_module
 from tests.host.export.frames import EACH, INTERFACES, frames
 
@@ -36,7 +36,7 @@ def test_it_needs_nothing_but_python(tmp_path: Path) -> None:
 def test_every_message_both_ways(interface: Interface) -> None:
     exported = module(interface)
     for message in interface.messages:
-        prefix = "Tlm" if message.kind is Kind.TELEMETRY else "Tc"
+        prefix = "Tlm" if message.kind is MessageKind.TELEMETRY else "Tc"
         cls = getattr(exported, prefix + message.name)
         assert (message.id, message.length) == (cls.MESSAGE_ID, cls.MESSAGE_LENGTH)
         assert cls().encode() == message.pack(**message.reset_values())
@@ -59,7 +59,7 @@ def test_frames_are_those_of_the_line(interface: Interface) -> None:
             payload = bytes([message.id, 0x1F]) + data
             assert exported.frame(payload) == encode_frame(payload)
             assert exported.payload(encode_frame(payload)) == payload
-        if message.kind is Kind.TELEMETRY:
+        if message.kind is MessageKind.TELEMETRY:
             request = getattr(exported, f"Tlm{message.name}").request()
         else:
             request = getattr(exported, f"Tc{message.name}")().frame()
@@ -81,7 +81,7 @@ def test_named_numbers_have_their_names() -> None:
     exported = module(CUBESTAR)
     message = next(one for one in CUBESTAR.messages if any(f.choices for f in one.fields))
     named = next(one for one in message.fields if one.choices)
-    prefix = "Tlm" if message.kind is Kind.TELEMETRY else "Tc"
+    prefix = "Tlm" if message.kind is MessageKind.TELEMETRY else "Tc"
     data = bytearray(message.length)
     for choice in named.choices or ():
         data[named.bit_offset // 8] = int(choice)

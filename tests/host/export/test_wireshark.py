@@ -8,7 +8,7 @@ import lupa
 import pytest
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.export.wireshark import PORT, wireshark
 from tests.host.export.frames import EACH, INTERFACES, frames, messages
 
@@ -130,7 +130,7 @@ def shown(item: Any) -> Any:
 def test_every_message_is_shown_as_our_client_reads_it(interface: Interface) -> None:
     dissector, prefix = Dissector(interface), interface.name.lower()
     for message in interface.messages:
-        telemetry = message.kind is Kind.TELEMETRY
+        telemetry = message.kind is MessageKind.TELEMETRY
         path = f"{prefix}.{'tlm' if telemetry else 'tc'}.{message.name.lower()}"
         for data, values in frames(message, 5):
             request = bytes([message.id]) + (b"" if telemetry else data)
@@ -155,7 +155,7 @@ def test_an_acknowledge_a_wrong_length_and_what_nobody_asked_for() -> None:
     dissector, prefix = Dissector(interface), interface.name.lower()
     ack = dissector.fields(encode_frame(b"\3"), to_device=False)[f"{prefix}.ack"]
     assert (shown(ack), ack.field.more[2][3]) == (3, interface.ack_errors(3).name)
-    first = messages(interface, Kind.TELEMETRY)[0]
+    first = messages(interface, MessageKind.TELEMETRY)[0]
     dissector.dissect(encode_frame(bytes([first.id])), to_device=True)
     items = dissector.fields(encode_frame(bytes(first.length + 1)), to_device=False)
     assert items[f"{prefix}.wrong"].text == f"{first.length + 1} bytes, not {first.length}"
@@ -164,7 +164,7 @@ def test_an_acknowledge_a_wrong_length_and_what_nobody_asked_for() -> None:
 def test_an_answer_stays_that_to_its_request_when_it_is_looked_at_again() -> None:
     interface = INTERFACES[0]
     dissector, prefix = Dissector(interface), interface.name.lower()
-    first, second = messages(interface, Kind.TELEMETRY)[:2]
+    first, second = messages(interface, MessageKind.TELEMETRY)[:2]
     answer = encode_frame(bytes(first.length))
     dissector.dissect(encode_frame(bytes([first.id])), to_device=True)
     name = f"{prefix}.message"
@@ -176,7 +176,7 @@ def test_an_answer_stays_that_to_its_request_when_it_is_looked_at_again() -> Non
 def test_a_frame_in_two_segments_and_two_in_one() -> None:
     interface = INTERFACES[0]
     dissector = Dissector(interface)
-    request = encode_frame(bytes([messages(interface, Kind.TELEMETRY)[0].id]))
+    request = encode_frame(bytes([messages(interface, MessageKind.TELEMETRY)[0].id]))
     for cut in range(1, len(request)):
         items, pinfo = dissector.dissect(request[:cut], to_device=True)
         assert (items, pinfo.desegment_offset, pinfo.desegment_len) == ([], 0, "more")

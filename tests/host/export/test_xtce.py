@@ -9,7 +9,7 @@ import space_packet_parser
 from lxml import etree
 from space_packet_parser.xtce.definitions import XtcePacketDefinition
 
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.export.xtce import NAMESPACE, parameter, xtce
 from tests.host.export.frames import COUNTS, EACH, frames, messages, same
 
@@ -49,7 +49,7 @@ def test_a_parser_reads_every_telemetry_frame_as_our_client_does(
     interface: Interface, count: int
 ) -> None:
     definition = XtcePacketDefinition.from_xtce(io.BytesIO(xtce(interface).encode()))
-    for message in messages(interface, Kind.TELEMETRY):
+    for message in messages(interface, MessageKind.TELEMETRY):
         for data, values in frames(message, count):
             packet = definition.parse_bytes(data, root_container_name=message.name)
             for field in message.fields:
@@ -70,7 +70,7 @@ def test_every_telecommand_has_its_bytes(interface: Interface) -> None:
         for one in root.iterfind(".//x:ArgumentTypeSet/*/*", names)
         if one.tag.endswith("DataEncoding")
     }
-    for message in messages(interface, Kind.TELECOMMAND):
+    for message in messages(interface, MessageKind.TELECOMMAND):
         command = root.find(f".//x:MetaCommand[@name='{message.name}']", names)
         types = {
             one.get("name"): one.get("argumentTypeRef")

@@ -11,7 +11,7 @@ from typing import Any
 from cubestack.emulator.bus.line_format import LineFormat, LineSampler
 from cubestack.emulator.ports.terminal_settings import line_format, read_settings
 from cubestack.firmware_model.formats.recording import load_recording
-from cubestack.firmware_model.interface.codec.message import Interface, Kind
+from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.errors import PortClosedError
 from cubestack.host.recording.said import said
 from cubestack.host.shell.language import Shell
@@ -71,7 +71,7 @@ class RecordedNode:
         self.told = {
             one.name: one.values
             for one in said(load_recording(path), interface)
-            if one.kind == Kind.TELEMETRY.value and not one.error
+            if one.kind == MessageKind.TELEMETRY.value and not one.error
         }
 
     def answer(self, payload: bytes) -> bytes | None:

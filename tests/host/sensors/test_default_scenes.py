@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.devices.registry import device
 
 ALNILAM_DEG = 84.05, -1.20
@@ -22,6 +22,9 @@ def test_star_trackers_look_at_the_middle_of_orions_belt_with_north_up(name: str
 
 def test_the_default_scene_of_cubesense_is_that_of_the_tutorial() -> None:
     scene = device("cubesense").default_scene()
-    for target, angles_deg in ((Target.SUN, (20.0, 10.0)), (Target.NADIR, (-8.0, 12.0))):
+    for target, angles_deg in (
+        (CameraTarget.SUN, (20.0, 10.0)),
+        (CameraTarget.NADIR, (-8.0, 12.0)),
+    ):
         truth = scene.truth(target, 0)
         assert (truth.alpha_deg, truth.beta_deg) == pytest.approx(angles_deg)

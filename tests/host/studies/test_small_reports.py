@@ -14,7 +14,7 @@ from cubestack.host.devices.experiment import Section
 from cubestack.host.experiments.aramis import measure as aramis
 from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign.folder import Folder
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
 from cubestack.host.studies.campaign.worst import worst
 from cubestack.host.studies.cubestar import memory
@@ -134,7 +134,7 @@ def test_magnitudes_that_are_none(given: object) -> None:
 
 @pytest.mark.usefixtures("failing")
 def test_a_page_has_the_tables_and_figures_of_its_experiment(
-    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("matplotlib")
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
@@ -164,7 +164,7 @@ def test_a_page_has_the_tables_and_figures_of_its_experiment(
 
 
 def test_of_one_outcome_the_largest_error_comes_first(
-    plan: Plan, tmp_path: Path, failing: set[float], monkeypatch: pytest.MonkeyPatch
+    plan: CampaignPlan, tmp_path: Path, failing: set[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from dataclasses import replace
 
@@ -186,7 +186,7 @@ def test_of_one_outcome_the_largest_error_comes_first(
 
 
 def test_what_fails_again_is_told_and_what_did_not_fail_raises(
-    plan: Plan, tmp_path: Path, failing: set[float]
+    plan: CampaignPlan, tmp_path: Path, failing: set[float]
 ) -> None:
     failing.add(0.5)
     folder = Folder.begun(tmp_path / "c", plan, resume=False)

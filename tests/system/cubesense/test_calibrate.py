@@ -10,7 +10,7 @@ from PIL import Image
 from cubestack.emulator.camera.ov7620.fisheye import lens_of
 from cubestack.emulator.camera.ov7620.lens_error import LensError, drawn_lens
 from cubestack.emulator.scene.angles import vector_from_angles
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.cli.main import main
 
 LENS = "[{}_lens]\ncentre_px = [0.8, -0.5]\nradial_deg = [[40.0, 0.2], [75.0, 1.0]]\n"
@@ -26,7 +26,7 @@ def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[st
     which = ("--sensor", "nadir", "--seed", 2, "--emulated", 20, "--check-poses", 8)
     found = calibrate(capsys, *which, "--profile", "extended", "--set", "lens=residuals")
     assert found["error_after_deg"] < 0.06 < 0.2 < found["error_before_deg"]
-    centre = np.add((371, 236), drawn_lens(Target.NADIR, 2).centre_px)
+    centre = np.add((371, 236), drawn_lens(CameraTarget.NADIR, 2).centre_px)
     np.testing.assert_allclose(found["boresight_px"], centre, atol=0.15)
 
 
@@ -44,7 +44,7 @@ def test_a_lens_of_a_scene_is_found(capsys: pytest.CaptureFixture[str], tmp_path
 def test_pictures_of_a_light_give_the_lens(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    lens = lens_of(Target.NADIR, LensError((0.8, -0.5), ((40.0, 0.2), (75.0, 0.6))))
+    lens = lens_of(CameraTarget.NADIR, LensError((0.8, -0.5), ((40.0, 0.2), (75.0, 0.6))))
     lines = ["file,alpha_deg,beta_deg"]
     y, x = np.mgrid[:480, :640]
     for number, turn in enumerate(np.arange(0, 20, 1.3)):

@@ -8,7 +8,7 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.earth_sun import Reflection, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, Reflection
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import Measurement
 from tests.system.conftest import Open
@@ -40,8 +40,10 @@ def test_a_light_beside_the_earth_is_dropped_from_its_limb(
     ready: Open, radius_px: float, edges: int
 ) -> None:
     """A disc on a sample of a scanned row: small ones make no edges, the fit leaves others out."""
-    (sample,) = LENSES[Target.NADIR].unproject([(511, 79)])
-    light = Reflection(Target.NADIR, *angles_from_vector(sample), radius_px=radius_px, level=200.0)
+    (sample,) = LENSES[CameraTarget.NADIR].unproject([(511, 79)])
+    light = Reflection(
+        CameraTarget.NADIR, *angles_from_vector(sample), radius_px=radius_px, level=200.0
+    )
     with ready(FACING) as opened:
         check_right(opened.client.capture_and_detect(Camera.NADIR))
         alone = len(opened.client.edges())
@@ -62,5 +64,5 @@ def test_a_light_beside_the_earth_is_dropped_from_its_limb(
 def test_the_first_bright_light_of_the_picture_is_the_sun(
     ready: Open, beta: float, level: float, expected: tuple[float, float]
 ) -> None:
-    light = Reflection(Target.SUN, 0.0, beta, radius_px=5.0, level=level)
+    light = Reflection(CameraTarget.SUN, 0.0, beta, radius_px=5.0, level=level)
     check_right(measure(ready, replace(FACING, reflections=(light,)), Camera.SUN), expected)

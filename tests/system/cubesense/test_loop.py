@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, Sram
 from cubestack.host.clients.cubesense.client import Measurement
@@ -42,7 +42,7 @@ def test_every_turn_measures_a_second_further_on(session: Open) -> None:
             assert (found.detected, found.capture) == (True, stored)
             # Within the second in which it was taken, what the sensor sees turns by 2.3 deg.
             middle_ps = round((number + 0.4) * PS_PER_S)
-            truth = TURNING.truth(Target[camera.name], middle_ps)
+            truth = TURNING.truth(CameraTarget[camera.name], middle_ps)
             off = found.alpha_deg - truth.alpha_deg, found.beta_deg - truth.beta_deg
             assert np.hypot(*off) < 1.5
 

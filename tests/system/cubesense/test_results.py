@@ -6,7 +6,7 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import LENSES
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.angles import angles_from_vector
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Reflection
 from cubestack.firmware_model.interface.cubesense.codes import (
     Camera,
     CaptureResult,
@@ -36,12 +36,12 @@ def test_on_the_way_to_a_result(ready: Open) -> None:
 
 def lights(count: int | None = None) -> EarthSunScene:
     """Discs around every other sample of rows and columns, four edges each; not small ones."""
-    lens = LENSES[Target.NADIR]
+    lens = LENSES[CameraTarget.NADIR]
     samples = [(x, y) for x in (191, 319, 447) for y in (79, 207, 335)]
     samples += [(x, y) for x in (255, 383, 511) for y in (143, 271, 399)]
     samples = [(x, y) for x, y in samples if np.hypot(x - lens.cx, y - lens.cy) < 200]
     discs = (
-        Reflection(Target.NADIR, *angles_from_vector(vector), radius_px=25.0, level=200.0)
+        Reflection(CameraTarget.NADIR, *angles_from_vector(vector), radius_px=25.0, level=200.0)
         for vector in lens.unproject(samples[:count])
     )
     return EarthSunScene(nadir=(0, 0, -1), sun=(1, 0, 0), reflections=tuple(discs))

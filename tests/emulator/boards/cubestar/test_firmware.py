@@ -7,7 +7,7 @@ import pytest
 
 from cubestack.emulator.boards.cubestar.firmware import CubeStarFirmwareBoard
 from cubestack.emulator.iss.image import Image, load_image
-from cubestack.emulator.iss.outcome import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_S
@@ -117,9 +117,11 @@ def test_what_is_soldered_to_a_switch_pulls_it_up(
     board = powered(images["toggle"])
     for channel, pin in wired.SWITCHES.items():
         board.power.switch(channel, not on)
-        board._pin(Outgoing(Kind.PIN, pin_number(pin), level, 0, board.kernel.now))
+        board._pin(Outgoing(OutgoingKind.PIN, pin_number(pin), level, 0, board.kernel.now))
         assert board.power.is_on(channel) is on
-    board._pin(Outgoing(Kind.PIN, pin_number(wired.CAMERA_RESET), level, 0, board.kernel.now))
+    board._pin(
+        Outgoing(OutgoingKind.PIN, pin_number(wired.CAMERA_RESET), level, 0, board.kernel.now)
+    )
     assert board.camera.running is (on and board.power.is_on("imager"))
     board.close()
 
@@ -129,7 +131,7 @@ def test_a_reset_of_the_camera_cuts_the_picture_where_it_comes(images: dict[str,
     board = powered(images["toggle"], engine="compiled")
     frame = board.camera.frame_from(0)
     board.engine.set_pin("ENABLE", 1)
-    board._pin(Outgoing(Kind.PIN, pin_number(wired.CAMERA_RESET), 0, 0, 20 * PS_PER_MS))
+    board._pin(Outgoing(OutgoingKind.PIN, pin_number(wired.CAMERA_RESET), 0, 0, 20 * PS_PER_MS))
     board.engine.run(30 * PS_PER_MS)
     dark_rows = board.engine.sram[: 512 * 1024].reshape(512, 1024).mean(axis=1) < 20
     board.close()

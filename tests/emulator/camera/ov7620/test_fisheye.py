@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.camera.ov7620 import fisheye
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.firmware_model.interface.cubesense import codes
 
 
@@ -24,7 +24,7 @@ def test_published_radii() -> None:
 
 def test_the_firmware_knows_the_lens_and_the_picture() -> None:
     assert codes.PIXELS_PER_DEGREE == fisheye.PIXELS_PER_DEGREE
-    assert [(c.name, int(c)) for c in codes.Camera] == [(t.name, int(t)) for t in Target]
+    assert [(c.name, int(c)) for c in codes.Camera] == [(t.name, int(t)) for t in CameraTarget]
 
 
 @pytest.mark.parametrize("radius", [0.2, 1.0, 50.0, 168.0, 226.0])
@@ -44,10 +44,10 @@ def test_angles_are_a_turn_away_from_the_boresight() -> None:
 
 
 @pytest.mark.parametrize(
-    ("camera", "centre"), [(Target.SUN, (369, 250)), (Target.NADIR, (371, 236))]
+    ("camera", "centre"), [(CameraTarget.SUN, (369, 250)), (CameraTarget.NADIR, (371, 236))]
 )
 def test_published_boresights_and_right_and_down(
-    camera: Target, centre: tuple[float, float]
+    camera: CameraTarget, centre: tuple[float, float]
 ) -> None:
     lens, (cx, cy) = fisheye.LENSES[camera], centre
     np.testing.assert_array_equal(lens.project([0, 0, 2.0]), centre)
@@ -58,7 +58,7 @@ def test_published_boresights_and_right_and_down(
 
 
 def test_projecting_is_undone_within_the_field() -> None:
-    lens = fisheye.LENSES[Target.SUN]
+    lens = fisheye.LENSES[CameraTarget.SUN]
     generator = np.random.default_rng(5)
     for theta, phi in generator.uniform([0, -180], [fisheye.FIELD_DEG, 180], (200, 2)):
         pixel = lens.project(towards(theta, phi))
@@ -67,8 +67,8 @@ def test_projecting_is_undone_within_the_field() -> None:
     assert lens.project(towards(95.001, 20)) is lens.project([0, 0, -1.0]) is None
 
 
-@pytest.mark.parametrize("camera", list(Target))
-def test_field_of_view(camera: Target) -> None:
+@pytest.mark.parametrize("camera", list(CameraTarget))
+def test_field_of_view(camera: CameraTarget) -> None:
     lens = fisheye.LENSES[camera]
     field = lens.field
     y, x = np.divmod(field.index, 640)
@@ -88,7 +88,7 @@ def test_field_of_view(camera: Target) -> None:
 
 
 def test_pixel_angle_is_that_between_neighbours() -> None:
-    lens = fisheye.LENSES[Target.NADIR]
+    lens = fisheye.LENSES[CameraTarget.NADIR]
     field = lens.field
     for x, y in [(380, 240), (471, 336), (371, 36), (160, 236)]:
         here, right, down = lens.unproject(
@@ -100,7 +100,7 @@ def test_pixel_angle_is_that_between_neighbours() -> None:
 
 
 def test_pixels_on_the_rim_are_lit_by_their_share_of_it() -> None:
-    lens = fisheye.LENSES[Target.NADIR]
+    lens = fisheye.LENSES[CameraTarget.NADIR]
     rim = float(fisheye.distorted(2.9 * 95))
     fine = (np.arange(10) - 4.5) / 10
     rows, columns = np.divmod(lens.field.index, 640)

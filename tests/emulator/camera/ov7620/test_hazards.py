@@ -22,7 +22,7 @@ from cubestack.emulator.camera.ov7620.fisheye import lens_of
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.emulator.scene.file import SceneError
 
 from .test_sensor import MANUAL, picture, write
@@ -35,13 +35,13 @@ DARK = replace(EARTH, sun=(0, 0, 1))  # the Earth by night
 def camera(
     *hazards: SensorHazard,
     scene: EarthSunScene = EARTH,
-    which: Target = Target.NADIR,
+    which: CameraTarget = CameraTarget.NADIR,
     gain: int = 0,
     **condition: object,
 ) -> Ov7620:
     like = FisheyeCondition(hazards=hazards, **{"noise": False} | condition)  # type: ignore[arg-type]
     made = Ov7620(scene, which, like)
-    write(made, MANUAL | {"EXPOSURE": 1 if which is Target.SUN else 4, "GAIN": gain})
+    write(made, MANUAL | {"EXPOSURE": 1 if which is CameraTarget.SUN else 4, "GAIN": gain})
     return made
 
 
@@ -89,7 +89,7 @@ def test_a_background_has_its_level_and_its_noise() -> None:
 
 def test_protons_leave_other_tracks_in_each_frame_and_camera() -> None:
     hit = Protons(hits=100)
-    shots = [grey(hit, scene=DARK, frame=frame, which=w) for frame in (3, 4) for w in Target]
+    shots = [grey(hit, scene=DARK, frame=frame, which=w) for frame in (3, 4) for w in CameraTarget]
     places = [set(np.flatnonzero(shot > 40).tolist()) for shot in shots]
     assert min(map(len, places)) > 50
     for n, one in enumerate(places):
@@ -106,16 +106,18 @@ def test_hot_pixels_are_stuck_as_those_of_the_key() -> None:
 
 
 def test_each_camera_has_a_draw_of_its_own() -> None:
-    slopes = [grey(Gradient(seed=6), scene=DARK, which=which) for which in Target]
+    slopes = [grey(Gradient(seed=6), scene=DARK, which=which) for which in CameraTarget]
     assert np.abs(slopes[0] - slopes[1]).max() > 5
-    residuals = [camera(LensResiduals(seed=6), which=which).lens.residuals for which in Target]
+    residuals = [
+        camera(LensResiduals(seed=6), which=which).lens.residuals for which in CameraTarget
+    ]
     assert residuals[0] != residuals[1]
 
 
 def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
     boresight = np.array([369, 250])
     own, moved = (
-        centroid(grey(*hazards, scene=SUN, which=Target.SUN)) - boresight
+        centroid(grey(*hazards, scene=SUN, which=CameraTarget.SUN)) - boresight
         for hazards in ((), (FocalLength(percent=3.0),))
     )
     assert np.hypot(*own) > 120
@@ -124,15 +126,17 @@ def test_a_longer_lens_moves_the_sun_away_from_the_boresight() -> None:
 
 def test_a_longer_lens_has_a_longer_rim() -> None:
     lens = camera(FocalLength(percent=3.0)).lens
-    lit = [np.count_nonzero(lens_of(Target.NADIR, which).field.lit) for which in (NOMINAL, lens)]
+    lit = [
+        np.count_nonzero(lens_of(CameraTarget.NADIR, which).field.lit) for which in (NOMINAL, lens)
+    ]
     # All but what is cut off at the top and bottom edge.
     assert 1.02 < lit[1] / lit[0] < 1.03**2
 
 
 def test_residuals_displace_and_can_be_undone() -> None:
     residual = LensResiduals(rms_px=1.0, seed=2)
-    crooked = lens_of(Target.SUN, camera(residual, which=Target.SUN).lens)
-    straight = lens_of(Target.SUN)
+    crooked = lens_of(CameraTarget.SUN, camera(residual, which=CameraTarget.SUN).lens)
+    straight = lens_of(CameraTarget.SUN)
     y, x = np.mgrid[110:390:10, 230:510:10]
     pixels = np.stack([x.ravel(), y.ravel()], axis=1).astype(float)
     moved = np.array([crooked.project(v) for v in straight.unproject(pixels)]) - pixels

@@ -10,7 +10,7 @@ from cubestack.emulator.camera.ov7620.lens_error import (
     drawn_lens,
 )
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.file import SceneError
 
 LENS = LensError((0.4, -0.3), ((40.0, 0.3), (75.0, 1.85)), (0.1, -0.05))
@@ -50,7 +50,7 @@ def test_decentring_is_brown_s_near_the_axis_and_none_at_the_rim() -> None:
 
 
 def test_projecting_is_undone_and_shifted_by_the_error() -> None:
-    lens, nominal = lens_of(Target.SUN, LENS), LENSES[Target.SUN]
+    lens, nominal = lens_of(CameraTarget.SUN, LENS), LENSES[CameraTarget.SUN]
     generator = np.random.default_rng(3)
     for theta, phi in generator.uniform([0.5, -3], [FIELD_DEG, 3], (100, 2)):
         direction = vector_from_angles(*polar(theta, phi))
@@ -62,8 +62,11 @@ def test_projecting_is_undone_and_shifted_by_the_error() -> None:
 
 
 def test_the_rim_stays_where_it_is_published() -> None:
-    lens, nominal = lens_of(Target.NADIR, LensError(LENS.centre_px)), LENSES[Target.NADIR]
-    field = lens_of(Target.NADIR, LENS).field
+    lens, nominal = (
+        lens_of(CameraTarget.NADIR, LensError(LENS.centre_px)),
+        LENSES[CameraTarget.NADIR],
+    )
+    field = lens_of(CameraTarget.NADIR, LENS).field
     np.testing.assert_array_equal(field.index, lens.field.index)
     assert field.lit.sum() == pytest.approx(nominal.field.lit.sum(), rel=1e-3)
     assert not np.allclose(field.vectors, lens.field.vectors, atol=1e-3)
@@ -84,9 +87,9 @@ def test_a_lens_that_can_not_be(wrong: dict[str, tuple[float, ...]]) -> None:
 
 
 def test_units_have_lenses_of_their_own() -> None:
-    drawn = [drawn_lens(camera, serial) for camera in Target for serial in SERIALS]
+    drawn = [drawn_lens(camera, serial) for camera in CameraTarget for serial in SERIALS]
     assert len(set(drawn)) == len(drawn)
-    assert drawn_lens(Target.NADIR, 7) == drawn_lens(Target.NADIR, 7) != NOMINAL
+    assert drawn_lens(CameraTarget.NADIR, 7) == drawn_lens(CameraTarget.NADIR, 7) != NOMINAL
     centres = np.array([lens.centre_px for lens in drawn])
     assert np.abs(centres).max() <= 0.5
     assert np.abs(centres.mean(axis=0)).max() < 0.1
@@ -94,7 +97,7 @@ def test_units_have_lenses_of_their_own() -> None:
 
 def test_the_sun_s_lenses_err_outwards_by_up_to_what_is_published() -> None:
     for serial in SERIALS:
-        radial = drawn_lens(Target.SUN, serial).radial_deg
+        radial = drawn_lens(CameraTarget.SUN, serial).radial_deg
         for (angle, error), (expected, most) in zip(radial, SUN_OFFSETS_DEG, strict=True):
             assert angle == expected
             assert 0.6 * most <= error <= most

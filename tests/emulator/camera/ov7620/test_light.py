@@ -6,18 +6,18 @@ import pytest
 from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistorted
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE, scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Mounting, Reflection, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting, Reflection
 from cubestack.emulator.scene.hazards import Ghosts, Glint, Moon
 from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE
 from cubestack.emulator.scene.hazards.glint import SUN_SURFACE
 from cubestack.firmware_model.interface.cameras.ov7620 import EXPOSURE_LINES
 
-SUN, NADIR = Target.SUN, Target.NADIR
+SUN, NADIR = CameraTarget.SUN, CameraTarget.NADIR
 ROWS, COLUMNS = np.mgrid[:480, :640]
 DOWN = Mounting([0, 0, 1])
 
 
-def levels(scene: EarthSunScene, camera: Target, bloom_px: float = 7.0) -> np.ndarray:
+def levels(scene: EarthSunScene, camera: CameraTarget, bloom_px: float = 7.0) -> np.ndarray:
     """Grey values at the exposure of the published levels, without noise and without a limit."""
     lines = USUAL_EXPOSURE[camera] * EXPOSURE_LINES
     return BLACK + scene_light(scene, camera, bloom_px, 0) * lines
@@ -28,7 +28,7 @@ def noon(scene: EarthSunScene) -> EarthSunScene:
     return replace(scene, sun=-np.asarray(scene.nadir))
 
 
-def radius(camera: Target) -> np.ndarray:
+def radius(camera: CameraTarget) -> np.ndarray:
     return np.hypot(COLUMNS - LENSES[camera].cx, ROWS - LENSES[camera].cy)
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.ov7620.luminance import luminance, stuck_pixels
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 
 NONE = np.zeros(0, np.int64)
 
@@ -41,7 +41,7 @@ def test_noise_is_that_of_its_generator() -> None:
 
 
 def test_stuck_pixels_are_at_full_scale() -> None:
-    stuck = stuck_pixels(3, Target.SUN, 20, 10)
+    stuck = stuck_pixels(3, CameraTarget.SUN, 20, 10)
     grey = luminance(flat(0), 1.0, None, stuck)
     assert np.count_nonzero(grey == 255) == 40
     assert np.all(grey.ravel()[stuck] == 255)
@@ -50,7 +50,7 @@ def test_stuck_pixels_are_at_full_scale() -> None:
 def test_pairs_are_side_by_side_and_never_three() -> None:
     for seed in range(20):
         hot = np.zeros(480 * 640, bool)
-        hot[stuck_pixels(seed, Target.NADIR, 300, 200)] = True
+        hot[stuck_pixels(seed, CameraTarget.NADIR, 300, 200)] = True
         rows = hot.reshape(480, 640).astype(int)
         pairs = rows[:, 1:] + rows[:, :-1] == 2
         triples = rows[:, 2:] + rows[:, 1:-1] + rows[:, :-2] == 3
@@ -58,7 +58,7 @@ def test_pairs_are_side_by_side_and_never_three() -> None:
 
 
 def test_each_camera_has_its_own_stuck_pixels() -> None:
-    sun, again = stuck_pixels(1, Target.SUN, 10, 0), stuck_pixels(1, Target.SUN, 10, 0)
+    sun, again = stuck_pixels(1, CameraTarget.SUN, 10, 0), stuck_pixels(1, CameraTarget.SUN, 10, 0)
     np.testing.assert_array_equal(sun, again)
-    assert np.any(sun != stuck_pixels(1, Target.NADIR, 10, 0))
-    assert np.any(sun != stuck_pixels(2, Target.SUN, 10, 0))
+    assert np.any(sun != stuck_pixels(1, CameraTarget.NADIR, 10, 0))
+    assert np.any(sun != stuck_pixels(2, CameraTarget.SUN, 10, 0))

@@ -8,12 +8,12 @@ from cubestack.emulator.camera.ov7620 import scene_file
 from cubestack.emulator.camera.ov7620.lens_error import LensError
 from cubestack.emulator.camera.ov7620.scene_file import load_earth_sun_scene
 from cubestack.emulator.camera.ov7620.view import FisheyeCondition
-from cubestack.emulator.scene.earth_sun import Reflection, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, Reflection
 from cubestack.emulator.scene.hazards import Clouds, Terminator
 
 from ..files import check_refused, save
 
-SUN, NADIR = Target.SUN, Target.NADIR
+SUN, NADIR = CameraTarget.SUN, CameraTarget.NADIR
 
 SCENE = """
 kind = "earth-sun"
@@ -117,7 +117,7 @@ def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) 
 def test_the_ball_of_the_bench(tmp_path: Path) -> None:
     text = 'kind = "ball"\nangle_deg = [20, -10]\nseed = 4\nnoise = false\n[nadir_lens]\n'
     view = load_earth_sun_scene(save(tmp_path, text + "centre_px = [1, 0]"))
-    truth = view.scene.truth(Target.NADIR, 0)
+    truth = view.scene.truth(CameraTarget.NADIR, 0)
     assert (truth.alpha_deg, truth.beta_deg) == pytest.approx((20, -10))
     assert view.scene.altitude_km == pytest.approx(748.4, abs=0.1)
     assert view.condition.nadir_lens == LensError(centre_px=(1.0, 0.0))

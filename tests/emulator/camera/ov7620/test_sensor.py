@@ -9,7 +9,7 @@ import pytest
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Reflection, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Reflection
 from cubestack.firmware_model.interface.cameras.ov7620 import REGISTERS, window_column, window_row
 
 from ..streams import segments
@@ -29,11 +29,11 @@ def write(camera: Ov7620, values: dict[str, int], now_ps: int = 0) -> None:
         assert send(camera.on_pin, lambda: camera.sda, data, start) == [0, 0, 0]
 
 
-def quiet(scene: EarthSunScene | EarthSunView, camera: Target = Target.NADIR) -> Ov7620:
+def quiet(scene: EarthSunScene | EarthSunView, camera: CameraTarget = CameraTarget.NADIR) -> Ov7620:
     return Ov7620(scene, camera, FisheyeCondition(noise=False))
 
 
-def make(scene: EarthSunScene, camera: Target = Target.NADIR, **values: int) -> Ov7620:
+def make(scene: EarthSunScene, camera: CameraTarget = CameraTarget.NADIR, **values: int) -> Ov7620:
     made = quiet(scene, camera)
     write(made, MANUAL | {"EXPOSURE": USUAL_EXPOSURE[camera]} | values)
     return made
@@ -164,9 +164,12 @@ def test_mirror(scene: EarthSunScene) -> None:
 
 
 def test_colour_mode_has_less_detail_from_row_to_row() -> None:
-    spot = Reflection(Target.SUN, 10, 10, radius_px=1, level=150)
+    spot = Reflection(CameraTarget.SUN, 10, 10, radius_px=1, level=150)
     scene = EarthSunScene(sun=(0, 0, 1), reflections=(spot,))
-    fine, coarse = light(make(scene, Target.SUN)), light(make(scene, Target.SUN, COMMON_H=0x20))
+    fine, coarse = (
+        light(make(scene, CameraTarget.SUN)),
+        light(make(scene, CameraTarget.SUN, COMMON_H=0x20)),
+    )
     assert coarse.max() < fine.max()
     np.testing.assert_allclose(coarse[:-1], (fine[:-1] + fine[1:]) / 2, atol=1)
 
@@ -277,7 +280,7 @@ def test_pictures_are_rendered_once_and_noise_belongs_to_the_frame(scene: EarthS
 
 
 def test_a_reflection_beyond_the_field_is_refused(scene: EarthSunScene) -> None:
-    far = Reflection(Target.SUN, 90, 90, radius_px=1, level=1)
+    far = Reflection(CameraTarget.SUN, 90, 90, radius_px=1, level=1)
     with pytest.raises(ValueError, match="at_deg must be within 95"):
         make(replace(scene, reflections=(far,)))
     with pytest.raises(TypeError, match="nadir sensor is Earth and Sun, not 3"):

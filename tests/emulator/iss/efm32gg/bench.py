@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.iss.machine import Machine
-from cubestack.emulator.iss.outcome import Kind, Outgoing
+from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
 
@@ -110,7 +110,7 @@ class Bench:
     def run_for(self, ps: int) -> None:
         self.run_until(self.now + ps)
 
-    def out(self, kind: Kind) -> list[Outgoing]:
+    def out(self, kind: OutgoingKind) -> list[Outgoing]:
         """Remove and return the messages of a kind."""
         self.items += self.machine.outbox()
         found = [item for item in self.items if item.kind is kind]
@@ -119,7 +119,7 @@ class Bench:
 
     def pins(self, pin: int | None = None) -> list[tuple[int, int, int]]:
         """Time, pin and level of the changes of one pin or all."""
-        items = self.out(Kind.PIN)
+        items = self.out(OutgoingKind.PIN)
         return [(one.time_ps, one.unit, one.value) for one in items if pin in (None, one.unit)]
 
     def pending(self) -> list[int]:
@@ -136,7 +136,7 @@ class Bench:
         self["DMA.CHENS"] = 1 << channel
 
     def log(self) -> str:
-        return "\n".join(item.text for item in self.out(Kind.LOG))
+        return "\n".join(item.text for item in self.out(OutgoingKind.LOG))
 
     def clock(self, *units: str) -> "Bench":
         """Enable clocks of peripherals, by field names of the enable registers."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 
 from .bench import LOCK_UP, MS, PIN_RESET, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, WFI, Bench, S
 
@@ -38,7 +38,7 @@ def wake(bench: Bench) -> None:
 
 
 def modes(bench: Bench) -> list[int]:
-    return [item.value for item in bench.out(Kind.SLEEP)]
+    return [item.value for item in bench.out(OutgoingKind.SLEEP)]
 
 
 def test_wfi_enters_em1_where_clocks_continue() -> None:
@@ -114,10 +114,10 @@ def test_em4_needs_its_sequence_and_a_pin_ends_it_by_a_reset() -> None:
     bench["EMU.CTRL"] = 2 << 2
     bench.run_for(S)
     assert modes(bench) == [4]
-    bench.out(Kind.RESET)
+    bench.out(OutgoingKind.RESET)
     bench.machine.pin(0, 0, 1)
     bench.run_for(MS)
-    assert [item.value for item in bench.out(Kind.RESET)] == [0x180]
+    assert [item.value for item in bench.out(OutgoingKind.RESET)] == [0x180]
     assert bench["RMU.RSTCAUSE"] == 0x180
     bench.clock("GPIO")
     assert bench["GPIO.EM4WUCAUSE"] == 1
@@ -156,20 +156,20 @@ def test_reset_request_resets_registers_but_not_the_ram() -> None:
 def test_lock_up_resets_unless_disabled() -> None:
     undefined = 0xDE00
     bench = Bench(undefined)
-    bench.out(Kind.RESET)
+    bench.out(OutgoingKind.RESET)
     # The vector table leads every fault to the same instruction.
     bench.run_for(MS)
-    resets = bench.out(Kind.RESET)
+    resets = bench.out(OutgoingKind.RESET)
     assert resets
     assert all(item.value == LOCK_UP for item in resets)
     bench = Bench(0xE7FE, undefined)
     bench["RMU.CTRL"] = 1
-    bench.out(Kind.RESET)
+    bench.out(OutgoingKind.RESET)
     bench.machine.set_register("pc", 0x102)
     for vector in range(2, 16):
         bench.machine.flash[4 * vector] = 3
     bench.run_for(MS)
-    assert bench.out(Kind.RESET) == []
+    assert bench.out(OutgoingKind.RESET) == []
     began = bench.now
     bench.run_for(MS)
     assert bench.now == began + MS or bench.now - began < 2 * MS
@@ -191,13 +191,13 @@ def test_first_instruction_runs_after_the_start_up_time() -> None:
 def watchdog(control: int) -> Bench:
     bench = Bench().clock("LE")
     bench["RMU.CMD"] = 1
-    bench.out(Kind.RESET)
+    bench.out(OutgoingKind.RESET)
     bench["WDOG.CTRL"] = control
     return bench
 
 
 def watchdog_reset(bench: Bench) -> bool:
-    return any(item.value == WATCHDOG for item in bench.out(Kind.RESET))
+    return any(item.value == WATCHDOG for item in bench.out(OutgoingKind.RESET))
 
 
 @pytest.mark.parametrize("period", [0, 3, 7])
@@ -233,7 +233,7 @@ def test_locked_watchdog_cannot_be_stopped() -> None:
 @pytest.mark.parametrize(("runs", "resets"), [(0, False), (1 << 3, True)])
 def test_watchdog_runs_in_deep_sleep_if_configured(runs: int, resets: bool) -> None:
     bench = sleeper(deep=True)
-    bench.out(Kind.RESET)
+    bench.out(OutgoingKind.RESET)
     wake(bench)
     bench["WDOG.CTRL"] = 1 | runs | 2 << 8
     bench.run_for(4 * MS)
@@ -248,8 +248,8 @@ def test_watchdog_period_on_the_crystal() -> None:
     bench.run_for(1401 * MS)
     bench["WDOG.CTRL"] = 1 | 2 << 12 | 5 << 8
     began = bench.now
-    bench.out(Kind.RESET)
+    bench.out(OutgoingKind.RESET)
     bench.run_for(MS * 20)
-    (reset,) = bench.out(Kind.RESET)
+    (reset,) = bench.out(OutgoingKind.RESET)
     edges = (reset.time_ps - began) * 32768 / S
     assert 257 + 2 <= edges <= 257 + 3.1

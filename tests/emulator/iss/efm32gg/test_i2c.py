@@ -2,7 +2,7 @@
 
 import pytest
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 
 from .bench import SYSTEM_REQUEST, Bench, S, asleep, mask_of
 
@@ -40,7 +40,7 @@ def routed(value: int = 1, bench: Bench | None = None) -> Bench:
 def master(value: int = 1) -> Bench:
     bench = routed(value)
     command(bench, "ABORT")
-    bench.out(Kind.I2C_STOP)
+    bench.out(OutgoingKind.I2C_STOP)
     return bench
 
 
@@ -62,7 +62,7 @@ def answer(bench: Bench, acknowledged: bool) -> None:
 
 def read(bench: Bench, byte: int, acknowledged_last: int) -> None:
     """Answer a read request with a byte."""
-    [item] = bench.out(Kind.I2C_READ)
+    [item] = bench.out(OutgoingKind.I2C_READ)
     assert item.extra == acknowledged_last
     bench.machine.i2c_answer(0, True, byte)
     bits(bench, 8)
@@ -72,7 +72,7 @@ def state(bench: Bench) -> int:
     return bench["I2C0.STATE"]
 
 
-def one(bench: Bench, kind: Kind) -> int:
+def one(bench: Bench, kind: OutgoingKind) -> int:
     [item] = bench.out(kind)
     assert item.unit == PD14 << 8
     return item.value
@@ -100,7 +100,7 @@ def test_write_transfer_like_the_vendor_driver() -> None:
     bits(bench, 1)
     assert flags(bench, "START")
     bits(bench, 8)
-    [item] = bench.out(Kind.I2C_START)
+    [item] = bench.out(OutgoingKind.I2C_START)
     assert item.value == 0xA0
     assert abs(item.time_ps - began - 9 * BIT_PS) < 10**6
     assert state(bench) == 0x67  # address sent, waiting for the acknowledge
@@ -111,7 +111,7 @@ def test_write_transfer_like_the_vendor_driver() -> None:
     assert state(bench) == 0x97
     bench.load("I2C0", IFC=flag("ACK"), TXDATA=0x12)
     bits(bench, 8)
-    assert one(bench, Kind.I2C_WRITE) == 0x12
+    assert one(bench, OutgoingKind.I2C_WRITE) == 0x12
     answer(bench, True)
     assert state(bench) == 0xD7
     assert flags(bench, "TXC")
@@ -119,7 +119,7 @@ def test_write_transfer_like_the_vendor_driver() -> None:
     bits(bench, 1)
     assert flags(bench, "MSTOP")
     assert state(bench) == 0
-    one(bench, Kind.I2C_STOP)
+    one(bench, OutgoingKind.I2C_STOP)
 
 
 def test_unanswered_address_sets_nack() -> None:
@@ -140,12 +140,12 @@ def test_write_then_read_with_a_repeated_start() -> None:
     bench["I2C0.TXDATA"] = 0x75
     bits(bench, 8)
     answer(bench, True)
-    bench.out(Kind.I2C_START)
+    bench.out(OutgoingKind.I2C_START)
     command(bench, "START")
     bench["I2C0.TXDATA"] = 0xD1
     bits(bench, 9)
     assert flags(bench, "RSTART")
-    assert one(bench, Kind.I2C_START) == 0xD1
+    assert one(bench, OutgoingKind.I2C_START) == 0xD1
     answer(bench, True)
     bits(bench, 20)  # the slave stretches
     assert not flags(bench, "RXDATAV")
@@ -160,7 +160,7 @@ def test_write_then_read_with_a_repeated_start() -> None:
     command(bench, "NACK", "STOP")
     bits(bench, 2)
     assert flags(bench, "MSTOP")
-    assert not bench.out(Kind.I2C_READ)
+    assert not bench.out(OutgoingKind.I2C_READ)
 
 
 @pytest.mark.parametrize(("ratio", "cycles"), [(0, 8), (1, 9), (2, 17)])
@@ -169,7 +169,7 @@ def test_bit_rate_follows_divider_and_ratio(ratio: int, cycles: int) -> None:
     began = bench.now
     command(bench, "START")
     bench.run_for(10**9)
-    [item] = bench.out(Kind.I2C_START)
+    [item] = bench.out(OutgoingKind.I2C_START)
     assert abs(item.time_ps - began - 9 * (cycles * 4 + 4) * S // HZ) < 2 * S // HZ
 
 
@@ -242,7 +242,7 @@ def test_unread_byte_stretches_the_clock() -> None:
     assert machine.i2c_slave_poll(0) is None
     assert flags(bench, "BUSHOLD")
     assert bench["I2C0.RXDATA"] == ADDRESS
-    assert one(bench, Kind.I2C_SLAVE) == 1
+    assert one(bench, OutgoingKind.I2C_SLAVE) == 1
     assert machine.i2c_slave_poll(0) == 1
     assert bench["I2C0.RXDATA"] == 0x11
 
@@ -330,7 +330,7 @@ def test_address_wakes_a_sleeping_slave_which_stretches_the_clock() -> None:
     assert machine.i2c_slave_start(0, ADDRESS) is None
     bench.run_for(10 * 10**6)
     assert machine.energy_mode == 0
-    assert one(bench, Kind.I2C_SLAVE) == 1
+    assert one(bench, OutgoingKind.I2C_SLAVE) == 1
     assert machine.i2c_slave_poll(0) == 1
 
 
@@ -344,7 +344,7 @@ def test_reset_releases_the_bus() -> None:
     command(bench, "START")
     bits(bench, 5)
     bench.reset(SYSTEM_REQUEST)
-    assert len(bench.out(Kind.I2C_STOP)) == 1
+    assert len(bench.out(OutgoingKind.I2C_STOP)) == 1
     assert state(bench.clock("I2C0")) == 1
 
 

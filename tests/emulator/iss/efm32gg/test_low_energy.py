@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 
 from .bench import MS, POWER_ON, SYSTEM_REQUEST, US, WATCHDOG, Bench, S, asleep, mask_of
 
@@ -46,11 +46,11 @@ def test_rtc_compare_match_wakes_from_em2_at_its_time() -> None:
     bench = rtc(interrupts=True, COMP0=3276, IEN=2)
     began = bench.now
     bench["RTC.CTRL"] = 1
-    bench.out(Kind.SLEEP)
+    bench.out(OutgoingKind.SLEEP)
     bench.run_until(began + 3276 * S // HZ - TICK)
-    assert not bench.out(Kind.SLEEP)
+    assert not bench.out(OutgoingKind.SLEEP)
     bench.run_for(3 * TICK)
-    first = bench.out(Kind.SLEEP)[0]
+    first = bench.out(OutgoingKind.SLEEP)[0]
     assert first.value == 0
     assert abs(first.time_ps - began - 3276 * S // HZ) <= TICK
     assert bench["RTC.IF"] & 2
@@ -158,15 +158,15 @@ def test_letimer_counts_down_from_its_top() -> None:
 def test_letimer_wakes_from_em2_each_period() -> None:
     bench = letimer(TOP, interrupts=True, COMP0=327, IEN=4, CMD=1)
     times = []
-    bench.out(Kind.SLEEP)
+    bench.out(OutgoingKind.SLEEP)
     for _ in range(5):
         while not bench.peek("LETIMER0.IF") & 4:
             bench.run_for(TICK // 2)
-        times.append(bench.out(Kind.SLEEP)[0].time_ps)
+        times.append(bench.out(OutgoingKind.SLEEP)[0].time_ps)
         bench["LETIMER0.IFC"] = 4
         bench.machine.write(NOT_PENDING, 1 << LETIMER_IRQ)
         bench.run_for(10 * US)
-        bench.out(Kind.SLEEP)
+        bench.out(OutgoingKind.SLEEP)
     for n in range(4):
         assert abs(times[n + 1] - times[n] - 328 * S // HZ) <= 2 * US
 
@@ -228,7 +228,7 @@ def test_leuart_sends_at_9600_baud_in_em2() -> None:
         while bench["LEUART0.SYNCBUSY"]:
             bench.run_for(TICK)
     bench.run_for(3 * MS)
-    items = bench.out(Kind.UART)
+    items = bench.out(OutgoingKind.UART)
     assert [item.value for item in items] == list(b"go")
     assert items[0].unit == LEUART0 | PD4 << 8
     expected = 10 * (256 + 616) * S // 256 // HZ
@@ -260,10 +260,10 @@ def test_later_of_opposite_leuart_commands_wins() -> None:
 def test_received_character_wakes_from_em2() -> None:
     bench = leuart(interrupts=True)
     bench["LEUART0.IEN"] = 4
-    bench.out(Kind.SLEEP)
+    bench.out(OutgoingKind.SLEEP)
     bench.machine.uart_receive(0x100 | PD5, 0x7E)
     bench.run_for(US)
-    assert bench.out(Kind.SLEEP)[0].value == 0
+    assert bench.out(OutgoingKind.SLEEP)[0].value == 0
     assert bench["LEUART0.RXDATA"] == 0x7E
 
 

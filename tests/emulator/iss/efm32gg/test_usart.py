@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 
 from .bench import Bench, S, asleep, mask_of
 
@@ -27,7 +27,7 @@ def bit_ps(clkdiv: int, oversampling: int = 16) -> Fraction:
 
 
 def sent(bench: Bench) -> list[int]:
-    return [item.value for item in bench.out(Kind.UART)]
+    return [item.value for item in bench.out(OutgoingKind.UART)]
 
 
 @pytest.mark.parametrize("clkdiv", [0, 64, 3648, 14 << 8 | 0xC0, 0x1FFFC0])
@@ -36,7 +36,7 @@ def test_character_duration(clkdiv: int, ovs: int, oversampling: int) -> None:
     bench = uart(clkdiv, control=ovs << 5)
     bench["UART0.TXDATA"] = 0x5A
     frame_ps = 10 * bit_ps(clkdiv, oversampling)
-    [item] = bench.out(Kind.UART)
+    [item] = bench.out(OutgoingKind.UART)
     assert (item.unit, item.value) == (UART0 | PF6 << 8, 0x5A)
     assert item.extra in (int(frame_ps), int(frame_ps) + 1)
 
@@ -49,7 +49,7 @@ def test_back_to_back_characters_do_not_drift() -> None:
         while not bench.is_set("UART0.STATUS.TXBL"):
             bench.run_for(10**7)
         bench["UART0.TXDATA"] = count
-        starts += [item.time_ps for item in bench.out(Kind.UART)]
+        starts += [item.time_ps for item in bench.out(OutgoingKind.UART)]
     frame_ps = 10 * bit_ps(3648)
     assert len(starts) > 190
     for count, start in enumerate(starts):
@@ -71,7 +71,7 @@ def test_back_to_back_characters_do_not_drift() -> None:
 def test_frame_formats(frame: int, halves: int) -> None:
     bench = uart(0, frame)
     bench["UART0.TXDATAX"] = 0x1FF
-    [item] = bench.out(Kind.UART)
+    [item] = bench.out(OutgoingKind.UART)
     assert item.extra == int(halves * bit_ps(0) / 2)
     assert item.value == (1 << ((frame & 15) + 3)) - 1
 
@@ -219,7 +219,7 @@ def test_spi_master_sends_words_and_receives_the_idle_line() -> None:
     bench["GPIO.PD_MODEL"] = PUSH_PULL | INPUT << 4
     bench.load("USART1", CTRL=mask_of("USART.CTRL.SYNC"), CLKDIV=256, ROUTE=0xB | 1 << 8, CMD=0x15)
     bench["USART1.TXDATA"] = 0x9F
-    [item] = bench.out(Kind.SPI)
+    [item] = bench.out(OutgoingKind.SPI)
     assert item.value == 0x9F
     assert item.extra == 8 * 4 * S // HZ  # 14 MHz / (2 * (1 + 256 / 256))
     bench.run_for(9 * 4 * S // HZ)

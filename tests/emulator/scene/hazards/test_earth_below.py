@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.scene.earth import angular_radius_deg
-from cubestack.emulator.scene.earth_sun import EarthSunScene, Target
+from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.emulator.scene.hazards import EARTH_HAZARDS, Clouds, EarthInSunCamera, Terminator
 from cubestack.emulator.scene.hazards.hazard import Hazard
 from tests.emulator.scene.hazards.looks import NOW
@@ -44,4 +44,4 @@ def test_the_limb_is_beside_the_sun(above: float, visible: bool) -> None:
     scene = EarthSunScene(hazards=(EarthInSunCamera(above_deg=above, towards_deg=80.0),))
     angle = np.degrees(np.arccos(scene.sun @ scene.nadir))
     assert angle == pytest.approx(angular_radius_deg(750) + above)
-    assert scene.truth(Target.SUN, 0).visible is visible
+    assert scene.truth(CameraTarget.SUN, 0).visible is visible

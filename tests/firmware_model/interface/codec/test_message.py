@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import InterfaceError, bool1, i16, u8, u16, u32
-from cubestack.firmware_model.interface.codec.message import Interface, Kind, Message
+from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.firmware_model.interface.codec.node_codes import AckError
 from cubestack.firmware_model.interface.codec.node_messages import node_telemetry
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
@@ -53,7 +53,7 @@ def test_every_declared_bit_survives(data: bytes) -> None:
 
 
 def test_telemetry_saturates_and_telecommands_do_not() -> None:
-    assert (MIXED.kind, WINDOW.kind) == (Kind.TELEMETRY, Kind.TELECOMMAND)
+    assert (MIXED.kind, WINDOW.kind) == (MessageKind.TELEMETRY, MessageKind.TELECOMMAND)
     assert MIXED.pack(a=999, b=0, c=0, d=0, e=0)[0] == 255
     with pytest.raises(InterfaceError, match="Window: field low: 256 does not fit"):
         WINDOW.pack(low=256, high=9)

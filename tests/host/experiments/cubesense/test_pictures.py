@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from cubestack.emulator.camera.ov7620.fisheye import LENSES
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import direction
 from cubestack.host.experiments.cubesense.pictures import (
@@ -29,7 +29,7 @@ def test_pixels_are_those_of_the_camera_s_own_lens(camera: Camera) -> None:
     rng = np.random.default_rng(3)
     angles = rng.uniform(-60, 60, (50, 2))
     vectors = np.array([direction(*pair) for pair in angles])
-    seen = np.array([LENSES[Target[camera.name]].project(vector) for vector in vectors])
+    seen = np.array([LENSES[CameraTarget[camera.name]].project(vector) for vector in vectors])
     np.testing.assert_allclose(pixel(camera, vectors), seen, atol=0.01)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from cubestack.host.devices.experiment import Result
 from cubestack.host.studies.campaign import block
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,6 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> set[float]:
 
 
 @pytest.fixture
-def plan() -> Plan:
+def plan() -> CampaignPlan:
     """Two points of seven frames, in blocks of three."""
-    return Plan(device="cubestar", frames=7, seed=5, block=3, grid={"false_stars": [0, 9]})
+    return CampaignPlan(device="cubestar", frames=7, seed=5, block=3, grid={"false_stars": [0, 9]})

@@ -4,11 +4,11 @@ import pytest
 
 from cubestack.host.studies.campaign import block as blocks
 from cubestack.host.studies.campaign.block import perform, rows_of
-from cubestack.host.studies.campaign.plan import Block, Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
 
 
-def of(frames: int, device: str = "cubestar") -> Block:
-    return Block(4, device, {"false_stars": 2}, {"false_stars": 2}, frames, 77)
+def of(frames: int, device: str = "cubestar") -> FrameBlock:
+    return FrameBlock(4, device, {"false_stars": 2}, {"false_stars": 2}, frames, 77)
 
 
 def test_rows_say_what_became_of_each_frame(failing: set[float]) -> None:
@@ -46,13 +46,15 @@ def _results(seed: int):  # type: ignore[no-untyped-def]
 
 
 def test_a_frame_of_two_cameras_has_two_rows() -> None:
-    assert rows_of(Block(0, "cubesense", {}, {}, 5, 1)) == 10
-    assert rows_of(Block(0, "cubesense", {"sensor": "sun"}, {}, 5, 1)) == 5
+    assert rows_of(FrameBlock(0, "cubesense", {}, {}, 5, 1)) == 10
+    assert rows_of(FrameBlock(0, "cubesense", {"sensor": "sun"}, {}, 5, 1)) == 5
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
 def test_a_real_device(profile: str) -> None:
-    (one,) = Plan(device="cubestar", frames=2, seed=3, options={"profile": profile}).blocks()
+    (one,) = CampaignPlan(
+        device="cubestar", frames=2, seed=3, options={"profile": profile}
+    ).blocks()
     rows = perform(one)
     assert [row.outcome for row in rows] == ["right", "right"]
     assert "wall_ms" not in rows[0].result

@@ -9,14 +9,14 @@ import pytest
 
 from cubestack.host.studies.campaign.block import Row
 from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder, FolderError
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 
 
 def rows(block: int, count: int = 3) -> list[Row]:
     return [Row(block, row, 1, row, {}, "right", "", {"x": 0.1}) for row in range(count)]
 
 
-def test_rows_come_back_as_they_were_added(tmp_path: Path, plan: Plan) -> None:
+def test_rows_come_back_as_they_were_added(tmp_path: Path, plan: CampaignPlan) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     folder.add(rows(1))
     folder.add(rows(0))
@@ -26,7 +26,9 @@ def test_rows_come_back_as_they_were_added(tmp_path: Path, plan: Plan) -> None:
 
 
 @pytest.mark.parametrize("cut", range(1, 200, 13))
-def test_a_torn_block_is_taken_out_and_nothing_else(tmp_path: Path, plan: Plan, cut: int) -> None:
+def test_a_torn_block_is_taken_out_and_nothing_else(
+    tmp_path: Path, plan: CampaignPlan, cut: int
+) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     folder.add(rows(2))
     folder.add(rows(1))
@@ -36,17 +38,17 @@ def test_a_torn_block_is_taken_out_and_nothing_else(tmp_path: Path, plan: Plan, 
     assert list(folder.rows()) == rows(2)
 
 
-def test_a_folder_is_resumed_only_with_the_same_plan(tmp_path: Path, plan: Plan) -> None:
+def test_a_folder_is_resumed_only_with_the_same_plan(tmp_path: Path, plan: CampaignPlan) -> None:
     Folder.begun(tmp_path / "c", plan, resume=True)
     assert Folder.begun(tmp_path / "c", plan, resume=True).plan == plan
     with pytest.raises(FolderError, match="has a campaign already; --resume goes on"):
         Folder.begun(tmp_path / "c", plan, resume=False)
-    other = Plan(device="cubestar", frames=8, seed=6, block=3, grid={"false_stars": [0, 9]})
+    other = CampaignPlan(device="cubestar", frames=8, seed=6, block=3, grid={"false_stars": [0, 9]})
     with pytest.raises(FolderError, match="another plan, with other frames, seed"):
         Folder.begun(tmp_path / "c", other, resume=True)
 
 
-def test_a_folder_of_another_version_is_not_mixed(tmp_path: Path, plan: Plan) -> None:
+def test_a_folder_of_another_version_is_not_mixed(tmp_path: Path, plan: CampaignPlan) -> None:
     Folder.begun(tmp_path / "c", plan, resume=False)
     path = tmp_path / "c" / PLAN
     path.write_text(json.dumps(json.loads(path.read_text()) | {"version": "0.0.1"}))
@@ -69,13 +71,13 @@ def test_what_is_no_campaign_is_told(tmp_path: Path, told: str | None, error: st
         Folder(tmp_path)
 
 
-def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, plan: Plan) -> None:
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, plan: CampaignPlan) -> None:
     (tmp_path / "mine.txt").write_text("x")
     with pytest.raises(FolderError, match="is not empty, and no campaign's"):
         Folder.begun(tmp_path, plan, resume=True)
 
 
-def test_only_one_process_works_on_a_campaign(tmp_path: Path, plan: Plan) -> None:
+def test_only_one_process_works_on_a_campaign(tmp_path: Path, plan: CampaignPlan) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     with (
         folder.alone(),
@@ -86,7 +88,7 @@ def test_only_one_process_works_on_a_campaign(tmp_path: Path, plan: Plan) -> Non
 
 
 def test_a_full_disk_is_told_by_its_file(
-    tmp_path: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, plan: CampaignPlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     folder.add(rows(0))

@@ -8,7 +8,7 @@ import pytest
 
 from cubestack.host.studies.campaign import run as running
 from cubestack.host.studies.campaign.folder import ROWS, Folder
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
 
 
@@ -21,7 +21,7 @@ def backwards(
 
 @pytest.mark.usefixtures("failing")
 def test_rows_are_put_into_order(
-    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     usual = Folder.begun(tmp_path / "usual", plan, resume=False)
     list(run(usual, 1))

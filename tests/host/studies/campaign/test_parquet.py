@@ -8,11 +8,11 @@ import pytest
 
 from cubestack.host.studies.campaign import parquet
 from cubestack.host.studies.campaign.folder import Folder
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
 
 
-def test_a_column_for_each_value(failing: set[float], plan: Plan, tmp_path: Path) -> None:
+def test_a_column_for_each_value(failing: set[float], plan: CampaignPlan, tmp_path: Path) -> None:
     failing.add(0.9)
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows = list(run(folder, 1))
@@ -27,7 +27,7 @@ def test_a_column_for_each_value(failing: set[float], plan: Plan, tmp_path: Path
     assert {one["swept.false_stars"] for one in found} == {0, 9}
 
 
-def test_without_rows_there_is_no_file(plan: Plan, tmp_path: Path) -> None:
+def test_without_rows_there_is_no_file(plan: CampaignPlan, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     with pytest.raises(ValueError, match="has no rows yet"):
         parquet.write(folder)
@@ -35,7 +35,7 @@ def test_without_rows_there_is_no_file(plan: Plan, tmp_path: Path) -> None:
 
 
 def test_what_is_missing_is_told(
-    plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(ValueError, match=r'pip install "cubestack\[parquet\]"'):

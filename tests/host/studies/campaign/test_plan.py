@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 
 TEXT = """
 device = "cubestar"
@@ -31,7 +31,7 @@ def write(path: Path, text: str = TEXT) -> Path:
 
 
 def test_every_combination_is_a_point(tmp_path: Path) -> None:
-    plan = Plan.read(write(tmp_path / "a.toml"))
+    plan = CampaignPlan.read(write(tmp_path / "a.toml"))
     assert len(plan.points) == 6
     blocks = list(plan.blocks())
     assert [block.number for block in blocks] == list(range(24))
@@ -44,7 +44,7 @@ def test_every_combination_is_a_point(tmp_path: Path) -> None:
 
 
 def test_all_points_see_the_same_skies(tmp_path: Path) -> None:
-    plan = Plan.read(write(tmp_path / "a.toml"))
+    plan = CampaignPlan.read(write(tmp_path / "a.toml"))
     seen: dict[Any, list[Any]] = {}
     for block in plan.blocks():
         point = block.swept["false_stars"], tuple(block.swept["hazard"])
@@ -57,7 +57,10 @@ def test_all_points_see_the_same_skies(tmp_path: Path) -> None:
 def test_a_plan_that_tells_no_seed_is_that_of_seed_0() -> None:
     """As with every command's --seed."""
     untold, zero, one = (
-        [block.seed for block in Plan(device="cubestar", frames=3, block=1, **seed).blocks()]
+        [
+            block.seed
+            for block in CampaignPlan(device="cubestar", frames=3, block=1, **seed).blocks()
+        ]
         for seed in ({}, {"seed": 0}, {"seed": 1})
     )
     assert untold == zero != one
@@ -66,7 +69,7 @@ def test_a_plan_that_tells_no_seed_is_that_of_seed_0() -> None:
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 200), st.integers(1, 40))
 def test_blocks_hold_all_frames(frames: int, size: int) -> None:
-    blocks = list(Plan(device="cubestar", frames=frames, block=size).blocks())
+    blocks = list(CampaignPlan(device="cubestar", frames=frames, block=size).blocks())
     assert sum(block.frames for block in blocks) == frames
     assert max(block.frames for block in blocks) == min(size, frames)
     assert len({block.seed for block in blocks}) == len(blocks)
@@ -74,7 +77,7 @@ def test_blocks_hold_all_frames(frames: int, size: int) -> None:
 
 def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
     write(tmp_path / "a.toml", 'device = "cubestar"\nframes = 1\n[grid]\nscene = ["x.toml"]\n')
-    (block,) = Plan.read(tmp_path / "a.toml").blocks()
+    (block,) = CampaignPlan.read(tmp_path / "a.toml").blocks()
     assert block.options == {"scene": str(tmp_path / "x.toml")}
 
 
@@ -104,12 +107,12 @@ def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_named(tmp_path: Path, text: str, error: str) -> None:
     with pytest.raises(ValueError, match=error) as caught:
-        Plan.read(write(tmp_path / "a.toml", text))
+        CampaignPlan.read(write(tmp_path / "a.toml", text))
     assert str(caught.value).startswith(f"{tmp_path / 'a.toml'}: ")
     assert "\n" not in str(caught.value)
 
 
 def test_the_plan_of_the_page(tmp_path: Path) -> None:
     page = (Path(__file__).parents[4] / "docs" / "campaigns.md").read_text("utf-8")
-    plan = Plan.read(write(tmp_path / "a.toml", page.split("```toml\n")[1].split("```")[0]))
+    plan = CampaignPlan.read(write(tmp_path / "a.toml", page.split("```toml\n")[1].split("```")[0]))
     assert (plan.frames, len(plan.points)) == (1000, 8)

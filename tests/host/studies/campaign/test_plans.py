@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
 
 ROOT = Path(__file__).parents[4]
@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[4]
 @pytest.mark.parametrize("name", known_plans())
 def test_it_is_read_and_told(name: str) -> None:
     path = plan_file(name)
-    assert Plan.read(path).points
+    assert CampaignPlan.read(path).points
     assert len(summary(path)) > 20
     assert f"`{name}`" in (ROOT / "docs" / "campaigns.md").read_text("utf-8")
 

@@ -15,7 +15,7 @@ from scipy.stats import binomtest
 from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign.block import Row
 from cubestack.host.studies.campaign.folder import Folder, FolderError
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.statistics import by_chance, compared, errors, rates
 
 Make = Callable[..., Folder]
@@ -30,7 +30,7 @@ def make(tmp_path: Path) -> Make:
         name: str, others: dict[str, str], seed: int = 5, errors: Sequence[str] = ("error_deg",)
     ) -> Folder:
         grid = {"false_stars": [0, 9], "hazard": [["moon"]]}
-        plan = Plan(device="cubestar", frames=FRAMES, seed=seed, block=FRAMES, grid=grid)
+        plan = CampaignPlan(device="cubestar", frames=FRAMES, seed=seed, block=FRAMES, grid=grid)
         folder = Folder.begun(tmp_path / name, plan, resume=False)
         for block in plan.blocks():
             rows = []
@@ -92,7 +92,7 @@ def test_only_the_same_skies_are_compared(make: Make, tmp_path: Path) -> None:
     other = make("other", {}, seed=6)
     with pytest.raises(FolderError, match=r"other skies than .*: another seed"):
         compared(before, other)
-    plan = Plan(device="cubestar", frames=2, grid={"false_stars": [1]})
+    plan = CampaignPlan(device="cubestar", frames=2, grid={"false_stars": [1]})
     with pytest.raises(FolderError, match="not the same grid and as many rows"):
         compared(before, Folder.begun(tmp_path / "less", plan, resume=False))
 
@@ -173,6 +173,6 @@ def test_the_page_compares(make: Make) -> None:
     assert f"Compared with {before.path}" in cells
 
 
-def test_without_rows_there_is_no_page(plan: Plan, tmp_path: Path) -> None:
+def test_without_rows_there_is_no_page(plan: CampaignPlan, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="has no rows yet"):
         report.write(Folder.begun(tmp_path / "c", plan, resume=False))

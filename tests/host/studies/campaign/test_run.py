@@ -11,7 +11,7 @@ import pytest
 
 from cubestack.host.studies.campaign import block as blocks
 from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import count, replayed, run
 from cubestack.host.studies.campaign.statistics import rates
 
@@ -30,7 +30,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def alone(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
     """What one worker makes of it."""
-    folder = Folder.begun(tmp_path_factory.mktemp("c") / "alone", Plan.read(small), resume=False)
+    folder = Folder.begun(
+        tmp_path_factory.mktemp("c") / "alone", CampaignPlan.read(small), resume=False
+    )
     rows = list(run(folder, 1))
     assert len(rows) == count(folder.plan) == 4
     return folder
@@ -100,7 +102,7 @@ def test_rates_are_counted_by_point(alone: Folder) -> None:
 
 
 def test_what_is_there_is_not_measured_again(
-    failing: set[float], plan: Plan, tmp_path: Path
+    failing: set[float], plan: CampaignPlan, tmp_path: Path
 ) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows: Iterator[object] = run(folder, 1)
@@ -117,7 +119,7 @@ def test_what_is_there_is_not_measured_again(
 
 
 def test_where_everything_fails_nothing_is_kept(
-    failing: set[float], plan: Plan, tmp_path: Path
+    failing: set[float], plan: CampaignPlan, tmp_path: Path
 ) -> None:
     failing.add(-1.0)
     folder = Folder.begun(tmp_path / "c", plan, resume=False)

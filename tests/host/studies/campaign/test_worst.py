@@ -3,12 +3,14 @@
 from pathlib import Path
 
 from cubestack.host.studies.campaign.folder import Folder
-from cubestack.host.studies.campaign.plan import Plan
+from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
 from cubestack.host.studies.campaign.worst import worst
 
 
-def test_outcomes_first_then_errors(tmp_path: Path, plan: Plan, failing: set[float]) -> None:
+def test_outcomes_first_then_errors(
+    tmp_path: Path, plan: CampaignPlan, failing: set[float]
+) -> None:
     failing.add(0.9)
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows = list(run(folder, 1))
@@ -22,7 +24,7 @@ def test_outcomes_first_then_errors(tmp_path: Path, plan: Plan, failing: set[flo
 
 
 def test_a_real_one_has_its_picture(tmp_path: Path) -> None:
-    plan = Plan(device="cubestar", frames=2, options={"mag_limit": 3.8})
+    plan = CampaignPlan(device="cubestar", frames=2, options={"mag_limit": 3.8})
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     first, second = (row.result["error_cross_deg"] for row in run(folder, 1))
     (case,) = worst(folder, 1)

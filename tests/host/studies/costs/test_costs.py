@@ -12,17 +12,17 @@ from cubestack.emulator.boards.cubestar.compiled.build import COMPILER, compiler
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import device
 from cubestack.host.studies.costs import command as command
-from cubestack.host.studies.costs.contract import CostReport, Measurement
+from cubestack.host.studies.costs.contract import CostMeasurement, CostReport
 from cubestack.host.studies.cubestar.costs import COLUMNS, _cases, costs, measure
 from tests.conftest import Run
 
 DOCS = Path(__file__).parents[4] / "docs"
 
 
-def recorded() -> list[Measurement]:
+def recorded() -> list[CostMeasurement]:
     """What was measured last."""
     data = json.loads(costs().file.read_text("utf-8"))
-    return [Measurement(**build) for build in data["builds"]]
+    return [CostMeasurement(**build) for build in data["builds"]]
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
@@ -64,9 +64,9 @@ def test_a_build_with_doubles_costs_what_was_recorded() -> None:
 
 
 BUILDS = [
-    Measurement("-O2 own", "usual", {"add": 1.5, "mul": 3.0}, {"a": 1000, "b": 234_567}),
-    Measurement("-O0 own", "usual", {"add": 2.5, "mul": 4.25}, {"a": 2000}),
-    Measurement("-O2 own", "slow", {"add": 9.0, "mul": 9.0}, {"a": 9000}),
+    CostMeasurement("-O2 own", "usual", {"add": 1.5, "mul": 3.0}, {"a": 1000, "b": 234_567}),
+    CostMeasurement("-O0 own", "usual", {"add": 2.5, "mul": 4.25}, {"a": 2000}),
+    CostMeasurement("-O2 own", "slow", {"add": 9.0, "mul": 9.0}, {"a": 9000}),
 ]
 
 
@@ -75,7 +75,7 @@ def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     """A device whose costs are known; how they were asked for."""
     asked = list[Any]()
 
-    def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[Measurement]:
+    def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[CostMeasurement]:
         asked.append((levels, precisions))
         yield from BUILDS
 

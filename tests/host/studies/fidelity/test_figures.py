@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
-from cubestack.emulator.scene.earth_sun import Target
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.studies.aramis import fidelity as aramis
 from cubestack.host.studies.cubesense import fidelity as cubesense
@@ -239,7 +239,7 @@ def test_the_sun_stands_still_at_the_angles_that_the_row_names(
     seen: list[float] = []
 
     def found_at(_device: str, *, frames: int, scene: Any, **_: Any) -> list[SimpleNamespace]:
-        angle = scene.truth(Target.SUN, 0, 100.0).alpha_deg
+        angle = scene.truth(CameraTarget.SUN, 0, 100.0).alpha_deg
         seen.append(angle)
         off = angle / 1000 * np.resize([1, -1], frames)
         return [SimpleNamespace(alpha_deg=angle, beta_deg=one) for one in off]

@@ -14,13 +14,13 @@ from cubestack.host.studies.upsets.sample import (
     Effect,
     Outcome,
     Running,
-    Target,
     Upset,
     UpsetResult,
+    UpsetTarget,
     effect_of,
     followed,
 )
-from cubestack.host.studies.upsets.subject import Answer, Subject, Verdict
+from cubestack.host.studies.upsets.subject import Answer, Subject, UpsetVerdict
 from cubestack.host.studies.upsets.watch import PortWatch
 
 ROW = 16
@@ -89,9 +89,9 @@ class Device:
     def start(self, _emulated: Any) -> None:
         self._note("start")
 
-    def judge(self, _emulated: Any) -> Verdict:
+    def judge(self, _emulated: Any) -> UpsetVerdict:
         self._note("judge")
-        return Verdict(next(self.answers))
+        return UpsetVerdict(next(self.answers))
 
     def running(self) -> Running:
         """In the middle of its loop, which would be right."""
@@ -106,7 +106,7 @@ class Device:
         watch = PortWatch(port, ())
         snapshot = replace(take(sites, watch), memories={"ram": self.ram.copy()})
         loop = [Interval("storing", 10 * PS_PER_US, 50 * PS_PER_US)]
-        clean = CleanLoop(loop, 40 * PS_PER_US, snapshot, Verdict("right"))
+        clean = CleanLoop(loop, 40 * PS_PER_US, snapshot, UpsetVerdict("right"))
         subject = Subject(lambda _generator: None, self.start, self.judge, lambda _engine: "", ROW)
         return Running(emulated, subject, sites, watch, clean)
 
@@ -129,9 +129,9 @@ def test_loops_are_started_and_judged_until_one_is_right(
 ) -> None:
     """The one that was hit is only judged, at its end; each takes as long as the clean one."""
     device = Device(answers)
-    upset = Upset(20 * PS_PER_US, "storing", Target("ram", 13, memory=True))
+    upset = Upset(20 * PS_PER_US, "storing", UpsetTarget("ram", 13, memory=True))
     found = followed(device.running(), [upset, upset])
-    assert found == [Outcome("left over", Verdict(answers[0]), recovered)]
+    assert found == [Outcome("left over", UpsetVerdict(answers[0]), recovered)]
     assert device.ram.tolist() == [0, 1 << 5, 0, 0]
     further = [
         (what, us)
