@@ -13,7 +13,7 @@ from cubestack.firmware_model.values import FLAG, WHOLE, DeclaredValues, ValueKi
 
 
 def _corner(given: Any) -> tuple[int, int]:
-    left, top = map(WHOLE.read, given)
+    left, top = (WHOLE.parse(one) if isinstance(one, str) else WHOLE.read(one) for one in given)
     return left, top
 
 
@@ -25,9 +25,7 @@ PATH = ValueKind("path", "a path", Path, Path)
 FILE = ValueKind("file", "a file", _file, Path)
 """The path of a file, or what a program made instead of it: a scene, a plan of faults."""
 
-CORNER = ValueKind(
-    "corner", "X,Y, as in 0,256", _corner, lambda text: _corner(map(WHOLE.parse, text.split(",")))
-)
+CORNER = ValueKind("corner", "X,Y, as in 0,256", _corner, lambda text: _corner(text.split(",")))
 SWITCH = replace(FLAG, read={False: False, True: True}.__getitem__)  # 0 and 1 too
 
 # Each takes (default, meaning), then keywords of `Declaration`.

@@ -66,7 +66,7 @@ PHASE_S = 0.2
 
 
 def _magnitudes(given: Any) -> tuple[float, float]:
-    brightest, faintest = map(NUMBER.read, given)
+    brightest, faintest = (NUMBER.read(float(one)) for one in given)
     if not brightest <= faintest:
         raise ValueError
     return brightest, faintest
@@ -76,7 +76,7 @@ MAGNITUDES = ValueKind(
     "magnitudes",
     "V,V, the brightest first, as in 4.5,6",
     _magnitudes,
-    lambda text: _magnitudes(map(float, text.split(","))),
+    lambda text: _magnitudes(text.split(",")),
 )
 
 

@@ -32,7 +32,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "Atmosphere": {"latitude_deg": 0.0, "sidereal_deg": 0.0},
     "Mounting": SUN,
     "Optics": {one.name: getattr(LENS, one.name) for one in fields(LENS)},
-    "Plan": {"device": "cubestar", "frames": 1},
+    "CampaignPlan": {"device": "cubestar", "frames": 1},
     "PictureScene": {"file": ROOT / "none.png"},
     "Pose": SKY,
     "Reflection": {"camera": 0, "alpha_deg": 0, "beta_deg": 0, "radius_px": 1, "level": 1},

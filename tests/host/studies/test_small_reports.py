@@ -117,16 +117,19 @@ def test_an_exposure_is_the_nearest_number_of_rows(exposure_ms: float) -> None:
     assert rows >= 1
 
 
+FALSE_MAGS = aramis.AramisOptions.declared()["false_mags"]
+
+
 @pytest.mark.parametrize("given", ["4.5,6", (4.5, 6), ("4.5", "6")])
 def test_magnitudes_are_typed_or_given(given: object) -> None:
-    assert aramis.MAGNITUDES(given) == (4.5, 6.0)
+    assert FALSE_MAGS.take(given) == (4.5, 6.0)
 
 
 @pytest.mark.parametrize("given", ["6,4.5", "4.5", "a,b", (6, 4.5)])
 def test_magnitudes_that_are_none(given: object) -> None:
     with pytest.raises(ValueError, match="the brightest first"):
-        aramis.MAGNITUDES(given)
-    assert aramis.MAGNITUDES("5,5") == (5.0, 5.0)
+        FALSE_MAGS.take(given)
+    assert FALSE_MAGS.take("5,5") == (5.0, 5.0)
 
 
 # --- campaigns ------------------------------------------------------------------------------------
