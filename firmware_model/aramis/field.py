@@ -34,12 +34,10 @@ class CameraField(DeclaredValues):
 
     @property
     def radius_mm(self) -> float:
-        """Half of the shorter side of the picture."""
         return min(self.columns * self.pitch_x_mm, self.rows * self.pitch_y_mm) / 2
 
     @property
     def focal_length_mm(self) -> float:
-        """Focal length of the lens."""
         return self.radius_mm / tan(radians(self.fov_deg / 2))
 
     @property
@@ -80,7 +78,6 @@ class CameraField(DeclaredValues):
 
     @cached_property
     def pixels(self) -> int:
-        """Number of pixels in the field."""
         return int(np.count_nonzero(self.mask))
 
     def directions(self, points: Floats, meter: Meter) -> Floats:
@@ -112,7 +109,6 @@ class CameraField(DeclaredValues):
         return tangents[:, 0], tangents[:, 1]
 
     def _inside(self, x: Floats, y: Floats, meter: Meter) -> Mask:
-        """Which tangents of angles to the boresight are in the field."""
         count = len(x)
         meter.charge(f32_add=count, f32_mul=2 * count, f32_compare=2 * count, loop=count)
         if self.round:

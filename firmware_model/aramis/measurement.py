@@ -28,8 +28,8 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 
 T = TypeVar("T")
 
+#: With a local threshold so many times MaxStars are kept: half of them may be no stars.
 HALF_FALSE = 2
-"""With a local threshold so many times MaxStars are kept: half of them may be no stars."""
 
 
 @lru_cache(maxsize=4)
@@ -82,7 +82,6 @@ class Measuring:
     _catalogue: CatalogueStore
 
     def __post_init__(self) -> None:
-        """Begin without pictures."""
         self.restart()
 
     def restart(self) -> None:
@@ -146,7 +145,6 @@ class Measuring:
         return None
 
     def _check(self, result: MeasurementResult) -> Routine[Reason | None]:
-        """Make sure that RAM holds a good catalogue."""
         errors = self._catalogue.ram_errors
         good = yield from self._timed(result, "Check", self._catalogue.ensure())
         if self._catalogue.ram_errors != errors:

@@ -37,17 +37,13 @@ from cubestack.firmware_model.star_tracker.background import (
 )
 from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 
-STEP = 2
-"""Distance of the background's samples in px."""
+STEP = 2  #: distance of the background's samples in px
 
+#: In 1/16 count: the converter's steps hide less, and levels near 0 are cut off there.
 LEAST_NOISE = 19
-"""In 1/16 count: the converter's steps hide less, and levels near 0 are cut off there."""
 
-BLIND = 240
-"""Level from which on no star can be told from its surroundings."""
-
-SPIKE_SIGMAS = 8.0
-"""A pixel is far above its surroundings from so many standard deviations on."""
+BLIND = 240  #: level from which on no star can be told from its surroundings
+SPIKE_SIGMAS = 8.0  #: a pixel is far above its surroundings from so many standard deviations on
 
 
 @dataclass(frozen=True)
@@ -70,7 +66,6 @@ class DetectionSettings(DeclaredValues):
     )
 
     def __post_init__(self) -> None:
-        """Refuse settings with which nothing can be found: ValueError."""
         super().__post_init__()
         self.check_within("min_pixels", high=self.max_pixels)
 
@@ -87,9 +82,9 @@ class Configuration:
     profile: Profile = _PROFILE
 
 
-PUBLISHED = Configuration()
-"""As the thesis runs it: a unique triangle is believed."""
+PUBLISHED = Configuration()  #: as the thesis runs it: a unique triangle is believed
 
+#: An extension: further stars must confirm the attitude; noise of 0.15 px is expected.
 VERIFIED = replace(
     PUBLISHED,
     detection=DetectionSettings(
@@ -97,7 +92,6 @@ VERIFIED = replace(
     ),
     profile=Profile(sigma_rad=5.6e-5, verify=True),
 )
-"""An extension: further stars must confirm the attitude; noise of 0.15 px is expected."""
 
 
 def _check_size(picture: NDArray[np.uint8], field: CameraField) -> None:

@@ -13,12 +13,11 @@ from cubestack.firmware_model.star_tracker.disturbance import DisturbanceLimits
 #: Share of hit pixels: one in a window of 25, which distinguishes a spike from a star.
 MOST_HIT = 0.04
 
+#: Share of the field: the Moon's disc with its glare, not a bright star. Counts: a dark sky stays
+#: below both. Pixels above noise that no star explains: a quiet picture has fewer (all measured).
 LIMITS = DisturbanceLimits(saturated=0.004, background=20.0, background_range=10.0, spikes=40)
-"""Share of the field: the Moon's disc with its glare, not a bright star. Counts: a dark sky stays
-below both. Pixels above noise that no star explains: a quiet picture has fewer (all measured)."""
 
-WIDE_PX = 2500
-"""A bright region that no star fills."""
+WIDE_PX = 2500  #: a bright region that no star fills
 
 #: Of a search that found no attitude, which says nothing of the cause.
 _OPEN = (Reason.UNCONFIRMED, Reason.NO_TRIANGLE, Reason.NO_TIME, Reason.TOO_FEW_STARS)

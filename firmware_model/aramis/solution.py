@@ -15,8 +15,7 @@ from cubestack.firmware_model.star_tracker.disturbance import SkyStatistics
 from cubestack.firmware_model.star_tracker.rating import Rating
 from cubestack.firmware_model.values import DeclaredValues, choice, flag, number, whole
 
-NONE = -1
-"""Mark of a measured star without identity."""
+NONE = -1  #: mark of a measured star without identity
 
 
 @dataclass(frozen=True)
@@ -84,73 +83,49 @@ class Profile(DeclaredValues):
 
 @dataclass(frozen=True)
 class PictureLight(SkyStatistics):
-    """What a picture has beside stars, in counts.
+    """What a picture has beside stars, in counts."""
 
-    Attributes:
-        threshold: median level of a bright pixel.
-        widest: pixels of the largest bright region.
-        rejected: regions whose shape no star has.
-    """
-
-    threshold: float
-    widest: int
-    rejected: int
+    threshold: float  #: median level of a bright pixel
+    widest: int  #: pixels of the largest bright region
+    rejected: int  #: regions whose shape no star has
 
 
 @dataclass(frozen=True, eq=False)
 class StarList:
-    """Stars of a picture, the brightest first.
+    """Stars of a picture, the brightest first."""
 
-    Attributes:
-        centroids: (n, 2) x and y in px, float32.
-        brightness: (n,) sum of grey levels, falling, float32.
-        smear_px: length of the streaks that motion made of them.
-        skew_px: how far they moved while the rows were exposed one after the other.
-        sigma_px: (n,) expected errors of the centroids, each axis; None: the profile's.
-        light: what the picture has beside them; None with a threshold for the whole picture.
-    """
-
-    centroids: Floats
-    brightness: Floats
-    smear_px: float = 0.0
-    skew_px: float = 0.0
+    centroids: Floats  #: (n, 2) x and y in px, float32
+    brightness: Floats  #: (n,) sum of grey levels, falling, float32
+    smear_px: float = 0.0  #: length of the streaks that motion made of them
+    skew_px: float = 0.0  #: how far they moved while the rows were exposed one after the other
+    #: (n,) expected errors of the centroids, each axis; None: the profile's
     sigma_px: Floats | None = None
+    #: what the picture has beside them; None with a threshold for the whole picture
     light: PictureLight | None = None
 
     def __len__(self) -> int:
-        """Number of stars."""
         return len(self.centroids)
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What became of one picture.
+    """What became of one picture."""
 
-    Attributes:
-        outcome: conclusive, ambiguous or none.
-        reason: why.
-        quaternion: (4,) inertial to camera, scalar last and not negative; None unless conclusive.
-        stars: (n,) index into the database's star list for each measured star, -1 for none.
-        measured: the stars that were found.
-        candidates, pivots: of the last triple: triangles left, and pivot triangles used.
-        triples: tried.
-        expected: catalogue stars in the field by the attitude, 0 without verification.
-        rating: of a confirmed attitude.
-    """
-
-    outcome: MeasurementOutcome
-    reason: Reason
+    outcome: MeasurementOutcome  #: conclusive, ambiguous or none
+    reason: Reason  #: why
+    #: (4,) inertial to camera, scalar last and not negative; None unless conclusive
     quaternion: Floats | None
+    #: (n,) index into the database's star list for each measured star, -1 for none
     stars: NDArray[np.int32]
-    measured: StarList
+    measured: StarList  #: the stars that were found
+    #: of the last triple: triangles left, and pivot triangles used
     candidates: int = 0
     pivots: int = 0
-    triples: int = 0
-    expected: int = 0
-    rating: Rating | None = None
+    triples: int = 0  #: tried
+    expected: int = 0  #: catalogue stars in the field by the attitude, 0 without verification
+    rating: Rating | None = None  #: of a confirmed attitude
 
 
 def unsolved(reason: Reason, measured: StarList, **counts: int) -> Solution:
-    """A solution without attitude."""
     nothing = np.full(len(measured), NONE, dtype=np.int32)
     return Solution(MeasurementOutcome.NONE, reason, None, nothing, measured, rating=None, **counts)

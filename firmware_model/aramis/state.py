@@ -21,7 +21,6 @@ class Clock:
 
     @property
     def is_set(self) -> bool:
-        """Whether a host has set it."""
         return self._zero_ms is not None
 
     def set(self, day: int, millisecond: int, uptime_us: int) -> None:
@@ -37,36 +36,29 @@ class Clock:
 
 @dataclass
 class MeasurementResult:
-    """The latest measurement.
+    """The latest measurement."""
 
-    Attributes:
-        outcome, reason, mode: how it ended.
-        image_us: uptime at mid-exposure of the middle row.
-        frame: number of its picture.
-        solution: what became of the picture; None without a picture or catalogue.
-        mean, threshold, pictures: levels of the last pictures, and how many.
-        times_us: duration of each step.
-    """
-
+    #: how it ended
     outcome: MeasurementOutcome = MeasurementOutcome.NOT_MEASURED
     reason: aramis.Reason = aramis.Reason.NOT_MEASURED
     mode: aramis.MeasurementMode = aramis.MeasurementMode.LOST_IN_SPACE
-    image_us: int = 0
-    frame: int = 0
+    image_us: int = 0  #: uptime at mid-exposure of the middle row
+    frame: int = 0  #: number of its picture
+    #: what became of the picture; None without a picture or catalogue
     solution: Solution | None = None
+    #: levels of the last pictures, and how many
     mean: int = 0
     threshold: int = 0
     pictures: int = 0
+    #: duration of each step
     times_us: dict[str, int] = field(default_factory=lambda: dict.fromkeys(aramis.PHASES, 0))
 
     @property
     def valid(self) -> bool:
-        """Whether it gave an attitude."""
         return self.outcome is MeasurementOutcome.CONCLUSIVE
 
     @property
     def detected(self) -> int:
-        """Stars in its picture."""
         return 0 if self.solution is None else len(self.solution.measured)
 
 
@@ -88,7 +80,6 @@ class State(NodeState):
     """
 
     def __init__(self, flash: FlashStore, switches: AramisSwitches = DEFAULT_SWITCHES) -> None:
-        """Start with the settings in ``flash``, and ``switches`` of power-up."""
         super().__init__(FLAG_NAMES)
         self.settings = StoredSettings(flash)
         self.switches = RunningSwitches(switches)
@@ -107,5 +98,4 @@ class State(NodeState):
 
     @property
     def active(self) -> bool:
-        """Whether measurements can be asked for."""
         return self.sensor in (SensorState.READY, SensorState.MEASURING, SensorState.PROGRAMMING)

@@ -3,9 +3,7 @@
 M. D. Shuster and S. D. Oh, "Three-axis attitude determination from vector observations", Journal of
 Guidance and Control 4 (1981), section "covariance analysis": a star whose direction b has the
 standard deviation sigma in each axis across it tells w (I - b b^T) about the rotation, w = 1 /
-sigma^2, and the inverse of the sum is the covariance of the best estimate. Of an estimate by
-other weights it is H^-1 G H^-1, with H the sum by those weights and G that of their squares times
-sigma^2 (the sandwich form of an estimator's variance).
+sigma^2, and the inverse of the sum is the covariance of the best estimate.
 
 The declared sigmas are a belief. The residuals of the fit correct it, as far as so few can: the
 variance's scale is the mean of its posterior distribution (scaled inverse chi squared; A. Gelman et
@@ -13,7 +11,7 @@ al., "Bayesian Data Analysis", 3rd edition, section 3.2), in which the belief co
 `PRIOR_DEGREES` squares of residuals. The mean is larger than the best guess of the scale, and so
 makes up for the long tails that a scale guessed from few squares leaves the errors.
 
-What moves all stars alike leaves no residual; `floor` is added for it.
+What moves all stars alike leaves no residual, and is not in it.
 """
 
 import numpy as np
@@ -22,11 +20,11 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.mcu.costs import Meter
 
+#: Degrees of freedom by which the declared sigmas count: three stars' residuals are 3, ten's 17.
 PRIOR_DEGREES = 6
-"""Degrees of freedom by which the declared sigmas count: three stars' residuals are 3, ten's 17."""
 
+#: Of the information of weights that add up to 1: two stars 0.1 deg apart, as in QUEST.
 _SMALLEST_DETERMINANT = np.float32(2e-6)
-"""Of the information of weights that add up to 1: two stars 0.1 deg apart, as in QUEST."""
 
 _IDENTITY = np.eye(3, dtype=np.float32)
 
@@ -37,24 +35,20 @@ def covariance(
     sigmas: NDArray[np.float32],
     meter: Meter,
     *,
-    weights: NDArray[np.float32] | None = None,
-    floor: tuple[float, float, float] = (0.0, 0.0, 0.0),
     excess: float = 1.0,
     beyond: float = 1.0,
 ) -> NDArray[np.float32]:
     """Covariance (3, 3) of the small rotation that separates the true camera axes from the
-    estimated ones, in rad^2, about the camera's axes.
+    estimated ones, in rad^2, about the camera's axes, for weights of 1 / sigma^2.
 
     Args:
         directions: (n, 3) unit vectors in camera axes of the stars used, n at least 2.
         residuals: (n,) angles in rad between them and the catalogue's, turned by the attitude.
         sigmas: (n,) declared standard deviation of a direction, in rad, in each axis across it.
         meter: charged with every operation.
-        weights: (n,) weights by which the attitude was estimated; None for 1 / sigma^2.
-        floor: standard deviations, in rad about the axes, of errors that no residual shows.
-        excess: by how much the variance counts that residuals show beyond the declared one: more
-            than 1 where its cause moves neighbouring stars alike, as a lens does.
-        beyond: multiple of the declared variance from which on it does.
+        excess: factor of the variance that residuals show beyond the declared one: more than 1
+            where its cause moves neighbouring stars alike, as a lens does.
+        beyond: multiple of the declared variance from which on it counts.
 
     Raises:
         AttitudeError: for fewer than two stars, or stars that all lie in one direction.
@@ -63,15 +57,9 @@ def covariance(
     if count < 2:
         raise AttitudeError(f"a covariance needs at least 2 stars, not {count}")
     variances = sigmas.astype(np.float32) ** 2
-    used = np.float32(1) / variances if weights is None else weights.astype(np.float32)
-    total = np.float32(used.sum())
-    used = used / total
-    bread = inverse(information(directions, used, meter), meter)
-    if weights is None:
-        shape = bread / total
-    else:
-        shape = bread @ information(directions, used * used * variances, meter) @ bread
-        meter.charge(f32_mul=54 + 2 * count, f32_add=36, loop=18)
+    weights = np.float32(1) / variances
+    total = np.float32(weights.sum())
+    shape = inverse(information(directions, weights / total, meter), meter) / total
     squares = np.float32((residuals.astype(np.float32) ** 2 / variances).sum())
     # The mean of the posterior, degrees - 2: see above.
     scale = (np.float32(PRIOR_DEGREES) + squares) / np.float32(PRIOR_DEGREES + 2 * count - 3 - 2)
@@ -79,7 +67,7 @@ def covariance(
         f32_mul=3 * count + 12, f32_add=2 * count + 4, f32_div=3 * count + 1, loop=3 * count
     )
     scale = max(scale, np.float32(excess) * (scale - np.float32(beyond)) + np.float32(beyond))
-    return np.asarray(scale * shape + np.diag(np.square(floor)), np.float32)
+    return np.asarray(scale * shape, np.float32)
 
 
 def information(

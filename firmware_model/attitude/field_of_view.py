@@ -24,19 +24,15 @@ _CELLS = 40
 
 @dataclass(frozen=True, eq=False)
 class FieldOfView:
-    """The field of a camera.
+    """The field of a camera."""
 
-    Attributes:
-        sides: (3, 2, 2, 1) coefficients of 1, t, t^2 of the sides' tangents: left and upper, then
-            right and lower one; x is told by y, y by x.
-        smallest_cosine: cosine of the angle between the boresight and the farthest corner.
-        solid_angle_sr: of all of the picture in which stars can be seen.
-        blind: cells (down, across) of the picture in which none can; None: there are no such.
-    """
-
+    #: (3, 2, 2, 1) coefficients of 1, t, t^2 of the sides' tangents: left and upper, then right and
+    #: lower one; x is told by y, y by x
     sides: Floats
+    #: cosine of the angle between the boresight and the farthest corner
     smallest_cosine: np.float32
-    solid_angle_sr: float
+    solid_angle_sr: float  #: of all of the picture in which stars can be seen
+    #: cells (down, across) of the picture in which none can; None: there are no such
     blind: NDArray[np.bool_] | None = None
 
     def without(self, blind: NDArray[np.bool_]) -> Self:

@@ -25,30 +25,24 @@ class CameraParameterError(ValueError):
 
 @dataclass(frozen=True)
 class CameraParameters:
-    """Calibration of camera and lens, as telecommands 8 to 12 load it.
+    """Calibration of camera and lens, as telecommands 8 to 12 load it."""
 
-    Attributes:
-        focal_length_mm: focal length of the pinhole in mm.
-        fx, fy: focal length in px with which distortion coordinates are normalised.
-        cx, cy: principal point and distortion centre in px.
-        k1, k2: radial coefficients, distorted to undistorted.
-        p1, p2: tangential coefficients, distorted to undistorted.
-        pitch_mm: distance of pixel centres in mm, the same in x and y.
-    """
-
-    focal_length_mm: float
+    focal_length_mm: float  #: focal length of the pinhole in mm
+    #: focal length in px with which distortion coordinates are normalised
     fx: float
     fy: float
+    #: principal point and distortion centre in px
     cx: float
     cy: float
+    #: radial coefficients, distorted to undistorted
     k1: float
     k2: float
+    #: tangential coefficients, distorted to undistorted
     p1: float
     p2: float
-    pitch_mm: float = PIXEL_PITCH_MM
+    pitch_mm: float = PIXEL_PITCH_MM  #: distance of pixel centres in mm, the same in x and y
 
     def __post_init__(self) -> None:
-        """Refuse lengths that are not positive."""
         for name in ("focal_length_mm", "fx", "fy", "pitch_mm"):
             value = getattr(self, name)
             if not value > 0:

@@ -143,7 +143,6 @@ def _system(
 
 
 def _determinant(m: NDArray[np.float32], meter: Meter) -> np.float32:
-    """Determinant of a 3 x 3 matrix, along its first row."""
     meter.charge(f32_mul=9, f32_add=5, ram_read=9)
     return np.float32(
         m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
@@ -155,7 +154,6 @@ def _determinant(m: NDArray[np.float32], meter: Meter) -> np.float32:
 def _eliminate(
     matrix: NDArray[np.float32], right: NDArray[np.float32], meter: Meter
 ) -> NDArray[np.float32]:
-    """Solve a regular 3 x 3 system by Gaussian elimination with row exchange."""
     rows = np.column_stack([matrix, right]).astype(np.float32)
     for column in range(3):
         pivot = column + int(np.argmax(np.abs(rows[column:, column])))

@@ -24,32 +24,21 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 Floats = NDArray[np.float32]
 
-TAILS = 5.0
-"""Degrees of freedom of the errors' distribution: a star at 3 sigma weighs half."""
+TAILS = 5.0  #: degrees of freedom of the errors' distribution: a star at 3 sigma weighs half
 
 ROUNDS = 4
-SIGNIFICANT = 4.0
-"""Sigmas that the focal length must be off before it is corrected."""
-
-_HALF_CHI2 = 0.693
-"""Median of half the squared length of an error in two axes of sigma 1."""
+SIGNIFICANT = 4.0  #: sigmas that the focal length must be off before it is corrected
+_HALF_CHI2 = 0.693  #: median of half the squared length of an error in two axes of sigma 1
 
 
 @dataclass(frozen=True, eq=False)
 class AttitudeFit:
-    """An attitude with what is known of its error.
+    """An attitude with what is known of its error."""
 
-    Attributes:
-        quaternion: (4,), scalar last, reference to camera.
-        covariance: (3, 3) of the small rotation's error about the camera's axes, rad^2.
-        residuals: (n,) angles in rad between the stars and where the attitude puts them.
-        scale: measured focal length over the one that is set.
-    """
-
-    quaternion: Floats
-    covariance: Floats
-    residuals: Floats
-    scale: float
+    quaternion: Floats  #: (4,), scalar last, reference to camera
+    covariance: Floats  #: (3, 3) of the small rotation's error about the camera's axes, rad^2
+    residuals: Floats  #: (n,) angles in rad between the stars and where the attitude puts them
+    scale: float  #: measured focal length over the one that is set
 
 
 def robust_fit(
@@ -108,20 +97,14 @@ def robust_fit(
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """By what the stars are too far from the boresight, beside an attitude that fits best.
+    """By what the stars are too far from the boresight, beside an attitude that fits best."""
 
-    Attributes:
-        factor, sigma: part of the tangents of their field angles, and its standard deviation.
-        spread: mean square of the residuals that it leaves, of their expected ones.
-        turn: (3,) rotation of the attitude that a factor of 1 brings with it, rad.
-        alone: (3, 3) covariance of the attitude without a factor.
-    """
-
+    #: part of the tangents of their field angles, and its standard deviation
     factor: float
     sigma: float
-    spread: float
-    turn: Floats
-    alone: Floats
+    spread: float  #: mean square of the residuals that it leaves, of their expected ones
+    turn: Floats  #: (3,) rotation of the attitude that a factor of 1 brings with it, rad
+    alone: Floats  #: (3, 3) covariance of the attitude without a factor
 
     @property
     def is_significant(self) -> bool:

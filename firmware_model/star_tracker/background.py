@@ -13,20 +13,15 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-CELL = 32
-"""Width of a cell in px."""
+CELL = 32  #: width of a cell in px
+UNIT = 16  #: parts of a DN that levels are kept in
+BLOCK = 8  #: pixels of a row that share a threshold
 
-UNIT = 16
-"""Parts of a DN that levels are kept in."""
-
-BLOCK = 8
-"""Pixels of a row that share a threshold."""
-
+#: In 1/16 DN: what rounding to whole DN leaves of a sky without noise, 1 / sqrt(12) DN.
 LEAST_NOISE = 5
-"""In 1/16 DN: what rounding to whole DN leaves of a sky without noise, 1 / sqrt(12) DN."""
 
+#: Mean of |x - y| below its upper quartile, in standard deviations of x and y.
 _QUARTILE_MEAN = 0.728
-"""Mean of |x - y| below its upper quartile, in standard deviations of x and y."""
 
 Ints = NDArray[np.int64]
 Marks = NDArray[np.bool_]
@@ -34,20 +29,15 @@ Marks = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class SkyBackground:
-    """Levels and noises (cells down, cells across) in 1/16 DN; at least two cells each way.
-
-    Attributes:
-        saturated: share of the samples at the end of the scale, 0 to 1.
-        samples, differences: values that the histograms counted.
-        bins: bins that were added up to the quartiles.
-    """
+    """Levels and noises (cells down, cells across) in 1/16 DN; at least two cells each way."""
 
     levels: Ints
     noises: Ints
-    saturated: float = 0.0
+    saturated: float = 0.0  #: share of the samples at the end of the scale, 0 to 1
+    #: values that the histograms counted
     samples: int = 0
     differences: int = 0
-    bins: int = 0
+    bins: int = 0  #: bins that were added up to the quartiles
 
     def interpolated(self, cells: Ints, rows: Ints, columns: Ints) -> Ints:
         """Values of ``cells`` at rows and columns, broadcast."""

@@ -20,21 +20,13 @@ class Disturbance(Enum):
 
 @dataclass(frozen=True)
 class SkyStatistics:
-    """What the search for stars measured of the sky.
+    """What the search for stars measured of the sky."""
 
-    Attributes:
-        background: level of the sky in DN.
-        background_range: difference between its bright and its dark parts in DN.
-        noise: median standard deviation of a pixel in DN.
-        saturated: share of the field that is too bright for stars, 0 to 1.
-        spikes: bright pixels and spots that no star leaves: hot pixels, particles.
-    """
-
-    background: float
-    background_range: float
-    noise: float
-    saturated: float
-    spikes: int
+    background: float  #: level of the sky in DN
+    background_range: float  #: difference between its bright and its dark parts in DN
+    noise: float  #: median standard deviation of a pixel in DN
+    saturated: float  #: share of the field that is too bright for stars, 0 to 1
+    spikes: int  #: bright pixels and spots that no star leaves: hot pixels, particles
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,7 @@ class View(Protocol):
         """Cosine of the angle between the boresight and the farthest direction."""
 
     @property
-    def solid_angle_sr(self) -> float:
-        """Of all of the picture in which stars can be seen."""
+    def solid_angle_sr(self) -> float: ...
 
     def contains(self, directions: Floats, meter: Meter, factor: float = 1.0) -> NDArray[np.bool_]:
         """Which unit vectors (n, 3) lie where stars can be seen; ``factor``: by which tangents of
@@ -72,44 +71,30 @@ class View(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An attitude with the stars that confirm it.
+    """An attitude with the stars that confirm it."""
 
-    Attributes:
-        centroids, stars, residuals: (k,) centroid, catalogue star, and angle between them in rad.
-        rotation: (3, 3) inertial to camera.
-        factor: by which tangents of measured field angles are multiplied.
-        expected: catalogue stars predicted in the picture.
-        false_alarm: expected wrong attitudes that are confirmed as well.
-    """
-
+    #: (k,) centroid, catalogue star, and angle between them in rad
     centroids: Indices
     stars: Indices
     residuals: Floats
-    rotation: Floats
-    factor: float
-    expected: int
-    false_alarm: float
+    rotation: Floats  #: (3, 3) inertial to camera
+    factor: float  #: by which tangents of measured field angles are multiplied
+    expected: int  #: catalogue stars predicted in the picture
+    false_alarm: float  #: expected wrong attitudes that are confirmed as well
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Measured stars, and the sky and camera that they are compared with.
+    """Measured stars, and the sky and camera that they are compared with."""
 
-    Attributes:
-        directions: (n, 3) unit vectors in camera axes, by the calibration.
-        stars: catalogue stars that may be among them.
-        view: what the picture shows.
-        margin_rad: largest distance of a star from its predicted place.
-        levels: shares of the margin within which stars may agree, rising; the last is 1.
-        scales: attitudes that count for one whose focal length was changed: it can be any.
-    """
-
-    directions: Floats
-    stars: CatalogueStars
-    view: View
-    margin_rad: float
+    directions: Floats  #: (n, 3) unit vectors in camera axes, by the calibration
+    stars: CatalogueStars  #: catalogue stars that may be among them
+    view: View  #: what the picture shows
+    margin_rad: float  #: largest distance of a star from its predicted place
     meter: Meter
+    #: shares of the margin within which stars may agree, rising; the last is 1
     levels: tuple[float, ...] = LEVELS
+    #: attitudes that count for one whose focal length was changed: it can be any
     scales: float = 1.0
 
     def mirrored(self) -> Self:

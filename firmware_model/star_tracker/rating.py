@@ -17,23 +17,16 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 @dataclass(frozen=True, eq=False)
 class Rating:
-    """The rating of an attitude.
+    """The rating of an attitude."""
 
-    Attributes:
-        covariance: (3, 3) of the rotation's error about the camera's axes, rad^2.
-        residual_rad: root mean square of the stars' residuals in each axis.
-        false_alarm: expected wrong attitudes that are confirmed as well; nan if unknown.
-        scale: measured focal length over the one that is set.
-    """
-
+    #: (3, 3) of the rotation's error about the camera's axes, rad^2
     covariance: NDArray[np.float32]
-    residual_rad: float
-    false_alarm: float
-    scale: float
+    residual_rad: float  #: root mean square of the stars' residuals in each axis
+    false_alarm: float  #: expected wrong attitudes that are confirmed as well; nan if unknown
+    scale: float  #: measured focal length over the one that is set
 
     @classmethod
     def of(cls, fit: AttitudeFit, false_alarm: float, meter: Meter) -> "Rating":
-        """Of a fit to stars that confirm its attitude."""
         count = len(fit.residuals)
         residual_rad = float(np.sqrt(np.mean(fit.residuals**2) / 2))
         meter.charge(f32_mul=count, f32_add=count, f32_sqrt=1)

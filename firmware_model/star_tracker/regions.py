@@ -26,11 +26,9 @@ class Runs:
         return cls(edges[::2], edges[1::2])
 
     def __len__(self) -> int:
-        """Number of runs."""
         return len(self.begins)
 
     def __getitem__(self, which: Marks) -> "Runs":
-        """Those that are marked (n,)."""
         return Runs(self.begins[which], self.ends[which])
 
     @property
@@ -39,7 +37,6 @@ class Runs:
         return self.ends - self.begins
 
     def places(self) -> Ints:
-        """Offsets of the pixels, (p,)."""
         lengths = self.lengths
         first = np.cumsum(lengths) - lengths
         places: Ints = np.arange(lengths.sum()) + np.repeat(self.begins - first, lengths)
@@ -77,17 +74,13 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Weighted moments of regions, (n,) each.
+    """Weighted moments of regions, (n,) each."""
 
-    Attributes:
-        light: sum of the weights, 1 at least where ``of`` is given whole numbers.
-        x, y: mean place in px.
-        xx, yy, xy: variances and covariance in px^2.
-    """
-
-    light: Reals
+    light: Reals  #: sum of the weights, 1 at least where ``of`` is given whole numbers
+    #: mean place in px
     x: Reals
     y: Reals
+    #: variances and covariance in px^2
     xx: Reals
     yy: Reals
     xy: Reals
@@ -131,12 +124,10 @@ class Moments:
 
     @cached_property
     def along(self) -> Reals:
-        """Largest variance in any direction."""
         return (self.xx + self.yy + self.spread) / 2
 
     @cached_property
     def across(self) -> Reals:
-        """Smallest variance in any direction."""
         return (self.xx + self.yy - self.spread) / 2
 
     @property

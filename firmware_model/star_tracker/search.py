@@ -40,20 +40,14 @@ class MatchOutcome(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """Triangles of measured stars that agree with triangles of the catalogue.
+    """Triangles of measured stars that agree with triangles of the catalogue."""
 
-    Attributes:
-        centroids, stars: (t, 3) measured stars, and those of the catalogue, in the order to try.
-        shares: (t,) of the wrong triangles by chance, those that agree as well.
-        factors: (t,) by which tangents of measured field angles are multiplied.
-        by_chance: triangles that chance gives, to be expected since the step before.
-    """
-
+    #: (t, 3) measured stars, and those of the catalogue, in the order to try
     centroids: Indices
     stars: Indices
-    shares: NDArray[np.floating]
-    factors: NDArray[np.floating]
-    by_chance: float
+    shares: NDArray[np.floating]  #: (t,) of the wrong triangles by chance, those that agree as well
+    factors: NDArray[np.floating]  #: (t,) by which tangents of measured field angles are multiplied
+    by_chance: float  #: triangles that chance gives, to be expected since the step before
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,23 +62,14 @@ class SearchPass:
 
 @dataclass
 class AttitudeSearch:
-    """The search of one picture.
+    """The search of one picture."""
 
-    Attributes:
-        limit: cycles of the meter at which time is over.
-        largest: false alarms a picture, above which an attitude is not believed.
-        sure: false alarms at which it is taken at once.
-        fewest: stars that an attitude needs.
-        chance: triangles that chance gives, to be expected so far.
-        tried: attitudes tried.
-    """
-
-    limit: float
-    largest: float
-    sure: float
-    fewest: int = STARS_OF_TRIANGLE
-    chance: float = 0.0
-    tried: int = 0
+    limit: float  #: cycles of the meter at which time is over
+    largest: float  #: false alarms a picture, above which an attitude is not believed
+    sure: float  #: false alarms at which it is taken at once
+    fewest: int = STARS_OF_TRIANGLE  #: stars that an attitude needs
+    chance: float = 0.0  #: triangles that chance gives, to be expected so far
+    tried: int = 0  #: attitudes tried
 
     def run(self, passes: Iterable[SearchPass]) -> Candidate | MatchOutcome:
         """The attitude that is believed, or why there is none."""

@@ -25,7 +25,6 @@ class LevelHistory:
     """
 
     def __init__(self) -> None:
-        """No picture yet."""
         self.sums: deque[tuple[int, int, int]] = deque(maxlen=FRAMES)
 
     def add(self, picture: NDArray[np.uint8], field: CameraField, meter: Meter) -> None:

@@ -16,31 +16,25 @@ from cubestack.firmware_model.aramis.arrays import Indices, Mask
 from cubestack.firmware_model.aramis.solution import StarList
 from cubestack.firmware_model.star_tracker.regions import Moments, Runs
 
+#: Runs of pixels that the list in RAM holds (assumed); a picture of stars has some hundred.
 MOST_RUNS = 20_000
-"""Runs of pixels that the list in RAM holds (assumed); a picture of stars has some hundred."""
 
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """Connected regions of a mask.
+    """Connected regions of a mask."""
 
-    Attributes:
-        rows, columns: (p,) the pixels of all regions.
-        labels: (p,) region of each pixel, 0 to count - 1.
-        count: number of regions.
-        runs, comparisons: runs of pixels, and comparisons of two runs, to find them.
-    """
-
+    #: (p,) the pixels of all regions
     rows: Indices
     columns: Indices
-    labels: Indices
-    count: int
+    labels: Indices  #: (p,) region of each pixel, 0 to count - 1
+    count: int  #: number of regions
+    #: runs of pixels, and comparisons of two runs, to find them
     runs: int = 0
     comparisons: int = 0
 
     @cached_property
     def sizes(self) -> Indices:
-        """Pixels (n,) of each region."""
         return np.bincount(self.labels, minlength=self.count)
 
     @cached_property
@@ -55,7 +49,6 @@ class Regions:
         return top, left, bottom, right
 
     def only(self, chosen: Mask) -> "Regions":
-        """The chosen regions (n,)."""
         pixels = np.flatnonzero(chosen[self.labels])
         numbers = np.cumsum(chosen) - 1
         return Regions(

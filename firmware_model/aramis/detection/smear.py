@@ -14,21 +14,15 @@ from cubestack.firmware_model.aramis.detection.regions import Regions
 from cubestack.firmware_model.aramis.detection.spots import StarSpots
 from cubestack.firmware_model.aramis.field import CameraField
 
-LARGEST = 10
-"""Regions looked at."""
+LARGEST = 10  #: regions looked at
+UPPER_QUARTILE = 75  #: of the lengths: long streaks fall apart, and their pieces are shorter
+FEWEST_LONG = 3  #: streaks that show a motion; at least half of the brightest spots must be any
 
-UPPER_QUARTILE = 75
-"""Of the lengths: long streaks fall apart, and their pieces are shorter."""
-
-FEWEST_LONG = 3
-"""Streaks that show a motion; at least half of the brightest spots must be any."""
-
+#: Streaks times the square of the length of the mean of their directions, doubled, as unit vectors:
+#: chance exceeds it once in thirteen.
 ALIGNED = 2.6
-"""Streaks times the square of the length of the mean of their directions, doubled, as unit vectors:
-chance exceeds it once in thirteen."""
 
-TRACK_PX = 6.0
-"""Beside stars at rest, what is longer is a track."""
+TRACK_PX = 6.0  #: beside stars at rest, what is longer is a track
 
 
 def smear_px(picture: NDArray[np.uint8], regions: Regions, floor: int) -> float:

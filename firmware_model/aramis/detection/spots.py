@@ -15,71 +15,51 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.detection.regions import Regions
 
-MOST_REGIONS = 400
-"""Regions looked at, the ones with most light first."""
+MOST_REGIONS = 400  #: regions looked at, the ones with most light first
+RING = 16  #: places around a region where the sky is looked at, each the mean of 3 x 3 pixels
+GAP = 3  #: pixels between a region and the middle of its ring's places
 
-RING = 16
-"""Places around a region where the sky is looked at, each the mean of 3 x 3 pixels."""
-
-GAP = 3
-"""Pixels between a region and the middle of its ring's places."""
-
+#: Fraction of the way from the sky to the region's mean above which a place of the ring is lit.
 LIT = 0.3
-"""Fraction of the way from the sky to the region's mean above which a place of the ring is lit."""
 
-MOST_LIT = 4
-"""Places of a star's ring that may be lit, by its neighbours."""
+MOST_LIT = 4  #: places of a star's ring that may be lit, by its neighbours
 
+#: Variance of a pixel in counts squared that each count of light brings: that of 8 electrons.
 SHOT = 0.12
-"""Variance of a pixel in counts squared that each count of light brings: that of 8 electrons."""
 
+#: Error of a centroid that light does not explain, pixels and faint neighbours, as a share of the
+#: root of its area (measured).
 FLOOR_SHARE = 0.006
-"""Error of a centroid that light does not explain, pixels and faint neighbours, as a share of the
-root of its area (measured)."""
 
+#: Where a spot is cut off depends on its noise too, which adds variance, the more so the smaller
+#: and fainter it is: measured over spots of 1.5 to 6 px, levels of 2 to 200 counts and gradients.
 CUT, CUT_AREA, CUT_LEVEL = 1.8, 60.0, 4.0
-"""Where a spot is cut off depends on its noise too, which adds variance, the more so the smaller
-and fainter it is: measured over spots of 1.5 to 6 px, levels of 2 to 200 counts and gradients."""
 
-FULL = 250
-"""Counts from which a pixel is full, and its region's centroid less sure."""
+FULL = 250  #: counts from which a pixel is full, and its region's centroid less sure
 
+#: A region is long whose streak is longer, and whose moments along and across differ so much.
 LONG_PX, LONG_RATIO = 5.0, 2.5
-"""A region is long whose streak is longer, and whose moments along and across differ so much."""
 
 _F = np.float32
 
 
 @dataclass(frozen=True, eq=False)
 class StarSpots:
-    """Stars of a picture, the brightest first, and what was left out.
+    """Stars of a picture, the brightest first, and what was left out."""
 
-    Attributes:
-        centroids: (n, 2) x and y in px.
-        brightness: (n,) counts above the sky.
-        sigma_px: (n,) expected error of the centroids, each axis.
-        length_px: (n,) of the streak that motion could have made of it.
-        angle: (n,) direction of that streak, 0 to pi.
-        areas: (n,) pixels of them.
-        rejected: regions that are no stars by their shape.
-        widest: pixels of the largest region.
-    """
-
-    centroids: Floats
-    brightness: Floats
-    sigma_px: Floats
-    length_px: Floats
-    angle: Floats
-    areas: Indices
-    rejected: int
-    widest: int
+    centroids: Floats  #: (n, 2) x and y in px
+    brightness: Floats  #: (n,) counts above the sky
+    sigma_px: Floats  #: (n,) expected error of the centroids, each axis
+    length_px: Floats  #: (n,) of the streak that motion could have made of it
+    angle: Floats  #: (n,) direction of that streak, 0 to pi
+    areas: Indices  #: (n,) pixels of them
+    rejected: int  #: regions that are no stars by their shape
+    widest: int  #: pixels of the largest region
 
     def __len__(self) -> int:
-        """Number of stars."""
         return len(self.centroids)
 
     def of(self, chosen: Indices | Mask) -> "StarSpots":
-        """Only the chosen ones."""
         return replace(
             self,
             centroids=self.centroids[chosen],

@@ -22,17 +22,12 @@ _THREE, _TWO = np.float32(3), np.float32(2)
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """Identities of three measured stars.
+    """Identities of three measured stars."""
 
-    Attributes:
-        scores: (3, 3) measured stars down, stars of the catalogue's triangle across.
-        order: (3,) star of the catalogue's triangle for each measured one, by the higher score.
-        other: (3,) the same by the criterion that lost; equal to `order` when both agree.
-    """
-
-    scores: Floats
+    scores: Floats  #: (3, 3) measured stars down, stars of the catalogue's triangle across
+    #: (3,) star of the catalogue's triangle for each measured one, by the higher score
     order: Indices
-    other: Indices
+    other: Indices  #: (3,) the same by the criterion that lost; equal to `order` when both agree
 
 
 def assign(

@@ -28,24 +28,20 @@ from cubestack.firmware_model.star_tracker.search import AttitudeSearch, MatchOu
 
 FEWEST_STARS = 4
 
+#: Parts of the profile's tolerance within which stars may agree: 0.5, 1.3 and 3.3 px by default.
 LEVELS = (0.15, 0.4, 1.0)
-"""Parts of the profile's tolerance within which stars may agree: 0.5, 1.3 and 3.3 px by default."""
 
-SCALES = 30
-"""Attitudes that count for one whose focal length was changed."""
+SCALES = 30  #: attitudes that count for one whose focal length was changed
+MOVED = 1.0  #: error of a star that was put back to the middle row, as a share of its way (chosen)
 
-MOVED = 1.0
-"""Error of a star that was put back to the middle row, as a share of its way (chosen)."""
-
+#: Error of a real lens beside the model, which triples must bear (measured with real pictures).
 LENS_PX = 0.1
-"""Error of a real lens beside the model, which triples must bear (measured with real pictures)."""
 
-FLOOR_PX = 0.01
-"""Error of a star's place beside its centroid's: catalogue (assumed)."""
+FLOOR_PX = 0.01  #: error of a star's place beside its centroid's: catalogue (assumed)
 
+#: How much residuals count beyond so many declared variances, which chance seldom gives: chosen so
+#: that the claimed sigmas hold with lens residuals, which move neighbouring stars alike.
 EXCESS, BEYOND = 4.0, 2.0
-"""How much residuals count beyond so many declared variances, which chance seldom gives: chosen so
-that the claimed sigmas hold with lens residuals, which move neighbouring stars alike."""
 
 
 def identify_confirmed(
@@ -168,11 +164,9 @@ class DatabaseStars:
     """Stars of the database, looked through with one product of integers each."""
 
     def __init__(self, vectors: Floats) -> None:
-        """Keep the catalogue's ``vectors`` (n, 3)."""
         self.vectors = vectors
 
     def within(self, boresight: Floats, least: np.float32, meter: Meter) -> Indices:
-        """Stars, rising, whose cosine with a unit vector (3,) is ``least`` or more."""
         count = len(self.vectors)
         meter.charge(ram_read=3 * count // 2, i32_mul=3 * count, i32_add=3 * count, loop=count)
         return np.flatnonzero(self.vectors @ boresight >= np.float32(least))

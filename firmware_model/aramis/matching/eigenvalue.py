@@ -15,8 +15,8 @@ from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.mcu.costs import Meter
 
 MOST_STEPS = 10
+#: The largest value at 1 seen among 20 000 exact sets of 3 to 11 stars is 1.8e-7.
 ROUNDING = np.float32(5e-7)
-"""The largest value at 1 seen among 20 000 exact sets of 3 to 11 stars is 1.8e-7."""
 
 _ZERO, _ONE, _TWO, _FOUR = (np.float32(value) for value in (0, 1, 2, 4))
 

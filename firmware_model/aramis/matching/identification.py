@@ -22,11 +22,11 @@ from cubestack.firmware_model.aramis.matching.assignment import assign, assign_p
 from cubestack.firmware_model.aramis.matching.confirmed import identify_confirmed
 from cubestack.firmware_model.aramis.matching.eigenvalue import largest_eigenvalue
 from cubestack.firmware_model.aramis.matching.triples import Match, match_triple
-from cubestack.firmware_model.aramis.matching.verification import sides_agree
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList, unsolved
 from cubestack.firmware_model.attitude.quest import AttitudeError, dcm, quest
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
+from cubestack.firmware_model.star_tracker.confirmation import volume
 
 
 def identify(
@@ -127,7 +127,6 @@ class _Search:
             return sides_agree(measured, known, self.profile.side_tolerance_rad, self.meter)
 
     def _attitude(self, measured: Indices, identities: Indices) -> Floats | None:
-        """Of identified stars, all of the same weight."""
         body, reference = self.vectors[measured], self.database.vectors[identities]
         weights = np.ones(len(measured), dtype=np.float32)
         with self.meter.phase("attitude"):
@@ -157,3 +156,14 @@ class _Search:
         stars[measured] = identities
         outcome = MeasurementOutcome.CONCLUSIVE
         return Solution(outcome, reason, quaternion, stars, self.measured, rating=None, **counts)
+
+
+def sides_agree(vectors: Floats, catalogue: Floats, tolerance: float, meter: Meter) -> bool:
+    """Whether two triangles of unit vectors (3, 3) agree within a tolerance: in each side, as area
+    and moment leave one measure of a triangle free, and in the volume of the three vectors, whose
+    sign distinguishes a triangle from its mirror image."""
+    meter.charge(f32_add=33 + 11, f32_mul=18 + 18, f32_sqrt=6, f32_compare=4, loop=3)
+    edges = (corners[[0, 1, 0]] - corners[[1, 2, 2]] for corners in (vectors, catalogue))
+    measured, expected = (np.sqrt(np.sum(edge**2, axis=1)) for edge in edges)
+    apart = np.append(measured - expected, volume(vectors) - volume(catalogue))
+    return bool(np.all(np.abs(apart) <= np.float32(tolerance)))

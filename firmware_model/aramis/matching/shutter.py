@@ -16,21 +16,17 @@ import numpy as np
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.mcu.costs import Meter
 
-FEWEST = 5
-"""Stars: ten components across the line of sight for six unknowns."""
+FEWEST = 5  #: stars: ten components across the line of sight for six unknowns
+ROUNDS = 4  #: fits, each with the weights that the one before leaves
 
-ROUNDS = 4
-"""Fits, each with the weights that the one before leaves."""
-
+#: Of a moving star's place. Over the largest turn that the streaks allow, it says how much the
+#: stars must show before a turn is believed.
 NOISE_RAD = np.float32(2e-4)
-"""Of a moving star's place. Over the largest turn that the streaks allow, it says how much the
-stars must show before a turn is believed."""
 
+#: Typical distance of a star from the boresight: a turn about it moves stars by so much less.
 FIELD_RAD = np.float32(0.1)
-"""Typical distance of a star from the boresight: a turn about it moves stars by so much less."""
 
-_FLOOR = np.float32(1e-4)
-"""rad; stars are not expected to fit better."""
+_FLOOR = np.float32(1e-4)  #: rad; stars are not expected to fit better
 
 _ONE = np.float32(1)
 

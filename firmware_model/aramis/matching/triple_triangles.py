@@ -17,6 +17,7 @@ stars come by their brightness, false ones that are all bright are also soon lef
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,46 +25,36 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.field import CameraField
-from cubestack.firmware_model.aramis.matching.triangles import MeasuredTriangles, measure_triangles
+from cubestack.firmware_model.aramis.matching.triangles import (
+    Triangle,
+    charge_triangles,
+    measure_triangles,
+)
 from cubestack.firmware_model.star_tracker.observation import Observation
 from cubestack.firmware_model.star_tracker.search import SearchPass, Triangles
 
-BOUND_SIGMAS = 3.5
-"""Of areas, moments and sides."""
+BOUND_SIGMAS = 3.5  #: of areas, moments and sides
 
+#: Error of a side beside the measured ones: lens, catalogue, proper motion (assumed).
 CATALOGUE_RAD = 6e-5
-"""Error of a side beside the measured ones: lens, catalogue, proper motion (assumed)."""
 
-MOST_LISTED = 12_000
-"""A triple whose bounds hold more moments says too little for its time."""
+MOST_LISTED = 12_000  #: a triple whose bounds hold more moments says too little for its time
+MOST_TRIPLES = 4000  #: tried with the focal length that is set, before others are
+STRETCH = 0.035  #: largest change of the focal length
+MOST_STRETCHED_TRIPLES = 80  #: tried with other ones
+MOST_STRETCHED = 120_000  #: as `MOST_LISTED`, where the focal length may be another
 
-MOST_TRIPLES = 4000
-"""Tried with the focal length that is set, before others are."""
-
-STRETCH = 0.035
-"""Largest change of the focal length."""
-
-MOST_STRETCHED_TRIPLES = 80
-"""Tried with other ones."""
-
-MOST_STRETCHED = 120_000
-"""As `MOST_LISTED`, where the focal length may be another."""
-
+#: Of the triangles within the bounds of area and moment, at most so many agree in their sides by
+#: chance: 0.0006 to 0.004 at errors of 0.05 to 1 px (measured with mirrored stars).
 WRONG_SHARE = 0.005
-"""Of the triangles within the bounds of area and moment, at most so many agree in their sides by
-chance: 0.0006 to 0.004 at errors of 0.05 to 1 px (measured with mirrored stars)."""
 
-SMALLEST_AREA = 2e-4
-"""Of chords: flatter triples leave the sense of rotation and the turn open."""
+SMALLEST_AREA = 2e-4  #: of chords: flatter triples leave the sense of rotation and the turn open
+CELL = 2  #: pixels along a side of a cell of the map of measured stars
 
-CELL = 2
-"""Pixels along a side of a cell of the map of measured stars."""
-
+#: Unit of the integers that hold directions: the difference of two stars fits 16 bits.
 FIXED = 1 << 16
-"""Unit of the integers that hold directions: the difference of two stars fits 16 bits."""
 
-BATCH = 64
-"""Triples worked on at once, which only saves wall time."""
+BATCH = 64  #: triples worked on at once, which only saves wall time
 
 #: Corner of the catalogue's triangle for each measured one; the first three keep the sense.
 _ORDERS = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]])
@@ -71,8 +62,8 @@ _ORDERS = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0
 #: Sides by their corners: a, b, c.
 _FROM, _TO = np.array([0, 1, 0]), np.array([1, 2, 2])
 _SIDE = np.array([[-1, 0, 2], [0, -1, 1], [2, 1, -1]])
+#: Side of the catalogue's triangle for each measured side, in each order.
 _SIDES = _SIDE[_ORDERS[:, _FROM], _ORDERS[:, _TO]]
-"""Side of the catalogue's triangle for each measured side, in each order."""
 
 _F = np.float32
 
@@ -88,6 +79,9 @@ def pyramid(count: int) -> Iterator[tuple[int, int, int]]:
 class TripleTriangles:
     """Triangles among the measured stars of one picture, proposed by a triangle database.
 
+    ``picture`` holds the stars, the brightest first; ``points`` (n, 2) are their places in px and
+    ``sigma_rad`` (n,) their errors in each axis.
+
     Attributes:
         triples: tried so far.
         matches: triangles of the database within the bounds so far.
@@ -101,15 +95,6 @@ class TripleTriangles:
         field: CameraField,
         database: Database,
     ) -> None:
-        """Look at measured stars, the brightest first.
-
-        Args:
-            picture: their directions, and how far from its place a star counts.
-            points: (n, 2) their places in px.
-            sigma_rad: (n,) their errors, each axis.
-            field: of the camera.
-            database: stars and triangles.
-        """
         self._picture, self._points, self._sigma_rad = picture, points, sigma_rad
         self._field, self._database = field, database
         self._hint: tuple[Floats, np.float32, Mask] | None = None
@@ -137,11 +122,14 @@ class TripleTriangles:
         measured = measure_triangles(corners, sigma)
         found, looked_at = self._listed(measured, stretch)
         listed = np.array([len(part) for part in found])
-        owner = np.repeat(np.arange(len(batch)), listed)
-        triangles = np.concatenate(found)
-        reach = BOUND_SIGMAS * np.sqrt(sigma[:, _FROM] ** 2 + sigma[:, _TO] ** 2) + CATALOGUE_RAD
+        owner, triangles = np.repeat(np.arange(len(batch)), listed), np.concatenate(found)
+        reach = BOUND_SIGMAS * np.hypot(sigma[:, _FROM], sigma[:, _TO]) + CATALOGUE_RAD
         kept, orders, scales = self._same_sides(
-            measured.sides, reach, corners, owner, triangles, stretch
+            (measured.sides - reach)[owner],
+            (measured.sides + reach)[owner],
+            corners[owner],
+            triangles,
+            stretch,
         )
         owner, stars = owner[kept], self._database.stars[triangles[kept]].astype(np.intp)
         stars = np.take_along_axis(stars, _ORDERS[orders], axis=1)
@@ -158,8 +146,7 @@ class TripleTriangles:
             chance = self._charge(listed[triple:upto], looked_at[triple:upto], tried, stretch)
             triple, hypothesis = upto, index + 1
             row = slice(index, index + self._is_near_hint(turns[index]))
-            one = np.ones(1)
-            yield Triangles(batch[owner[row]], stars[row], one, 1 / scales[row], chance)
+            yield Triangles(batch[owner[row]], stars[row], np.ones(1), 1 / scales[row], chance)
         chance = self._charge(listed[triple:], looked_at[triple:], near[hypothesis:], stretch)
         yield Triangles(batch[:0], batch[:0], np.ones(0), np.ones(0), chance)
 
@@ -171,17 +158,19 @@ class TripleTriangles:
         return bool(np.dot(turn[2], hint) >= least)
 
     def _listed(
-        self, measured: MeasuredTriangles, stretch: float
+        self, measured: Triangle, stretch: float
     ) -> tuple[list[NDArray[np.uint32]], NDArray[np.int_]]:
         """Triangles within each one's bounds, and moments that were looked at (n,)."""
         database = self._database
-        low, high = (1 - stretch) ** 2, (1 + stretch) ** 2
-        area, moment = BOUND_SIGMAS * measured.area_sigma, BOUND_SIGMAS * measured.moment_sigma
-        first = np.searchsorted(database.areas, ((measured.area - area) * low).astype(_F), "left")
-        last = np.searchsorted(database.areas, ((measured.area + area) * high).astype(_F), "right")
-        moments = database.moments
-        start = np.searchsorted(moments, ((measured.moment - moment) * low**2).astype(_F), "left")
-        stop = np.searchsorted(moments, ((measured.moment + moment) * high**2).astype(_F), "right")
+
+        def bounds(of: Floats, middle: Any, sigma: Any, power: int) -> tuple[Indices, Indices]:
+            low, high = (1 - stretch) ** power, (1 + stretch) ** power
+            start = of.searchsorted(((middle - BOUND_SIGMAS * sigma) * low).astype(_F), "left")
+            stop = of.searchsorted(((middle + BOUND_SIGMAS * sigma) * high).astype(_F), "right")
+            return start, stop
+
+        first, last = bounds(database.areas, measured.area, measured.area_sigma, 2)
+        start, stop = bounds(database.moments, measured.moment, measured.moment_sigma, 4)
         most = MOST_STRETCHED if stretch else MOST_LISTED
         used = (measured.area >= SMALLEST_AREA) & (stop - start <= most)
         looked_at = np.where(used, stop - start, 0)
@@ -196,79 +185,30 @@ class TripleTriangles:
 
     def _same_sides(
         self,
-        sides: Floats,
-        reach: Floats,
+        shortest: Floats,
+        longest: Floats,
         corners: Floats,
-        owner: Indices,
         triangles: NDArray[np.uint32],
         stretch: float,
     ) -> tuple[Indices, Indices, Floats]:
-        """Which of the triangles agree in all sides, but for one factor, and in their sense.
-
-        Also in which of the six orders, and the factors.
-        """
+        """Which of the triangles (k,) agree in all sides, but for one factor, and in their sense;
+        in which of the six orders, and the factors."""
         fixed = self._fixed[self._database.stars[triangles].astype(np.intp)]
         edges = fixed[:, _FROM] - fixed[:, _TO]
         known = np.maximum((edges * edges).sum(axis=2), 1)[:, _SIDES]  # (k, 6, 3)
-        low = (np.maximum(sides - reach, 0) * FIXED)[owner, None].astype(np.float64) ** 2 / known
-        high = ((sides + reach) * FIXED)[owner, None].astype(np.float64) ** 2 / known
+        low, high = (
+            (np.maximum(sides, 0) * FIXED)[:, None].astype(np.float64) ** 2 / known
+            for sides in (shortest, longest)
+        )
         least = np.maximum(low.max(axis=2), (1 - stretch) ** 2)
         most = np.minimum(high.min(axis=2), (1 + stretch) ** 2)
         kept: Mask = least <= most
-        sense = _sense(corners)[owner] == _sense(fixed.astype(np.float64))
+        sense = (np.linalg.det(corners) > 0) == (np.linalg.det(fixed) > 0)
         kept[:, :3] &= sense[:, None]
         kept[:, 3:] &= ~sense[:, None]
         which, orders = np.nonzero(kept)
         scales = np.sqrt((least[which, orders] + most[which, orders]) / 2).astype(_F)
         return which, orders, scales
-
-    def _charge(
-        self,
-        listed: NDArray[np.int_],
-        looked_at: NDArray[np.int_],
-        near: NDArray[np.int_],
-        stretch: float,
-    ) -> float:
-        """Charge and count triples (n,) and the attitudes (k,) that they propose; return the
-        wrong ones to be expected among these."""
-        self.triples += len(listed)
-        self.matches += int(listed.sum())
-        meter = self._picture.meter
-        with meter.phase("triangles"):
-            MeasuredTriangles.charge(len(listed), meter)
-        with meter.phase("search"):
-            count, looked, steps = len(listed), int(looked_at.sum()), int(listed.sum())
-            meter.charge(f32_add=8 * count, f32_mul=14 * count, f32_compare=16 * count)
-            meter.charge(ram_read=looked + 4 * count, i32_add=2 * looked, loop=looked)
-            # Three sides of integers; six orders of comparisons, most of which end at the first.
-            meter.charge(ram_read=12 * steps, i32_mul=9 * steps, i32_add=40 * steps)
-        with meter.phase("verification"):
-            for stars in near.tolist():
-                self._charge_look(stars)
-        return len(near) if stretch else WRONG_SHARE * int(listed.sum())
-
-    @cached_property
-    def _fixed(self) -> NDArray[np.int64]:
-        """The catalogue's directions in integers, (n, 3)."""
-        return np.rint(self._database.vectors.astype(np.float64) * FIXED).astype(np.int64)
-
-    @cached_property
-    def _map(self) -> Mask:
-        """Which cells of the picture are within reach of a measured star."""
-        reach_px = self._picture.margin_rad / self._field.scale[1]
-        with self._picture.meter.phase("verification"):
-            cells = np.zeros((self._field.rows // CELL + 1, self._field.columns // CELL + 1), bool)
-            span = int(reach_px // CELL) + 1
-            around = np.mgrid[-span : span + 1, -span : span + 1].reshape(2, -1).T
-            around = around[np.hypot(*(CELL * around).T) <= reach_px]
-            places = np.rint(self._points[:, ::-1] / CELL).astype(np.intp)
-            rows, columns = (places[:, None] + around).reshape(-1, 2).T
-            limit_y, limit_x = np.array(cells.shape) - 1
-            cells[np.clip(rows, 0, limit_y), np.clip(columns, 0, limit_x)] = True
-            self._picture.meter.charge(
-                ram_write=cells.size // 32 + len(rows), i32_add=4 * len(rows)
-            )
-        return cells
 
     def _agreeing(self, turns: Floats, scales: Floats) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
         """Catalogue stars that attitudes (k, 3, 3) put where one was measured, and near the field.
@@ -281,30 +221,66 @@ class TripleTriangles:
         limit = (self._field.smallest_cosine - 1e-4) * float(FIXED) ** 2
         which, stars = np.nonzero(along >= limit)
         seen = np.einsum("nij,nj->ni", turns[which], self._database.vectors[stars])
-        across = seen[:, :2] / np.maximum(seen[:, 2:], _F(0.1))
-        across *= scales[which, None]
-        x, y = (across / self._field.scale + self._field.centre).T
-        columns, rows = np.rint(x / CELL).astype(np.intp), np.rint(y / CELL).astype(np.intp)
+        across = seen[:, :2] / np.maximum(seen[:, 2:], _F(0.1)) * scales[which, None]
+        places = across / self._field.scale + self._field.centre
+        columns, rows = np.rint(places.T / CELL).astype(np.intp)
         inside = (columns >= 0) & (rows >= 0) & (columns < cells.shape[1]) & (rows < cells.shape[0])
         hits = np.zeros(len(which), bool)
         hits[inside] = cells[rows[inside], columns[inside]]
         count = len(turns)
         return np.bincount(which, hits, count).astype(int), np.bincount(which, minlength=count)
 
-    def _charge_look(self, near: int) -> None:
-        """The attitude of three stars, products with all catalogue stars, and the map."""
-        meter, count = self._picture.meter, len(self._database.numbers)
-        meter.charge(f32_mul=18 + 4 * 9 + 27, f32_add=15 + 4 * 4 + 18, f32_div=12, f32_sqrt=4)
-        meter.charge(ram_read=3 * count // 2, i32_mul=3 * count, i32_add=3 * count, loop=count)
-        meter.charge(f32_mul=11 * near, f32_add=8 * near, f32_div=2 * near, ram_read=5 * near)
-        meter.charge(f32_convert=2 * near, loop=near)
+    @cached_property
+    def _fixed(self) -> NDArray[np.int64]:
+        """The catalogue's directions in integers, (n, 3)."""
+        return np.rint(self._database.vectors.astype(np.float64) * FIXED).astype(np.int64)
 
+    @cached_property
+    def _map(self) -> Mask:
+        """Which cells of the picture are within reach of a measured star."""
+        reach_px = self._picture.margin_rad / self._field.scale[1]
+        cells = np.zeros((self._field.rows // CELL + 1, self._field.columns // CELL + 1), bool)
+        span = int(reach_px // CELL) + 1
+        around = np.mgrid[-span : span + 1, -span : span + 1].reshape(2, -1).T
+        around = around[np.hypot(*(CELL * around).T) <= reach_px]
+        places = np.rint(self._points[:, ::-1] / CELL).astype(np.intp)
+        rows, columns = (places[:, None] + around).reshape(-1, 2).T
+        limit_y, limit_x = np.array(cells.shape) - 1
+        cells[np.clip(rows, 0, limit_y), np.clip(columns, 0, limit_x)] = True
+        meter, writes = self._picture.meter, cells.size // 32 + len(rows)
+        with meter.phase("verification"):
+            meter.charge(ram_write=writes, i32_add=4 * len(rows))
+        return cells
 
-def _sense(corners: NDArray[np.floating]) -> Mask:
-    """Whether triangles of directions (n, 3, 3) turn to the left."""
-    first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
-    volume = np.einsum("ni,ni->n", first, np.cross(second, third))
-    return np.asarray(volume > 0)
+    def _charge(
+        self,
+        listed: NDArray[np.int_],
+        looked_at: NDArray[np.int_],
+        near: NDArray[np.int_],
+        stretch: float,
+    ) -> float:
+        """Charge and count triples (n,) and the attitudes (k,) that they propose; return the
+        wrong ones to be expected among these."""
+        meter, count, matches = self._picture.meter, len(listed), int(listed.sum())
+        self.triples += count
+        self.matches += matches
+        with meter.phase("triangles"):
+            charge_triangles(count, meter)
+        with meter.phase("search"):
+            looked = int(looked_at.sum())
+            meter.charge(f32_add=8 * count, f32_mul=14 * count, f32_compare=16 * count)
+            meter.charge(ram_read=looked + 4 * count, i32_add=2 * looked, loop=looked)
+            # Three sides of integers; six orders of comparisons, most of which end at the first.
+            meter.charge(ram_read=12 * matches, i32_mul=9 * matches, i32_add=40 * matches)
+        with meter.phase("verification"):
+            # The attitude of three stars, products with all catalogue stars, and the map.
+            looks, seen = len(near), int(near.sum())
+            stars = looks * len(self._database.numbers)
+            meter.charge(f32_mul=81 * looks, f32_add=49 * looks, f32_div=12 * looks)
+            meter.charge(f32_sqrt=4 * looks, i32_mul=3 * stars, i32_add=3 * stars, loop=stars)
+            meter.charge(ram_read=3 * stars // 2 + 5 * seen, f32_mul=11 * seen, f32_add=8 * seen)
+            meter.charge(f32_div=2 * seen, f32_convert=2 * seen, loop=seen)
+        return looks if stretch else WRONG_SHARE * matches
 
 
 def _triad(measured: Floats, known: Floats) -> Floats:

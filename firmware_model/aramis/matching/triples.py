@@ -33,18 +33,13 @@ _FIRST, _SECOND = [0, 0, 1], [1, 2, 2]
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """How the search for one main triangle ended.
-
-    Attributes:
-        main: the main triangle; None when DEGENERATE.
-        candidates: triangles of the database that are left, uint32; empty when there is none.
-        pivots: pivot triangles that were used.
-    """
+    """How the search for one main triangle ended."""
 
     end: Reason
-    main: Triangle | None
+    main: Triangle | None  #: the main triangle; None when DEGENERATE
+    #: triangles of the database that are left, uint32; empty when there is none
     candidates: NDArray[np.uint32]
-    pivots: int
+    pivots: int  #: pivot triangles that were used
 
     @property
     def counts(self) -> dict[str, int]:

@@ -12,35 +12,26 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.star_tracker.regions import Ints, Marks, Moments, Runs
 
+#: Pixels of a row: longer ones belong to the Moon, the limb, or a streak too long to be used.
 LONGEST_RUN = 32
-"""Pixels of a row: longer ones belong to the Moon, the limb, or a streak too long to be used."""
 
+#: A pixel whose four neighbours hold less than 3/5 of its own signal is a spike. They hold 2.3
+#: times as much in the middle of a spot of sigma 0.9 px, and 0.7 in one of 0.45 px; chosen.
 _SPIKE = 3, 5
-"""A pixel whose four neighbours hold less than 3/5 of its own signal is a spike. They hold
-2.3 times as much in the middle of a spot of sigma 0.9 px, and 0.7 in one of 0.45 px; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Areas:
-    """Connected areas, (n,) each, in the order of their first pixels.
+    """Connected areas, (n,) each, in the order of their first pixels."""
 
-    Attributes:
-        sizes: pixels.
-        large: there was a run longer than `LONGEST_RUN`; the rest then counts the short ones.
-        peaks: place of the brightest pixel, as an offset into the region.
-        tops: its signal in 1/16 DN.
-        moments: of the signal in 1/16 DN.
-    """
-
-    sizes: Ints
-    large: Marks
-    peaks: Ints
-    tops: Ints
-    moments: Moments
+    sizes: Ints  #: pixels
+    large: Marks  #: there was a run longer than `LONGEST_RUN`; the rest then counts the short ones
+    peaks: Ints  #: place of the brightest pixel, as an offset into the region
+    tops: Ints  #: its signal in 1/16 DN
+    moments: Moments  #: of the signal in 1/16 DN
 
 
 def short(runs: Runs) -> Marks:
-    """Which runs may be part of a spot."""
     return runs.lengths <= LONGEST_RUN
 
 

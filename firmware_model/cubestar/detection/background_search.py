@@ -36,31 +36,23 @@ from cubestack.firmware_model.star_tracker import background
 from cubestack.firmware_model.star_tracker.background import CELL, UNIT, Ints, Marks, SkyBackground
 from cubestack.firmware_model.star_tracker.regions import Runs
 
-STEP = 4
-"""Distance of the background's samples in px."""
+STEP = 4  #: distance of the background's samples in px
+SIGMAS = 4  #: noise alone passes it in 17 pixels of a picture, but hardly in two that touch
+SPIKE_SIGMAS = 6  #: spikes and pairs of pixels count from here on, as noise alone never passes it
+FEWEST_PIXELS = 2  #: smaller areas are never stars, whatever the setting
 
-SIGMAS = 4
-"""Noise alone passes it in 17 pixels of a picture, but hardly in two that touch."""
-
-SPIKE_SIGMAS = 6
-"""Spikes and pairs of pixels count from here on, as noise alone never passes it."""
-
-FEWEST_PIXELS = 2
-"""Smaller areas are never stars, whatever the setting."""
-
+#: Ratio of the variances along and across an area from which on it is drawn out; chosen.
 STRETCHED = 5
-"""Ratio of the variances along and across an area from which on it is drawn out; chosen."""
 
+#: Standard deviation of the widest spot out of focus. The Moon's disc has 2.8 px without its glare;
+#: areas of more than the maximum size are stars only if they are narrower.
 WIDEST_PX = 2.3
-"""Standard deviation of the widest spot out of focus. The Moon's disc has 2.8 px without its glare;
-areas of more than the maximum size are stars only if they are narrower."""
 
 MOST_STARS_FACTOR = 2
+#: Areas whose sharpness and whose shape are looked at, the brightest ones.
 MOST_AREAS, MOST_SHAPES = 256, 64
-"""Areas whose sharpness and whose shape are looked at, the brightest ones."""
 
-LIMIT_MS = 190
-"""For all rows; the centroids of a full list take less than 35 ms more."""
+LIMIT_MS = 190  #: for all rows; the centroids of a full list take less than 35 ms more
 
 _BYTE = 255
 
@@ -102,8 +94,6 @@ def background_search(rows: int, columns: int, config: DetectionConfig, meter: M
 
 @dataclass(frozen=True)
 class _Region:
-    """The part of the picture that is searched, in px."""
-
     top: int
     left: int
     bottom: int
@@ -119,7 +109,6 @@ class _Region:
         return self.right - self.left
 
     def look(self, y: Ints, x: Ints) -> Look:
-        """Read the pixels at rows and columns of the region, broadcast."""
         offsets = (self.top + y) * self.columns + self.left + x
         return Look(offsets.astype(np.int32).reshape(-1))
 

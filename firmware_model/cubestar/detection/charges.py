@@ -9,30 +9,29 @@ from cubestack.firmware_model.star_tracker.background import BLOCK, CELL, SkyBac
 
 Operations = dict[str, int]
 
+#: Of a bright pixel of a short run: is it sharper than a spot?
 TEST: Operations = {"ram_read": 5, "i32_add": 10, "loop": 1}
-"""Of a bright pixel of a short run: is it sharper than a spot?"""
 
+#: Of one that is not: its part in the sums of its area.
 PIXEL: Operations = {"ram_read": 3, "i32_add": 12, "i32_mul": 4}
-"""Of one that is not: its part in the sums of its area."""
 
+#: Of a run: the runs that it touches, and its area.
 RUN: Operations = {"ram_read": 20, "ram_write": 12, "i32_add": 18, "loop": 4}
-"""Of a run: the runs that it touches, and its area."""
 
+#: Of an area that is not too small: its moments, and its place in the list.
 AREA: Operations = {
     **{"ram_read": 14, "ram_write": 8, "i32_add": 40, "i32_mul": 8},
     **{"i32_div": 5, "loop": 2},
 }
-"""Of an area that is not too small: its moments, and its place in the list."""
 
+#: Of a pixel on a slope, beside its row: what is no brighter than both needs no sum. In place of
+#: the comparison with the cells' level.
 SLOPE_PIXEL: Operations = {"ram_read": 2, "i32_add": 1}
-"""Of a pixel on a slope, beside its row: what is no brighter than both needs no sum. In place of
-the comparison with the cells' level."""
 
-BUMP: Operations = {"i32_add": 15, "loop": 3}
-"""Of one that is brighter, in the other directions."""
+BUMP: Operations = {"i32_add": 15, "loop": 3}  #: of one that is brighter, in the other directions
 
+#: Words of a cell's histogram of bytes that are cleared, for levels and for differences.
 CELLS_READ = 64
-"""Words of a cell's histogram of bytes that are cleared, for levels and for differences."""
 
 
 def charge_each(count: int, operations: Operations, meter: Meter) -> None:

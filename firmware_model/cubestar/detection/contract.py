@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.star_tracker.disturbance import SkyStatistics
 from cubestack.firmware_model.values import DeclaredValues, flag, whole
 
 
@@ -80,35 +81,17 @@ class DetectionConfig(DeclaredValues):
 
 
 @dataclass(frozen=True)
-class PictureStatistics:
-    """What the background search measured of the picture, beside its stars.
+class PictureStatistics(SkyStatistics):
+    """What the background search measured of the picture, beside its stars."""
 
-    Attributes:
-        background: mean level of the sky in DN.
-        background_range: its brightest minus its darkest part (32 px wide) in DN.
-        noise: median standard deviation of a pixel in DN.
-        saturated: share of the picture at the end of the scale, 0 to 1.
-        spikes: bright pixels and spots that no star leaves: hot pixels, particles.
-        large: areas of too many pixels: Moon, limb, horizon.
-        elongated: areas drawn out in one direction: streaks, tracks of particles.
-        aligned: 1 where all areas are drawn out in the same direction, 0 where none are or all
-            differ: streaks of stars share their direction, tracks of particles do not, and the
-            edge of something large is beside stars that are round.
-        streak_px: median length of these in px; 0 without any.
-        spot_px: standard deviation of a star's spot in px, the pixel's own width in it; the usual
-            one where fewer than three stars tell.
-    """
-
-    background: float
-    background_range: float
-    noise: float
-    saturated: float
-    spikes: int
-    large: int
-    elongated: int
+    large: int  #: areas of too many pixels: Moon, limb, horizon
+    elongated: int  #: areas drawn out in one direction: streaks, tracks of particles
+    #: 1 where all areas are drawn out in the same direction, 0 where none are or all differ:
+    #: streaks of stars share their direction, tracks of particles do not, and the edge of
+    #: something large is beside stars that are round.
     aligned: float
-    streak_px: float
-    spot_px: float
+    streak_px: float  #: median length of the elongated ones in px; 0 without any
+    spot_px: float  #: standard deviation of a star's spot with the pixel's own width
 
 
 def _unknown() -> NDArray[np.float32]:
@@ -117,32 +100,23 @@ def _unknown() -> NDArray[np.float32]:
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """What a search found: row by row, or the brightest star first (background search).
+    """What a search found: row by row, or the brightest star first (background search)."""
 
-    Attributes:
-        centroids: (n, 2) x and y in px.
-        sizes: (n,) pixels of each area.
-        intensities: (n,) sum of the values of each area's pixels, DN; of the background search
-            the light above the background, 65 535 at most.
-        invalid: areas above the maximum size; the background search stops counting at 255.
-        noise: areas below the minimum size; the same.
-        dark_value: mean of the sampled background in DN, 0 when nothing was background.
-        end: why the search ended.
-        errors_px: (n,) expected standard deviation of each centroid along one axis in px; empty
-            where the search does not know.
-        statistics: of the picture; None where the search does not know.
-        blind: cells (down, across) of the whole picture in which no star can be seen, likewise.
-    """
-
-    centroids: NDArray[np.float32]
-    sizes: NDArray[np.uint8]
+    centroids: NDArray[np.float32]  #: (n, 2) x and y in px
+    sizes: NDArray[np.uint8]  #: (n,) pixels of each area
+    #: (n,) sum of the values of each area's pixels, DN; of the background search the light above
+    #: the background, 65 535 at most
     intensities: NDArray[np.uint16]
-    invalid: int
-    noise: int
-    dark_value: int
-    end: SearchEnd
+    invalid: int  #: areas above the maximum size; the background search stops counting at 255
+    noise: int  #: areas below the minimum size; the same
+    dark_value: int  #: mean of the sampled background in DN, 0 when nothing was background
+    end: SearchEnd  #: why the search ended
+    #: (n,) expected standard deviation of each centroid along one axis in px; empty where the
+    #: search does not know
     errors_px: NDArray[np.float32] = field(default_factory=_unknown)
+    #: of the picture; None where the search does not know
     statistics: PictureStatistics | None = None
+    #: cells (down, across) of the whole picture in which no star can be seen, likewise
     blind: NDArray[np.bool_] | None = None
 
 
@@ -165,5 +139,5 @@ class Put:
     values: NDArray[np.uint8]
 
 
+#: A search; whoever runs it performs the accesses and charges them.
 Search = Generator[Look | Put, Any, Detection]
-"""A search; whoever runs it performs the accesses and charges them."""

@@ -16,59 +16,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 HALF = 4
-SIDE = 2 * HALF + 1
-"""Pixels of a window to each side of the brightest one, and along its side."""
+SIDE = 2 * HALF + 1  #: pixels of a window to each side of the brightest one, and along its side
 
+#: Width of the weights of a saturated spot, whose middle is flat, and of those that measure it.
 WIDE_SIGMA_PX = 1.5
-"""Width of the weights of a saturated spot, whose middle is flat, and of those that measure it."""
 
-USUAL_SIGMA_PX = 0.95
-"""Width of a star's spot and a pixel together, where too few stars tell it."""
+USUAL_SIGMA_PX = 0.95  #: width of a star's spot and a pixel together, where too few stars tell it
 
 SIGMA_RANGE_PX = 0.5, 2.0
 FEWEST_SPOTS = 3
 SHAPE_ROUNDS = 5
 SATURATED_DN = 250
 ROUNDS = 4
+#: Largest share of the brightest pixel in the 3 x 3 around it: 0.22 in a spot of sigma 0.9 px, 0.54
+#: in one of 0.45 px, and more in what particles and hot pixels leave; chosen.
 SHARPEST = 0.6
-"""Largest share of the brightest pixel in the 3 x 3 around it: 0.22 in a spot of sigma 0.9 px, 0.54
-in one of 0.45 px, and more in what particles and hot pixels leave; chosen."""
 
+#: So many of the brightest round spots tell the usual width, and share of them that have at most
+#: it: chosen.
 MOST_WIDTHS, USUAL_SHARE = 24, 0.6
-"""So many of the brightest round spots tell the usual width, and share of them that have at
-most it: chosen."""
 
+#: Share of a spot that may stand out above the Gaussian of its own width where it tells the usual
+#: one; chosen.
 ROUND = 0.05
-"""Share of a spot that may stand out above the Gaussian of its own width where it tells the usual
-one; chosen."""
 
+#: Parts of the usual width between which a spot is a star's: a saturated one is wider. Of protons'
+#: tracks half are narrower, of stars none; haze is wider.
 NARROW, NARROW_SATURATED, WIDE = 0.65, 0.9, 1.9
-"""Parts of the usual width between which a spot is a star's: a saturated one is wider. Of protons'
-tracks half are narrower, of stars none; haze is wider."""
 
+#: Share of a star's light that may stand out: with 20 000 hot pixels it is 0.4 for one star in a
+#: hundred, and more for half of the protons' tracks.
 MOST_DISTURBED = 0.5
-"""Share of a star's light that may stand out: with 20 000 hot pixels it is 0.4 for one star in a
-hundred, and more for half of the protons' tracks."""
 
+#: Share of a spot's height by which a pixel may exceed its Gaussian, beside four times the noise:
+#: what a spot is that is no Gaussian; chosen.
 STANDS_OUT = 0.15
-"""Share of a spot's height by which a pixel may exceed its Gaussian, beside four times the noise:
-what a spot is that is no Gaussian; chosen."""
 
-DISTURBED_PX = 0.5
-"""Expected error in px for each part of the light that was replaced: measured."""
-
-ELECTRONS_PER_DN = 36.5
-"""MLX75412: 2.28 electrons per count of 12 bits, whose upper 8 are here."""
+DISTURBED_PX = 0.5  #: expected error in px for each part of the light that was replaced: measured
+ELECTRONS_PER_DN = 36.5  #: MLX75412: 2.28 electrons per count of 12 bits, whose upper 8 are here
 
 LEAST_ERROR_PX = 0.01
+#: What uneven pixels leave of bright stars, and a flat middle besides: measured, with a margin.
 SATURATED_ERROR_PX = 0.04
-"""What uneven pixels leave of bright stars, and a flat middle besides: measured, with a margin."""
 
-_PARTS = 64
-"""Of a pixel: places between which the weights are tabulated."""
-
-_ONE = 256
-"""Weight in the middle."""
+_PARTS = 64  #: of a pixel: places between which the weights are tabulated
+_ONE = 256  #: weight in the middle
 
 _CELLS = _PARTS * np.arange(-HALF, HALF + 1)
 
@@ -177,7 +169,6 @@ class _Weights:
         return cls(wx, wy, *away)
 
     def sums(self, windows: Ints) -> Ints:
-        """Weighted sums (n,)."""
         return _weighed(windows, self.wx, self.wy)
 
     def means(self, windows: Ints) -> Reals:

@@ -14,22 +14,17 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.cubestar.detection.spots import ELECTRONS_PER_DN, HALF, SATURATED_DN
 from cubestack.firmware_model.star_tracker.background import CELL, UNIT, Ints, Marks, SkyBackground
 
+#: Range of a cell and its eight neighbours from which on it is steep, in DN and in times the noise
+#: of a pixel; chosen.
 STEEP_DN, STEEP_SIGMAS = 12, 4
-"""Range of a cell and its eight neighbours from which on it is steep, in DN and in times the noise
-of a pixel; chosen."""
 
-SIGMAS = 4
-"""Of the noise by which a pixel stands out."""
+SIGMAS = 4  #: of the noise by which a pixel stands out
+BLIND_DN = 160  #: level of a cell of which more than half is at the end of the scale; chosen
+REACH = HALF + 1  #: distance of the pixels compared with: beyond a spot
 
-BLIND_DN = 160
-"""Level of a cell of which more than half is at the end of the scale; chosen."""
-
-REACH = HALF + 1
-"""Distance of the pixels compared with: beyond a spot."""
-
+#: That are looked at in all directions: they take 20 ms. The Earth's limb across the picture has up
+#: to 8000; those below are not searched.
 MOST_PLACES = 10_000
-"""That are looked at in all directions: they take 20 ms. The Earth's limb across the picture has up
-to 8000; those below are not searched."""
 
 _OTHER_WAYS = REACH * np.array([[-1, 0], [1, 0], [-1, -1], [1, 1], [-1, 1], [1, -1]])
 
@@ -44,11 +39,9 @@ class Places:
     noises: Ints
 
     def __len__(self) -> int:
-        """Number of places."""
         return len(self.rows)
 
     def __getitem__(self, which: Marks | slice) -> "Places":
-        """Those that are marked (n,), or a slice."""
         return Places(self.rows[which], self.columns[which], self.levels[which], self.noises[which])
 
 
@@ -115,7 +108,6 @@ class LocalBackground:
     places: Places
 
     def levels_at(self, rows: Ints, columns: Ints) -> Ints:
-        """Levels (n,) of bright pixels."""
         return self._known(
             self.cells.interpolated(self.cells.levels, rows, columns),
             self.places.levels,
@@ -124,7 +116,6 @@ class LocalBackground:
         )
 
     def noises_at(self, rows: Ints, columns: Ints) -> Ints:
-        """Noises (n,) of bright pixels."""
         return self._known(
             self.cells.interpolated(self.cells.noises, rows, columns),
             self.places.noises,

@@ -24,27 +24,22 @@ NONE = -1
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """Identities of the centroids of one picture.
+    """Identities of the centroids of one picture."""
 
-    Attributes:
-        stars: (n,) index into the star list for each centroid, -1 for none. All are -1 unless the
-            outcome is IDENTIFIED.
-        votes: (n,) verification votes of each centroid: other centroids that confirmed the
-            identity which it was given before the final selection.
-        outcome: how it ended.
-        false_alarm: wrong attitudes to be expected in such a picture that would be confirmed as
-            well; nan where nothing is confirmed by its stars.
-        expected: catalogue stars that the attitude puts into the picture.
-        residuals: (n,) angle in rad between each centroid and its star; nan without identity.
-        scale: tangents of measured field angles over true ones; 1 where the focal length is right.
-    """
-
+    #: (n,) index into the star list for each centroid, -1 for none. All are -1 unless the outcome
+    #: is IDENTIFIED.
     stars: NDArray[np.int32]
+    #: (n,) verification votes of each centroid: other centroids that confirmed the identity which
+    #: it was given before the final selection
     votes: NDArray[np.uint8]
-    outcome: MatchOutcome
+    outcome: MatchOutcome  #: how it ended
+    #: wrong attitudes to be expected in such a picture that would be confirmed as well; nan where
+    #: nothing is confirmed by its stars
     false_alarm: float = nan
-    expected: int = 0
+    expected: int = 0  #: catalogue stars that the attitude puts into the picture
+    #: (n,) angle in rad between each centroid and its star; nan without identity
     residuals: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
+    #: tangents of measured field angles over true ones; 1 where the focal length is right
     scale: float = 1.0
 
     @property
@@ -98,22 +93,16 @@ def angles_between(
 
 @dataclass(frozen=True, eq=False)
 class CentroidPairs:
-    """Every pair of centroids and the angle between them, computed once.
+    """Every pair of centroids and the angle between them, computed once."""
 
-    Attributes:
-        count: number of centroids.
-        first, second: (p,) the pairs, first below second.
-        angle: (p,) in rad.
-    """
-
-    count: int
+    count: int  #: number of centroids
+    #: (p,) the pairs, first below second
     first: NDArray[np.intp]
     second: NDArray[np.intp]
-    angle: NDArray[np.float32]
+    angle: NDArray[np.float32]  #: (p,) in rad
 
     @classmethod
     def measure(cls, directions: NDArray[np.float32], meter: Meter) -> Self:
-        """Pairs of the unit vectors (n, 3) of a picture."""
         first, second = np.triu_indices(len(directions), k=1)
         angle = angles_between(directions[first], directions[second], meter)
         meter.charge(loop=len(first), ram_read=6 * len(first), ram_write=len(first))

@@ -10,9 +10,6 @@ any with a fainter one, and a false star spoils only those that it is in. (Pyram
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -32,10 +29,6 @@ Marks = NDArray[np.bool_]
 #: Entries that the newest centroid may have with all others; beyond, its step is not done.
 MOST_PAIRS = 3072
 
-#: Centroids whose triangles the model finds together, for its own speed; later ones follow only if
-#: these give no attitude. The charge is made centroid by centroid.
-_BATCHES = (8, 24, 64)
-
 #: Triangles that chance gives over those of even stars in a round field: measured in random
 #: pictures. In a field twice as wide as high rings cross at smaller angles, and real stars cluster.
 _UNEVEN = 2.5
@@ -54,7 +47,7 @@ class PairTriangles:
         self, catalogue: StarCatalogue, listed: Marks | None, meter: Meter, limit: int
     ) -> None:
         """Use the ``listed`` (stars,) stars, None for all; end at ``limit`` cycles of the meter."""
-        self.catalogue, self.listed, self.meter, self.limit = catalogue, listed, meter, limit
+        self._catalogue, self._listed, self._meter, self._limit = catalogue, listed, meter, limit
         self.entries = 0
 
     def steps(
@@ -66,212 +59,107 @@ class PairTriangles:
         The meter is charged step by step, in phases `distances`, `votes` and `identities`.
         ``factor`` multiplies the tangents of field angles.
         """
-        with self.meter.phase("distances"):
-            rays = scaled(directions, factor, self.meter)
-        sides, done = _Sides(rays), 2
-        for batch in _BATCHES:
-            count = min(batch, len(rays))
-            if count > done:
-                found = _Batch(sides, done, count, self, tolerance_rad)
-                for first, last in found.groups():
-                    if found.charged(first, last):
-                        yield found.step(first, last, factor)
-                        continue
-                    for newest in range(first, last + 1):
-                        if not found.charged(newest, newest):
-                            yield None
-                            return
-                        yield found.step(newest, newest, factor)
-                done = count
-
-
-@lru_cache(maxsize=128)
-def _pairs_of(count: int) -> tuple[Indices, Indices]:
-    """Newer and older one of all pairs of so many centroids, by rising newer one."""
-    return np.tril_indices(count, -1)
-
-
-class _Sides:
-    """What is between the centroids of unit vectors (n, 3).
-
-    Attributes:
-        cosines, sines: (n, n) of the angles between them.
-        angles: (p,) in rad, of the pairs as ``_pairs_of`` has them.
-    """
-
-    def __init__(self, rays: Floats) -> None:
-        self.cosines = rays @ rays.T
-        square = self.cosines * self.cosines
-        self.sines = np.sqrt(np.maximum(1 - square, _SMALLEST_SQUARED_SINE))
-        self.angles = arc_cosine(np.minimum(self.cosines[_pairs_of(len(rays))], np.float32(1)))
-
-
-@dataclass(frozen=True)
-class _Work:
-    """What the centroids of a batch in front of each make together; the last is in front of none.
-
-    Attributes:
-        walked: entries of the pair list that are as wide as a pair.
-        entries: entries with either star as that of the newer centroid.
-        wedges: every two entries that give the newer centroid one star.
-        found: triangles.
-    """
-
-    walked: list[int]
-    entries: list[int]
-    wedges: list[int]
-    found: list[int]
-
-
-class _Batch:
-    """All triangles among the first ``count`` centroids whose newest is not one of the first
-    ``done``, and what work each centroid makes."""
-
-    def __init__(
-        self, sides: _Sides, done: int, count: int, triangles: PairTriangles, tolerance_rad: float
-    ) -> None:
-        self._done, self._count, self._of = done, count, triangles
-        self._catalogue, self._tolerance_rad = triangles.catalogue, tolerance_rad
-        self._tolerance = np.float32(tolerance_rad)
-        begin, end = done * (done - 1) // 2, count * (count - 1) // 2
-        newer, older = (each[begin:] for each in _pairs_of(count))
-        self._angle = sides.angles[begin:end]
-        ranks = np.arange(done, count + 1)
-        walked = self._look_up(ranks * (ranks - 1) // 2 - begin)
-        stars = len(self._catalogue)
-        # An entry joins the rim, an older centroid with one star, to the hub, the newer one with
-        # the other star; either may be either.
-        hub = ((newer * stars).take(self._pair) + self._ends[::-1]).ravel()
-        small = np.uint16 if count * stars < 1 << 16 else np.int32
-        self._order = hub.astype(small).argsort(kind="stable")
-        self._hub = hub.take(self._order)
-        rims = older.take(self._pair)
-        self._rims, self._rim_stars = np.concatenate((rims, rims)), self._ends.ravel()
-        self._pair_up(sides)
-        entries = self._hub.searchsorted(ranks * stars)
-        wedges = self._first.searchsorted(entries)
-        found = self._fits.searchsorted(wedges)
-        self._before = _Work(*(each.tolist() for each in (walked, entries, wedges, found)))
+        with self._meter.phase("distances"):
+            rays = scaled(directions, factor, self._meter)
+        cosines = rays @ rays.T
+        sines = np.sqrt(np.maximum(1 - cosines * cosines, _SMALLEST_SQUARED_SINE))
+        angles = arc_cosine(np.minimum(cosines, np.float32(1)))
         # Chance: each entry fixes an attitude in two ways; a third star then agrees where two
         # rings of width 2 e cross, 4 e^2 over the sine of the angle of crossing (2/pi in the mean).
-        density = _UNEVEN * stars / (4 * pi)
-        self._chance = len(hub) / (end - begin) * density * 2 * pi * tolerance_rad**2
+        density = _UNEVEN * len(self._catalogue) / (4 * pi)
+        per_entry = density * 2 * pi * tolerance_rad**2
+        entries = pairs = 0
+        for newest in range(2, len(rays)):
+            step = self._step(newest, angles[newest, :newest], cosines, sines, tolerance_rad)
+            if step is None:
+                yield None
+                return
+            centroids, stars, misfit, found = step
+            self.entries += found
+            entries, pairs = entries + found, pairs + newest
+            # Entries and both rings are narrower by a level: its cube of triangles by chance.
+            level = np.searchsorted(LEVELS, np.minimum(misfit.astype(float) / tolerance_rad, 1))
+            shares, factors = (
+                len(LEVELS) * np.array(LEVELS)[level] ** 3,
+                np.full(len(level), factor),
+            )
+            by_chance = newest * (newest - 1) / 2 * entries / pairs * per_entry
+            yield Triangles(centroids, stars, shares, factors, by_chance)
 
-    def _look_up(self, pairs: Indices) -> Indices:
-        """Find the entries as wide as the pairs; how many the pairs in front of some walk over."""
-        angles, reach = self._catalogue.pairs.angle, self._tolerance
-        start, end = angles.searchsorted(np.array((self._angle - reach, self._angle + reach)))
+    def _step(
+        self, newest: int, angles: Floats, cosines: Floats, sines: Floats, tolerance_rad: float
+    ) -> tuple[Indices, Indices, Floats, int] | None:
+        """Triangles of the newest centroid, those first whose new star has most of them: centroids
+        and stars (t, 3), largest difference of the sides (t,) in rad, and entries of the pair list;
+        None where these, or the time for them, are too many."""
+        catalogue, tolerance = self._catalogue, np.float32(tolerance_rad)
+        pairs, count = catalogue.pairs, len(catalogue)
+        start, end = pairs.angle.searchsorted(np.array((angles - tolerance, angles + tolerance)))
         lengths = end - start
-        pair = np.arange(len(start)).repeat(lengths)
-        entry = np.arange(len(pair)) + (end - lengths.cumsum()).repeat(lengths)
-        ends = self._catalogue.pairs.ends.take(entry, axis=1)
-        walked = pair.searchsorted(pairs)
-        if self._of.listed is not None:
-            kept = self._of.listed[ends].all(axis=0)
-            pair, entry, ends = pair[kept], entry[kept], ends[:, kept]
-        self._pair, self._entry, self._ends = pair, entry, ends
-        return walked
+        older = np.arange(newest).repeat(lengths)
+        entry = np.arange(len(older)) + (end - lengths.cumsum()).repeat(lengths)
+        walked, ends = len(older), pairs.ends.take(entry, axis=1)
+        if self._listed is not None:
+            kept = self._listed[ends].all(axis=0)
+            older, entry, ends = older[kept], entry[kept], ends[:, kept]
+        if ends.size > MOST_PAIRS:
+            return None
+        # An entry joins the rim, an older centroid with one star, to the hub, the newest one with
+        # the other star; either may be either.
+        hub = ends[::-1].ravel()
+        order = hub.astype(np.uint16).argsort(kind="stable")
+        hub, rim_stars = hub.take(order), ends.ravel().take(order)
+        order %= max(len(entry), 1)
+        rims = older.take(order)
+        apart = np.abs(pairs.angle.take(entry.take(order)) - angles.take(rims))
+        # Every two entries of one hub: each with all of the hub's entries before it.
+        place = np.arange(len(hub))
+        before = place - hub.searchsorted(hub)
+        one = place.repeat(before)
+        two = (place + before.cumsum() - before - 1).repeat(before) - np.arange(len(one))
+        rim, other, star, another = rims[one], rims[two], rim_stars[one], rim_stars[two]
+        third = catalogue.cosines.take(star * count + another)
+        third = np.abs(third - cosines[rim, other]) / sines[rim, other]
+        fits = ((third <= tolerance) & (rim != other) & (star != another)).nonzero()[0]
+        operations = _operations(newest, walked, len(hub), len(one), len(fits), catalogue)
+        if not self._meter.charge_all(operations, self._limit):
+            return None
+        hubs = hub[one[fits]]
+        popularity = hubs.searchsorted(hubs, side="right") - hubs.searchsorted(hubs)
+        fits = fits[(-popularity).argsort(kind="stable")]
+        one, two = one[fits], two[fits]
+        misfit = np.maximum(np.maximum(apart[one], apart[two]), third[fits])
+        centroids = np.stack([rims[one], rims[two], np.full(len(fits), newest)], axis=1)
+        return centroids, np.stack([rim_stars[one], rim_stars[two], hub[one]], 1), misfit, len(hub)
 
-    def _pair_up(self, sides: _Sides) -> None:
-        """Find every two entries of one hub, each with all of the hub's entries before it, and
-        which of them fit."""
-        place = np.arange(len(self._hub))
-        before = place.copy()
-        before[1:] *= self._hub[1:] != self._hub[:-1]
-        before = place - np.maximum.accumulate(before)
-        wedges = before.cumsum()
-        first = place.repeat(before)
-        second = (place + wedges - before - 1).repeat(before) - np.arange(len(first))
-        one, two = self._order.take(first), self._order.take(second)
-        rim, other = self._rims.take(one), self._rims.take(two)
-        star, another = self._rim_stars.take(one), self._rim_stars.take(two)
-        side = rim * len(sides.cosines) + other
-        third = self._catalogue.cosines.take(star * len(self._catalogue) + another)
-        third = np.abs(third - sides.cosines.take(side)) / sides.sines.take(side)
-        fits = (third <= self._tolerance).nonzero()[0]
-        apart = (rim.take(fits) != other.take(fits)) & (star.take(fits) != another.take(fits))
-        self._first, self._fits = first, fits[apart]
-        self._one, self._two, self._third = one, two, third
 
-    def groups(self) -> list[tuple[int, int]]:
-        """First and last of the centroids up to each that has triangles, and of what follows."""
-        found, done = self._before.found, self._done
-        lasts = [
-            rank for rank in range(done, self._count) if found[rank - done] < found[rank + 1 - done]
-        ]
-        firsts = [done, *(last + 1 for last in lasts)]
-        lasts.append(self._count - 1)
-        return [(one, two) for one, two in zip(firsts, lasts, strict=True) if one <= two]
-
-    def charged(self, first: int, last: int) -> bool:
-        """Charge the steps of the centroids from a first to a last one, if the time suffices."""
-        entries = self._before.entries[first - self._done : last + 2 - self._done]
-        if max(after - before for before, after in pairwise(entries)) > MOST_PAIRS:
-            return False
-        return self._of.meter.charge_all(self._operations(first, last), self._of.limit)
-
-    def _operations(self, first: int, last: int) -> dict[str, dict[str, int]]:
-        """What each phase of some steps of the part's program executes."""
-        work, begin, end = self._before, first - self._done, last + 1 - self._done
-        walked, entries, wedges, found = (
-            each[end] - each[begin] for each in (work.walked, work.entries, work.wedges, work.found)
-        )
-        steps = last - first + 1
-        older = steps * (first + last) // 2
-        searched, cleared = (
-            len(self._catalogue.pairs).bit_length() * older,
-            steps * (len(self._catalogue) // 2),
-        )
-        return {
-            "distances": {  # of the newest centroid to the older ones: angles and their sines
-                "f32_mul": 5 * older,
-                "f32_add": 5 * older,
-                "f32_acos": older,
-                "f32_sqrt": older,
-                "ram_read": 6 * older,
-            },
-            # Entries of the pair list, each kept with the newest centroid's star. Floats that are
-            # not negative are in order as integers, and compared as such.
-            "votes": {
-                "flash_read": searched + 3 * walked,
-                "i32_add": 4 * (searched + entries) + walked + older,
-                "table_byte": 2 * entries,
-                "ram_write": 2 * entries + cleared,
-                "loop": searched + walked + entries + cleared,
-            },
-            "identities": {  # third sides, and which way the triangles turn
-                "f32_mul": 4 * wedges + 19 * found,
-                "f32_add": 3 * wedges + 10 * found,
-                "flash_read": 6 * wedges + 9 * found,
-                "i32_add": 6 * wedges + found,
-                "table_byte": wedges,
-                "ram_write": 8 * found,
-                "loop": wedges,
-            },
-        }
-
-    def step(self, first: int, last: int, factor: float) -> Triangles:
-        """Triangles of the last of some centroids, those whose newest star has most triangles
-        first, and the chance of all of them."""
-        work, done = self._before, self._done
-        self._of.entries += work.entries[last + 1 - done] - work.entries[first - done]
-        triples = (last * (last * last - 1) - first * (first - 1) * (first - 2)) / 6
-        fits = self._fits[work.found[last - done] : work.found[last + 1 - done]]
-        hub = self._hub.take(self._first.take(fits))
-        if len(fits) > 1:
-            popularity = hub.searchsorted(hub, side="right") - hub.searchsorted(hub)
-            chosen = (-popularity).argsort(kind="stable")
-            fits, hub = fits.take(chosen), hub.take(chosen)
-        both = np.array((self._one.take(fits), self._two.take(fits)))
-        centroids, stars = np.full((2, len(fits), 3), last)
-        centroids[:, :2] = self._rims.take(both).T
-        stars[:, :2], stars[:, 2] = self._rim_stars.take(both).T, hub % len(self._catalogue)
-        both %= max(len(self._pair), 1)
-        wide = self._catalogue.pairs.angle.take(self._entry.take(both))
-        one, two = np.abs(wide - self._angle.take(self._pair.take(both)))
-        misfit = np.maximum(np.maximum(one, two), self._third.take(fits))
-        # Entries and both rings are narrower by a level: its cube of triangles by chance.
-        level = np.searchsorted(LEVELS, np.minimum(misfit.astype(float) / self._tolerance_rad, 1))
-        shares = len(LEVELS) * np.array(LEVELS)[level] ** 3
-        factors = np.full(len(misfit), factor)
-        return Triangles(centroids, stars, shares, factors, triples * self._chance)
+def _operations(
+    older: int, walked: int, entries: int, wedges: int, found: int, catalogue: StarCatalogue
+) -> dict[str, dict[str, int]]:
+    """Operations of each phase of a step of the part's program: ``older`` centroids, entries of the
+    pair list ``walked`` over and kept, every two of these at one star, and triangles."""
+    searched, cleared = len(catalogue.pairs).bit_length() * older, len(catalogue) // 2
+    return {
+        "distances": {  # of the newest centroid to the older ones: angles and their sines
+            **{"f32_mul": 5 * older, "f32_add": 5 * older, "f32_acos": older, "f32_sqrt": older},
+            "ram_read": 6 * older,
+        },
+        # Entries of the pair list, each kept with the newest centroid's star. Floats that are not
+        # negative are in order as integers, and compared as such.
+        "votes": {
+            "flash_read": searched + 3 * walked,
+            "i32_add": 4 * (searched + entries) + walked + older,
+            "table_byte": 2 * entries,
+            "ram_write": 2 * entries + cleared,
+            "loop": searched + walked + entries + cleared,
+        },
+        "identities": {  # third sides, and which way the triangles turn
+            "f32_mul": 4 * wedges + 19 * found,
+            "f32_add": 3 * wedges + 10 * found,
+            "flash_read": 6 * wedges + 9 * found,
+            "i32_add": 6 * wedges + found,
+            "table_byte": wedges,
+            "ram_write": 8 * found,
+            "loop": wedges,
+        },
+    }

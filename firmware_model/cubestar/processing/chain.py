@@ -24,9 +24,8 @@ from cubestack.firmware_model.cubestar.processing.identify import (
     OUTCOME_FLAGS,
     Searches,
 )
-from cubestack.firmware_model.cubestar.processing.reasons import reason_of
 from cubestack.firmware_model.cubestar.processing.results import Results
-from cubestack.firmware_model.cubestar.processing.transitions import Transitions, transitions_of
+from cubestack.firmware_model.cubestar.processing.transitions import Automatic, transitions_of
 from cubestack.firmware_model.cubestar.state import UNRATED, Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import Reason, TaskStatus
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
@@ -43,17 +42,14 @@ _SEARCH_FLAGS = {
 
 @dataclass(eq=False)
 class Processing:
-    """The processing functions, what they found in the latest picture, and how long each took.
-
-    Attributes:
-        latest_ms, longest_ms: time of each step by name, since the last reset.
-    """
+    """The processing functions, what they found in the latest picture, and how long each took."""
 
     meter: Meter
     state: State
     capture: ImageCapture
     catalogue: StarCatalogue
     results: Results = field(default_factory=Results)
+    #: time of each step by name, since the last reset
     latest_ms: dict[str, float] = field(default_factory=dict)
     longest_ms: dict[str, float] = field(default_factory=dict)
 
@@ -71,8 +67,7 @@ class Processing:
             self._tell(Reason.NO_PICTURE)
 
     @property
-    def transitions(self) -> Transitions:
-        """The rules by which the mode flag changes."""
+    def transitions(self) -> Automatic:
         return transitions_of(self.state, self.meter)
 
     @property
@@ -98,7 +93,6 @@ class Processing:
         return False
 
     def discard_results(self) -> None:
-        """There is nothing to report about the latest picture."""
         self.results = Results()
         self._withdraw()
 
@@ -113,12 +107,11 @@ class Processing:
 
     def _tell_outcome(self, outcome: MatchOutcome) -> None:
         detection = self.results.detection
-        self._tell(reason_of(None if detection is None else detection.statistics, outcome))
+        self._tell(quality.reason_of(None if detection is None else detection.statistics, outcome))
 
     # --- detection ----------------------------------------------------------------------------
 
     def detect(self) -> Routine[bool]:
-        """Find the stars of the picture and their camera unit vectors."""
         self.discard_results()
         retained, settings = self.state.retained, self.state.settings
         if not retained.image_present:
@@ -156,7 +149,6 @@ class Processing:
     # --- identification -----------------------------------------------------------------------
 
     def identify(self) -> Routine[bool]:
-        """Find the catalogue star of each detected one."""
         results = self.results
         results.identification, results.best = None, []
         self._withdraw()

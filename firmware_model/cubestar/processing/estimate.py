@@ -19,16 +19,15 @@ from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.rating import Rating
 
-CENTROID_ERROR_PX = 0.2
-"""Of a search that does not tell what errors to expect."""
+CENTROID_ERROR_PX = 0.2  #: of a search that does not tell what errors to expect
 
+#: Difference of the focal length from the one that is set, from which on the identification's
+#: estimate of it counts; below, it is left to the fit.
 SCALED = 2e-3
-"""Difference of the focal length from the one that is set, from which on the identification's
-estimate of it counts; below, it is left to the fit."""
 
+#: How much residuals beyond the expected errors count: chosen so that the claimed sigmas hold with
+#: lens residuals, defocus, uneven response and hot pixels, which move neighbouring stars alike.
 EXCESS = 2.2
-"""How much residuals beyond the expected errors count: chosen so that the claimed sigmas hold with
-lens residuals, defocus, uneven response and hot pixels, which move neighbouring stars alike."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,8 @@ from cubestack.firmware_model.interface.cubestar.codes import MatchMode
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
+#: Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4).
 FEWEST_STARS = 3
-"""Stars that an identification needs when nothing is known (sections 4.3.5 and 5.3.4)."""
 
 OUTCOME_FLAGS = {
     MatchOutcome.TOO_FEW_CENTROIDS: "LessThanThreeStarsDetected",
@@ -36,7 +36,6 @@ class Searches:
     """Lost in space, assisted and tracking, with what the switches make of them."""
 
     def __init__(self, state: State, catalogue: StarCatalogue, meter: Meter) -> None:
-        """Search ``catalogue`` with the settings and the attitude of ``state``."""
         self._state, self._catalogue, self._meter = state, catalogue, meter
 
     def run(self, results: Results, cone_deg: float) -> Identification:

@@ -27,7 +27,6 @@ cycle there is none.
 
 from dataclasses import replace
 from math import cos, radians
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,63 +35,30 @@ from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import IdMode, MatchMode
 from cubestack.firmware_model.mcu.costs import Meter
 
+#: Body rate that is reckoned with: three times what can be tracked (section 4.5: 0.3 deg in each
+#: iteration of a second); stars smear over more pixels than they can fill at still larger ones.
 LARGEST_RATE_DEG_S = 1.0
-"""Body rate that is reckoned with: three times what can be tracked (section 4.5: 0.3 deg in each
-iteration of a second); stars smear over more pixels than they can fill at still larger ones."""
 
-REACH_DEG = 0.3
-"""Two attitudes closer than this agree, however short the time between them."""
+REACH_DEG = 0.3  #: two attitudes closer than this agree, however short the time between them
 
+#: Largest error of the boresight that assisted matching searches with (section 4.3.4).
 WIDEST_CONE_DEG = 5.0
-"""Largest error of the boresight that assisted matching searches with (section 4.3.4)."""
 
+#: False-alarm probability below which an attitude needs no second one, whatever was known.
 SURE = 1e-8
-"""False-alarm probability below which an attitude needs no second one, whatever was known."""
 
 _HALF_TURN_DEG = 180.0
 _U32 = 1 << 32
 
 
-class Transitions(Protocol):
-    """One set of rules; all that happens to the mode flag."""
-
-    def choose(self) -> MatchMode:
-        """The mode for the next picture."""
-
-    def cone_deg(self) -> float:
-        """How far the boresight may be from the expected one."""
-
-    def believes(self, attitude: Attitude, false_alarm: float) -> bool:
-        """Whether a new attitude may be reported and stored."""
-
-    def solved(self) -> None:
-        """A new attitude was stored."""
-
-    def failed(self, mode: MatchMode) -> None:
-        """A picture was not identified in ``mode``."""
-
-    def commanded(self, mode: IdMode) -> None:
-        """Telecommand setIDMode came."""
-
-    def hinted(self) -> None:
-        """Telecommand setTrackingMode came."""
-
-
-def transitions_of(state: State, meter: Meter) -> Transitions:
-    """The rules that switch ``transitions`` selects."""
-    automatic = state.switches.now.transitions == "automatic"
-    return Automatic(state) if automatic else Confirmed(state, meter)
-
-
 class Automatic:
-    """As published: every attitude is believed."""
+    """All that happens to the mode flag; as published, every attitude is believed."""
 
     def __init__(self, state: State) -> None:
-        """Act on the mode flag of ``state``."""
         self._state = state
 
     def choose(self) -> MatchMode:
-        """The flag, if there is anything to start from."""
+        """The mode for the next picture."""
         state = self._state
         if state.mode is MatchMode.LOST_IN_SPACE:
             return MatchMode.LOST_IN_SPACE
@@ -102,41 +68,40 @@ class Automatic:
         return state.mode
 
     def cone_deg(self) -> float:
-        """As published, at any time."""
+        """How far the boresight may be from the expected one."""
         return WIDEST_CONE_DEG
 
     def believes(self, attitude: Attitude, false_alarm: float) -> bool:
-        """Always."""
+        """Whether a new attitude may be reported and stored."""
         return True
 
     def solved(self) -> None:
-        """The next picture is tracked."""
+        """A new attitude was stored."""
         self._state.mode = MatchMode.TRACKING
 
     def failed(self, mode: MatchMode) -> None:
-        """Nothing is known any more."""
+        """A picture was not identified in ``mode``."""
         self._state.mode = MatchMode.LOST_IN_SPACE
 
     def commanded(self, mode: IdMode) -> None:
-        """Lost in space holds for the next picture."""
+        """Telecommand setIDMode came."""
         if mode == IdMode.LOST_IN_SPACE:
             self._state.mode = MatchMode.LOST_IN_SPACE
 
     def hinted(self) -> None:
-        """The next picture is matched near the hint."""
+        """Telecommand setTrackingMode came."""
         self._state.mode = MatchMode.ASSISTED
 
 
-class Confirmed:
-    """Nothing wrong stays: see the table above."""
+class Confirmed(Automatic):
+    """Recovers from wrong attitudes: see the table above."""
 
     def __init__(self, state: State, meter: Meter) -> None:
-        """Act on the mode flag, base and candidate of ``state``; ``meter`` is charged."""
-        self._state, self._meter = state, meter
+        super().__init__(state)
+        self._meter = meter
 
     @property
     def _alone(self) -> bool:
-        """Whether each picture is judged by itself."""
         return bool(self._state.settings.get("setIDMode", "IdMode") == IdMode.LOST_IN_SPACE)
 
     @property
@@ -151,7 +116,6 @@ class Confirmed:
         return REACH_DEG + LARGEST_RATE_DEG_S * ((at_ms - since.image_ms) % _U32) / 1000
 
     def choose(self) -> MatchMode:
-        """Lost in space, if that is commanded or nothing is known well enough."""
         state = self._state
         if self._alone:
             return MatchMode.LOST_IN_SPACE
@@ -181,15 +145,13 @@ class Confirmed:
         return False
 
     def _agree(self, before: Attitude, after: Attitude) -> bool:
-        """Whether the body can have turned from the one to the other."""
         largest = min(self._turned_deg(before, after.image_ms), _HALF_TURN_DEG)
         self._meter.charge(f32_mul=4, f32_add=3, f32_sin=1, f32_compare=2)
         return cosine_of_half(before.quaternion, after.quaternion) >= cos(radians(largest / 2))
 
     def solved(self) -> None:
-        """The attitude is the base."""
         self._state.retained.confirmed = 1
-        self._state.mode = MatchMode.TRACKING
+        super().solved()
 
     def failed(self, mode: MatchMode) -> None:
         """One step back, as far as what is known allows."""
@@ -199,16 +161,20 @@ class Confirmed:
         state.mode = MatchMode.LOST_IN_SPACE if lost else MatchMode.ASSISTED
 
     def commanded(self, mode: IdMode) -> None:
-        """Lost in space makes void what was known."""
         if mode == IdMode.LOST_IN_SPACE:
             self._state.retained.confirmed = 0
             self._state.candidate = None
 
     def hinted(self) -> None:
-        """The hint stands for what was known."""
         self._state.retained.confirmed = 0
         self._state.candidate = None
-        self._state.mode = MatchMode.ASSISTED
+        super().hinted()
+
+
+def transitions_of(state: State, meter: Meter) -> Automatic:
+    """The rules that switch ``transitions`` selects."""
+    automatic = state.switches.now.transitions == "automatic"
+    return Automatic(state) if automatic else Confirmed(state, meter)
 
 
 def cosine_of_half(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:

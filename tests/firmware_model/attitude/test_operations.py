@@ -57,12 +57,6 @@ def _(count: int, meter: Meter) -> None:
     covariance(seen(count)[0], sigmas(count), sigmas(count), meter)
 
 
-@case("covariance of other weights")
-def _(count: int, meter: Meter) -> None:
-    weights = np.ones(count, np.float32)
-    covariance(seen(count)[0], sigmas(count), sigmas(count), meter, weights=weights)
-
-
 @case("robust fit")
 def _(count: int, meter: Meter) -> None:
     robust_fit(*seen(count), sigmas(count), meter, scale=1.0, excess=1.0)

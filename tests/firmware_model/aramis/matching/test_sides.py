@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cubestack.firmware_model.aramis.matching.verification import sides_agree
+from cubestack.firmware_model.aramis.matching.identification import sides_agree
 
 from ..sky import meter
 
