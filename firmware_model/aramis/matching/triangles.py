@@ -8,6 +8,7 @@ the derivative of the area by c is (u1 + u2 + u3 - u4) / 4A, and the three deriv
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,10 @@ class Triangle:
     """A measured triangle, or several with one more axis in front."""
 
     sides: Floats  #: (3,) a, b, c
-    area: np.float32 | Floats  #: by Heron's formula; 0 where the stars stand on a line
-    moment: np.float32 | Floats  #: polar moment of the area
-    area_sigma: np.float32 | Floats  #: standard deviation by the directions' noise
-    moment_sigma: np.float32 | Floats  #: likewise
+    area: Any  #: float32, by Heron's formula; 0 where the stars are on a line
+    moment: Any  #: float32, polar moment of the area
+    area_sigma: Any  #: float32, standard deviations by the directions' noise
+    moment_sigma: Any
 
 
 def charge_triangles(count: int, meter: Meter) -> None:
@@ -66,7 +67,7 @@ def measure_triangles(corners: Floats, sigma_rad: Floats) -> Triangle:
     by_side /= (_FOUR * np.where(area > 0, area, _ONE))[:, None]
     moment_by_side = area[:, None] * sides / _EIGHTEEN
     moment_by_side += (squares / _THIRTY_SIX)[:, None] * by_side
-    units = edges / np.where(sides > 0, sides, _ONE)[:, :, None]
+    units = edges / np.where(sides > 0, sides, _ONE)[:, :, None].astype(np.float32)
     gains = (_gains(slopes, units, corners, sigma_rad) for slopes in (by_side, moment_by_side))
     return Triangle(sides, area, area * squares / _THIRTY_SIX, *gains)
 

@@ -185,8 +185,8 @@ class TripleTriangles:
 
     def _same_sides(
         self,
-        shortest: Floats,
-        longest: Floats,
+        shortest: NDArray[np.floating],
+        longest: NDArray[np.floating],
         corners: Floats,
         triangles: NDArray[np.uint32],
         stretch: float,

@@ -23,11 +23,7 @@ from cubestack.firmware_model.cubestar.detection import (
     SearchEnd,
     detect_stars,
 )
-from cubestack.firmware_model.cubestar.matching.identification import (
-    Identification,
-    MatchOutcome,
-    unidentified,
-)
+from cubestack.firmware_model.cubestar.matching.identification import Identification, unidentified
 from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG, identify
 from cubestack.firmware_model.cubestar.state import SETTING_COMMANDS
@@ -36,6 +32,7 @@ from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitche
 from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.node.settings import Settings
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 from tests.tiers import quick
 

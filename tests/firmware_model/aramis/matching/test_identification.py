@@ -14,7 +14,7 @@ from cubestack.firmware_model.aramis.pipeline import PUBLISHED, VERIFIED
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
-from ..campaign import COARSE, NOTHING, rates
+from ..campaign import COARSE, rates
 from ..sky import FIELD, Light, Picture, database, errors_deg, meter, pictures
 
 NOISY = replace(COARSE, noise_px=1.0)
@@ -76,13 +76,6 @@ def test_verification_is_right(
     found = rates(50, VERIFIED.profile, light, hint_error_deg, field, seed=1)
     assert found["wrong"] == 0
     assert found["right"] >= right
-
-
-@pytest.mark.slow
-def test_false_stars_alone_give_no_attitude() -> None:
-    for solution in map(run, pictures(20, 2, NOTHING)):
-        assert (solution.outcome, solution.quaternion) == (MeasurementOutcome.NONE, None)
-        assert (solution.stars == NONE).all()
 
 
 def test_all_confirming_stars_make_the_attitude_better() -> None:

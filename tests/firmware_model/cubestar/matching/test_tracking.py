@@ -13,10 +13,10 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.identification import (
     CentroidPairs,
     Identification,
-    MatchOutcome,
     verify,
 )
 from cubestack.firmware_model.cubestar.matching.tracking import _nearest, track
+from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 from ..sky import meter, pinhole
 
