@@ -67,7 +67,8 @@ def measure_triangles(corners: Floats, sigma_rad: Floats) -> Triangle:
     by_side /= (_FOUR * np.where(area > 0, area, _ONE))[:, None]
     moment_by_side = area[:, None] * sides / _EIGHTEEN
     moment_by_side += (squares / _THIRTY_SIX)[:, None] * by_side
-    units = edges / np.where(sides > 0, sides, _ONE)[:, :, None].astype(np.float32)
+    lengths = np.where(sides > 0, sides, _ONE)[:, :, None]
+    units = np.asarray(edges / lengths, np.float32)
     gains = (_gains(slopes, units, corners, sigma_rad) for slopes in (by_side, moment_by_side))
     return Triangle(sides, area, area * squares / _THIRTY_SIX, *gains)
 
