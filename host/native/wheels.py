@@ -1,0 +1,148 @@
+"""Builds the files of a release: the source distribution, and a wheel per platform.
+
+``python -m cubestack.host.native.wheels dist`` in a clone with the extra ``release``. The wheels
+contain the libraries of the shipped devices, cross-compiled by the zig compiler of the wheel
+``ziglang``. Two builds of the same tree with the same packages are byte-identical; times in the
+archives are ``$SOURCE_DATE_EPOCH``, or 1980.
+"""
+
+import argparse
+import base64
+import gzip
+import hashlib
+import io
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
+from pathlib import Path
+
+from cubestack.emulator.native.cache import SHIPPED, Recipe, hash_of
+from cubestack.emulator.native.compiler import Compiler
+from cubestack.host.native.shipped import choices, recipes
+from cubestack.host.terminal import progress, tell
+
+ROOT = Path(__file__).parents[2]
+
+PLATFORMS = {
+    "manylinux_2_17_x86_64": "x86_64-linux-gnu.2.17",
+    "manylinux_2_17_aarch64": "aarch64-linux-gnu.2.17",
+    "musllinux_1_2_x86_64": "x86_64-linux-musl",
+    "musllinux_1_2_aarch64": "aarch64-linux-musl",
+    "macosx_11_0_x86_64": "x86_64-macos.11.0",
+    "macosx_11_0_arm64": "aarch64-macos.11.0",
+}
+"""Platform tag of a wheel to the target of zig."""
+
+_NOT_PACKED = shutil.ignore_patterns(
+    ".git", ".venv", "build", "dist", "out", "__pycache__", "*.egg-info", ".*_cache", ".hypothesis"
+)
+_EARLIEST = 315_532_800  # 1980, the first year of a zip archive
+
+
+def compiled(wanted: Iterable[Recipe], platform: str) -> dict[str, bytes]:
+    """Libraries for a platform, by their file names."""
+    options = ["-target", PLATFORMS[platform], "-s"]
+    if platform.startswith("macosx"):
+        options.append("-Wl,-install_name,@rpath/library.so")  # else its path here
+    command = (sys.executable, "-m", "ziglang", "c++", *options)
+    compiler = Compiler(command, f"ziglang {version('ziglang')}")
+
+    def build(recipe: Recipe) -> tuple[str, bytes]:
+        with tempfile.TemporaryDirectory() as scratch:
+            library = recipe.build(compiler, Path(scratch), Path(scratch) / "log").read_bytes()
+        return f"{hash_of(recipe.inputs)}-{hash_of(library)}.so", library
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return dict(pool.map(build, wanted))
+
+
+def pure_files(folder: Path) -> tuple[Path, Path]:
+    """Source distribution and wheel without libraries, by setuptools from a copy of the tree."""
+    tree = folder / "tree"
+    shutil.copytree(ROOT, tree, ignore=_NOT_PACKED)
+    call = [sys.executable, "-m", "build", "--no-isolation", "-o", str(folder), str(tree)]
+    subprocess.run(call, check=True, stdout=subprocess.DEVNULL)
+    (source,), (wheel,) = folder.glob("*.tar.gz"), folder.glob("*.whl")
+    return source, wheel
+
+
+def packed_source(source: Path, folder: Path) -> Path:
+    """The source distribution with sorted names, fixed times and no owner."""
+    packed = io.BytesIO()
+    with tarfile.open(source) as old, tarfile.open(fileobj=packed, mode="w") as new:
+        for member in sorted(old.getmembers(), key=lambda one: one.name):
+            plain = tarfile.TarInfo(member.name)
+            plain.type, plain.size, plain.mtime = member.type, member.size, _time()
+            plain.mode = 0o755 if member.isdir() or member.mode & 0o100 else 0o644
+            new.addfile(plain, old.extractfile(member))
+    path = folder / source.name
+    path.write_bytes(gzip.compress(packed.getvalue(), mtime=0))
+    return path
+
+
+def packed_wheel(pure: Path, platform: str, libraries: Mapping[str, bytes], folder: Path) -> Path:
+    """The wheel of a platform: the pure one, and libraries by their file names."""
+    with zipfile.ZipFile(pure) as archive:
+        files = {name: archive.read(name) for name in archive.namelist() if name[-1] != "/"}
+    place = SHIPPED.relative_to(ROOT)
+    files |= {f"cubestack/{place}/{name}": content for name, content in libraries.items()}
+    (record,) = (name for name in files if name.endswith(".dist-info/RECORD"))
+    del files[record]
+    metadata = record.replace("RECORD", "WHEEL")
+    tag = f"py3-none-{platform}"
+    files[metadata] = (
+        files[metadata]
+        .replace(b"Root-Is-Purelib: true", b"Root-Is-Purelib: false")
+        .replace(b"Tag: py3-none-any", f"Tag: {tag}".encode())
+    )
+    lines = [f"{name},sha256={_digest(text)},{len(text)}" for name, text in sorted(files.items())]
+    files[record] = "\n".join([*lines, f"{record},,", ""]).encode()
+    path = folder / pure.name.replace("py3-none-any", tag)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in sorted(files.items(), key=lambda one: (".dist-info/" in one[0], one)):
+            entry = zipfile.ZipInfo(name, time.gmtime(_time())[:6])
+            entry.external_attr = (0o100755 if name.endswith(".so") else 0o100644) << 16
+            archive.writestr(entry, text, zipfile.ZIP_DEFLATED, 9)
+    return path
+
+
+def _time() -> int:
+    return max(_EARLIEST, int(os.environ.get("SOURCE_DATE_EPOCH", 0)))
+
+
+def _digest(content: bytes) -> str:
+    return base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Build all, or the wheels of some platforms."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="where the files go")
+    parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=", ".join(PLATFORMS))
+    args = parser.parse_args(arguments)
+    unknown = set(args.platforms) - set(PLATFORMS)
+    if unknown:
+        parser.error(f"unknown platform {min(unknown)}; known: {', '.join(PLATFORMS)}")
+    args.folder.mkdir(parents=True, exist_ok=True)
+    wanted = recipes(choices())
+    with tempfile.TemporaryDirectory() as scratch:
+        source, pure = pure_files(Path(scratch))
+        files = [packed_source(source, args.folder)]
+        for platform in progress(
+            platforms := args.platforms or [*PLATFORMS], len(platforms), "wheels"
+        ):
+            files.append(packed_wheel(pure, platform, compiled(wanted, platform), args.folder))
+    for path in files:
+        tell(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path}")
+
+
+if __name__ == "__main__":
+    main()
