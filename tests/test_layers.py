@@ -48,7 +48,7 @@ ORDER = {
         "reference",
     ),
     "host": (
-        "errors options terminal",
+        "errors extras options terminal",
         "transport export calibration",
         "clients",
         "recording pictures",

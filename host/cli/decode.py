@@ -6,7 +6,7 @@ fields by the device's table. A file has a row for each field.
 examples:
   cubestack emulate {second} --record run.rec
   cubestack decode run.rec
-  cubestack decode run.rec --out run.csv        or run.parquet (cubestack[parquet])
+  cubestack decode run.rec --out run.csv        or run.parquet (needs pyarrow)
   cubestack decode run.rec --json               one object per line
 """
 

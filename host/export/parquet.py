@@ -6,14 +6,18 @@ from importlib.util import find_spec
 from io import BytesIO
 from typing import Any
 
-Cell = bool | int | float | str | None
+from cubestack.host.extras import install_command
 
-MISSING = 'Parquet needs pyarrow: pip install "cubestack[parquet]"'
+Cell = bool | int | float | str | None
 
 
 def missing() -> str:
     """Why no Parquet file can be written; empty if it can."""
-    return "" if find_spec("pyarrow") else MISSING
+    return "" if find_spec("pyarrow") else _missing()
+
+
+def _missing() -> str:
+    return f"Parquet needs pyarrow: {install_command('parquet')}"
 
 
 def arrow() -> Any:
@@ -22,7 +26,7 @@ def arrow() -> Any:
         import_module("pyarrow.parquet")
         return import_module("pyarrow")
     except ModuleNotFoundError:
-        raise ValueError(MISSING) from None
+        raise ValueError(_missing()) from None
 
 
 def parquet_file(

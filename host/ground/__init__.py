@@ -2,6 +2,8 @@
 
 from importlib.util import find_spec
 
+from cubestack.host.extras import install_command
+
 for _name in ("starlette", "uvicorn", "websockets"):
     if find_spec(_name) is None:
-        raise ValueError(f'this needs {_name}: pip install "cubestack[ground]"')
+        raise ValueError(f"this needs {_name}: {install_command('ground')}")

@@ -5,6 +5,8 @@ from io import BytesIO
 from math import log, radians, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
+from cubestack.host.extras import install_command
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -20,7 +22,7 @@ def figure(width: float, height: float) -> "Figure":
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise ValueError('figures need matplotlib: pip install "cubestack[plots]"') from None
+        raise ValueError(f"figures need matplotlib: {install_command('plots')}") from None
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from cubestack.host.extras import install_command
 from cubestack.host.pictures.stretch import stretched
 
 WIDTH_PX = 480
@@ -50,7 +51,7 @@ def save_curves(
     try:
         from matplotlib.figure import Figure
     except ImportError:
-        raise ValueError('figures need matplotlib: pip install "cubestack[plots]"') from None
+        raise ValueError(f"figures need matplotlib: {install_command('plots')}") from None
     figure = Figure(figsize=(3.2 * max(len(rows), 1.6), 2.9), layout="constrained")
     panels = figure.subplots(1, len(rows), sharey=True, squeeze=False)[0]
     for panel, (name, points) in zip(panels, rows.items(), strict=True):

@@ -20,6 +20,8 @@ from multiprocessing import connection, get_context, parent_process
 from threading import Thread
 from typing import Any, TypeVar
 
+from cubestack.host.extras import install_command
+
 Job = TypeVar("Job")
 Done = TypeVar("Done")
 
@@ -134,7 +136,7 @@ def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
     try:
         connect: Any = import_module("distributed").Client
     except ModuleNotFoundError:
-        text = 'a scheduler needs distributed: pip install "cubestack[cluster]"'
+        text = f"a scheduler needs distributed: {install_command('cluster')}"
         raise ValueError(text) from None
     try:
         client = connect(address, timeout=CONNECT)

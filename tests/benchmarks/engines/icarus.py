@@ -31,7 +31,7 @@ class CocotbError(RuntimeError):
 def missing_for_cocotb() -> str | None:
     """What is to be installed for :func:`run_cocotb`, or None."""
     if importlib.util.find_spec("cocotb") is None:
-        return 'pip install "cubestack[dev]", for cocotb'
+        return "pip install cocotb"
     if shutil.which("iverilog") is None:
         return "Icarus Verilog (apt-get install iverilog)"
     return None

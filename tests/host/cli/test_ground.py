@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from cubestack.host.cli.main import main
+from cubestack.host.extras import install_command
 from tests.tiers import quick
 
 CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
@@ -48,4 +49,4 @@ def test_what_must_be_installed_is_told(words: list[str], missing: str) -> None:
     call = [sys.executable, "-c", text]
     ended = subprocess.run(call, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 2
-    assert ended.stderr.endswith(f'this needs {missing}: pip install "cubestack[ground]"\n')
+    assert ended.stderr.endswith(f"this needs {missing}: {install_command('ground')}\n")

