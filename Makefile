@@ -4,6 +4,9 @@ BIN := .venv/bin
 # Real photographs of the sky with their truth.json, when there are any.
 PHOTOGRAPHS ?= ../shared/data/sky
 
+# Platforms of `make wheels`, for instance PLATFORMS=manylinux_2_17_x86_64; all when it is empty.
+PLATFORMS ?=
+
 # What `make mutants` tries, for instance MUTANTS="cubestar --all"; --help says what there is.
 MUTANTS ?=
 
@@ -24,7 +27,7 @@ DOCUMENTS ?=
 # Nothing here is made by a built-in rule: one would make "setup" of setup.sh.
 MAKEFLAGS += --no-builtin-rules
 
-.PHONY: help venv run docs test test-all test-hdl pasted firmware mutants lint bench bench-engines clean
+.PHONY: help venv run docs test test-all test-hdl pasted firmware mutants lint wheels bench bench-engines clean
 
 help:
 	@echo "make run       set up, then boot the sensors, measure over their serial ports, and draw what they saw"
@@ -36,6 +39,7 @@ help:
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make docs      set up, then build the documents as a site in out/site"
 	@echo "make lint      ruff and mypy"
+	@echo "make wheels    set up, then build the source distribution and the wheels of all platforms into dist/"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
 	@echo "make clean     remove .venv, out and caches"
@@ -82,6 +86,10 @@ lint: .venv/ready-dev
 
 bench: .venv/ready-run
 	@$(BIN)/cubestack bench
+
+wheels: .venv/ready-run
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[release]"
+	@SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m cubestack.host.native.wheels dist $(PLATFORMS)
 
 docs: .venv/ready-dev
 	@NO_MKDOCS_2_WARNING=1 COLUMNS=90 $(BIN)/mkdocs build --strict --quiet

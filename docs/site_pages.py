@@ -8,6 +8,7 @@ import re
 from argparse import _SubParsersAction
 from collections.abc import Iterator
 from functools import partial
+from importlib.metadata import metadata
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -19,7 +20,7 @@ from cubestack.hdl import blocks
 from cubestack.host.cli.main import make_parser
 from cubestack.host.cli.new_sensor import rendered
 
-REPOSITORY = "https://github.com/cubestack/cubestack/blob/main/"
+REPOSITORY = metadata("cubestack")["Project-URL"].rpartition(" ")[2] + "/blob/main/"
 
 
 def on_files(files: Files, config: Any) -> Files:

@@ -25,7 +25,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from cubestack.emulator.native.cache import SHIPPED, Recipe, hash_of
-from cubestack.emulator.native.compiler import Compiler
+from cubestack.emulator.native.compiler import Compiler, CompilerError
 from cubestack.host.native.shipped import choices, recipes
 from cubestack.host.terminal import progress, tell
 
@@ -57,7 +57,11 @@ def compiled(wanted: Iterable[Recipe], platform: str) -> dict[str, bytes]:
 
     def build(recipe: Recipe) -> tuple[str, bytes]:
         with tempfile.TemporaryDirectory() as scratch:
-            library = recipe.build(compiler, Path(scratch), Path(scratch) / "log").read_bytes()
+            log = Path(scratch) / "log"
+            try:
+                library = recipe.build(compiler, Path(scratch), log).read_bytes()
+            except CompilerError as error:
+                raise CompilerError(f"{error}:\n{log.read_text()}") from error
         return f"{hash_of(recipe.inputs)}-{hash_of(library)}.so", library
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -69,7 +73,9 @@ def pure_files(folder: Path) -> tuple[Path, Path]:
     tree = folder / "tree"
     shutil.copytree(ROOT, tree, ignore=_NOT_PACKED)
     call = [sys.executable, "-m", "build", "--no-isolation", "-o", str(folder), str(tree)]
-    subprocess.run(call, check=True, stdout=subprocess.DEVNULL)
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(done.stderr)
     (source,), (wheel,) = folder.glob("*.tar.gz"), folder.glob("*.whl")
     return source, wheel
 
@@ -115,7 +121,7 @@ def packed_wheel(pure: Path, platform: str, libraries: Mapping[str, bytes], fold
 
 
 def _time() -> int:
-    return max(_EARLIEST, int(os.environ.get("SOURCE_DATE_EPOCH", 0)))
+    return max(_EARLIEST, int(os.environ.get("SOURCE_DATE_EPOCH") or 0))
 
 
 def _digest(content: bytes) -> str:

@@ -1,0 +1,118 @@
+"""Files of a release: whole, installable, and the same from build to build."""
+
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from cubestack.emulator.native.cache import recipe
+from cubestack.emulator.native.compiler import Compiler
+from cubestack.host.native import wheels
+
+PLATFORM = "manylinux_2_17_x86_64"
+LIBRARIES = {"b-2.so": b"second", "a-1.so": b"first"}
+
+
+@pytest.fixture(scope="module")
+def pure(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return wheels.pure_files(tmp_path_factory.mktemp("pure"))
+
+
+@pytest.fixture
+def wheel(pure: tuple[Path, Path], tmp_path: Path) -> Path:
+    return wheels.packed_wheel(pure[1], PLATFORM, LIBRARIES, tmp_path)
+
+
+def test_wheel_contains_the_libraries_and_records_them(wheel: Path) -> None:
+    assert wheel.name.endswith(f"-py3-none-{PLATFORM}.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        (metadata,) = (name for name in names if name.endswith(".dist-info/WHEEL"))
+        text = archive.read(metadata).decode()
+        record = archive.read(metadata.replace("WHEEL", "RECORD")).decode().splitlines()
+        assert archive.read("cubestack/emulator/native/libraries/a-1.so") == b"first"
+    assert f"Tag: py3-none-{PLATFORM}\n" in text
+    assert "Root-Is-Purelib: false\n" in text
+    assert "none-any" not in text
+    assert sorted(line.split(",")[0] for line in record) == sorted(names)
+    assert len(set(names)) == len(names)
+    folder = "cubestack/emulator/native/libraries"
+    (line,) = (line for line in record if line.startswith(f"{folder}/a-1.so"))
+    assert line == f"{folder}/a-1.so,sha256=p5N7ZLjKpY8Dchu2us9ceMsjX-vg5wsbhM2ZVBRhoI4,5"
+
+
+def test_pip_verifies_and_installs_it_where_the_modules_find_the_libraries(
+    pure: tuple[Path, Path], tmp_path: Path
+) -> None:
+    tag = f"linux_{wheels.os.uname().machine}"  # of this machine, whatever it is
+    wheel = wheels.packed_wheel(pure[1], tag, LIBRARIES, tmp_path)
+    venv.create(tmp_path / "venv", with_pip=False)
+    python = tmp_path / "venv" / "bin" / "python"
+    call = [sys.executable, "-m", "pip", "--python", str(python), "install", "--no-deps", "-q"]
+    subprocess.run([*call, "--no-index", str(wheel)], check=True)
+    program = (
+        "from cubestack.emulator.native.cache import SHIPPED as s; print(*sorted(s.iterdir()))"
+    )
+    done = subprocess.run([python, "-c", program], check=True, capture_output=True, text=True)
+    assert [Path(one).name for one in done.stdout.split()] == sorted(LIBRARIES)
+
+
+def test_same_content_packs_to_the_same_bytes(
+    pure: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packed = []
+    for name, libraries in (("one", LIBRARIES), ("two", dict(reversed(LIBRARIES.items())))):
+        (tmp_path / name).mkdir()
+        wheel = wheels.packed_wheel(pure[1], PLATFORM, libraries, tmp_path / name)
+        source = wheels.packed_source(pure[0], tmp_path / name)
+        packed.append((wheel.read_bytes(), source.read_bytes()))
+    assert packed[0] == packed[1]
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    source = wheels.packed_source(pure[0], tmp_path)
+    with tarfile.open(source) as archive:
+        assert {one.mtime for one in archive} == {1700000000}
+        assert {(one.uid, one.gid, one.uname) for one in archive} == {(0, 0, "")}
+    wheel = wheels.packed_wheel(pure[1], PLATFORM, LIBRARIES, tmp_path)
+    with zipfile.ZipFile(wheel) as archive:
+        assert {one.date_time for one in archive.infolist()} == {(2023, 11, 14, 22, 13, 20)}
+
+
+def test_source_distribution_keeps_content_and_executables(
+    pure: tuple[Path, Path], tmp_path: Path
+) -> None:
+    with tarfile.open(pure[0]) as old, tarfile.open(wheels.packed_source(pure[0], tmp_path)) as new:
+        assert new.getnames() == sorted(old.getnames())
+        for member in old.getmembers():
+            same = new.getmember(member.name)
+            assert same.isfile() == member.isfile()
+            assert same.mode & 0o100 == (member.mode & 0o100 or member.isdir() << 6)
+            if member.isfile():
+                assert new.extractfile(same).read() == old.extractfile(member).read()
+
+
+@pytest.mark.parametrize("platform", wheels.PLATFORMS)
+def test_libraries_are_compiled_for_the_platform_and_named_by_their_hash(
+    platform: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wheels, "version", lambda _: "1")
+
+    def build(compiler: Compiler, scratch: Path, _log: Path) -> Path:
+        (scratch / "library").write_text(" ".join(compiler.command))
+        return scratch / "library"
+
+    wanted = recipe("a", "a", [], build)
+    ((name, content),) = wheels.compiled([wanted], platform).items()
+    assert name == f"{wheels.hash_of(wanted.inputs)}-{wheels.hash_of(content)}.so"
+    assert f"-target {wheels.PLATFORMS[platform]}" in content.decode()
+    machine = wheels.PLATFORMS[platform].partition("-")[0]
+    assert platform.endswith(machine.replace("aarch64", "arm64" if "mac" in platform else machine))
+
+
+def test_unknown_platform_is_rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        wheels.main([str(tmp_path), "manylinux_x"])
+    assert "unknown platform manylinux_x; known: manylinux_2_17" in capsys.readouterr().err
