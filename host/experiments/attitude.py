@@ -1,4 +1,4 @@
-"""What measuring star trackers has in common: random skies, hints, and attitudes beside the truth.
+"""Shared parts of measuring star trackers: random skies, hints, attitudes beside the truth.
 
 Axes and errors: D = A_measured A_truth^T, with A the rotation from inertial to camera; the error
 across is the angle between the boresights, the error about them atan2(D01 - D10, D00 + D11).
@@ -34,9 +34,9 @@ from cubestack.host.pictures.campaigns import sky_map
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3
-POOR = 0.5  # part of right results below which a reader is told what to change
+POOR = 0.5  # share of right results below which a hint is printed
 SAME_STAR_DEG = 0.2
-"""An identified star further than this from where the truth puts it has a wrong identity."""
+"""An identified star farther than this from its true position has a wrong identity."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,9 +74,9 @@ def random_view(
     time_s: float = 0.0,
     **more: Any,
 ) -> SkyView:
-    """A sky as the options say, at a random pose, and the camera; ``more`` as the scene has it.
+    """A view of a sky at a random pose, as the options say; ``more`` are arguments of the scene.
 
-    ``time_s`` is about when it will be exposed.
+    ``time_s`` is the approximate time of its exposure.
     """
     scene = SkyScene(
         quaternion=random_quaternion(rng),
@@ -92,7 +92,7 @@ def random_view(
 def rough_boresight(
     truth: NDArray[np.float64], error_deg: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """A boresight (3,) at most ``error_deg`` from the true attitude's, uniform over that cap."""
+    """A boresight (3,) at most ``error_deg`` from the true one, uniform over that cap."""
     matrix = matrix_from_quaternion(truth)
     away = np.radians(error_deg) * np.sqrt(rng.random())
     side = rng.random() * 2 * np.pi
@@ -113,7 +113,7 @@ def is_right(cross_deg: float, roll_deg: float) -> bool:
 def compare(
     measured: NDArray[np.float64] | None, truth: NDArray[np.float64] | None
 ) -> dict[str, Any]:
-    """The fields of an ``AttitudeResult`` that come from both; None where there is none."""
+    """Fields of an ``AttitudeResult`` from measured and true attitude; None if one is missing."""
     cross = roll = right = None
     if measured is not None and truth is not None:
         cross, roll = errors(measured, truth)
@@ -145,7 +145,7 @@ def claims(
     measured: NDArray[np.float64] | None,
     truth: NDArray[np.float64] | None,
 ) -> dict[str, Any]:
-    """The fields of an ``AttitudeResult`` that say what the sensor claims, beside its errors."""
+    """Fields of an ``AttitudeResult`` with the sensor's claims and errors."""
     known = rated if rated is not None and rated.valid and measured is not None else None
     return {
         "false_alarm": None if known is None else float(known.false_alarm),
@@ -161,11 +161,11 @@ def _listed(quaternion: NDArray[np.float64] | None) -> list[float] | None:
 
 
 def count_wrong(hipparcos: Sequence[int], directions: ArrayLike, truth: NDArray[np.float64]) -> int:
-    """Identified stars that the truth puts elsewhere.
+    """Number of wrongly identified stars.
 
     Args:
         hipparcos: their Hipparcos numbers.
-        directions: where they were seen, shape (n, 3), any length, in camera axes.
+        directions: measured directions (n, 3), any length, in camera axes.
         truth: quaternion (4,).
     """
     if not hipparcos:
@@ -184,13 +184,13 @@ class AttitudeResult(Result):
     Attributes:
         solved: the measurement gave an attitude.
         right: it did, and the attitude is right; None without truth.
-        centroids, matched: stars found, and stars that the attitude rests on.
+        centroids, matched: stars found, and stars used for the attitude.
         wrong: identified stars with a wrong identity, whether or not they gave an attitude.
-        mode: "lis", "assisted" or "tracking": how it was found, or looked for.
+        mode: "lis", "assisted" or "tracking".
         error_cross_deg, error_roll_deg: across and about the boresight.
         truth, quaternion: inertial to camera, scalar last; None without attitude.
-        reason: why there is no attitude, by a sensor that says so, else None.
-        false_alarm: wrong attitudes to be expected that are confirmed as well; None if not rated.
+        reason: why there is no attitude, if the sensor says so, else None.
+        false_alarm: expected number of wrong confirmed attitudes; None if not rated.
         sigma_deg, error_deg: claimed standard deviations, and errors, about the camera's axes.
         phase_ms: virtual time of each step; wall_ms is wall time.
         status: how it ended, and names of the error flags.
@@ -228,7 +228,7 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
 
     title = "attitude over the serial line, beside the truth; errors in arcsec"
     limits_ms: ClassVar[Mapping[str, float]] = {}
-    """What each step of the processing may take in the worst case, by its name in ``phase_ms``."""
+    """Worst-case limit of each processing step, by its name in ``phase_ms``."""
 
     columns = ("frame", "right", "stars", "matched", "wrong", "cross", "roll", "status and flags")
 
@@ -236,7 +236,7 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         return options.frames
 
     def row(self, number: int, result: AttitudeResultT) -> tuple[str, ...]:
-        """Verdict, numbers of stars, errors, and how it ended."""
+        """Verdict, numbers of stars, errors, and ending."""
         yes_no = {True: "yes", False: "no", None: "-"}
         return (
             str(number),
@@ -250,8 +250,8 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         )
 
     def summarise(self, results: Sequence[AttitudeResultT], wall_s: float) -> Iterator[str]:
-        """Rates over all frames; why the others were refused; over the right ones 95th percentiles
-        of errors, mean time; how the claims did; the longest step."""
+        """Rates over all frames and reasons of refusals; of the right ones, 95th percentiles of
+        errors and mean time; quality of the claims; the longest step."""
         right = [result for result in results if result.right]
         judged = sum(result.right is not None for result in results)
         solved = sum(result.solved for result in results)
@@ -265,7 +265,7 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         if reasons:
             yield "refused: " + ", ".join(f"{number} {name}" for name, number in reasons.items())
         if right:
-            # Some devices tell the time of the whole measurement.
+            # Some devices report the time of the whole measurement.
             times = [result.phase_ms["total"] for result in right if "total" in result.phase_ms]
             time = f"; mean time {np.mean(times):.0f} ms" if times else ""
             yield (
@@ -291,20 +291,20 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
             yield f"what may help: {self.advice(results)}"
 
     def succeeded(self, results: Sequence[AttitudeResultT]) -> bool:
-        """At least one has an attitude."""
+        """Whether at least one has an attitude."""
         return any(result.solved for result in results)
 
     def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
-        """Where on the sky it was right."""
+        """A map of right results over the sky."""
         known = [each for each in results if each.get("truth") is not None]
         if known:
             looking = [pointing_deg(np.array(each["truth"])) for each in known]
             ended = map(_ended, known)
             places = [(ra, dec, end) for (ra, dec, _), end in zip(looking, ended, strict=True)]
-            yield Section("right by where it looked", png=sky_map(places, wilson))
+            yield Section("right results by pointing", png=sky_map(places, wilson))
 
     def longest(self, results: Sequence[AttitudeResultT]) -> str:
-        """The worst case of each step of the processing, beside what it may take; one phrase."""
+        """The worst case of each processing step and its limit; one phrase."""
         shown = [
             f"{name} {max((r.phase_ms.get(name, 0.0) for r in results), default=0.0):.1f} of {ms:g}"
             for name, ms in self.limits_ms.items()
@@ -312,7 +312,7 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         return f"longest, ms: {', '.join(shown)}" if shown else ""
 
     def advice(self, results: Sequence[AttitudeResultT]) -> str:
-        """What to change where few results are right; one phrase."""
+        """Advice if few results are right; one phrase."""
         return "--mode assisted --hint-error 3, or --profile extended"
 
 
@@ -321,7 +321,7 @@ def _ended(result: Mapping[str, Any]) -> str:
 
 
 def percentile_95(values: Iterator[float | None]) -> float | None:
-    """95th percentile of the magnitudes of those that are known."""
+    """95th percentile of the magnitudes of the known values."""
     known = [abs(value) for value in values if value is not None]
     return float(np.percentile(known, 95)) if known else None
 

@@ -1,4 +1,4 @@
-"""Experiments that give facts; most look them up and need no device for it."""
+"""Experiments whose result is a set of facts; most need no device."""
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ OptionsT = TypeVar("OptionsT", bound=Options)
 
 @dataclass(frozen=True)
 class Facts(Result):
-    """Facts by name, in their order; ``lines`` tell them to a reader, if not each on a line."""
+    """Facts by name; ``lines`` is their text, by default a line each."""
 
     facts: dict[str, Any]
     lines: tuple[str, ...] = ()
@@ -31,7 +31,7 @@ def fact_lines(facts: Mapping[str, Any]) -> Iterator[str]:
 
 
 class Telling(Experiment[Opener[Any, Any], OptionsT, Facts]):
-    """Gives one result: facts."""
+    """An experiment with one result: facts."""
 
     label = ""
 
@@ -47,7 +47,7 @@ class Lookup(Telling[OptionsT]):
 
     @abstractmethod
     def look_up(self, options: OptionsT, shown: Shown) -> dict[str, Any]:
-        """The facts by name; ValueError for options that make no sense."""
+        """The facts by name; raises ValueError for invalid options."""
 
     def run(self, opened: Opener[Any, Any], options: OptionsT) -> Iterator[Facts]:
         yield Facts(self.look_up(options, opened.shown))

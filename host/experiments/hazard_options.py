@@ -1,4 +1,4 @@
-"""Hazards as an option: each random frame has those that were asked for, placed in its own sky."""
+"""Hazards as an option: each random frame gets the requested ones, placed in its own sky."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ from cubestack.firmware_model.values import REQUIRED, ValueKind, declare, many
 
 @dataclass(frozen=True)
 class Asked:
-    """A hazard that was asked for.
+    """A requested hazard.
 
     Attributes:
         name: of a hazard.
@@ -72,9 +72,7 @@ def known() -> Mapping[str, type[Hazard]]:
 
 
 def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
-    """Raise ValueError for hazards that there are not, or not of such a strength; those of an
-    ``earth`` below are for scenes that have one.
-    """
+    """Raise ValueError for unknown hazards or strengths; hazards of the Earth need ``earth``."""
     if not asked:
         return
 

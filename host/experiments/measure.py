@@ -24,21 +24,20 @@ def measure(
     opened: Callable[[AnyEmulated], object] = lambda _emulated: None,
     **options: Any,
 ) -> Iterator[Result]:
-    """Measure a device end to end; yields each result, beside the truth, as soon as it is there.
+    """Measure a device end to end; yields each result beside the truth.
 
     Args:
         name: of the device, one of ``device_names()``.
         progress: called with the number of results so far, and of all.
         engine: how its FPGA is run.
-        opened: told of each device that is powered up.
+        opened: called with each device after power-up.
         command: another one that the device has, such as ``upsets``.
         options: as `cubestack measure NAME --help` has them, with underscores: ``frames=20``,
             ``mag_limit=3.8``, ``no_noise=True``; options of its board among them.
 
     Raises:
         TargetError: no device has that name.
-        ValueError: a command that the device does not have, an option, or a value of one, that can
-            not be; the text says what is right.
+        ValueError: an unknown command or option, or an invalid value; the text says what is valid.
     """
     device = registered(name)
     experiment = experiment_of(device, command)
@@ -57,7 +56,7 @@ def measure(
 
 
 def experiment_of(device: AnyDevice, command: str = MEASURE) -> AnyExperiment:
-    """What ``measure``, or another command, does with a device; ValueError when that is nothing."""
+    """The experiment of ``measure`` or another command; raises ValueError if there is none."""
     if command != MEASURE:
         found = {report.name: report for report in device.reports}
         if command not in found:
@@ -65,25 +64,25 @@ def experiment_of(device: AnyDevice, command: str = MEASURE) -> AnyExperiment:
             raise ValueError(f"{device.name} has no command {command!r}, only {names}")
         return found[command].load()
     if device.experiment is None:
-        raise ValueError(f"there is nothing to measure with {device.name}")
+        raise ValueError(f"there is no experiment for {device.name}")
     return device.experiment()
 
 
 def board_options(device: AnyDevice, experiment: AnyExperiment) -> Mapping[str, BoardOption]:
-    """Options of the device's board that the experiment leaves to the user."""
+    """Board options that the experiment leaves to the user."""
     options = device.all_options if experiment.powers_up else ()
     return {one.name: one for one in options if one.name not in experiment.decides}
 
 
 def board_as_said(device: AnyDevice, options: Options, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of the board: those that were given, and what the scene file says beside them."""
+    """Board options: the given ones, and those of the scene file."""
     return scene_options(device, getattr(options, "scene", None)) | dict(given)
 
 
 def running(
     device: AnyDevice, experiment: AnyExperiment, board: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """For each result: the firmware or profile that ran, and the switches that differ, if any."""
+    """Entries of each result: the firmware or profile, and switches that differ from it."""
     if "profile" not in board_options(device, experiment):
         return {}
     if board.get("firmware"):

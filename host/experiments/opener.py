@@ -1,4 +1,4 @@
-"""Powers devices up for experiments, and the options of all that are measured."""
+"""Powers devices up for experiments; options that all experiments share."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -29,14 +29,14 @@ def _silent(items: Iterable[Any], _total: int, _label: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Opener(Generic[BoardT_co, ClientT_co]):
-    """Powers a device up for an experiment, with the board that the user chose.
+    """Powers a device up for an experiment with the user's board options.
 
     Attributes:
         device: to power up.
         engine: how its FPGA is run.
         board: options of its board.
-        shown: shows how many are done of what takes seconds the first time.
-        opened: told of each device that was powered up.
+        shown: progress display of slow first-time work.
+        opened: called with each device after power-up.
     """
 
     device: Device[BoardT_co, ClientT_co]
@@ -47,22 +47,22 @@ class Opener(Generic[BoardT_co, ClientT_co]):
 
     @property
     def switches(self) -> Switches:
-        """Those that the device's firmware is powered up with."""
+        """Switches of the firmware at power-up."""
         chosen = self.board.get("profile", DEFAULT_PROFILE), self.board.get("set", "")
         return self.device.switches.of(*chosen)
 
     @property
     def rates(self) -> bool:
-        """Whether the firmware rates its results: our own, but for the published algorithms."""
+        """Whether the firmware rates its results: the Python model, except in ``published``."""
         return not self.board.get("firmware") and self.switches.profile != DEFAULT_PROFILE
 
     def __call__(
         self, scene: Any, *, seed: int, faults: Path | Plan | None = None, **options: Any
     ) -> EmulatedDevice[BoardT_co, ClientT_co]:
-        """The device, looking at ``scene``, with a plan of faults, or that in a file, injected.
+        """The device, with its scene and a fault plan (or its file) injected.
 
-        ``options`` are keywords of its board that the experiment decides. Raises ValueError for a
-        scene or a plan that makes no sense.
+        ``options`` are board keywords that the experiment sets. Raises ValueError for an invalid
+        scene or plan.
         """
         plan = load_plan(faults) if isinstance(faults, Path) else faults
         emulated = power_up(

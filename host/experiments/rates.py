@@ -1,4 +1,4 @@
-"""How often: what became of pictures, and within which limits that is their rate."""
+"""Rates of outcomes and their confidence limits."""
 
 from math import sqrt
 from typing import Any, Literal
@@ -9,19 +9,19 @@ Outcome = Literal["right", "refused", "wrong"]
 
 
 def outcome(result: Any) -> Outcome:
-    """What became of the picture of a result, which has ``right`` and ``solved``."""
+    """Outcome of a result with ``right`` and ``solved``."""
     return "right" if result.right else "wrong" if result.solved else "refused"
 
 
 def why_refused(result: Any) -> str:
-    """The reason of a refused one, as the device gives it."""
+    """The device's reason for a refusal."""
     return str(result.reason or result.ending)
 
 
 def wilson(count: int, of: int, z: float = CONFIDENCE_Z) -> tuple[float, float]:
-    """Limits of a rate, 0 to 1, of which ``count`` of ``of`` were seen: Wilson 1927, JASA 22, 209.
+    """Wilson limits (JASA 22, 209, 1927) of a rate, 0 to 1, seen in ``count`` of ``of`` cases.
 
-    All that there can be where nothing was seen.
+    0 and 1 if nothing was seen.
     """
     if of == 0:
         return 0.0, 1.0

@@ -1,4 +1,4 @@
-"""What the cameras of a powered-up device have rendered."""
+"""Images that the cameras of a device rendered."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ def cameras_of(board: Any) -> Sequence[Any]:
 
 
 def picture_of(board: Any) -> NDArray[np.uint8] | None:
-    """What the cameras rendered last, side by side; None where none of them did."""
+    """The last rendered images of all cameras side by side, or None."""
     rendered = [camera.rendered for camera in cameras_of(board)]
     shown = [picture for picture in rendered if picture is not None]
     return np.hstack(shown) if shown else None

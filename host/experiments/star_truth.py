@@ -1,4 +1,4 @@
-"""Where stars truly are in a picture: for marks that people see, never for a device."""
+"""True positions of stars in an image, for marks on pictures; no device sees them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from cubestack.host.pictures.images import TrueStar
 from cubestack.host.pictures.sheet import Lens
 
 BRIGHT = 3.8
-"""Magnitude V below which stars are marked: where the CubeStar thesis' list ends, section 4.3.2."""
+"""Faintest marked magnitude V: the end of the CubeStar thesis' list, section 4.3.2."""
 
 
 def true_stars(
@@ -21,7 +21,7 @@ def true_stars(
         quaternion: the true attitude (4,), scalar last, inertial to camera.
         lens: that took the picture.
         shape: of the picture.
-        within_deg: angle from the boresight beyond which a shade keeps light away, at most 90.
+        within_deg: angle from the boresight beyond which a shade blocks the light, at most 90.
     """
     sky = load_sky(mag_limit=BRIGHT)
     seen = sky.vectors @ matrix_from_quaternion(quaternion).T

@@ -104,7 +104,7 @@ def error_curves(
 def sky_map(
     places: Sequence[tuple[float, float, str]], limits: Callable[[int, int], tuple[float, float]]
 ) -> bytes:
-    """A PNG of how often a sensor was right by where it looked, in cells of equal area.
+    """A PNG of how often a sensor was right results by pointing, in cells of equal area.
 
     Args:
         places: right ascension and declination in degrees, and what became of the picture.

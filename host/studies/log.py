@@ -1,9 +1,9 @@
-"""Log a device's results to a CSV file: time, attitude or angles, and what goes with them.
+"""Log a device's results to a CSV file: time, attitude or angles, and their quality.
 
-TARGET is what `cubestack shell` takes: a serial port, tcp://HOST:PORT, i2c:BUS:ADDR,
-emulated:DEVICE... A log reads results and commands nothing by itself; -c has shell
-commands for its beginning, --each for every line. At the end it tells how much each
-angle scatters about a straight line.
+TARGET is as in `cubestack shell`: a serial port, tcp://HOST:PORT, i2c:BUS:ADDR,
+emulated:DEVICE... A log only reads results; -c runs shell commands at the start,
+--each before every line. At the end it prints the scatter of each angle about a
+straight line.
 
 examples:
   cubestack log /dev/ttyUSB0 --device {first} --out night.csv
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Log; returns 0 when every line has a result."""
+    """Log; returns 0 if every line has a result."""
     lines: list[Columns] = []
     with ExitStack() as stack:
         target = open_any_target(args.target, args)

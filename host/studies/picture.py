@@ -1,9 +1,9 @@
-"""Make the picture that a star tracker takes of the sky at a known attitude.
+"""Render the image that a star tracker captures of the sky at a known attitude.
 
-The emulated camera exposes it as its firmware asks for, with lens, noise and what else
-a scene file says; the file holds its grey values unchanged, unless --stretched makes
-faint stars visible to the eye. Where the device takes
-uploaded pictures, its client's `upload_image` puts it into the memory of a real one.
+The emulated camera exposes it as its firmware requests, with lens, noise and all else
+of a scene file. The file has the grey values unchanged, unless --stretched makes faint
+stars visible. If the device accepts uploads, its client's `upload_image` loads it into a
+real one.
 
 examples:
   cubestack picture {first} --ra 83.8 --dec -5.4 --roll 30 --out orion.png
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _scene(args: argparse.Namespace) -> Any:
-    """The scene, with the pose that was asked for; ValueError where there is none."""
+    """The scene with the requested pose; raises ValueError without one."""
     if (args.ra is None) != (args.dec is None) or (args.ra is None and args.roll is not None):
         raise ValueError("a pose needs both --ra and --dec")
     if args.ra is None and args.scene is None:

@@ -56,13 +56,13 @@ AramisOpener: TypeAlias = "Opener[AramisBoard, Aramis]"
 _Emulated: TypeAlias = "EmulatedDevice[AramisBoard, Aramis]"
 
 FIELD_DEG = 21.53463888888889
-"""Of the published simulations; the lens that was expected to be built has 18."""
+"""Field of the published simulations; the lens to be built was expected to have 18."""
 
 NOISE_TERMS = ("shot", "dark", "background", "quantisation", "readout")
 ROW_CLOCKS = mt9m001.COLUMNS + mt9m001.FRAME_START_CLOCKS + mt9m001.FRAME_END_CLOCKS
 ROW_S = ROW_CLOCKS / mt9m001.PIXEL_CLOCK_HZ
 PHASE_S = 0.2
-"""Measurements start at a random time within so long after each other."""
+"""Measurements start at a random time within this many s of each other."""
 
 
 def _magnitudes(given: Any) -> tuple[float, float]:
@@ -119,7 +119,7 @@ class AramisOptions(attitudes.SkyOptions):
     )
 
     def check(self) -> None:
-        """Options of a picture need one, those of the random sky need that."""
+        """Options for images need --image; options for random skies exclude --scene and --image."""
         if self.image is None and self.given("crop"):
             raise ValueError("--crop belongs to --image")
         hazards.check(self.hazard)
@@ -148,11 +148,11 @@ class AramisResult(attitudes.AttitudeResult):
     Attributes:
         outcome: how the identification ended.
         candidates, pivots, triples: of the identification.
-        far: whether the middle of the triangle, the first three stars with an identity, is more
-            than a field's diameter from the boresight: wrong as appendix E of the thesis counts;
-            None without truth or such stars.
+        far: whether the middle of the triangle (the first three identified stars) is more than a
+            field's diameter from the boresight, which appendix E counts as wrong; None without
+            truth or triangle.
         image_time_s: mid-exposure by the star tracker's clock, since power-up.
-        flips, corrected, lost: bits turned over in flash, and what loading made of the words.
+        flips, corrected, lost: flipped bits in flash, and corrected and lost words on loading.
     """
 
     outcome: str
@@ -178,7 +178,7 @@ class _Experiment(attitudes.AttitudeExperiment["AramisOpener", AramisOptions, Ar
     description = __doc__
 
     def summarise(self, results: Sequence[AramisResult], wall_s: float) -> Iterator[str]:
-        """Beside the usual ones, what is wrong as the thesis counts."""
+        """The usual lines, and wrong results as the thesis counts them."""
         yield from super().summarise(results, wall_s)
         far = 100 * sum(bool(result.far) for result in results) / max(1, len(results))
         yield f"wrong by appendix E's criterion, a triangle more than a field away: {far:.1f} %"
@@ -284,7 +284,7 @@ def _measure(
 def _count_wrong(
     emulated: _Emulated, named: Sequence[Star], truth: NDArray[np.float64] | None
 ) -> int | None:
-    """Identified stars that the truth puts elsewhere; None without a truth."""
+    """Number of wrongly identified stars; None without a truth."""
     camera = emulated.board.camera
     if truth is None or not isinstance(camera.scene, SkyScene):
         return None
@@ -296,7 +296,7 @@ def _count_wrong(
 def _is_far(
     named: Sequence[Star], field_deg: float, truth: NDArray[np.float64] | None
 ) -> bool | None:
-    """Appendix E's criterion of a wrong result; None where it can not be told."""
+    """Appendix E's criterion of a wrong result; None if it cannot be evaluated."""
     triangle = [star.hipparcos or 0 for star in named[:3]]
     if truth is None or len(triangle) < 3:
         return None

@@ -79,7 +79,7 @@ class CubeSenseOptions(MeasureOptions):
     hazard: tuple[hazards.Asked, ...] = hazards.hazard_option()
 
     def check(self) -> None:
-        """Options of the random pose need one; a search reads the camera's own memory."""
+        """Options for random poses exclude --scene; a search reads the camera's own memory."""
         hazards.check(self.hazard, earth=True)
         if self.scene is not None and self.given(*POSE):
             names = ", ".join(map(option_string, POSE))
@@ -100,17 +100,17 @@ class SensorResult(Result):
 
     Attributes:
         sensor: "sun" or "nadir".
-        detected: whether the angles are a measurement.
+        detected: whether the angles are valid.
         alpha_deg, beta_deg: measured angles along the picture's rows and columns.
-        truth_alpha_deg, truth_beta_deg: what they should be.
+        truth_alpha_deg, truth_beta_deg: true angles.
         error_deg: angle between the measured and the true direction.
         tolerance_deg: error up to which a direction is right: the thesis' goals, sections 7.1 and
             7.2, by sensor and, for the Sun, by its angle to the boresight; three times what the
-            device claims where that is more.
-        right: whether the direction is, or nothing was found where nothing can be seen.
+            device claims if that is more.
+        right: whether the direction is right, or rightly nothing was found.
         sigma_deg: standard deviations of alpha and beta that the device claims; None where it
             claims none.
-        reason: why the detection ended so, by name; "none" of the published program.
+        reason: why the detection ended as it did; "none" in profile ``published``.
         edges: edges that the nadir sensor's fit used; None for the sun sensor.
         sun_pixels: pixels of the sun sensor's mean; None for the nadir sensor.
         pixels_read: pixels that the processor read from the FPGA.
@@ -140,12 +140,12 @@ class SensorResult(Result):
 
     @property
     def solved(self) -> bool:
-        """As experiments with star trackers call it."""
+        """The name that star trackers' results use."""
         return self.detected
 
 
 def _told(results: Sequence[SensorResult]) -> str:
-    """How many detected their target; over those the errors, and the times."""
+    """Number of detections; their errors and times."""
     errors = [result.error_deg for result in results if result.error_deg is not None]
     times = [result.phase_ms["total"] for result in results if result.detected]
     right = sum(result.right for result in results)
@@ -160,8 +160,8 @@ def _told(results: Sequence[SensorResult]) -> str:
 
 
 def _claimed(results: Sequence[SensorResult]) -> str | None:
-    """How errors compare with the standard deviations claimed, and the longest step of each kind;
-    None where none is claimed.
+    """Errors against the claimed standard deviations, and the longest step of each kind; None
+    without claims.
     """
     ratios = np.array([ratio for result in results for ratio in _ratios(result)])
     if not len(ratios):
@@ -176,7 +176,7 @@ def _claimed(results: Sequence[SensorResult]) -> str | None:
 
 
 def _ratios(result: SensorResult) -> list[float]:
-    """Errors of alpha and beta by what was claimed."""
+    """Errors of alpha and beta divided by the claims."""
     if result.sigma_deg is None or result.error_deg is None:
         return []
     pairs = zip(
@@ -262,12 +262,12 @@ class _Experiment(Experiment["CubeSenseOpener", CubeSenseOptions, SensorResult])
         yield f"{wall_s:.1f} s wall time"
 
     def succeeded(self, results: Sequence[SensorResult]) -> bool:
-        """Something was found, or rightly nothing."""
+        """Whether something was found, or rightly nothing."""
         return any(result.detected or result.right for result in results)
 
 
 def _ending(result: SensorResult) -> str:
-    """What became of it, and why nothing was found."""
+    """Its result, and why nothing was found."""
     if not result.capture.startswith("stored"):
         return result.capture
     told = not result.detected and result.reason != "none"
@@ -281,7 +281,7 @@ def _degrees(value: float | None, digits: int = 2) -> str:
 def random_view(
     options: CubeSenseOptions, sensor: Camera, rng: np.random.Generator
 ) -> EarthSunView:
-    """A pose for one sensor: its target anywhere within the given angle, and the Earth at noon."""
+    """A pose for one sensor: its target within the given angle, and the Earth at noon."""
     reach = _or(options.sun_angle, 90.0) if sensor is Camera.SUN else _or(options.tilt, 30.0)
     radius, towards = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random()
     angles = (float(radius * np.cos(towards)), float(radius * np.sin(towards)))
@@ -320,8 +320,8 @@ def measure_once(
     *,
     rated: bool = False,
 ) -> SensorResult:
-    """One measurement into ``sram``, beside the truth; ``rated``: with what the firmware says of
-    its quality.
+    """One measurement into ``sram``, beside the truth; ``rated``: with the firmware's quality
+    telemetry.
     """
     cubesense = emulated.client
     started = time.perf_counter()
@@ -361,7 +361,7 @@ def measure_once(
 def is_right(
     emulated: EmulatedDevice[CubeSenseBoard, CubeSense], sensor: Camera, measured: Measurement
 ) -> bool:
-    """Whether what was detected is as near to the truth as the thesis aimed at."""
+    """Whether the error is within the thesis' goal."""
     truth = emulated.board.truth(sensor) if measured.capture.stored else None
     if truth is None or not truth.visible:
         return False
@@ -372,7 +372,7 @@ def is_right(
 def _tolerance_deg(
     sensor: Camera, truth: SensorTruth | None, claimed: tuple[float, float] | None
 ) -> float:
-    """Goals of sections 7.1 and 7.2, or three of the standard deviations that are claimed."""
+    """Goals of sections 7.1 and 7.2, or three claimed standard deviations."""
     wide = truth is not None and float(truth.vector[2]) < np.cos(np.radians(SUN_WIDE_DEG))
     goal = SUN_WIDE_GOAL_DEG if sensor is Camera.SUN and wide else GOAL_DEG
     return max(goal, 3 * max(claimed or (0.0,)))
@@ -382,7 +382,7 @@ def _error_deg(measured: Measurement, truth: SensorTruth) -> float | None:
     if not measured.detected:
         return None
     vector = direction(measured.alpha_deg, measured.beta_deg)
-    # Precise for small angles, which an arc cosine is not.
+    # Precise for small angles, unlike an arc cosine.
     sine = float(np.linalg.norm(np.cross(vector, truth.vector)))
     return float(np.degrees(np.arctan2(sine, float(vector @ truth.vector))))
 

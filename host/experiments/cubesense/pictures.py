@@ -1,6 +1,6 @@
-"""CubeSense's pictures for people: edges and limb of the Earth, the Sun and its window.
+"""CubeSense's overlays: edges and limb of the Earth, the Sun and its window.
 
-Drawn from what the node tells: angles, radius, edges, first Sun pixel; the lens by its published
+They use the node's telemetry (angles, radius, edges, first Sun pixel) and the lens' published
 polynomial (CubeSense thesis, equation 5.2.3) and boresights (table 5.1), as declared in the
 telecommands.
 """
@@ -28,7 +28,7 @@ LIMB_POINTS = 180
 EDGE = (255, 90, 90)
 FITTED = (120, 255, 120)
 WIDEST_DEG = 90.0
-"""Of the grid: half of what the lens images."""
+"""Extent of the grid in deg: half of the lens' field."""
 
 Pixels = NDArray[np.float64]
 
@@ -57,9 +57,9 @@ def limb(alpha_deg: float, beta_deg: float, radius_deg: float) -> Pixels:
 
 
 def overlay(cubesense: CubeSense, picture: str) -> Overlay:
-    """What was found in the memory called ``picture``: edges and limb, or the Sun and its window.
+    """Overlay of the memory called ``picture``: edges and limb, or the Sun and its window.
 
-    Nothing where no camera's latest picture lies. Raises the client's errors.
+    Empty if it holds no camera's latest image. Raises the client's errors.
     """
     marks, lines = list[Mark](), list[Pixels]()
     for camera in Camera:
@@ -95,9 +95,8 @@ def annotate_nadir(
 ) -> None:
     """Write the nadir ``picture`` (480, 640) with its ``edges`` (n, 2) and the ``fitted`` Earth.
 
-    ``fitted`` is alpha, beta and angular radius in degrees, None when there is no fit; the radius
-    is 0 where the program tells none. ``truth`` is alpha and beta of the Earth's true centre, where
-    that is known. ``title`` is what it shows.
+    ``fitted`` is alpha, beta and angular radius in degrees, or None; the radius is 0 if the program
+    reports none. ``truth`` is alpha and beta of the Earth's true centre, if known.
     """
     sheet = _sheet(picture, Camera.NADIR)
     legend = [Entry("circle", EDGE, "edge found on a scanned line")]
@@ -115,7 +114,7 @@ def annotate_nadir(
             legend.append(Entry("line", FITTED, "limb fitted"))
             told += f", radius {fitted[2]:.2f}°"
         else:
-            told += " (this program tells no radius)"
+            told += " (this program reports no radius)"
     told += _true(sheet, legend, Camera.NADIR, truth)
     legend.append(Entry("cross", GRID, "boresight, angles from it"))
     sheet.save(path, title, told, legend)
@@ -131,9 +130,8 @@ def annotate_sun(
 ) -> None:
     """Write the sun ``picture`` (480, 640) with the window at its ``first`` Sun pixel.
 
-    ``angles`` are alpha and beta in degrees, None when the Sun was not found; ``truth`` the true
-    ones, where they are known. The window is shown once more, enlarged, in the corner of the
-    picture that is farthest from it.
+    ``angles`` are alpha and beta in degrees, None without detection; ``truth`` the true ones, if
+    known. The corner farthest from the window shows it enlarged.
     """
     sheet = _sheet(picture, Camera.SUN)
     legend: list[Entry] = []
@@ -174,11 +172,11 @@ def _angles(angles: tuple[float, float]) -> str:
 def _true(
     sheet: Sheet, legend: list[Entry], camera: Camera, truth: tuple[float, float] | None
 ) -> str:
-    """Mark the truth, if it is known; returns what is told of it."""
+    """Mark the truth, if known; returns its caption."""
     if truth is None:
         return ""
     sheet.mark("ticks", _seen(camera, truth), TRUTH, 1.4)
-    legend.append(Entry("ticks", TRUTH, "truth (not told to the device)"))
+    legend.append(Entry("ticks", TRUTH, "truth (unknown to the device)"))
     return f"; truth {_angles(truth)}"
 
 
@@ -189,7 +187,7 @@ def _inset(
     centre: Pixels,
     truth: Pixels | None,
 ) -> Box:
-    """Put the window, enlarged, where it hides nothing of interest; returns where."""
+    """Draw the enlarged window in a free corner; returns its position."""
     rows, columns = picture.shape
     side = FULL_SIZE.window + 2 * INSET_MARGIN
     left = min(max(origin[0] - INSET_MARGIN, 0), columns - side)

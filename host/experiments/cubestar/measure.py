@@ -60,19 +60,19 @@ MODE_NAMES = {
 }
 
 UNIT_TOLERANCE = 1e-3
-FEWEST_STARS, MOST_STARS = 3, 20  # that an attitude needs, that a search of a picture ends with
+FEWEST_STARS, MOST_STARS = 3, 20  # needed for an attitude; the largest in a search
 SEARCH = "search"
 SKIES = 5
-"""Random skies that a threshold is searched with."""
+"""Random skies in a threshold search."""
 
 START_S = 0.02
-"""A firmware of one's own starts clocks and peripherals meanwhile, and hears nothing."""
+"""Start-up time in s of own firmware, which ignores its ports until then."""
 
 EXPOSED_S = 0.3
-"""About so long after the command the picture is exposed, which only what moves fast notices."""
+"""Approximate time in s from command to exposure; it matters only for fast motion."""
 
 LIMITS_MS = {"detect": 220.0, "match": 250.0, "attitude": 30.0}
-"""The 1 Hz loop leaves 500 ms for all of them (section 5.3.6; with idle time and capture)."""
+"""The 1 Hz loop leaves 500 ms for all steps (section 5.3.6; with idle time and capture)."""
 
 _DN = whole(REQUIRED, "", 1, 255, "DN")
 THRESHOLD = ValueKind(
@@ -110,7 +110,7 @@ class CubeStarOptions(attitudes.SkyOptions):
     )
 
     def check(self) -> None:
-        """Options of a picture need one, those of the random sky need that."""
+        """Options for images need --image; options for random skies exclude --scene and --image."""
         if self.image is None and self.given("camera", "crop"):
             raise ValueError("--crop and --camera belong to --image")
         hazards.check(self.hazard)
@@ -122,7 +122,7 @@ class CubeStarOptions(attitudes.SkyOptions):
 
     @property
     def searches(self) -> bool:
-        """Whether a threshold is searched before the first frame, if the firmware needs one."""
+        """Whether to search a threshold before the first frame, if the firmware needs one."""
         if self.threshold is not None:
             return self.threshold == SEARCH
         uncut = self.is_random and self.mag_limit is None and self.faults is None
@@ -135,7 +135,7 @@ class CubeStarResult(attitudes.AttitudeResult):
 
     Attributes:
         threshold: of detection, in DN.
-        searched: whether it was searched with some skies, or the picture, before.
+        searched: whether it was searched first, with some skies or the image.
     """
 
     threshold: int
@@ -196,13 +196,13 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
 
 
 def wait_started(emulated: CubeStarEmulated) -> None:
-    """Let a firmware of one's own come up."""
+    """Wait for own firmware to start."""
     if emulated.board.firmware:
         emulated.wait(START_S)
 
 
 def _threshold(emulated: CubeStarEmulated, options: CubeStarOptions, searches: bool) -> int:
-    """Search or set the detection threshold; the one that holds."""
+    """Search or set the detection threshold; returns it."""
     command, name = "setDetectionThresholds", "DetectionThreshold"
     found = None if options.threshold == SEARCH else options.threshold
     if searches:
@@ -213,13 +213,13 @@ def _threshold(emulated: CubeStarEmulated, options: CubeStarOptions, searches: b
 
 
 def _adapts(opened: CubeStarOpener) -> bool:
-    """Whether the firmware takes its threshold from each picture, above what is set."""
+    """Whether the firmware raises its threshold by each image."""
     switches: Any = opened.switches
     return opened.rates and bool(switches.detection == "background")
 
 
 def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[None]:
-    """What a threshold is searched with: some random skies, or what the camera looks at."""
+    """Views for a threshold search: random skies, or the camera's scene."""
     if not options.is_random:
         yield
         return
@@ -231,13 +231,13 @@ def _views(emulated: CubeStarEmulated, options: CubeStarOptions) -> Iterator[Non
 
 
 def _picture_truth(image: Path, camera: Path | None) -> NDArray[np.float64] | None:
-    """Attitude of a picture, from the "images" object of its camera file if that has it."""
+    """Attitude of an image, from the "images" object of its camera file, if any."""
     if camera is None:
         return None
     content = json.loads(camera.read_text(encoding="utf-8"))
     try:
         quaternion = content["images"][image.name]["quaternion_xyzw_inertial_to_camera"]
-    except (KeyError, TypeError):  # a camera file need not know the picture
+    except (KeyError, TypeError):  # a camera file may lack the image
         return None
     truth = np.array(quaternion, np.float64)
     if truth.shape != (4,) or not abs(np.linalg.norm(truth) - 1) < UNIT_TOLERANCE:
@@ -281,7 +281,7 @@ def _measure(
     named = solved or status is TaskStatus.CALCULATION_FAILED
     wrong = count_wrong(cubestar, known) if named else 0
     phases = {name: ms for name, ms in cubestar.phase_times().items() if name != "loop_total"}
-    # The flags say why a task ended as its status tells.
+    # The flags say why a task ended.
     flags = [name for name, up in client.telemetry("ErrorFlags").items() if up]
     rated = cubestar.quality() if rates else None
     measured = attitude.quaternion if solved else None
@@ -306,7 +306,7 @@ def _words(reason: IntEnum) -> str:
 
 
 def give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
-    """Tell the device roughly where it looks: an inertial vector (3,)."""
+    """Set the device's rough boresight: an inertial vector (3,)."""
     x, y, z = boresight
     cubestar.client.command(
         "setTrackingMode",
@@ -318,10 +318,10 @@ def give_hint(cubestar: CubeStar, boresight: NDArray[np.float64]) -> None:
 def _prime_tracking(
     emulated: CubeStarEmulated, offset_deg: float, rng: np.random.Generator
 ) -> None:
-    """Let the device find an attitude at most ``offset_deg`` from the one it will track from."""
+    """Have the device find an attitude at most ``offset_deg`` from the one to track."""
     scene = emulated.scene
     if not isinstance(scene, SkyScene):
-        raise ValueError("--mode tracking needs a sky scene: a picture has no frame before it")
+        raise ValueError("--mode tracking needs a sky scene: an image has no previous frame")
     axis = rng.standard_normal(3)
     rate = offset_deg * rng.random() * axis / np.linalg.norm(axis)
     emulated.scene = scene.turned(rate)
@@ -331,7 +331,7 @@ def _prime_tracking(
 
 
 def count_wrong(cubestar: CubeStar, truth: NDArray[np.float64] | None) -> int | None:
-    """Identified stars that the truth puts elsewhere; None without a truth."""
+    """Number of wrongly identified stars; None without a truth."""
     if truth is None:
         return None
     client = cubestar.client

@@ -1,4 +1,4 @@
-"""What it costs to emulate an AraMiS star tracker."""
+"""Cost of emulating AraMiS."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ HIGHEST_GAIN = 15.0
 
 
 def _figures(device: Device[AramisBoard, Aramis]) -> dict[str, float]:
-    """The loop, and the wall times of what it spends them on."""
+    """The loop, and wall times of its parts."""
     database = onboard_database()
     with power_up(device) as emulated:
         emulated.client.activate()

@@ -45,7 +45,7 @@ class _Experiment(StarCalibration[Aramis]):
         return {"catalogue": onboard_database()}
 
     def load(self, client: Aramis, camera: Camera, light: Path | None) -> None:
-        """The field is all that this star tracker is told of its lens."""
+        """This star tracker has only the field as a lens parameter."""
         field_deg = 2 * np.degrees(np.arctan(ROWS / 2 / camera.f_px))
         client.client.command("SetField", FieldOfView=float(field_deg), Round=OnOff.ON)
         client.client.wait_processed(1.0)

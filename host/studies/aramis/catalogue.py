@@ -24,7 +24,7 @@ from cubestack.host.options import Options, path_option
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueOptions(Options):
-    """What the catalogue is compiled for; None as it is flown."""
+    """Options of the catalogue; None means as flown."""
 
     mag_limit: float | None = number(None, "faintest star, included; default 6", metavar="V")
     epoch: float = number(2026.0, "default 2026", 1800, 2200, metavar="YEAR")
@@ -35,7 +35,7 @@ class CatalogueOptions(Options):
     output: Path | None = path_option(None, "write the flash image")
 
     def parameters(self) -> CatalogueParameters:
-        """As the compiler of the catalogue takes them; ValueError for what it can not do."""
+        """Arguments of the catalogue's compiler; raises ValueError if invalid."""
         given: dict[str, Any] = {
             "fov_deg": self.fov,
             "stars_per_field": self.stars_per_field,

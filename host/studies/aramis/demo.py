@@ -22,7 +22,7 @@ from cubestack.host.terminal import tell
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion
 ROUGHLY_OFF_DEG = 2.0
 MOST_STARS = int(INTERFACE.telecommand("SetDetection").reset_values()["MaxStars"])
-"""Stars that are kept of a picture, at most."""
+"""Largest number of stars kept per image."""
 
 
 def show(
@@ -50,7 +50,7 @@ def show(
         switches = aramis.profile()
         left_out = [f"all but the {MOST_STARS} brightest"] if len(stars) >= MOST_STARS else []
         if isinstance(switches, AramisSwitches) and switches.belief == "unique":
-            left_out.append("names of stars outside the triangle that was unique")
+            left_out.append("names of stars outside the unique triangle")
         picture = download("the picture over the serial line", aramis.image)
     save_picture(picture, out / "aramis-raw.png")
     lens = CONDITION.optics.project

@@ -1,4 +1,4 @@
-"""AraMiS' published figures (thesis, Politecnico di Torino, 2008) and what measures ours."""
+"""AraMiS' published figures (thesis, Politecnico di Torino, 2008) and their trials."""
 
 from collections.abc import Sequence
 
@@ -66,7 +66,7 @@ def _catalogue(_opened: AramisOpener, _frames: int) -> Figures:
 
 
 def _lookups(_opened: AramisOpener, frames: int) -> Figures:
-    """Triangles that a lookup by area and one by moment give, both, and after one pivot.
+    """Triangles found by area, by moment, by both, and after one pivot.
 
     Stars of random fields without noise, with the bounds of appendix E; means of main triangles.
     """

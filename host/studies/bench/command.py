@@ -6,11 +6,11 @@ import json
 from cubestack.host.devices.registry import devices
 from cubestack.host.terminal import busy, tell
 
-COMPARISON = "What compares the engines that can run the FPGA designs is `make bench-engines`."
+COMPARISON = "`make bench-engines` compares the engines that run the FPGA designs."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the option, and tell what each figure means."""
+    """Declare the option, with the meaning of each figure."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     lines = [
         f"{name:<17} {device.title}: {meaning}"

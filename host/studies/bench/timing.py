@@ -1,4 +1,4 @@
-"""What benchmarks of devices have in common."""
+"""Shared parts of the benchmarks."""
 
 import time
 from collections.abc import Callable
@@ -9,11 +9,11 @@ LOOP_S = 10
 """Virtual time over which a loop is measured."""
 
 ROUNDS = 5
-"""Times that something short is measured: the best one counts, the rest is the machine's noise."""
+"""Repetitions of short measurements: the best counts, the rest is noise of the machine."""
 
 
 def simulated_ratio(emulated: AnyEmulated, run: Callable[[], None]) -> float:
-    """Simulated seconds for each wall second of ``run``."""
+    """Simulated seconds per wall second of ``run``."""
     virtual, wall = emulated.time_s, time.perf_counter()
     run()
     return round((emulated.time_s - virtual) / (time.perf_counter() - wall), 2)

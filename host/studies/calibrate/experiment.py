@@ -1,7 +1,7 @@
-"""What calibrating star trackers has in common: pictures in, stars named by the device, a fit.
+"""Shared calibration of star trackers: images in, stars identified by the device, a fit.
 
-The device detects and identifies, with its own firmware: only what comes back over its serial line
-is fitted. The stars' directions are the catalogue's.
+The device detects and identifies with its own firmware; the fit uses only what comes back over its
+serial line, with directions from the catalogue.
 """
 
 from abc import abstractmethod
@@ -59,15 +59,15 @@ class CalibrateOptions(Options):
     )
 
     def check(self) -> None:
-        """A scene is for emulated pictures; the camera's file can be written."""
+        """A scene needs emulated images; the camera's file must be writable."""
         if self.images is not None and self.scene is not None:
-            raise ValueError("--scene belongs to --emulated: it says what lens the unit has")
+            raise ValueError("--scene requires --emulated: it sets the unit's lens")
         if self.out is not None and (self.out.suffix != ".json" or not self.out.parent.is_dir()):
             raise ValueError(f"--out must be a file NAME.json in a folder that is, not {self.out}")
 
     @property
     def pictures(self) -> list[Path]:
-        """The files of ``images``, in the order of their names; ValueError when there is none."""
+        """The files of ``images`` by name; raises ValueError if there are none."""
         given = self.images
         if given is None:
             return []
@@ -81,7 +81,7 @@ class CalibrateOptions(Options):
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What the device looks at: a sky, or the part of a picture from ``corner`` on."""
+    """A sky, or the part of an image from ``corner`` on."""
 
     scene: Any
     picture: Path | None = None
@@ -95,8 +95,8 @@ class CalibrateResult(Result):
     Attributes:
         camera: the fitted parameters, as a camera file has them, and ``sigma`` their deviations.
         pairs_f_px: focal length by star pairs near the middle; None without any.
-        pictures: that were used, of all ``tried``; of a large picture each part counts.
-        stars, rejected: that count, and outliers.
+        pictures: images used, of all ``tried``; each part of a large image counts.
+        stars, rejected: stars used, and outliers.
         before_px, after_px: root mean square residual with the camera at first, and fitted.
         lens_px: root mean square distance of the fitted camera from the emulated unit's lens over
             the picture, at the best rotation; None for pictures of an unknown lens.
@@ -123,8 +123,8 @@ class StarCalibration(
 ):
     """Calibrates a star tracker's camera.
 
-    The firmware that names the stars is the extended one: as printed, it names few with a lens
-    that is a pixel off.
+    It uses profile ``extended``: the published one identifies few stars with a lens that is a pixel
+    off.
 
     Attributes:
         size: columns and rows of the sensor.
@@ -145,24 +145,24 @@ class StarCalibration(
 
     @abstractmethod
     def condition(self, options: CalibrateOptions) -> SkyCondition:
-        """What the camera is like of the unit that takes emulated pictures."""
+        """The camera of the emulated unit."""
 
     @abstractmethod
     def load(self, client: ClientT, camera: Camera, light: Path | None) -> None:
-        """Tell the device its camera, and what else it needs for a picture, if it is one."""
+        """Load the camera into the device, and settings for an image file."""
 
     @abstractmethod
     def identify(self, client: ClientT) -> Sequence[FoundStar]:
-        """Take a picture; the stars that the device finds, where it has an attitude."""
+        """Capture an image; returns the identified stars if there is an attitude."""
 
     def board(self, camera: Camera) -> Mapping[str, Any]:
-        """Options of the board that go with a camera."""
+        """Board options for a camera."""
         return {}
 
     def run(
         self, opened: "_Opener[ClientT]", options: CalibrateOptions
     ) -> Iterator[CalibrateResult]:
-        """Identify and fit, several times over."""
+        """Identify and fit repeatedly."""
         given = options.camera
         guess = camera = self._like(self.tables()) if given is None else load_camera(given)
         looks = self._looks(options)
@@ -193,7 +193,7 @@ class StarCalibration(
         )
 
     def _looks(self, options: CalibrateOptions) -> list[_Look]:
-        """All that the device looks at; large pictures in parts that do not overlap."""
+        """All views; large images in parts that do not overlap."""
         if options.images is None:
             rng, own = np.random.default_rng(options.seed), self.condition(options)
             skies = [
@@ -214,7 +214,7 @@ class StarCalibration(
     def _sights(
         self, opened: "_Opener[ClientT]", seed: int, looks: Sequence[_Look], camera: Camera
     ) -> Iterator[Sight]:
-        """Each picture's identified stars, by a device that has ``camera`` loaded."""
+        """Each image's identified stars, with ``camera`` loaded."""
         sky = load_sky()
         own = self.board(camera)
         with opened(looks[0].scene, seed=seed, profile="extended", **own) as emulated:
@@ -229,7 +229,7 @@ class StarCalibration(
                 yield Sight(places, sky.vectors[rows])
 
     def _like(self, optics: Optics) -> Camera:
-        """The camera that is most like a lens over the picture."""
+        """The camera closest to a lens over the image."""
         f_px = 1000 * optics.focal_length_mm / optics.pixel_pitch_um
         return self._over_picture(optics, Camera(f_px, optics.cx, optics.cy), self.free).camera
 

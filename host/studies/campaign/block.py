@@ -1,7 +1,7 @@
-"""Measures a block of frames, in whatever process or on whatever machine.
+"""Measures a block of frames, in any process or machine.
 
-A frame that fails is a row with its error, and the next one starts with a seed of its own; so any
-row is measured again by its seed and its place after it.
+A failed frame is a row with its error, and the next one starts with a new seed; so any row can be
+measured again from its seed and its position after it.
 """
 
 from collections.abc import Iterator
@@ -17,12 +17,12 @@ from cubestack.host.experiments.rates import outcome, why_refused
 from cubestack.host.studies.campaign.plan import FrameBlock, Values
 
 WALL = "wall_ms"
-"""The one value of a result that another run does not give again."""
+"""The only value of a result that does not repeat."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """What became of a picture.
+    """Outcome of a frame.
 
     Attributes:
         block, row: of the campaign; of the block, from 0.
@@ -49,7 +49,7 @@ class Row:
 
 
 def rows_of(block: FrameBlock) -> int:
-    """How many rows it makes: of devices with several cameras, one for each in a frame."""
+    """Number of rows: one per camera and frame."""
     experiment = experiment_of(registered(block.device), block.command)
     own = experiment.options.declared()
     options = {name: value for name, value in block.options.items() if name in own}
@@ -57,13 +57,13 @@ def rows_of(block: FrameBlock) -> int:
 
 
 def measured(block: FrameBlock, frames: int, seed: int, **more: Any) -> Iterator[Any]:
-    """Results from one power-up on; ``more`` as ``measure`` has it."""
+    """Results from one power-up on; ``more`` are arguments of ``measure``."""
     options = {"frames": frames, "seed": seed, **block.options}
     return measure(block.device, command=block.command, **options, **more)
 
 
 def frames_of(block: FrameBlock, seed: int) -> int:
-    """How many frames were to be measured from the power-up with that seed on."""
+    """Number of frames planned for the power-up with that seed."""
     seeds = [block.seed, *(_seed(block.seed, frame) for frame in range(1, block.frames))]
     return block.frames - seeds.index(seed)
 
@@ -82,7 +82,7 @@ def perform(block: FrameBlock) -> list[Row]:
 def _measured(
     block: FrameBlock, results: Iterator[Any], before: int, seed: int, a_frame: int
 ) -> Iterator[Row]:
-    """Rows from one power-up on, up to the first frame that fails."""
+    """Rows from one power-up on, up to the first failed frame."""
     after = 0
     try:
         for result in results:
@@ -94,14 +94,14 @@ def _measured(
             after += 1
     except CompilerError:
         raise
-    except Exception as error:  # whatever it is: of one frame of thousands
+    except Exception as error:  # any error of one frame among thousands
         text = f"{type(error).__name__}: {error}"
         for other in range(after, after + a_frame - after % a_frame):
             yield Row(block.number, before + other, seed, other, block.swept, "failed", text, {})
 
 
 def _seed(seed: int, frame: int) -> int:
-    """For the frames of a block from one on."""
+    """Seed for the frames of a block from one on."""
     return int(np.random.default_rng([seed, frame]).integers(1 << 31))
 
 

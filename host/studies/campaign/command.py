@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run or replay; 1 when frames failed, or when it was stopped."""
+    """Run or replay; returns 1 if frames failed or it was stopped."""
     if args.list:
         return _list(as_json=args.json)
     if not args.words:
@@ -153,7 +153,7 @@ def _report(args: argparse.Namespace) -> int:
 
 
 def _show(folder: Folder, *, as_json: bool) -> int:
-    """Rates at every point; returns how many frames failed."""
+    """Print the rates at every point; returns the number of failed frames."""
     found = statistics.rates(folder)
     names = list(folder.plan.grid)
     table = Table(*names, *statistics.ENDINGS, title="results, and 95 % limits of their rates")

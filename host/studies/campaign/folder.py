@@ -1,8 +1,7 @@
-"""A campaign's folder: its plan, and a row for each result, which outlive whatever stops the run.
+"""A campaign's folder: its plan and a row per result, which survive any interruption.
 
-The rows of a block are added at once when it is done. What a kill or a full disk left of a block is
-taken out when the campaign goes on. When all are there they are put into order, so that the file
-does not tell how many workers made it.
+The rows of a finished block are appended together. Resuming removes incomplete blocks. A complete
+campaign is sorted, so that its file does not depend on the number of workers.
 """
 
 import fcntl
@@ -20,7 +19,7 @@ PLAN, ROWS = "campaign.json", "rows.jsonl"
 
 
 class FolderError(ValueError):
-    """A folder that is not this campaign's."""
+    """The folder does not belong to this campaign."""
 
 
 class Folder:
@@ -33,7 +32,7 @@ class Folder:
     """
 
     def __init__(self, path: Path) -> None:
-        """Open one that there is; FolderError where there is no campaign in it."""
+        """Open an existing folder; raises FolderError if it has no campaign."""
         self.path = path
         try:
             told = json.loads((path / PLAN).read_text("utf-8"))
@@ -45,7 +44,7 @@ class Folder:
 
     @classmethod
     def begun(cls, path: Path, plan: CampaignPlan, *, resume: bool) -> "Folder":
-        """The folder for a plan: a new one or, to ``resume``, the one that it has.
+        """The folder for a plan: a new one or, to ``resume``, its existing one.
 
         Raises:
             FolderError: it has results and is not to be resumed, or they are of another plan or of
@@ -55,13 +54,13 @@ class Folder:
         path.mkdir(parents=True, exist_ok=True)
         if not (path / PLAN).is_file():
             if any(path.iterdir()):
-                raise FolderError(f"{path} is not empty, and no campaign's; give another folder")
+                raise FolderError(f"{path} is not empty and has no campaign; choose another folder")
             told = {"version": version("cubestack"), "plan": plan.as_dict()}
             _replace(path / PLAN, [json.dumps(told, indent=1) + "\n"])
             return cls(path)
         found = cls(path)
         if not resume:
-            raise FolderError(f"{path} has a campaign already; --resume goes on with it")
+            raise FolderError(f"{path} already has a campaign; --resume continues it")
         if found.version != version("cubestack"):
             raise FolderError(
                 f"{path} was begun by cubestack {found.version}, and this is {version('cubestack')}"
@@ -75,7 +74,7 @@ class Folder:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep others from adding rows meanwhile; FolderError when one does already."""
+        """Lock the folder; raises FolderError if another process has it."""
         with (self.path / PLAN).open() as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -84,7 +83,7 @@ class Folder:
             yield
 
     def rows(self) -> Iterator[Row]:
-        """All rows so far, as they stand; of a torn last line, none."""
+        """All rows so far, without a torn last line."""
         try:
             with (self.path / ROWS).open(encoding="utf-8") as file:
                 for line in file:
@@ -94,7 +93,7 @@ class Folder:
             return
 
     def repair(self, rows_of: Mapping[int, int]) -> set[int]:
-        """Take out blocks that have not all of their rows; the numbers of the others."""
+        """Remove incomplete blocks; returns the numbers of the others."""
         found: dict[int, int] = {}
         for row in self.rows():
             found[row.block] = found.get(row.block, 0) + 1
@@ -104,7 +103,7 @@ class Folder:
         return whole
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Add the rows of a block; OSError names the file when the disk is full."""
+        """Append the rows of a block; raises OSError with the file's name if the disk is full."""
         path = self.path / ROWS
         try:
             with path.open("a", encoding="utf-8") as file:
@@ -123,7 +122,7 @@ def _line(row: Row) -> str:
 
 
 def _replace(path: Path, lines: Iterable[str]) -> None:
-    """Write a file that is there whole or not at all."""
+    """Write a file atomically."""
     new = path.with_suffix(".new")
     with new.open("w", encoding="utf-8") as file:
         file.writelines(lines)

@@ -9,7 +9,7 @@ FILE = "rows.parquet"
 
 
 def write(folder: Folder) -> Path:
-    """Write the rows that there are so far, a column for each value; returns the file.
+    """Write the rows so far, a column per value; returns the file.
 
     Columns are the attributes of ``Row``; a swept option is ``swept.NAME``, a value of the result
     ``result.NAME``.

@@ -1,12 +1,11 @@
-"""What a campaign measures: a TOML file, and the blocks of frames that it asks for.
+"""A campaign's plan: a TOML file, and its blocks of frames.
 
 The file has ``device``, ``frames`` and ``seed``, and three tables of options of `cubestack measure
 DEVICE`, or of another ``command``: ``[options]`` for all frames, ``[grid]`` with lists of which
 every combination is a point, and ``[random]`` with what is drawn anew for each block
 (docs/campaigns.md has an example).
 
-All points see the same skies and the same drawn values, so that points differ by what they are and
-not by luck.
+All points use the same skies and the same drawn values, so that they differ only by their options.
 """
 
 import tomllib
@@ -24,17 +23,17 @@ from cubestack.host.experiments.measure import MEASURE, board_options, experimen
 from cubestack.host.options import Options
 
 FRAMES = 100
-"""Frames of a block: a device is powered up, and its threshold searched, once for so many."""
+"""Frames per block: a device is powered up, and its threshold searched, once per block."""
 
 DECIDED = ("frames", "seed")
-"""Options of `measure` that the plan decides."""
+"""Options of `measure` that the plan sets."""
 
 Values = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class FrameBlock:
-    """Frames that one worker measures one after the other; what it gives hangs on nothing else.
+    """Frames that one worker measures in sequence; the result depends on nothing else.
 
     Attributes:
         number: counts from 0 through the campaign.
@@ -77,7 +76,7 @@ class CampaignPlan(Options):
     random: Mapping[str, Values] = field(default_factory=dict)
 
     def check(self) -> None:
-        """Refuse what can not be measured; ValueError names the key."""
+        """Raise ValueError, with the key, for an invalid plan."""
         for name in ("options", "grid", "random"):
             if not isinstance(getattr(self, name), dict):
                 raise ValueError(f"{name} must be a table of options")
@@ -89,7 +88,7 @@ class CampaignPlan(Options):
         given = [*self.options, *self.grid, *self.random]
         for name in given:
             if name in DECIDED:
-                raise ValueError(f"{name} stands at the top of a plan, not among options")
+                raise ValueError(f"{name} belongs at the top of a plan, not in options")
             if given.count(name) > 1:
                 raise ValueError(f"{name} is given in two of options, grid and random")
         for block in self.blocks():
@@ -120,7 +119,7 @@ class CampaignPlan(Options):
             raise ValueError(f"{path}: {error}") from None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; ``Plan(**...)`` makes the same one of it."""
+        """As JSON; ``Plan(**...)`` restores it."""
         return dict(vars(self))
 
     @property
@@ -175,7 +174,7 @@ def _where(block: FrameBlock, error: str) -> str:
 
 
 def _with_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """The table with the paths of files in options, which start at the plan's folder, as told."""
+    """The table with paths of files relative to the plan's folder."""
     device = registered(table["device"])
     experiment = experiment_of(device, table.get("command", MEASURE))
     files = {

@@ -1,4 +1,4 @@
-"""Plans that come with the devices, by name: files in a folder beside each one's experiments."""
+"""Plans shipped with the devices, by name: files in a folder beside each one's studies."""
 
 from importlib import resources
 from pathlib import Path
@@ -20,15 +20,15 @@ def known_plans() -> dict[str, Path]:
 
 
 def summary(path: Path) -> str:
-    """What a plan is for: the comment on its first line."""
+    """A plan's purpose: the comment on its first line."""
     first, _, _ = path.read_text("utf-8").partition("\n")
     return first.removeprefix("#").strip() if first.startswith("#") else ""
 
 
 def plan_file(given: str) -> Path:
-    """The file that a user means by a path, or by the name of a plan that comes with a device.
+    """The file of a path, or of the name of a shipped plan.
 
-    Raises ValueError for a name that is neither.
+    Raises ValueError if it is neither.
     """
     path, known = Path(given), known_plans()
     if given in known and not path.exists():

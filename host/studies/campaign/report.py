@@ -1,4 +1,4 @@
-"""A campaign's page: one HTML file with its figures inside, which asks for nothing outside."""
+"""A campaign's page: one self-contained HTML file."""
 
 from base64 import b64encode
 from collections import Counter
@@ -17,7 +17,7 @@ from cubestack.host.studies.campaign.worst import Case
 
 PAGE = "report.html"
 FAILURES = 20
-"""Failed frames that the page lists."""
+"""Number of failed frames on the page."""
 
 STYLE = """
 body { font: 15px/1.5 sans-serif; color: #111; background: #fff; max-width: 60em; margin: 2em auto;
@@ -34,7 +34,7 @@ def write(
     against: Path | None = None,
     cases: Sequence[Case] = (),
 ) -> list[Path]:
-    """Write the page and its figures into the folder; the files, the page first.
+    """Write the page and its figures into the folder; returns the files, page first.
 
     ``cases`` are shown with their pictures.
 
@@ -64,7 +64,7 @@ def write(
 
 
 def _swept(folder: Folder, name: str, found: Mapping[Point, Counter[str]]) -> bytes:
-    """Rates over one swept option, whatever the others are."""
+    """Rates over one swept option, for all values of the others."""
     values = folder.plan.grid[name]
     counted = [Counter[str]() for _ in values]
     for point, ended in found.items():
@@ -110,7 +110,7 @@ def _page(
         data = b64encode(png).decode("ascii")
         parts.append(f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">')
     if cases:
-        parts.append("<h2>worst cases, and what the cameras saw, stretched for the eye</h2>")
+        parts.append("<h2>Worst cases with the camera images, contrast stretched</h2>")
     for case in cases:
         data = b64encode(case.jpeg).decode("ascii")
         image = f'<br><img alt="" src="data:image/jpeg;base64,{data}">' if case.jpeg else ""
@@ -146,7 +146,7 @@ def _changes(changes: Sequence[Change]) -> str:
 
 
 def verdict(change: Change) -> str:
-    return "worse" if change.worse else "better" if change.significant else "no change to be seen"
+    return "worse" if change.worse else "better" if change.significant else "no change"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

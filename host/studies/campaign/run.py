@@ -13,12 +13,12 @@ from cubestack.host.studies.workers import performed
 
 
 def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[Row]:
-    """Measure what is missing; yields each row that is in the folder, first those from before.
+    """Measure the missing rows; yields each row of the folder, earlier ones first.
 
     Raises:
         FolderError: another process works on it.
-        WorkersError: workers that can not be had or went away; what is done is kept.
-        RuntimeError: nothing but failures in the first block that ended.
+        WorkersError: workers are unavailable or lost; finished blocks are kept.
+        RuntimeError: all frames of the first finished block failed.
     """
     blocks = {block.number: block for block in folder.plan.blocks()}
     with folder.alone():
@@ -35,14 +35,14 @@ def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[
 
 
 def count(plan: CampaignPlan) -> int:
-    """How many rows a campaign has."""
+    """Number of rows of a campaign."""
     return sum(map(rows_of, plan.blocks()))
 
 
 def replayed(folder: Folder, number: int) -> dict[str, Any]:
-    """What the frame of a row of the file, counted from 0, gives now.
+    """Measure again the frame of a row, counted from 0.
 
-    Raises FolderError for a row that there is not; and whatever the frame failed with.
+    Raises FolderError for an unknown row, and the frame's own errors.
     """
     rows = list(folder.rows())
     if not 0 <= number < len(rows):
@@ -53,7 +53,7 @@ def replayed(folder: Folder, number: int) -> dict[str, Any]:
 def again(
     folder: Folder, row: Row, opened: Callable[[AnyEmulated], object] = lambda _emulated: None
 ) -> dict[str, Any]:
-    """The result of a row's frame, measured again; ``opened`` is told of the device."""
+    """The result of a row's frame, measured again; ``opened`` is called with the device."""
     block: FrameBlock = next(each for each in folder.plan.blocks() if each.number == row.block)
     results = measured(block, frames_of(block, row.seed), row.seed, opened=opened)
     found: dict[str, Any] = next(islice(results, row.after, None)).as_dict()
@@ -61,5 +61,5 @@ def again(
 
 
 def default_folder(path: Path) -> Path:
-    """Where the results of a plan's file go."""
+    """Folder for the results of a plan's file."""
     return Path(f"{path.stem}.campaign")

@@ -1,4 +1,4 @@
-"""What the rows of a campaign say together: rates, errors, and whether another campaign differs."""
+"""Statistics of a campaign: rates, errors, and differences to another campaign."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -12,27 +12,27 @@ from cubestack.host.studies.campaign.folder import Folder, FolderError
 ENDINGS = ("right", "refused", "wrong", "failed")
 
 ERROR = "error"
-"""What the names of errors begin with, in results."""
+"""Prefix of error names in results."""
 
 SIGNIFICANCE = 0.01
-"""Probability that a comparison tells a change where there is none, over all of its lines."""
+"""Probability of a false change in a comparison, over all its lines."""
 
 Point = tuple[tuple[str, Any], ...]
 
 
 def point_of(row: Row, names: Iterable[str]) -> Point:
-    """Where a row stands in the grid: names and values."""
+    """A row's point in the grid: names and values."""
     values = ((name, row.swept[name]) for name in names)
     return tuple((name, tuple(v) if isinstance(v, list) else v) for name, v in values)
 
 
 def told(point: Point) -> str:
-    """A point as a reader has it; all of a campaign without a grid."""
+    """Text of a point; "all" without a grid."""
     return ", ".join(f"{name} = {value}" for name, value in point) or "all"
 
 
 def rates(folder: Folder) -> dict[Point, Counter[str]]:
-    """How many rows ended how, by point of the grid."""
+    """Number of rows of each outcome, by point of the grid."""
     found: dict[Point, Counter[str]] = {}
     for row in folder.rows():
         found.setdefault(point_of(row, folder.plan.grid), Counter())[row.outcome] += 1
@@ -40,7 +40,7 @@ def rates(folder: Folder) -> dict[Point, Counter[str]]:
 
 
 def errors(folder: Folder) -> dict[str, dict[Point, list[float]]]:
-    """Sizes of errors of what is not refused, rising, by their name and point of the grid."""
+    """Sorted error sizes of the solved rows, by name and point of the grid."""
     found: dict[str, dict[Point, list[float]]] = {}
     measured = (row for row in folder.rows() if row.outcome in ("right", "wrong"))
     for row in measured:
@@ -56,13 +56,13 @@ def errors(folder: Folder) -> dict[str, dict[Point, list[float]]]:
 
 @dataclass(frozen=True)
 class Change:
-    """What another campaign has of an outcome at a point, on the same skies.
+    """Change of an outcome at a point in another campaign of the same skies.
 
     Attributes:
         point, outcome: of the rows.
-        before, after: how many have it.
-        lost, gained: rows that only the first, and only the other one has.
-        chance: probability of so unequal numbers, or more so, if nothing changed.
+        before, after: number of rows with it.
+        lost, gained: rows with it only in the first, and only in the other campaign.
+        chance: probability of such unequal numbers if nothing changed.
         significant: less than `SIGNIFICANCE` by the number of lines.
     """
 
@@ -77,15 +77,15 @@ class Change:
 
     @property
     def worse(self) -> bool:
-        """Significantly fewer right, or more wrong or failed."""
+        """Whether significantly fewer are right, or more wrong or failed."""
         fewer = self.after < self.before
         return self.significant and (fewer if self.outcome == "right" else not fewer)
 
 
 def compared(first: Folder, other: Folder) -> list[Change]:
-    """Changes of what is right, wrong or failed, row by row.
+    """Changes of right, wrong and failed rows.
 
-    The test is McNemar's, exact: of the rows that changed, as many should have changed either way.
+    It is McNemar's exact test: without a change, rows change equally often either way.
 
     Raises:
         FolderError: they have not the same skies.
@@ -123,7 +123,7 @@ def _change(
 
 
 def by_chance(one: int, other: int) -> float:
-    """Probability that so many coins fall so unequally, or more so."""
+    """Two-sided binomial probability of numbers at least this unequal."""
     of = one + other
     tail = sum(comb(of, number) for number in range(min(one, other) + 1))
     return min(1.0, 2 * tail / (1 << of))

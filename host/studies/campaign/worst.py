@@ -1,4 +1,4 @@
-"""The worst cases of a campaign, measured again to show what the cameras saw."""
+"""The worst cases of a campaign, measured again to render their images."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from cubestack.host.studies.campaign.run import again
 from cubestack.host.studies.campaign.statistics import ERROR
 
 ORDER = ("failed", "wrong", "refused", "right")
-"""Of outcomes, the worst first."""
+"""Outcomes, worst first."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A row with its number in the file, what there is to say, and the picture as JPEG, if any."""
+    """A row with its number in the file, a caption, and the image as JPEG, if any."""
 
     number: int
     text: str
@@ -27,9 +27,9 @@ class Case:
 
 
 def worst(folder: Folder, count: int) -> Iterator[Case]:
-    """The worst cases, the worst first: by outcome, then by the largest error.
+    """The worst cases first: by outcome, then by largest error.
 
-    Each costs what it took to come to its frame. Only pictures of `measure` are shown.
+    Each needs the run up to its frame. Only `measure` has images.
     """
     if folder.plan.command != MEASURE:
         return
@@ -51,7 +51,7 @@ def _errors(row: Row) -> dict[str, float]:
 
 
 def _told(row: Row) -> str:
-    """Outcome and reason, errors, and where it stands in what was swept."""
+    """Outcome and reason, errors, and the swept options."""
     errors = ", ".join(f"{name} {value:.3g}" for name, value in _errors(row).items())
     swept = ", ".join(f"{name} = {value}" for name, value in row.swept.items())
     return "; ".join(part for part in (row.outcome, row.reason, errors, swept) if part)
@@ -61,7 +61,7 @@ def _picture(folder: Folder, row: Row) -> bytes:
     seen = list[AnyEmulated]()
     try:
         again(folder, row, seen.append)
-    except Exception:  # it failed before, and may again: what was seen until then counts
+    except Exception:  # it may fail again; images up to then are shown
         if row.outcome != "failed":
             raise
     picture = picture_of(seen[-1].board) if seen else None

@@ -1,7 +1,7 @@
-"""Measure what a device's program costs as compiled code, on its simulated processor.
+"""Count the cycles of a device's program as compiled code on its simulated processor.
 
-Each operation of the cost table that the device's model charges is compiled, and counted in cycles;
-so is a whole picture's processing, phase by phase. Needs arm-none-eabi-gcc.
+It compiles each operation of the device's cost table, and the processing of a whole image phase
+by phase, and counts their cycles. Needs arm-none-eabi-gcc.
 
 examples:
   cubestack costs measure
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 def _report(name: str | None) -> CostReport:
     chosen: AnyDevice | None = next((d for d in devices() if d.name == name), None)
     if chosen is None or "costs" not in chosen.studies:
-        raise ValueError("no device here has a program that can be compiled")
+        raise ValueError("no device has a program to compile")
     report: CostReport = chosen.study("costs")
     return report
 
@@ -72,7 +72,7 @@ def _known(option: str, wanted: list[str] | None, known: tuple[str, ...]) -> tup
 
 
 def _show(report: CostReport, found: list[CostMeasurement]) -> None:
-    """Operations, a column a build, beside what is charged."""
+    """Operations with a column per build, beside the charged cycles."""
     first = [one for one in found if one.timing == found[0].timing]
     table = Table("operation", "charged", *(one.build for one in first))
     for name, charged in report.table.items():

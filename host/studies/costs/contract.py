@@ -1,4 +1,4 @@
-"""What a device's program costs as compiled code, and how that is measured."""
+"""Contract of compiled costs: results, and how they are measured."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ class CostMeasurement:
 
 @dataclass(frozen=True)
 class CostReport:
-    """How the costs of a device's program are measured.
+    """The cost measurement of a device's program.
 
     Attributes:
-        levels, precisions: which builds there are.
-        measure: measures those of some levels and precisions, one after the other.
-        as_data: what goes into ``file``.
+        levels, precisions: available builds.
+        measure: measures builds of the given levels and precisions.
+        as_data: content of ``file``.
         page: a table for ``document``, a page of docs.
         table: cycles that the device's model charges, by name.
     """

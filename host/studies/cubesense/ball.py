@@ -1,8 +1,8 @@
-"""Measure CubeSense's nadir sensor before the ball of its bench (thesis, section 7.1).
+"""Measure CubeSense's nadir sensor in front of a test ball (thesis, section 7.1).
 
-A rotary stage turns the sensor before a lit ball as large as the Earth from 750 km.
-At each angle several pictures are measured; their mean less the stage's angle is
-the offset, as in figure 7.1, and they scatter by sigma, as in figure 7.2.
+A rotary stage turns the sensor in front of a lit ball as large as the Earth from
+750 km. The mean of several images minus the stage's angle is the offset of figure
+7.1; their standard deviation is the sigma of figure 7.2.
 
 examples:
   cubestack ball                                  every 5 deg to 30, 10 pictures each
@@ -24,7 +24,7 @@ from cubestack.host.experiments.cubesense.measure import FRAME_S, CubeSenseOpene
 from cubestack.host.options import Options
 
 DIRECTIONS = {"right": (1, 0), "left": (-1, 0), "down": (0, 1), "up": (0, -1)}
-"""Where the ball goes in the picture; figure 7.1 does not say which of its four parts is which."""
+"""Directions of the ball in the image; figure 7.1 does not name its four parts."""
 
 REACH_DEG = 30.0
 """The ball's edge reaches that of the field there (section 7.1)."""
@@ -54,8 +54,8 @@ class BallResult(Result):
     """One direction; angles in degrees. Attributes are those of the JSON output.
 
     Attributes:
-        direction: where the ball goes in the picture.
-        detected, pictures: how many of how many.
+        direction: of the ball's motion in the image.
+        detected, pictures: number of detections, and of images.
         offset_deg: mean size of the offsets of the angle along the direction.
         worst_deg: the largest of them.
         sigma_deg: largest standard deviation at one angle.
@@ -72,7 +72,7 @@ class BallResult(Result):
 class _Ball(Experiment[CubeSenseOpener, BallOptions, BallResult]):
     options = BallOptions
     description = __doc__
-    title = "nadir sensor before the ball: offset from the stage's angle"
+    title = "nadir sensor in front of the ball: offset from the stage's angle"
     columns = ("direction", "offset", "worst", "sigma", "detected")
 
     def count(self, options: BallOptions) -> int:

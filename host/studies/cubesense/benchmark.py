@@ -1,4 +1,4 @@
-"""What it costs to emulate a CubeSense."""
+"""Cost of emulating CubeSense."""
 
 from cubestack.emulator.boards.cubesense import benchmark
 from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
@@ -24,7 +24,7 @@ def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:
 
 
 def _loop_ratio(device: Device[CubeSenseBoard, CubeSense]) -> float:
-    """Each second a host reads both results, which starts the next measurements."""
+    """A host reads both results each second, which starts the next measurements."""
     with power_up(device, EarthSunScene(), engine="compiled") as emulated:
         client = emulated.client.client
 

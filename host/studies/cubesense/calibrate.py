@@ -1,10 +1,10 @@
 """Calibrate CubeSense's cameras: pixel of the optical axis, and the polynomial of the distortion.
 
-Without --images a bench is emulated: the Sun, or an Earth whose limb is seen, at known angles
-before a unit, which is that of --seed or of --scene. What the sensor finds in the undistorted
-picture is fitted, loaded by telecommand, and measured at random poses, as before.
+Without --images it emulates a bench: the Sun, or an Earth with its limb, at known angles in front
+of the unit of --seed or --scene. It fits what the sensor finds in the undistorted image, loads the
+result by telecommand, and measures at random poses before and after.
 
-With --images the pictures show a light each, and --angles has lines file,alpha_deg,beta_deg.
+With --images each image shows a light, and --angles has lines file,alpha_deg,beta_deg.
 
 examples:
   cubestack calibrate cubesense --seed 3
@@ -41,23 +41,23 @@ from cubestack.host.experiments.cubesense.measure import (
 from cubestack.host.options import Options, path_option
 
 FIELD = (PIXELS_PER_DEGREE, 95.0)
-"""Pixels for a degree, undistorted, and the largest field angle, deg."""
+"""Undistorted pixels per degree, and the largest field angle in deg."""
 
 UNDISTORTED = (0.0, 1.0, 0.0, 0.0, 0.0)
-"""Factors with which a sensor leaves the picture as it is."""
+"""Factors without distortion."""
 
 FINEST = "distortion=equidistant,edges=sub-pixel,sun=confirmed"
-"""Switches of the firmware at the bench: it tells places in 1/100 px."""
+"""Switches of the firmware at the bench: it reports positions in 1/100 px."""
 
 REACH_DEG = {Camera.SUN: 88.0, Camera.NADIR: 30.0}
 """Largest angle at the bench: the Sun's image, and the limb, are then within the rim."""
 
 SETTLE_S = 1.5
-"""Until cameras are set up, and tables made."""
+"""Virtual time until cameras and tables are ready."""
 
 DEFAULT_POSES = 60
 FAINTEST = 20
-"""Grey values by which a light in a picture stands out."""
+"""Smallest contrast of a light in DN."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,11 +80,9 @@ class CalibrateOptions(Options):
     out: Path | None = path_option(None, "JSON file to be written")
 
     def check(self) -> None:
-        """Pictures need their angles and one sensor, the bench none."""
+        """Images need angles and one sensor; the bench needs neither."""
         if (self.images is None) != (self.angles is None):
-            raise ValueError(
-                "--images and --angles belong together: pictures, and where lights were"
-            )
+            raise ValueError("--images and --angles are needed together")
         if self.images is not None and (self.sensor == "both" or self.scene is not None):
             raise ValueError("--images are of one camera: --sensor sun or nadir, without --scene")
 
@@ -96,7 +94,7 @@ class CalibrateResult(Result):
     Attributes:
         sensor: "sun" or "nadir".
         boresight_px, factors: parameters of telecommands Boresight and Distortion.
-        places: that were fitted.
+        places: number of positions fitted.
         before_px, after_px: root mean square residual with the tables, and fitted.
         error_before_deg, error_after_deg: mean angle between measured and true direction at random
             poses, with the tables, and with the result loaded; None for pictures.
@@ -162,7 +160,7 @@ def _name(camera: Camera) -> str:
 def _bench(
     opened: CubeSenseOpener, options: CalibrateOptions, camera: Camera, tables: Fisheye
 ) -> FisheyeFit:
-    """Fit to known poses, spread evenly over the field."""
+    """Fit to known poses, evenly spread over the field."""
     count = options.emulated or DEFAULT_POSES
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)
     radius = REACH_DEG[camera] * np.sqrt((np.arange(count) + 0.5) / count)
@@ -225,7 +223,7 @@ def _checked(
 
 
 def _unit(options: CalibrateOptions) -> Callable[[EarthSunView], EarthSunView]:
-    """Gives a view the lenses of the scene's cameras, if one is given."""
+    """Applies the lenses of the scene's cameras to a view, if given."""
     if options.scene is None:
         return lambda view: view
     own = load_earth_sun_scene(options.scene).condition
@@ -238,7 +236,7 @@ def _unit(options: CalibrateOptions) -> Callable[[EarthSunView], EarthSunView]:
 
 
 def _photographed(folder: Path, angles: Path, tables: Fisheye) -> FisheyeFit:
-    """Fit to pictures of lights; ValueError names the line or the picture that is wrong."""
+    """Fit to images of lights; raises ValueError with the wrong line or image."""
     pixels, known = [], []
     try:
         lines = list(csv.DictReader(angles.read_text(encoding="utf-8").splitlines()))

@@ -33,7 +33,7 @@ def show(
     _photographs: Path | None,
     board: Sequence[str],
 ) -> bool:
-    """Measure with both sensors; returns whether both found what they looked for."""
+    """Measure with both sensors; returns whether both found their target."""
     demo = Demo(out, "earth-sun", "sun and nadir sensor: the Sun, and the Earth from 750 km")
     scene = (
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
@@ -59,7 +59,7 @@ def _measure(
     truth: tuple[float, float],
     out: Path,
 ) -> bool:
-    """Measure with one sensor, report, and write its picture; returns whether it found it."""
+    """Measure with one sensor, report, and write its image; returns whether it found its target."""
     measured = cubesense.capture_and_detect(camera)
     name = camera.name.lower()
     _report(measured, truth, cubesense.phase_times(camera))

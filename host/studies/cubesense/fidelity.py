@@ -1,4 +1,4 @@
-"""CubeSense's published figures (thesis, Stellenbosch University, 2011) and what measures ours."""
+"""CubeSense's published figures (thesis, Stellenbosch University, 2011) and their trials."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -73,7 +73,7 @@ def _sensor(results: Sequence[SensorResult]) -> Figures:
 
 
 def _ball(opened: CubeSenseOpener, frames: int) -> Figures:
-    """Mean offset in each direction, and the largest sigma, of ``frames`` pictures an angle."""
+    """Mean offset in each direction and largest sigma, of ``frames`` images per angle."""
     step = 5.0 if frames > 1 else 30.0
     results = list(EXPERIMENT.run(opened, BallOptions(step=step, samples=max(2, frames))))
     figures = {result.direction: result.offset_deg or np.nan for result in results}
@@ -126,7 +126,7 @@ def _power(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 
 def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
-    """What follows from the measured polynomial, the Earth's size and the pixels."""
+    """Figures that follow from the measured polynomial, the Earth's size and the pixels."""
     a, b, c, d = fisheye.DISTORTION
     field_px = lens_error.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
     rim_px = float(fisheye.distorted(field_px))
@@ -160,7 +160,7 @@ def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 
 def _tiles(opened: CubeSenseOpener, _frames: int) -> Figures:
-    """Tiles as they were last estimated: both FPGAs as built and with one search, and counters."""
+    """Stored estimates of tiles: both FPGAs as built and with one search, and counters."""
     designs = recorded_areas(AREA_FILE)
     flown = "-as-flown" * (opened.board["profile"] == "published")
     names = {
@@ -187,7 +187,7 @@ def _light(_opened: CubeSenseOpener, _frames: int) -> Figures:
 
 
 def _memory(_opened: CubeSenseOpener, _frames: int) -> Figures:
-    """Share of the memory that pictures leave free, and that beyond their last address."""
+    """Share of the memory that images leave free, and share beyond their last address."""
     size = 1 << 19
     stride = 1 << (COLUMNS - 1).bit_length()
     beyond = ROWS * stride + COLUMNS

@@ -32,7 +32,7 @@ class MemoryOptions(Options):
         CubeSenseSwitches.of(self.profile, self.set)
 
     def budget(self) -> tuple[Buffer, ...]:
-        """Buffers of the program that these describe."""
+        """Buffers of the program with these options."""
         return budget(CubeSenseSwitches.of(self.profile, self.set))
 
 

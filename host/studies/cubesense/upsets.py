@@ -1,11 +1,10 @@
 """Flip bits of CubeSense's two FPGAs and memories, and report the effects.
 
-A loop is a picture of the Sun and one of the Earth in the memory of one of the two, which one by
-chance: one of them comes over the link. Each bit of each register is hit at random times while both
-FPGAs are idle, one stores, waits
-between pictures, stores the other one's picture, and is read; each upset in a copy of the
-running device. What the processor sees is compared with the same loop without the upset,
-and what the firmware answers with the truth.
+A loop stores an image of the Sun and one of the Earth in one of the two memories, chosen at random;
+one comes over the link. Each bit of each register is hit at random times in each phase: both FPGAs
+idle, storing, waiting between images, storing the other one's image, reading. Each upset runs in a
+copy of the device. What the processor sees is compared with the same loop without the upset, and
+the firmware's answer with the truth.
 
 examples:
   cubestack upsets cubesense
@@ -38,7 +37,7 @@ from cubestack.host.studies.upsets.subject import BETWEEN, IDLE, STORING, Rig, S
 
 LINKED, READING = "linked", "reading"
 
-#: The Sun no further from the middle, so that the Earth behind is in the nadir's field.
+#: Largest angle of the Sun, so that the Earth is in the nadir camera's field.
 SUN_ANGLE_DEG = 25.0
 
 

@@ -1,4 +1,4 @@
-"""What it costs to emulate a CubeStar, and to read one over I2C."""
+"""Cost of emulating CubeStar, and of reading it over I2C."""
 
 import subprocess
 import sys
@@ -92,7 +92,7 @@ def _capture(emulated: EmulatedDevice[CubeStarBoard, CubeStar]) -> dict[str, flo
 
 
 def _i2c() -> dict[str, float]:
-    """Rates of a program in a process of its own: the median of stretches of 100 reads."""
+    """Read rates of a program in its own process: median over stretches of 100 reads."""
     figures: dict[str, float] = {}
     command = (sys.executable, "-m", "cubestack", "run", "--quiet")
     for route in ("seccomp", "preload"):

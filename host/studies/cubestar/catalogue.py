@@ -23,7 +23,7 @@ from cubestack.host.options import Options, path_option
 
 @dataclass(frozen=True, kw_only=True)
 class CatalogueOptions(Options):
-    """What the catalogue is compiled for; None as it is flown."""
+    """Options of the catalogue; None means as flown."""
 
     mag_limit: float | None = number(None, "faintest star; default 3.8", metavar="V")
     epoch: float = number(2026.0, "default 2026", 1800, 2200, metavar="YEAR")

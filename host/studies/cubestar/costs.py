@@ -1,4 +1,4 @@
-"""What CubeStar's program costs as compiled code: operations, and the phases of one picture."""
+"""Cost of CubeStar's program as compiled code: operations, and the phases of one image."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -31,13 +31,13 @@ from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 PUBLISHED_MS = 320.0
 """Detection and matching of 20 centroids: CubeStar thesis, figure 5.7."""
 
-#: Where the picture is taken, right ascension and declination in degrees, and down to which
-#: magnitude: one with the published 20 centroids.
+#: Right ascension and declination in degrees, and faintest magnitude, of an image with the
+#: published 20 centroids.
 POINTING_DEG, MAG_LIMIT = (84.0, -1.0), 4.5
 
 _BUILDS = tuple((f"O{level}", kind) for kind in ("own", "float", "literals", "double")
                 for level in ("0", "2", "s"))  # fmt: skip
-#: Waits of the memories beside the first one's; with the slowest of the builds and the fastest.
+#: Further wait states of the memories, for the slowest and the fastest build.
 _TIMINGS: tuple[dict[str, Any], ...] = (
     {"flash_waits": 0},
     {"cache": False},
@@ -45,7 +45,7 @@ _TIMINGS: tuple[dict[str, Any], ...] = (
     {"cache": False, "bus": (3, 3, 15, 3)},
 )
 
-#: Columns of the table, and the phases that each adds up.
+#: Columns of the table, with the phases in each.
 COLUMNS = {
     "search": ("search",),
     "centroids to vectors": ("centroid", "correction", "vectors"),
@@ -73,7 +73,7 @@ def _cases(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[_Case]:
 
 
 def picture() -> NDArray[np.uint8]:
-    """The picture that is processed, as the emulated camera takes it."""
+    """The image to process, as the emulated camera captures it."""
     from dataclasses import replace
 
     scene = replace(SkyScene.pointing(*POINTING_DEG), mag_limit=MAG_LIMIT)
@@ -86,7 +86,7 @@ def picture() -> NDArray[np.uint8]:
 
 
 def generated() -> dict[str, str]:
-    """Sources and headers of the measuring program that are made of tables."""
+    """Sources and headers of the measuring program, generated from tables."""
     return {**catalogue_tables(), "defaults.h": default_settings(), "efm32gg.h": c_header(LAYOUTS)}
 
 
@@ -104,7 +104,7 @@ def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[CostMe
 
 
 def page(found: Sequence[CostMeasurement], clock_hz: int) -> str:
-    """The table of builds, in ms, beside what the Python program charges and what is published."""
+    """The table of builds in ms, beside the Python program's charges and the published times."""
     lines = [
         f"| build | memory | {' | '.join(COLUMNS)} | sum, ms |",
         "|-" * (len(COLUMNS) + 3) + "|",

@@ -45,7 +45,7 @@ CROP = (0, 256)  # middle rows of a 1024 x 1024 photograph
 
 @dataclass(frozen=True)
 class _Subject:
-    """What the camera is pointed at.
+    """A subject of the demonstration.
 
     Attributes:
         name: stem of the PNG files.
@@ -93,7 +93,7 @@ def _sky(seed: int) -> _Subject:
 
 
 def _photograph(folder: Path | None) -> _Subject:
-    """The first photograph of the folder, else the picture that this project ships."""
+    """The first photograph of the folder, else the image shipped with this project."""
     camera = None if folder is None else folder / "truth.json"
     if folder is None or camera is None or not camera.is_file():
         return _shipped()
@@ -113,7 +113,7 @@ def _shipped() -> _Subject:
     truth = json.loads(RENDERED.with_suffix(".json").read_text(encoding="utf-8"))
     return _Subject(
         "photograph",
-        "a picture file that this project rendered itself, as there are no photographs",
+        "an image rendered by this project, as there are no photographs",
         f'kind = "picture"\nfile = "{RENDERED.resolve()}"\n',
         np.array(truth["quaternion_xyzw_inertial_to_camera"]),
     )
@@ -130,7 +130,7 @@ def _show(
             cubestar.configure(fit.settings)
             tell(f"camera parameters loaded; the fit is good to {fit.rms_px:.2f} px rms")
         threshold = find_threshold(cubestar)
-        tell(f"detection threshold found by trying: {threshold} DN")
+        tell(f"detection threshold from a search: {threshold} DN")
         cubestar.capture_and_process()
         attitude = cubestar.attitude()
         _report(attitude, subject.truth)
@@ -160,7 +160,7 @@ def _show(
 
 
 def left_out_by(cubestar: CubeStar) -> list[str]:
-    """What the latest detection saw and did not take, and why, for a picture's caption."""
+    """Rejected detections and reasons, for a picture's caption."""
     summary = cubestar.client.telemetry("DetectionSummary")
     found = int(summary["NumStarsDetected"])
     most = int(cubestar.client.telemetry("MaxStars")["maxStars"])

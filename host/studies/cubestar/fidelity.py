@@ -1,4 +1,4 @@
-"""CubeStar's published figures (thesis, Stellenbosch University, 2013) and what measures ours."""
+"""CubeStar's published figures (thesis, Stellenbosch University, 2013) and their trials."""
 
 from collections.abc import Sequence
 from functools import partial

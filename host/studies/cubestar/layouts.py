@@ -1,11 +1,11 @@
-"""Compare CubeStar's memory layouts: each runs its loop on the same sky, in
-virtual time, and is measured from outside.
+"""Compare CubeStar's memory layouts: each runs its loop on the same sky in virtual
+time and is measured over its ports.
 
-rate       attitudes a second
-age        from the mid-exposure of a picture to its attitude in flash, from when
-           on telemetry gives it; then at most, right before the next one
+rate       attitudes per second
+age        from the mid-exposure of an image until telemetry has its attitude, and
+           the maximum, just before the next attitude
 power      mean of the whole stack at 3.3 V, with its two LEDs
-energy     for each attitude
+energy     per attitude
 pins       of each FPGA, of the AGLN030's 77
 tiles      of each FPGA, as in hdl/cubestar/area.json
 
@@ -47,15 +47,15 @@ PUBLISHED = {
 
 @dataclass(frozen=True)
 class LayoutResult(Result):
-    """What was measured of a layout; the attributes are those of the JSON output.
+    """Measurements of a layout; the attributes are those of the JSON output.
 
-    Without attitudes there is no rate, age and energy: None.
+    Rate, age and energy are None without attitudes.
 
     Attributes:
         attitudes: counted.
-        right: those near the truth; None where the scene has none.
+        right: number of right ones; None if the scene has no truth.
         age_ms: mean, when an attitude becomes available.
-        oldest_ms: mean, right before the next one does.
+        oldest_ms: mean, just before the next one.
         phase_ms: the program's own times of the last turn.
         violations: broken rules of the memories and wires.
     """
@@ -119,7 +119,7 @@ class _Layouts(Experiment["CubeStarOpener", LayoutOptions, LayoutResult]):
             yield f"published for {result.layout}: {result.published}"
         for result in results:
             if not result.fits:
-                yield f"(!) layout {result.layout} can not be built: an AGLN030 has 77 pins"
+                yield f"(!) layout {result.layout} can't be built: an AGLN030 has 77 pins"
 
     def succeeded(self, results: Sequence[LayoutResult]) -> bool:
         return all(result.attitudes for result in results)
@@ -130,7 +130,7 @@ def _shown(value: float | None, digits: int = 0) -> str:
 
 
 def _measure(layout: Layout, opened: CubeStarOpener, options: LayoutOptions) -> LayoutResult:
-    """Run the loop of ``layout`` for so many seconds of virtual time, and some before."""
+    """Run the loop of ``layout`` for ``seconds`` of virtual time after settling."""
     with opened(options.scene, seed=options.seed, layout=layout.value) as emulated:
         emulated.client.client.command("Trigger")
         found = list(attitudes_of_loop(emulated.board, options.seconds))
@@ -170,7 +170,7 @@ def _known(value: float, digits: int = 1) -> float | None:
 
 @dataclass(frozen=True)
 class Found:
-    """An attitude at the instant at which it is available."""
+    """An attitude when it becomes available."""
 
     time_ps: int
     charge_mas: float
@@ -179,9 +179,9 @@ class Found:
 
 
 def attitudes_of_loop(board: CubeStarBoard, seconds: int) -> Iterator[Found]:
-    """What the loop finds after ``SETTLING`` attitudes: one, and those of ``seconds`` after it.
+    """Attitudes after the first ``SETTLING``: one, and those of the next ``seconds``.
 
-    When the first one does not come, its place is told without it.
+    If the first does not come, only its time is returned.
     """
     kernel, seen, end_ps = board.kernel, 0, board.kernel.now + (SETTLING + 3) * PS_PER_S
     begun = False

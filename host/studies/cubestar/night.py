@@ -1,8 +1,8 @@
-"""A night on a roof, as CubeStar's accuracy was measured (thesis, section 6.1, table 6.1).
+"""A night on a roof: CubeStar's accuracy test (thesis, section 6.1, table 6.1).
 
-The camera stands on the Earth and looks at the zenith of Stellenbosch while the 1 Hz loop runs. The
-operator has chosen a threshold before, by which the centroids are like those of figure 6.1: at most
-16, and matched. Straight lines through the logged angles stand for the truth.
+The camera stands on the ground and looks at the zenith of Stellenbosch while the 1 Hz loop runs.
+The operator first chooses a threshold with centroids like those of figure 6.1: at most 16, and
+matched. Straight lines through the logged angles replace the truth.
 
 Stated, where the thesis says nothing: 2 arcsec of seeing, 0.25 mag of extinction, a sky of 20 mag
 a square arcsecond (a town's edge), 120 m of height. The lens is that of the printed calibration, to
@@ -85,9 +85,9 @@ def night(opened: CubeStarOpener, frames: int) -> dict[str, float]:
 
 
 def choose_threshold(client: CubeStar) -> int:
-    """Capture once, and set the threshold in DN by which the stars are most like figure 6.1's.
+    """Capture once and set the threshold in DN whose stars are most like figure 6.1's.
 
-    Of those that leave at most ``MOST_CENTROIDS``, where most are matched and fewest are not.
+    Among those with at most ``MOST_CENTROIDS``, it has most matched and fewest other stars.
     """
     client.capture()
     best, most = LADDER[-1], -MOST_CENTROIDS

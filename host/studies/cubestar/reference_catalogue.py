@@ -19,13 +19,13 @@ from cubestack.firmware_model.cubestar.matching import tracking, voting
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.export.c_arrays import c_arrays
 
-#: Directions, some 2.9 deg apart, in which the reduced pair list is counted; and the part by which
-#: it may be longer between them.
+#: Number of directions, about 2.9 deg apart, for counting the reduced pair list; and the margin for
+#: directions between them.
 DIRECTIONS, SPARE = 5000, 0.03
 
 
 def catalogue_tables(epoch: float | None = None) -> dict[str, str]:
-    """Texts of the two files by name; ``epoch`` is a Julian year, that of the device by default."""
+    """Texts of the two files by name; ``epoch`` is a Julian year (default: the device's)."""
     published = CubeStarSwitches()
     epoch = DEFAULT_EPOCH if epoch is None else epoch
     widest = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))
@@ -77,7 +77,7 @@ def _largest_reduction(
     second: NDArray[np.generic],
     radius_deg: float,
 ) -> int:
-    """Pairs that the reduced catalogue holds where it holds most, and some to spare."""
+    """Largest number of pairs of the reduced catalogue, with a margin."""
     step = np.arange(DIRECTIONS) + 0.5
     z = 1 - 2 * step / DIRECTIONS  # on a spiral from pole to pole
     turn, radius = step * np.pi * (3 - np.sqrt(5)), np.sqrt(1 - z * z)

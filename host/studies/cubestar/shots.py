@@ -1,4 +1,4 @@
-"""Pictures of random skies as the host sees them: the published field's, and while turning."""
+"""Images of random skies as the host sees them: with the published field, and while turning."""
 
 import math
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ DEFAULT_MARGIN_RAD = 0.001  # about a pixel (section 4.3.5)
 SEED = 1
 
 PICTURES = 10
-"""Of one sky, a second apart: the first one lost in space, the others as the node's flag has it."""
+"""Images per sky, a second apart: the first lost in space, the others as the node's flag says."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Shot:
 
 
 def _shot(device: measure.CubeStarEmulated, *, judged: bool = False) -> Shot:
-    """Take one; if ``judged``, stars count whether or not they gave an attitude, and wrong ones."""
+    """Capture one; ``judged`` counts stars without an attitude too, and wrong ones."""
     cubestar, client = device.client, device.client.client
     status = cubestar.capture_and_process()
     attitude, truth = cubestar.attitude(), device.board.truth()

@@ -1,9 +1,9 @@
 """Flip bits of CubeStar's FPGA and memories, and report the effects.
 
-Each bit of each register is hit at random times while the FPGA is idle, stores, waits
-between pictures, and is read back; each upset in a copy of the running device. What the
-processor sees is compared with the same loop without the upset, and what the firmware
-answers with the truth.
+Each bit of each register is hit at random times in each phase: FPGA idle, storing,
+waiting between images, reading back. Each upset runs in a copy of the device. What the
+processor sees is compared with the same loop without the upset, and the firmware's
+answer with the truth.
 
 examples:
   cubestack upsets cubestar

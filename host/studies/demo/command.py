@@ -1,4 +1,4 @@
-"""The whole stack in about a minute: boot, capture, measure and download, with
+"""Run the whole stack in about a minute: boot, capture, measure and download, with
 pictures.
 
 An emulator process serves a device on pseudo-terminals; a client in this
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show the devices; returns 1 when one of them did not find what it looked for."""
+    """Show the devices; returns 1 if one of them did not find its target."""
     args.out.mkdir(parents=True, exist_ok=True)
     board = [f"--{name}={value}" for name, value in given_options(args).items()]
     found = [

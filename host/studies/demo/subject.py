@@ -1,4 +1,4 @@
-"""What demonstrations share: a device served by another process, a client, and what is told."""
+"""Shared parts of demonstrations: an emulator process, a client, and output."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +17,7 @@ from cubestack.host.terminal import busy, head, say, tell
 from cubestack.host.transport.streams import open_transport
 
 ANSWER_TIMEOUT_S = 60.0
-"""Wall time: on a busy machine an emulator may stand for seconds; that it ends is told at once."""
+"""Wall time: a busy machine may stop an emulator for seconds; its end is reported at once."""
 
 
 class Demo:
@@ -38,9 +38,9 @@ class Demo:
     def client(
         self, device: Device[BoardT_co, ClientT_co], scene: str, board: Sequence[str] = ()
     ) -> Iterator[tuple[ClientT_co, Path]]:
-        """A client of a ``device`` that sees ``scene``, a TOML text; and its port's path.
+        """A client of ``device`` with ``scene``, a TOML text; and the port's path.
 
-        ``board`` are words of `cubestack emulate`.
+        ``board`` are arguments of `cubestack emulate`.
         """
         path = self.out / f"{self.name}.toml"
         path.write_text(scene, encoding="utf-8")
@@ -52,7 +52,7 @@ class Demo:
             node.close()
 
     def finish(self, *pictures: str, virtual_s: float | None = None) -> None:
-        """Tell how long it took, and names of the pictures that were written."""
+        """Print the duration and the names of the written pictures."""
         wall = f"{time.monotonic() - self._started:.1f} s of wall time"
         times = wall if virtual_s is None else f"{virtual_s:.1f} s of virtual time in {wall}"
         names = ", ".join(str(self.out / picture) for picture in pictures)
@@ -61,13 +61,13 @@ class Demo:
 
 @contextmanager
 def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
-    """An emulator process, of what ``words`` say, that serves on ``port``."""
+    """An emulator process with arguments ``words`` that serves on ``port``."""
     say("starting the emulator")
     line = ""
     try:
         with emulating([*words, "--pty", str(port), "--pace", "fast"]) as said:
             for line in said:
-                say(line)  # where it serves, or that it takes long, or what is wrong
+                say(line)  # its port, progress, or an error
                 if port.exists():
                     break
             else:
@@ -79,12 +79,12 @@ def _served(words: Sequence[str], port: Path) -> Iterator[Path]:
 
 
 def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """The picture that ``fetch`` gets, with a progress bar."""
+    """The image from ``fetch``, with a progress bar."""
     with busy(f"downloading {what}") as shown:
         return fetch(shown)
 
 
 def tell_times(phases_ms: dict[str, float], indent: str = "") -> None:
-    """Tell the virtual times of a measurement's steps."""
+    """Print the virtual times of a measurement's steps."""
     times = ", ".join(f"{name} {ms:.1f} ms" for name, ms in phases_ms.items())
     tell(f"{indent}virtual time: {times}")

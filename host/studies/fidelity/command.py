@@ -1,9 +1,9 @@
 """Measure every published figure of the devices: the documents' values, ours in both
 profiles, and how ours arise.
 
-  predicted   follows from the model; nothing was set to make it so
-  fitted      a constant was set so that it comes out, or nearly
-  chosen      a choice that the document leaves open makes it
+  predicted   follows from the model; nothing was set to match it
+  fitted      a constant was set to match it
+  chosen      depends on a choice that the document leaves open
   definition  the document's own formula or setting
 
 All rows take less than half an hour on two idle cores.
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and show; ValueError for rows or pages that there are not."""
+    """Measure and print; raises ValueError for unknown rows or pages."""
     if args.write and (args.rows or args.profile or args.quick or args.frames):
         raise ValueError(
             "--write wants all rows whole: without --rows, --profile, --quick, --frames"
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Rest:
-    """Tells what is done, and how long the rest takes, going by what the done took."""
+    """Progress with an estimate of the remaining time."""
 
     def __init__(self, jobs: list[fidelity.Job], *, quiet: bool) -> None:
         self.all_s = self.rest_s = sum(job.seconds for job in jobs)
@@ -107,7 +107,7 @@ class _Rest:
 
 
 def _page(folder: Path, name: str) -> Path:
-    """A device's page, before anything is measured; ValueError where tables have no place."""
+    """A device's page; raises ValueError if a table has no place in it."""
     declared = fidelity.fidelity_of(name)
     path: Path = folder / declared.page
     text = path.read_text("utf-8") if path.is_file() else ""

@@ -1,12 +1,12 @@
-"""What a device declares of its published figures: rows, and the trials that measure ours."""
+"""A device's published figures: rows, and the trials that measure ours."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from importlib import resources
 from typing import Any, Literal, get_args
 
-#: How our value comes about: it follows from the model, a constant was set so that it comes out,
-#: a free choice makes it, or it is the source's own formula or setting.
+#: Origin of our value: it follows from the model, a constant was set to match it, it depends on a
+#: free choice, or it is the source's own formula or setting.
 Word = Literal["predicted", "fitted", "chosen", "definition"]
 WORDS: tuple[Word, ...] = get_args(Word)
 
@@ -15,17 +15,17 @@ Figures = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Trial:
-    """An experiment that gives the figures of one row or several.
+    """An experiment for the figures of one or more rows.
 
     Attributes:
-        run: figures by name, of (opened, frames); nan for one that there is not. ``opened`` is an
+        run: figures by name, of (opened, frames); nan for a missing one. ``opened`` is an
             ``experiments.opener.Opener`` of the device in one profile.
-        frames: of a whole run; 0 for what needs none.
+        frames: of a whole run; 0 if it needs none.
         quick: of a quick one.
         seconds: wall time of a whole run in one profile, roughly, on one core.
-        command: what a user types behind `cubestack` to see it; empty where
-            `fidelity DEVICE --rows KEY` is the only one.
-        profiles: whether the profile can make a difference.
+        command: arguments of `cubestack` that show it; empty if only
+            `fidelity DEVICE --rows KEY` does.
+        profiles: whether the profile matters.
     """
 
     run: Callable[[Any, int], Figures]
@@ -45,8 +45,8 @@ class Row:
         figure: what it is, in words.
         source: section, table, or figure of the device's document.
         published: as the document has it.
-        word: how ours comes about.
-        trial: name of what measures it.
+        word: origin of our value.
+        trial: name of its trial.
         ours: format of our value, with the names of the trial's figures.
     """
 
@@ -79,7 +79,7 @@ class Fidelity:
             yield from rows
 
     def command(self, device: str, row: Row) -> str:
-        """What shows the row's value, behind `cubestack`."""
+        """Arguments of `cubestack` that show the row's value."""
         return self.trials[row.trial].command or f"fidelity {device} --rows {row.key}"
 
 

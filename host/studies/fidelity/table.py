@@ -1,7 +1,7 @@
-"""Measures the published figures of devices, and writes the tables of their pages.
+"""Measures the published figures of devices and writes the tables of their pages.
 
-Rows share trials: one set of pictures gives many figures. Each trial runs once in each profile,
-several at a time.
+Rows share trials: one set of images yields many figures. Each trial runs once per profile, several
+in parallel.
 """
 
 import math
@@ -49,9 +49,9 @@ class Measured(Result):
         device: its name.
         table: of the page.
         key, figure, source, published, word: as declared.
-        command: what shows it.
-        ours: our value by profile, as text; without one that was not measured.
-        figures: what it was made of, by profile and name.
+        command: arguments that show it.
+        ours: our measured values as text, by profile.
+        figures: their figures, by profile and name.
     """
 
     device: str
@@ -76,7 +76,7 @@ class Measured(Result):
 
 
 def fidelity_of(device: str) -> Fidelity:
-    """What a device declares; ValueError when that is nothing."""
+    """A device's published figures; raises ValueError if it has none."""
     found = registered(device)
     if "fidelity" not in found.studies:
         raise ValueError(f"{found.name} declares no published figures")
@@ -85,7 +85,7 @@ def fidelity_of(device: str) -> Fidelity:
 
 
 def chosen_rows(device: str, patterns: Sequence[str] = ()) -> list[tuple[str, Row]]:
-    """(table, row) of a device whose keys are like one of ``patterns``, by default all."""
+    """(table, row) of a device whose keys match one of ``patterns``; default: all."""
     declared = fidelity_of(device)
     return [
         (table, row)
@@ -103,7 +103,7 @@ def jobs_of(
     quick: bool = False,
     frames: int | None = None,
 ) -> list[Job]:
-    """What has to run for these rows; ``frames`` in place of the number that a trial declares."""
+    """Jobs for these rows; ``frames`` replaces a trial's own number."""
     declared = fidelity_of(device)
     jobs = []
     for name in dict.fromkeys(row.trial for row in rows):
@@ -117,7 +117,7 @@ def jobs_of(
 
 
 def perform(job: Job) -> Figures:
-    """Run one job, in whatever process."""
+    """Run one job, in any process."""
     trial = fidelity_of(job.device).trials[job.trial]
     opened = Opener(registered(job.device), board={"profile": job.profile})
     return dict(trial.run(opened, job.frames))
@@ -126,7 +126,7 @@ def perform(job: Job) -> Figures:
 def run_jobs(
     jobs: Sequence[Job], workers: int, on_done: Callable[[Job], None]
 ) -> dict[Job, Figures]:
-    """Figures of all jobs, the longest first; ``on_done`` is told of each as it ends."""
+    """Figures of all jobs, longest first; ``on_done`` is called with each finished one."""
     found: dict[Job, Figures] = {}
     order = sorted(jobs, key=lambda job: -job.seconds)
     for job, figures in performed(perform, order, workers):
@@ -138,7 +138,7 @@ def run_jobs(
 def filled(
     device: str, rows: Iterable[tuple[str, Row]], found: Mapping[Job, Figures]
 ) -> Iterator[Measured]:
-    """The rows with our values out of what was found."""
+    """The rows with our values."""
     declared = fidelity_of(device)
     for table, row in rows:
         figures = {
@@ -158,7 +158,7 @@ def filled(
 
 
 def shown(row: Row, figures: Figures) -> str:
-    """Our value as the tables have it; what there is not is a dash."""
+    """Our value as in the tables; a dash if missing."""
     return re.sub(r"\bnan\b", "-", row.ours.format(**figures))
 
 
@@ -172,10 +172,10 @@ def measured(
     units: int = 1,
     **options: Any,
 ) -> Trial:
-    """A trial that is `cubestack measure`: ``summary`` makes figures of its results.
+    """A trial of `cubestack measure`: ``summary`` computes figures of its results.
 
-    ``units``: the frames are of so many devices, with seeds from ``seed`` on; of several no single
-    command is what was measured, and rows are shown by `cubestack fidelity`.
+    ``units`` is the number of devices for the frames, with seeds from ``seed`` on. With several, no
+    single command repeats it, and `cubestack fidelity` shows the rows.
     """
 
     def run(opened: Opener[Any, Any], count: int) -> Figures:
@@ -204,12 +204,12 @@ def markdown(rows: Sequence[Measured]) -> str:
 
 
 def marks(table: str) -> tuple[str, str]:
-    """Lines of a page between which a table stands."""
+    """Marker lines around a table of a page."""
     return f"<!-- rows: {table} -->\n", "<!-- end of rows -->\n"
 
 
 def rewritten(page: str, rows: Sequence[Measured]) -> str:
-    """A page with its tables replaced; ValueError names a table that it has no place for."""
+    """A page with its tables replaced; raises ValueError with a table that it lacks."""
     for table in dict.fromkeys(row.table for row in rows):
         begin, end = marks(table)
         if begin not in page:
@@ -222,6 +222,6 @@ def rewritten(page: str, rows: Sequence[Measured]) -> str:
 
 
 def mean(values: Iterable[float]) -> float:
-    """Mean of the values; nan of none."""
+    """Mean of the values; nan if there are none."""
     listed = list(values)
     return math.fsum(listed) / len(listed) if listed else math.nan

@@ -1,4 +1,4 @@
-"""A folder of what hazards look like and do: sample pictures, curves, points."""
+"""A folder of hazards: sample images, curves, points."""
 
 import json
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ TITLE = f"# Hard skies\n\n{BEGIN}{END}"
 
 
 def check(folder: Path) -> None:
-    """Make the folder; ValueError when it can not be one, or figures or a page have no place."""
+    """Create the folder; raises ValueError if it, its figures or its page cannot be written."""
     if find_spec("matplotlib") is None:
         raise ValueError(f"--out: figures need matplotlib: {install_command('plots')}")
     try:
@@ -38,7 +38,7 @@ def check(folder: Path) -> None:
 
 
 def write(points: Sequence[Point], folder: Path, seed: int) -> int:
-    """Write pictures, curves, all points, and the part of the page; returns how many files."""
+    """Write images, curves, points and the page; returns the number of files."""
     pictures = folder / PICTURES
     lines = [json.dumps(point.as_dict()) for point in points]
     (pictures / "points.jsonl").write_text("\n".join(lines) + "\n", "utf-8")
@@ -61,7 +61,7 @@ def write(points: Sequence[Point], folder: Path, seed: int) -> int:
 
 
 def _page(folder: Path) -> tuple[str, str]:
-    """What stands on the page before and behind the hazards; ValueError without such a place."""
+    """The page's text before and after the hazards; raises ValueError without the markers."""
     path = folder / PAGE
     page = path.read_text("utf-8") if path.is_file() else TITLE
     if BEGIN not in page or END not in page:
@@ -82,7 +82,7 @@ def _axis(name: str) -> str:
 
 
 def _section(name: str, points: Sequence[Point]) -> str:
-    """Of the page: what a hazard is, a picture of each device, the curve, and the numbers."""
+    """A section of the page: the hazard, an image per device, the curve and the numbers."""
     kind = known()[name]
     usual, where = f"{kind.strength.usual:g}", "/".join(kind.__module__.split(".")[1:])
     lines = [
@@ -109,15 +109,15 @@ def _section(name: str, points: Sequence[Point]) -> str:
 
 
 def sample(device: str, hazard: str, seed: int) -> NDArray[np.uint8]:
-    """The picture (rows, columns) of a device's first frame with a hazard of its usual strength;
-    those of several cameras side by side.
+    """The image (rows, columns) of a device's first frame with a hazard of its usual strength;
+    several cameras side by side.
     """
     found, kept = registered(device), list[AnyEmulated]()
     options = experiment_of(found).options(hazard=(Asked(hazard),), seed=seed)
     opener = Opener(found, board={"profile": PROFILE}, opened=kept.append)
     pictures: list[NDArray[np.uint8]] = []
     results = experiment_of(found).run(opener, options)
-    # Each result is of the next camera; what was rendered is what a download would bring, at once.
+    # Each result is the next camera's; the rendered image equals a download.
     for _ in results:
         cameras = list(cameras_of(kept[0].board))
         pictures.append(cameras[len(pictures)].rendered)

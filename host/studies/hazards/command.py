@@ -1,7 +1,7 @@
 """Count right, refused and wrong results in hard skies: for each hazard a sample image
 and a curve over its strength.
 
-Every picture goes through the whole device; the bands are 95 % limits of the rates.
+Every image goes through the whole device; the bands are 95 % limits of the rates.
 Results do not depend on the number of workers.
 
 examples:
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and show; ValueError for devices and hazards that there are not."""
+    """Measure and print; raises ValueError for unknown devices and hazards."""
     if args.list:
         _list()
         return 0

@@ -1,7 +1,7 @@
-"""How often a sensor is right, refuses, or is wrong, against the strength of each hazard.
+"""Rates of right, refused and wrong results over the strength of each hazard.
 
 The results come end to end: scene, camera, electronics, firmware, serial line, host. A result is
-right as `cubestack measure` judges it; wrong is one that the sensor calls valid and that is not.
+right as `cubestack measure` judges it; wrong if the sensor calls it valid and it is not right.
 """
 
 from collections import Counter, deque
@@ -20,7 +20,7 @@ from cubestack.host.studies.workers import performed
 
 @dataclass(frozen=True)
 class Job:
-    """Frames of one device with one hazard; by itself a run of `cubestack measure`."""
+    """Frames of one device with one hazard: one run of `cubestack measure`."""
 
     device: str
     profile: str
@@ -32,11 +32,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Point(Job):
-    """What a job gave.
+    """Result of a job.
 
     Attributes:
-        right, refused, wrong: how many pictures ended so.
-        reasons: of the refused ones, as the device gives them, with their number.
+        right, refused, wrong: numbers of images.
+        reasons: the device's reasons of refusals, with their numbers.
     """
 
     right: int
@@ -46,7 +46,7 @@ class Point(Job):
 
     @property
     def pictures(self) -> int:
-        """How many there were; a frame of several cameras has one of each."""
+        """Number of images; a frame of several cameras has one per camera."""
         return self.right + self.refused + self.wrong
 
     def as_dict(self) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def devices_with_hazards() -> list[str]:
 
 
 def hazards_of(device: AnyDevice) -> list[str]:
-    """Names of the hazards that its experiment takes, in alphabetical order."""
+    """Names of the hazards that its experiment takes, sorted."""
     options: Any = experiment_of(device).options
     found = []
     for name in sorted(known()):
@@ -78,9 +78,9 @@ def hazards_of(device: AnyDevice) -> list[str]:
 def jobs_of(
     device: str, names: Sequence[str], frames: int, seed: int, profile: str
 ) -> Iterator[Job]:
-    """One for each strength of each hazard; of no names, of all of the device.
+    """One job per strength and hazard; default: all hazards of the device.
 
-    ValueError for a hazard that the device has not.
+    Raises ValueError for a hazard that the device does not have.
     """
     own = hazards_of(registered(device))
     for name in names:
@@ -92,7 +92,7 @@ def jobs_of(
 
 
 def perform(job: Job) -> Point:
-    """Run one job, in whatever process."""
+    """Run one job, in any process."""
     options: dict[str, Any] = {"frames": job.frames, "seed": job.seed, "profile": job.profile}
     ended: Counter[str] = Counter()
     reasons: Counter[str] = Counter()
@@ -110,7 +110,7 @@ def perform(job: Job) -> Point:
 
 
 def run(jobs: Sequence[Job], workers: int) -> Iterator[Point]:
-    """Points of the jobs, in their order, each as soon as it and all before it are there."""
+    """Points of the jobs in their order, each when it and all before it are done."""
     found: dict[Job, Point] = {}
     rest = deque(jobs)
     for job, point in performed(perform, jobs, workers):

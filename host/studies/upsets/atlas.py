@@ -1,7 +1,7 @@
-"""The atlas of upsets: by register and memory how often what, and how often a day.
+"""The atlas of upsets: effects and daily rates by register and memory.
 
-A particle turns a bit over with a probability that is its cross-section; so many a day is the flux,
-times that, times the bits, times what became of the upsets in each phase, by how long it is.
+A particle flips a bit with a probability given by the bit's cross-section. The daily rate is flux
+times cross-section times bits times the effect's share in each phase, weighted by its duration.
 """
 
 import re
@@ -21,7 +21,7 @@ HEAD = ("", "bits", "upsets", *EFFECTS, "seen, 95 %", *BAD, "right in the next l
 
 @dataclass(frozen=True)
 class Part:
-    """What became of the upsets of one register or memory; attribute ``results`` are its."""
+    """Upsets of one register or memory; ``results`` has them."""
 
     name: str
     results: Sequence[UpsetResult]
@@ -41,18 +41,18 @@ class Part:
 
     @property
     def seen(self) -> int:
-        """Upsets that the processor saw something of."""
+        """Upsets that the processor noticed."""
         return sum(map(_is_seen, self.results))
 
     @property
     def healed(self) -> tuple[int, int]:
-        """Of the answers that were not right, those with a right one in the next loop; and all."""
+        """Answers not right but right in the next loop, and all that were not right."""
         bad = [one for one in self.results if one.answer in BAD]
         return sum(one.recovered == 1 for one in bad), len(bad)
 
     @property
     def a_day(self) -> float:
-        """How many are seen a day."""
+        """Number of noticed upsets per day."""
         found: dict[str, list[UpsetResult]] = {}
         for one in self.results:
             found.setdefault(one.phase, []).append(one)
@@ -65,7 +65,7 @@ class Part:
 
 
 def atlas(results: Iterable[UpsetResult]) -> list[Part]:
-    """A part for each register and memory, in the order of their names."""
+    """A part per register and memory, by name."""
     found: dict[str, list[UpsetResult]] = {}
     for result in results:
         found.setdefault(plain(result.target), []).append(result)
@@ -95,7 +95,7 @@ def rows(parts: Sequence[Part]) -> Iterator[list[str]]:
 
 
 def lines(results: Iterable[UpsetResult]) -> Iterator[str]:
-    """For a reader: what there is to say of each part."""
+    """Lines of text for each part."""
     for part in atlas(results):
         effects = ", ".join(f"{part.effects[e]} {e}" for e in EFFECTS if part.effects[e])
         answers = "".join(f", {part.answers[a]} answers {a}" for a in BAD if part.answers[a])
@@ -107,7 +107,7 @@ def lines(results: Iterable[UpsetResult]) -> Iterator[str]:
 
 
 def plain(target: str) -> str:
-    """A register's path without the numbers that make names unique."""
+    """A register's path without the numbers of unique names."""
     return _NUMBER.sub("", target)
 
 
@@ -116,7 +116,7 @@ def _is_seen(result: UpsetResult) -> bool:
 
 
 def _shares(results: Sequence[UpsetResult]) -> dict[str, float]:
-    """Part of the time that the FPGAs are in each phase, the mean over the loops of ``results``."""
+    """Mean share of time of each phase over the loops of ``results``."""
     found: dict[str, float] = {}
     for one in results:
         whole_s = sum(one.phases_s.values())

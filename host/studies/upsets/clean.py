@@ -1,4 +1,4 @@
-"""A loop without any upset: when its phases are, and what is there when the FPGAs are done."""
+"""A loop without upsets: its phases, and the state when the FPGAs are done."""
 
 from collections.abc import Iterator
 from copy import deepcopy
@@ -18,16 +18,16 @@ from cubestack.host.studies.upsets.watch import PortWatch
 PS_PER_S = 10**12
 
 LONGEST_S = 30.0
-"""Virtual time after which a loop is given up."""
+"""Time-out of a loop in virtual time."""
 
 
 class NoLoopError(RuntimeError):
-    """A loop that does not come to an end."""
+    """The loop does not end."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Where one phase is, in ps of virtual time, and the camera whose picture is stored then."""
+    """One phase in ps of virtual time, and the camera whose image is stored in it."""
 
     phase: str
     start_ps: int
@@ -37,10 +37,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What is there when the FPGAs are done.
+    """State when the FPGAs are done.
 
     Attributes:
-        data, seen: what the processor read, and when it saw acknowledges.
+        data, seen: bytes that the processor read, and times of acknowledges.
         registers: of the FPGAs.
         memories: of all of the board, by name.
         violations: broken rules of the memories' timing, by kind.
@@ -59,9 +59,9 @@ class CleanLoop:
 
     Attributes:
         intervals: of the phases, in their order.
-        over_ps: when the FPGAs are done: idle, or at the end.
-        snapshot: then.
-        verdict: on the answer.
+        over_ps: time when the FPGAs are done: idle, or the end.
+        snapshot: state at that time.
+        verdict: of the answer.
     """
 
     intervals: list[Interval]
@@ -75,11 +75,11 @@ class CleanLoop:
 
     @property
     def end_ps(self) -> int:
-        """When nothing was under way any more."""
+        """Time when all activity ended."""
         return self.intervals[-1].end_ps
 
     def seconds(self, period_s: float) -> dict[str, float]:
-        """How long the FPGAs are in each phase; from the end of a loop to the next, as there."""
+        """Duration of each phase from the end of one loop to the next."""
         rest_s = period_s - (self.end_ps - self.start_ps) / PS_PER_S
         found = {self.intervals[-1].phase: max(0.0, rest_s)}
         for one in self.intervals:
@@ -88,7 +88,7 @@ class CleanLoop:
 
 
 class _State(NamedTuple):
-    """What the FPGAs are commanded from a time on, and the camera whose picture they store."""
+    """The FPGAs' state from a time on, and the camera whose image they store."""
 
     start_ps: int
     state: str
@@ -103,7 +103,7 @@ def _state(now_ps: int, subject: Subject, engine: RtlEngine) -> _State:
 def clean_loop(
     emulated: AnyEmulated, subject: Subject, sites: Sites, watch: PortWatch
 ) -> CleanLoop:
-    """Go through the loop that has been started, to its end; for use in a copy.
+    """Run the started loop to its end; for use in a copy.
 
     Raises NoLoopError.
     """
@@ -122,7 +122,7 @@ def clean_loop(
             if state.state == IDLE:
                 snapshot = deepcopy(take(sites, watch))
     over_ps = states[-1].start_ps
-    if snapshot is None or states[-1].state != IDLE:  # they lead the processor to its memory
+    if snapshot is None or states[-1].state != IDLE:  # they connect the processor to its memory
         snapshot, over_ps = deepcopy(take(sites, watch)), kernel.now
     states.append(_State(kernel.now, IDLE, None))
     intervals = [
@@ -132,7 +132,7 @@ def clean_loop(
 
 
 def take(sites: Sites, watch: PortWatch) -> Snapshot:
-    """What is there now; live views."""
+    """The present state as live views."""
     engine = sites.engine
     assert engine is not None
     engine.run(max(sites.kernel.now, engine.now_ps))
@@ -146,7 +146,7 @@ def take(sites: Sites, watch: PortWatch) -> Snapshot:
 
 
 def render(clean: CleanLoop, sites: Sites) -> None:
-    """Have the loop's pictures rendered, once for all copies."""
+    """Render the loop's images once for all copies."""
     for one in clean.intervals:
         if one.camera is None:
             continue
@@ -158,7 +158,7 @@ def render(clean: CleanLoop, sites: Sites) -> None:
 
 
 def _phases(state: _State, end_ps: int, sites: Sites) -> Iterator[Interval]:
-    """The intervals of one state; a camera's pauses between two pictures are apart."""
+    """The intervals of one state; pauses between a camera's images are separate."""
     if state.state != STORING or state.camera is None:
         yield Interval(state.state, state.start_ps, end_ps, state.camera)
         return

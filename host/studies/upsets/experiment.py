@@ -1,4 +1,4 @@
-"""Turns every bit of a device over, at random times in every phase of its loop."""
+"""Flips every bit of a device at random times in every phase of its loop."""
 
 import gc
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -36,12 +36,12 @@ from cubestack.host.studies.upsets.subject import Rig, Subject
 from cubestack.host.studies.upsets.watch import PortWatch
 
 AT_ONCE = 200
-"""Upsets that one copy may follow."""
+"""Largest number of upsets per copy."""
 
 S_PER_DAY = 86_400
 
 SCENES = 200
-"""Scenes that are tried until the device measures one rightly; some profiles seldom do."""
+"""Number of scenes to try for a right measurement; some profiles seldom give one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +70,10 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
     """Upsets of one device.
 
     Attributes:
-        rig: whose bits they are, by the options.
+        rig: the subject, by the options.
         description: for the help.
-        decides: options of the board that the rig chooses.
-        options: with those that choose the rig.
+        decides: board options that the rig sets.
+        options: including those that choose the rig.
     """
 
     rig: Callable[[Any], Rig]
@@ -81,9 +81,9 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
     decides: tuple[str, ...] = ()
     options: type[UpsetOptions] = UpsetOptions
 
-    title = "upsets, what they do, and what the firmware makes of them"
+    title = "upsets, their effects, and the firmware's answers"
     columns = ("upset", "bit", "phase", "effect", "answer", "right after", "")
-    label = "turning bits over"
+    label = "flipping bits"
 
     def count(self, options: UpsetOptions) -> int:
         """Each bit in each phase, as often as asked."""
@@ -99,7 +99,7 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
             subject.ready(emulated)
             sites = emulated.board.sites()
             watch = PortWatch(sites.engine, sites.engine.wiring.acknowledges)
-            if not emulated.board.firmware:  # machine code reaches its FPGA past everyone
+            if not emulated.board.firmware:  # machine code bypasses the watched engine
                 emulated.board.processor.fpga = watch
             clean = _begin(emulated, subject, sites, watch, rng)
             render(clean, sites)
@@ -117,7 +117,7 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
             hits_a_day = options.flux * options.cross_section * S_PER_DAY
             about = _About(clean, subject.period_s, sizes, hits_a_day)
             running = Running(emulated, subject, sites, watch, clean)
-            gc.freeze()  # a collection would write to all memory that the copies share
+            gc.freeze()  # garbage collection would write to memory that the copies share
             while upsets:
                 emulated.board.kernel.advance_to(upsets[0].time_ps - AHEAD_PS)
                 outcomes = in_copy(partial(followed, running, upsets[:AT_ONCE]))
@@ -126,7 +126,7 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
                 del upsets[: len(outcomes)]
 
     def row(self, number: int, result: UpsetResult) -> tuple[str, ...]:
-        """What was hit, and what came of it."""
+        """The target and the effect."""
         later = {0: "at once", None: "never"}.get(result.recovered, f"{result.recovered} loops")
         return (
             *(result.target, str(result.bit), result.phase, result.effect, result.answer, later),
@@ -148,7 +148,7 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
 
 
 def _targets(rig: Rig, options: UpsetOptions) -> list[UpsetTarget]:
-    """Every bit of every register, and places for bits of memories, not yet drawn."""
+    """Every bit of every register, and undrawn bits of memories."""
     known = _registers(rig.wiring)
     registers = [
         UpsetTarget(name, bit)
@@ -172,10 +172,10 @@ def _begin(
     watch: PortWatch,
     rng: np.random.Generator,
 ) -> CleanLoop:
-    """Start a loop that, left alone, ends rightly; how it goes."""
+    """Start a loop that ends rightly without upsets; returns its course."""
     for _ in range(SCENES):
         subject.start(emulated)
-        subject.judge(emulated)  # from here on settings and buffers are as in use
+        subject.judge(emulated)  # now settings and buffers are as in operation
         watch.clear()
         subject.start(emulated)
         clean = in_copy(partial(clean_loop, emulated, subject, sites, watch))
@@ -188,7 +188,7 @@ def _begin(
 
 @dataclass(frozen=True)
 class _About:
-    """What all results of a run have in common."""
+    """Values that all results of a run share."""
 
     clean: CleanLoop
     period_s: float

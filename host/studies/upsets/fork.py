@@ -1,7 +1,7 @@
-"""A running device as a checkpoint: a copy of this process goes on from here, and tells what came.
+"""A running device as a checkpoint: a forked copy continues and reports its result.
 
-Everything is in the copy: gateware, memories, virtual time, and the firmware in the middle of its
-work. A copy shares all memory that neither writes, so it costs a few milliseconds.
+The copy has everything: gateware, memories, virtual time, and the running firmware. It shares all
+unwritten memory, so it costs a few milliseconds.
 """
 
 import logging
@@ -16,7 +16,7 @@ from typing import IO, TypeVar
 T = TypeVar("T")
 
 LIMIT_S = 60.0
-"""Wall time after which a copy is given up: what it does takes a second."""
+"""Time-out of a copy in wall time: its work takes a second."""
 
 
 class CopyError(RuntimeError):
@@ -24,9 +24,9 @@ class CopyError(RuntimeError):
 
 
 def in_copy(act: Callable[[], T], limit_s: float = LIMIT_S) -> T:
-    """What ``act`` gives in a copy of this process; here nothing happens.
+    """Result of ``act`` in a copy of this process.
 
-    Raises CopyError with what was raised there, when it dies, and after ``limit_s`` of wall time.
+    Raises CopyError with the copy's error, if it dies, and after ``limit_s`` of wall time.
     """
     reading, writing = os.pipe()
     child = os.fork()
@@ -51,12 +51,12 @@ def in_copy(act: Callable[[], T], limit_s: float = LIMIT_S) -> T:
 
 
 def _run(act: Callable[[], T], writing: int) -> None:
-    """In the copy; does not return. What is warned of there is part of the answer."""
+    """Runs in the copy and does not return. Its warnings are part of the answer."""
     logging.disable()
     try:
         try:
             answer = pickle.dumps((False, act()))
-        except BaseException as error:  # told to who waits
+        except BaseException as error:  # reported to the parent
             answer = pickle.dumps((True, f"{type(error).__name__}: {error}"))
         with open(writing, "wb") as pipe:
             pipe.write(answer)

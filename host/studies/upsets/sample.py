@@ -1,4 +1,4 @@
-"""One upset, in a copy of the running device: what it does, and what the firmware makes of it."""
+"""One upset in a copy of the running device: its effect and the firmware's answer."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ from cubestack.host.studies.upsets.subject import Answer, Subject, UpsetVerdict
 from cubestack.host.studies.upsets.watch import PortWatch
 
 AHEAD_PS = 2_000_000
-"""So long before an upset a copy is made: no step of the processor's takes the FPGAs past it."""
+"""Lead time of a copy before its upset: no processor step takes the FPGAs past it."""
 
 LOOPS = 3
-"""Loops after the hit one in which an answer may become right again."""
+"""Loops after the hit one that count for recovery."""
 
 PIXELS = 2
-"""Bytes that are a pixel's upset: itself, and one that took its place."""
+"""Bytes of a single pixel's upset: itself and its replacement."""
 
 Effect = Literal[
     "nothing", "left over", "pixel", "row", "picture", "late", "no ACK", "contention", "timing"
 ]
 EFFECTS: tuple[Effect, ...] = get_args(Effect)
-"""What can become of an upset, as the processor sees it; "left over" is in a register or memory
-after the loop, and was never seen; "late" is right, but not at its time."""
+"""Effects of an upset as the processor sees them; "left over" remains unseen in a register or
+memory after the loop; "late" is right, but at another time."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class UpsetResult(Result):
 
 @dataclass(frozen=True)
 class Running:
-    """A device in the middle of a loop of which the clean course is known."""
+    """A device within a loop whose clean course is known."""
 
     emulated: AnyEmulated
     subject: Subject
@@ -105,7 +105,7 @@ class Running:
 
 @dataclass(frozen=True)
 class Upset:
-    """A bit, and when it is turned over."""
+    """A bit and the time of its flip."""
 
     time_ps: int
     phase: str
@@ -114,7 +114,7 @@ class Upset:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an upset; attributes as ``UpsetResult`` has them."""
+    """Effect of an upset; attributes as in ``UpsetResult``."""
 
     effect: Effect
     verdict: UpsetVerdict
@@ -122,10 +122,9 @@ class Outcome:
 
 
 def followed(running: Running, upsets: Sequence[Upset]) -> list[Outcome]:
-    """What becomes of upsets, up to the first one that leaves a trace; for use in a copy.
+    """Effects of upsets up to the first that leaves a trace; for use in a copy.
 
-    One after which everything is as before it, as in a register in reset, leaves the device fit for
-    the next one.
+    An upset without a trace, as in a register in reset, leaves the device ready for the next one.
     """
     outcomes = list[Outcome]()
     for one in upsets:
@@ -136,7 +135,7 @@ def followed(running: Running, upsets: Sequence[Upset]) -> list[Outcome]:
 
 
 def _left_a_trace(running: Running, upset: Upset) -> bool:
-    """Turn the bit over at its time; whether anything is different then."""
+    """Flip the bit at its time; returns whether anything differs."""
     emulated, target = running.emulated, upset.target
     kernel, engine = emulated.board.kernel, running.sites.engine
     assert engine is not None
@@ -169,7 +168,7 @@ def _followed(running: Running) -> Outcome:
 
 
 def _out_of_sight(found: Snapshot, running: Running) -> bool:
-    """Whether only bytes behind the FPGAs differ, which the processor does not read any more."""
+    """Whether only memory bytes differ that the processor does not read again."""
     clean, engine = running.clean.snapshot, running.sites.engine
     assert engine is not None
     return found.registers == clean.registers and all(
@@ -179,14 +178,14 @@ def _out_of_sight(found: Snapshot, running: Running) -> bool:
 
 
 def _judged(running: Running, *, again: bool = False) -> UpsetVerdict:
-    """On the loop that is under way, or on the next one."""
+    """Verdict on the current loop or the next one."""
     kernel, clean = running.emulated.board.kernel, running.clean
     try:
         end_ps = clean.end_ps
         if again:
             end_ps = kernel.now + clean.end_ps - clean.start_ps
             running.subject.start(running.emulated)
-        kernel.advance_to(end_ps)  # asked before that, it would answer that it is at work
+        kernel.advance_to(end_ps)  # earlier it would answer that it is busy
         return running.subject.judge(running.emulated)
     except HostError as error:
         return UpsetVerdict("refused", type(error).__name__)

@@ -1,4 +1,4 @@
-"""What is asked of a device whose bits are turned over: a loop of its work, judged."""
+"""The subject of upsets: a device's loop and its verdict."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -12,10 +12,10 @@ from cubestack.emulator.rtl.wiring import Wiring
 Answer = Literal["right", "refused", "wrong"]
 
 IDLE = "idle"
-"""State of FPGAs that are commanded nothing."""
+"""State of idle FPGAs."""
 
 STORING = "storing"
-"""State of FPGAs that store; between two pictures it is the phase `BETWEEN`."""
+"""State of storing FPGAs; between two images it is the phase `BETWEEN`."""
 
 BETWEEN = "between"
 

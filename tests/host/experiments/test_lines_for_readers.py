@@ -210,7 +210,7 @@ def test_layouts_are_told_with_what_can_not_be_built() -> None:
     assert LAYOUTS.row(0, replace(LAYOUT, **nothing))[1:5] == ("-", "- to -", "-", "-")
     lines = list(LAYOUTS.summarise([LAYOUT, two], 1.0))
     assert lines[:2] == ["published for 2: 2 Hz", "published for two: 2 Hz"]
-    assert lines[2:] == ["(!) layout two can not be built: an AGLN030 has 77 pins"]
+    assert lines[2:] == ["(!) layout two can't be built: an AGLN030 has 77 pins"]
     assert LAYOUTS.succeeded([LAYOUT, two])
     assert not LAYOUTS.succeeded([LAYOUT, replace(LAYOUT, attitudes=0)])
 

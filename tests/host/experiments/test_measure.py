@@ -104,7 +104,7 @@ def test_unknown_devices_and_those_without_experiment(monkeypatch: pytest.Monkey
         measure("cubestarr")
     silent = replace(device("cubestar"), experiment=None)
     monkeypatch.setattr(measuring, "registered", lambda _name: silent)
-    with pytest.raises(ValueError, match="nothing to measure with cubestar"):
+    with pytest.raises(ValueError, match="no experiment for cubestar"):
         measure("cubestar")
 
 

@@ -223,7 +223,7 @@ def test_the_nadir_is_told_and_marked_where_it_is(tmp_path: Path, told: list[str
     text = " ".join(told)
     assert "Earth 1 edges found; centre at alpha +10.00°, beta -5.00° (this program" in text
     assert "truth alpha -20.00°, beta +15.00°" in text
-    assert {"edge found on a scanned line", "centre found", "truth (not told to the device)"} <= {
+    assert {"edge found on a scanned line", "centre found", "truth (unknown to the device)"} <= {
         *told
     }
     assert "limb fitted" not in told

@@ -116,7 +116,7 @@ def test_a_refused_attitude_has_no_error(
 @pytest.mark.parametrize(
     ("switches", "left_out"),
     [
-        (AramisSwitches(belief="unique"), ["names of stars outside the triangle that was unique"]),
+        (AramisSwitches(belief="unique"), ["names of stars outside the unique triangle"]),
         (AramisSwitches(belief="confirmed"), []),
         (None, []),
     ],

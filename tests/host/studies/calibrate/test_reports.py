@@ -124,8 +124,8 @@ def test_a_reader_sees_the_parameters_of_the_telecommands() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"images": "x"}, "--images and --angles belong together"),
-        ({"angles": "x"}, "--images and --angles belong together"),
+        ({"images": "x"}, "--images and --angles are needed together"),
+        ({"angles": "x"}, "--images and --angles are needed together"),
         ({"images": "x", "angles": "y"}, "--images are of one camera"),
         ({"images": "x", "angles": "y", "sensor": "sun", "scene": "z"}, "without --scene"),
     ],
@@ -209,7 +209,7 @@ def test_a_reader_sees_the_camera_with_its_deviations() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"images": "x", "scene": "y"}, "--scene belongs to --emulated"),
+        ({"images": "x", "scene": "y"}, "--scene requires --emulated"),
         ({"out": "x.txt"}, "--out must be a file NAME.json"),
         ({"out": "no/such/x.json"}, "--out must be a file NAME.json"),
     ],

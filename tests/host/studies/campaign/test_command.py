@@ -20,7 +20,7 @@ def test_a_campaign_from_begin_to_replay(
     assert [point["point"] for point in points] == [{"false_stars": 0}, {"false_stars": 10}]
     assert [point["of"] for point in points] == [2, 2]
     assert main(["campaign", "false.toml"]) == 2
-    assert "--resume goes on with it" in capsys.readouterr().err
+    assert "--resume continues it" in capsys.readouterr().err
     assert main(["campaign", "false.toml", "--resume", "--workers", "1"]) == 0
     assert "right" in capsys.readouterr().out
     assert (

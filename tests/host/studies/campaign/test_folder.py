@@ -41,7 +41,7 @@ def test_a_torn_block_is_taken_out_and_nothing_else(
 def test_a_folder_is_resumed_only_with_the_same_plan(tmp_path: Path, plan: CampaignPlan) -> None:
     Folder.begun(tmp_path / "c", plan, resume=True)
     assert Folder.begun(tmp_path / "c", plan, resume=True).plan == plan
-    with pytest.raises(FolderError, match="has a campaign already; --resume goes on"):
+    with pytest.raises(FolderError, match="already has a campaign; --resume continues"):
         Folder.begun(tmp_path / "c", plan, resume=False)
     other = CampaignPlan(device="cubestar", frames=8, seed=6, block=3, grid={"false_stars": [0, 9]})
     with pytest.raises(FolderError, match="another plan, with other frames, seed"):
@@ -73,7 +73,7 @@ def test_what_is_no_campaign_is_told(tmp_path: Path, told: str | None, error: st
 
 def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, plan: CampaignPlan) -> None:
     (tmp_path / "mine.txt").write_text("x")
-    with pytest.raises(FolderError, match="is not empty, and no campaign's"):
+    with pytest.raises(FolderError, match="is not empty and has no campaign"):
         Folder.begun(tmp_path, plan, resume=True)
 
 

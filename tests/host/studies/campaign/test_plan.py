@@ -92,7 +92,7 @@ def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
         ('device = "cubestar"\nframes = 1\n[grid]\nfalse_star = [1]', "no option 'false_star'"),
         ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = [1, -2]', "false_stars = -2"),
         ('device = "cubestar"\nframes = 1\n[grid]\nfalse_stars = 3', "must be a list of values"),
-        ('device = "cubestar"\nframes = 1\n[grid]\nseed = [1]', "seed stands at the top"),
+        ('device = "cubestar"\nframes = 1\n[grid]\nseed = [1]', "seed belongs at the top"),
         ('device = "cubestar"\nframes = 1\n[random]\nmag_limit = 3', "random.mag_limit must be"),
         (
             'device = "cubestar"\nframes = 1\n[random]\nmag_limit = { low = 6, high = 3 }',

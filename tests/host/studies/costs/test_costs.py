@@ -153,4 +153,4 @@ def test_without_such_a_device_it_says_so(
     monkeypatch.setattr(command, "devices", lambda: devices)
     found = run("costs", "measure")
     assert found.code == 2
-    assert "no device here has a program that can be compiled" in found.line
+    assert "no device has a program to compile" in found.line

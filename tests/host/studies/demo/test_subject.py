@@ -82,7 +82,7 @@ def test_cubestar_solves_a_sky_and_a_picture(
         assert np.all(stars[:512] == (120, 255, 120), axis=2).sum() > 200
         assert np.all(stars[:512] == (255, 225, 70), axis=2).sum() > 50
     for text in (
-        "detection threshold found by trying",
+        "detection threshold from a search",
         "measured beside the truth",
         "virtual time: discard 70.0 ms",
         "published:    discard 68 ms",
