@@ -181,7 +181,7 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
     def summarise(self, results: Sequence[CubeStarResult], wall_s: float) -> Iterator[str]:
         if any(result.searched for result in results):
             yield (
-                f"detection threshold {results[0].threshold} DN, found by trying, lost in space; "
+                f"detection threshold {results[0].threshold} DN, from a search, lost in space; "
                 "--threshold DN sets one"
             )
         yield from super().summarise(results, wall_s)

@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
         for _ in progress(rows, total, "measuring", quiet=args.json, before=before):
             done += 1
     except (KeyboardInterrupt, OSError):
-        say(f"{done} of {total} results are in {folder.path}; --resume goes on")
+        say(f"{done} of {total} results are in {folder.path}; --resume continues")
         raise
     failed = _show(folder, as_json=args.json)
     return 1 if failed else 0

@@ -155,7 +155,7 @@ def test_it_is_steered_with_its_token_alone(
         assert told == "a-secret"
         about["devices"] = ControlClient(url, told).ask("GET", "/")["devices"]
         about["no_past"] = ControlClient(url, told).ask("GET", "/devices/aramis")["no_past"]
-        with pytest.raises(PortOpenError, match="wants its token"):
+        with pytest.raises(PortOpenError, match="requires its token"):
             ControlClient(url, "another").ask("GET", "/")
 
     words = ("aramis", "--tcp", "0", "--pace", "fast", "--control", "0")

@@ -354,7 +354,7 @@ def test_how_to_go_on_is_told(
     folder.stop = stop
     told = run("campaign", "plan.toml")
     assert told.code == code
-    assert f"3 of 8 results are in {folder.path}; --resume goes on" in told.err
+    assert f"3 of 8 results are in {folder.path}; --resume continues" in told.err
 
 
 def test_plans_that_come_along_are_listed(run: Run) -> None:

@@ -153,8 +153,8 @@ def star_tracker(**more: Any) -> CubeStarResult:
 
 def test_a_searched_threshold_is_told() -> None:
     told = list(cubestar.EXPERIMENT.summarise([replace(star_tracker(), searched=True)], 1.0))
-    assert told[0].startswith("detection threshold 25 DN, found by trying")
-    assert not any("found by trying" in line for line in
+    assert told[0].startswith("detection threshold 25 DN, from a search")
+    assert not any("from a search" in line for line in
                    cubestar.EXPERIMENT.summarise([star_tracker()], 1.0))  # fmt: skip
 
 

@@ -75,6 +75,6 @@ def test_pictures_of_a_light_give_the_lens(
 
 def test_pictures_need_their_angles(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "cubesense", "--images", "x"]) == 2
-    assert "--images and --angles belong together" in capsys.readouterr().err
+    assert "--images and --angles are needed together" in capsys.readouterr().err
     assert main(["calibrate", "cubesense", "--images", "x", "--angles", "y"]) == 2
     assert "--sensor sun or nadir" in capsys.readouterr().err

@@ -20,7 +20,7 @@ def test_what_crosses_a_later_frame_is_there_while_it_is_exposed() -> None:
     (emulated,) = devices
     (debris,) = emulated.scene.hazards
     exposed_s = emulated.board.stored[-1].mid_exposure_ps(ROWS / 2) / 1e12
-    assert debris.time_s == pytest.approx(exposed_s, abs=0.1)
+    assert debris.at_s == pytest.approx(exposed_s, abs=0.1)
 
 
 def camera_file(folder: Path, quaternion: list[float]) -> Path:
