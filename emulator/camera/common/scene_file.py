@@ -40,11 +40,11 @@ from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s, si
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.file import SceneError, read_scene_file, values_for
 from cubestack.emulator.scene.hazards import SKY_HAZARDS, Hazard, SkyHazard
+from cubestack.emulator.scene.hazards.hazard import HazardTables
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
 from cubestack.firmware_model.values import (
     REQUIRED,
     Keys,
-    KindsDeclaration,
     choice,
     described,
     moment,
@@ -55,7 +55,6 @@ from cubestack.firmware_model.values import (
     text,
     vector,
     whole,
-    with_defaults,
 )
 
 
@@ -74,17 +73,13 @@ def load_scene(
     return read_scene_file(path, kinds, '"sky" or "picture"')
 
 
-def hazard_tables(kinds: Mapping[str, type[Hazard]], seed: int = 0) -> KindsDeclaration:
-    """The key ``hazards``, of ``kinds`` beside those of any sensor and lens.
+def hazard_tables(kinds: Mapping[str, type[Hazard]], seed: int = 0) -> HazardTables:
+    """The key ``hazards``, of ``kinds`` beside those of any sensor and lens."""
+    return HazardTables(kinds={**kinds, **SENSOR_HAZARDS}, seed=seed)
 
-    ``seed`` is that of a hazard whose table has none.
-    """
-    return KindsDeclaration(
-        meaning="what makes the picture hard",
-        kinds={**kinds, **SENSOR_HAZARDS},
-        default=None,
-        defaults={"seed": seed},
-    )
+
+def _with_defaults(keys: Keys, owner: Any) -> Keys:
+    return {name: replace(one, default=getattr(owner, name)) for name, one in keys.items()}
 
 
 #: Keys of the table "optics"; the sensor's size is the device's.
@@ -144,7 +139,7 @@ def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int
         )
 
     drawn = whole(None, "seed of a lens that differs from its calibration", 0)
-    optics = {**with_defaults(_OPTICS, condition.optics), "drawn": drawn}
+    optics = {**_with_defaults(_OPTICS, condition.optics), "drawn": drawn}
     return {
         **_POSE,
         **named(
@@ -155,7 +150,7 @@ def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int
                 "poses": table((), "later poses, in order of time", _LATER, array=True),
                 "atmosphere": table(None, "the air that stars are seen through", _AIR, _atmosphere),
                 **SkyScene.declared(),
-                **with_defaults(SkyCondition.declared(), condition),
+                **_with_defaults(SkyCondition.declared(), condition),
                 "seed": whole(0, "of noise, air, false stars and hot pixels", 0),
                 "optics": table(None, "how the lens differs", optics, lens),
                 "hazards": hazard_tables(SKY_HAZARDS, seed),
@@ -169,7 +164,7 @@ def _picture_keys(condition: SkyCondition) -> Keys:
     return {
         **named({"file": text(REQUIRED, "PNG, JPEG or TIFF")}),
         **PictureScene.declared(),
-        **with_defaults(temperature, condition),
+        **_with_defaults(temperature, condition),
         **named({"hazards": hazard_tables({})}),
     }
 

@@ -4,13 +4,27 @@ A hazard is a frozen dataclass of declared values, the keys of its table ``[haza
 files.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from cubestack.emulator.scene.file import SceneError
-from cubestack.firmware_model.values import REQUIRED, WHOLE, DeclaredValues, many, number, whole
+from cubestack.firmware_model.values import (
+    REQUIRED,
+    TABLE,
+    WHOLE,
+    Declaration,
+    DeclaredValues,
+    ValueKind,
+    described,
+    many,
+    number,
+    read_table,
+    table,
+    whole,
+)
 
 
 @dataclass(frozen=True)
@@ -71,3 +85,41 @@ class Hazard(DeclaredValues):
         counted = cls.declared()[cls.strength.key].kind is WHOLE
         values: dict[str, Any] = {cls.strength.key: int(strength) if counted else strength}
         return cls(seed=int(generator.integers(2**31)), **values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HazardTables(Declaration):
+    """The key ``hazards``: tables as ``[hazards.moon]``; several of a kind: ``[[hazards.debris]]``.
+
+    Attributes:
+        kinds: of hazards, by name.
+        seed: of a hazard whose table has none.
+    """
+
+    meaning: str = "what makes the picture hard"
+    default: Any = None
+    kind: ValueKind = TABLE
+    kinds: Mapping[str, type[Hazard]]
+    seed: int = 0
+
+    def read(self, given: Any) -> tuple[Hazard, ...]:
+        if not isinstance(given, dict):
+            raise self.error(given)
+        keys = {name: self._tables(kind, given.get(name)) for name, kind in self.kinds.items()}
+        return tuple(one for some in read_table(given, keys).values() for one in some)
+
+    def _tables(self, kind: type[Hazard], given: Any) -> Any:
+        several = isinstance(given, list)
+
+        def make(values: dict[str, Any]) -> Any:
+            made = kind(**{"seed": self.seed, **values})
+            return made if several else (made,)
+
+        return table(None, "", kind, make, array=several)
+
+    def described(self) -> dict[str, Any]:
+        kinds = {
+            name: {"meaning": kind.meaning, "keys": described(kind.declared())}
+            for name, kind in self.kinds.items()
+        }
+        return {**super().described(), "type": "kinds", "kinds": kinds}

@@ -23,7 +23,7 @@ from cubestack.firmware_model.values import (
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import Options
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 PACKAGES = ("firmware_model", "emulator", "host")
 
 SKY, SUN = {"quaternion": (0.0, 0.0, 0.0, 1.0)}, {"boresight": (0.0, 0.0, 1.0)}

@@ -1,38 +1,27 @@
-"""The declaration of one value, and constructors for the usual types."""
+"""Declared values: name, type, unit, limits, default, choices and meaning, in one form everywhere.
+
+Message fields, keys of scene files, hazards, faults, options and settings are declared with it.
+Checks, error texts, help, forms and documents derive from the declaration.
+"""
 
 import math
 import operator
+import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import Enum
 from functools import partial
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 REQUIRED: Any = object()
 """Default of a value that must be given."""
 
-UNITS = {
-    "_deg_s": "deg/s",
-    "_km_s": "km/s",
-    "_deg": "deg",
-    "_rad": "rad",
-    "_arcsec": "arcsec",
-    "_km": "km",
-    "_mm": "mm",
-    "_um": "um",
-    "_px": "px",
-    "_c": "C",
-    "_ma": "mA",
-    "_ms": "ms",
-    "_us": "us",
-    "_ns": "ns",
-    "_mag": "mag",
-    "_m": "m",
-    "_s": "s",
-}
-"""Unit of a value whose declaration has none, by the end of its name; the first match counts."""
+_OTHER = (ArithmeticError, LookupError, TypeError, ValueError)
+"""What reading a value of another type raises."""
+
+_UNITS = ("deg", "rad", "arcsec", "km", "mm", "um", "px", "ms", "us", "ns", "mag", "m", "s")
 
 
 @dataclass(frozen=True)
@@ -50,10 +39,6 @@ class ValueKind:
     what: str
     read: Callable[[Any], Any]
     parse: Callable[[str], Any]
-
-
-_OTHER = (ArithmeticError, LookupError, TypeError, ValueError)
-"""What reading a value of another type raises."""
 
 
 def _number(given: Any) -> float:
@@ -75,28 +60,27 @@ def _integer(given: str) -> int:
         return int(given, 0)  # 0x10
 
 
-def _exactly(kind: type[Any]) -> Callable[[Any], Any]:
+def _flag(given: str) -> bool:
+    return {"true": True, "false": False}[given.lower()]
+
+
+def _kind(name: str, what: str, own: type[Any], parse: Callable[[str], Any]) -> ValueKind:
     def read(given: Any) -> Any:
-        if not isinstance(given, kind):
+        if not isinstance(given, own):
             raise TypeError
         return given
 
-    return read
+    return ValueKind(name, what, read, parse)
 
 
 NUMBER = ValueKind("number", "a number", _number, float)
 WHOLE = ValueKind("whole", "a whole number", _whole, _integer)
-FLAG = ValueKind(
-    "flag",
-    "true or false",
-    _exactly(bool),
-    lambda given: {"true": True, "false": False}[given.lower()],
-)
-TEXT = ValueKind("text", "text", _exactly(str), str)
-CHOICE = ValueKind("choice", "a name", _exactly(str), str)
-TABLE = ValueKind("table", "a table", _exactly(dict), str)
-MOMENT = ValueKind(
-    "moment", "a date and time, as 2013-06-01T20:00:00Z", _exactly(datetime), datetime.fromisoformat
+FLAG = _kind("flag", "true or false", bool, _flag)
+TEXT = _kind("text", "text", str, str)
+CHOICE = _kind("choice", "a name", str, str)
+TABLE = _kind("table", "a table", dict, str)
+MOMENT = _kind(
+    "moment", "a date and time, as 2013-06-01T20:00:00Z", datetime, datetime.fromisoformat
 )
 
 
@@ -109,8 +93,8 @@ class Declaration:
         meaning: one phrase for a reader.
         unit: of a number, empty for none.
         low, high: its limits, both allowed; infinite for none.
-        choices: the allowed names, in order; of a mapping or an enumeration, also what each means
-            to a program. Empty for any value of the kind.
+        choices: the allowed names; of a mapping or an enumeration, also what each means to a
+            program. Empty for any value of the kind.
         default: `REQUIRED` where there is none; with None, None is allowed.
         kind: its type.
         make: what becomes of a value that is read; ValueError for one that is not allowed.
@@ -141,26 +125,20 @@ class Declaration:
     @property
     def choice_values(self) -> Mapping[str, Any]:
         """What each of the choices means to a program, by its name."""
-        if isinstance(self.choices, Mapping):
-            return self.choices
         if isinstance(self.choices, type):
             return self.choices.__members__  # type: ignore[attr-defined,no-any-return]
-        return {one: one for one in self.choices}
+        return self.choices if isinstance(self.choices, Mapping) else {c: c for c in self.choices}
 
     @property
     def limits(self) -> str:
-        """The limits in words, with the unit; empty for a number without any."""
+        """The limits in words, with the unit; empty for a value without any."""
         low, high = f"{self.low:.10g}", f"{self.high:.10g}"
-        least = f"above {low}" if self.exclusive else f"at least {low}"
-        match math.isfinite(self.low), math.isfinite(self.high):
-            case True, True:
-                text = f"{least} and at most {high}" if self.exclusive else f"{low} to {high}"
-            case True, False:
-                text = least
-            case False, True:
-                text = f"at most {high}"
-            case _:
-                return ""
+        text = f"above {low}" if self.exclusive else f"at least {low}"
+        if math.isfinite(self.high):
+            text = f"{text} and at most {high}" if self.exclusive else f"{low} to {high}"
+            text = text if math.isfinite(self.low) else f"at most {high}"
+        elif math.isinf(self.low):
+            return ""
         return f"{text} {self.unit}".rstrip()
 
     @property
@@ -168,18 +146,11 @@ class Declaration:
         """What it must be apart from its limits, in words."""
         return f"one of {', '.join(self.choice_values)}" if self.choices else self.kind.what
 
-    @property
-    def allowed(self) -> str:
-        """What is allowed, in words, as documents list it."""
-        return self.limits or " or ".join(self.choice_values) or self.kind.what
-
     def fits(self, value: Any) -> bool:
         """Whether a number is within the limits; anything is where there are none."""
         if self.low == -math.inf and self.high == math.inf:
             return True
-        if self.exclusive and value == self.low:
-            return False
-        return bool(self.low <= value <= self.high)
+        return bool(self.low <= value <= self.high) and not (self.exclusive and value == self.low)
 
     def read(self, given: Any) -> Any:
         """The value that TOML, JSON or a program gave; ValueError says what it must be."""
@@ -224,34 +195,25 @@ class Declaration:
 
         A default that JSON does not have is None, like no default.
         """
-        default = next(
-            (name for name, value in self.choice_values.items() if value == self.default),
-            plain(self.default),
-        )
+        names = [name for name, value in self.choice_values.items() if value == self.default]
+        default = names[0] if names else plain(self.default)
         found = {"type": self.kind.name, "unit": self.unit, "default": default}
-        limits = {"low": self.low, "high": self.high}
-        found |= {end: limit for end, limit in limits.items() if math.isfinite(limit)}
-        found |= {"meaning": self.meaning, "choices": [*self.choice_values]}
-        found |= {"instead": [*self.instead], "role": self.role}
-        always = ("type", "unit", "default", "low", "high", "meaning")
-        return {key: one for key, one in found.items() if one or key in always}
+        ends = {"low": self.low, "high": self.high}
+        found |= {end: limit for end, limit in ends.items() if math.isfinite(limit)}
+        found["meaning"] = self.meaning
+        more = {"choices": [*self.choice_values], "instead": [*self.instead], "role": self.role}
+        return found | {key: one for key, one in more.items() if one}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ListDeclaration(Declaration):
-    """A list of values.
-
-    Attributes:
-        part: what each of them is.
-        count: of them; None for any number.
-    """
+    """A list of ``count`` values, None for any number, each as ``part``."""
 
     part: Declaration
     count: int | None = None
 
     @property
     def wanted(self) -> str:
-        """What it must be, in words."""
         what = "texts" if self.part.kind is TEXT else "numbers"
         return "a list" if self.count is None else f"a list of {self.count} {what}"
 
@@ -263,7 +225,6 @@ class ListDeclaration(Declaration):
         return values if self.make is None else self.make(values)
 
     def take(self, given: Any) -> tuple[Any, ...]:
-        """The values, each a text or what a program gave."""
         return tuple(self.part.take(one) for one in given)
 
     def described(self) -> dict[str, Any]:
@@ -311,7 +272,7 @@ positive: Callable[..., Any] = partial(declare, NUMBER, low=0, exclusive=True)
 
 def choice(default: Any, meaning: str, choices: Any, **more: Any) -> Any:
     """One of some names: a sequence, or a mapping or enumeration of what each means."""
-    return Declaration(default=default, meaning=meaning, choices=choices, kind=CHOICE, **more)
+    return declare(CHOICE, default, meaning, choices=choices, **more)
 
 
 def vector(
@@ -322,7 +283,7 @@ def vector(
     kind: Callable[..., Any] = number,
     **more: Any,
 ) -> Any:
-    """A list of so many numbers, each with ``limits`` as `number` takes them."""
+    """A list of ``count`` numbers, each with ``limits`` as `number` takes them."""
     part = kind(REQUIRED, "", *limits)
     return ListDeclaration(default=default, meaning=meaning, part=part, count=count, **more)
 
@@ -330,3 +291,133 @@ def vector(
 def many(default: Any, meaning: str, part: Declaration, **more: Any) -> Any:
     """A list of any number of values."""
     return ListDeclaration(default=default, meaning=meaning, part=part, **more)
+
+
+Keys = Mapping[str, Declaration]
+"""The keys of a table, by name."""
+
+
+def named(keys: Keys) -> dict[str, Declaration]:
+    """Declarations with their names, and the units that end the names of numbers."""
+    return {
+        name: replace(one, name=name, unit=one.unit or _unit(name)) for name, one in keys.items()
+    }
+
+
+def _unit(name: str) -> str:
+    _, *ends = name.split("_")
+    rate = ends[-2:] in (["deg", "s"], ["km", "s"])
+    own = {"c": "C", "ma": "mA"} | {unit: unit for unit in _UNITS}
+    return "/".join(ends[-2:]) if rate else own.get("".join(ends[-1:]), "")
+
+
+def described(keys: Keys) -> dict[str, dict[str, Any]]:
+    """What each key is, as JSON has it."""
+    return {name: one.described() for name, one in keys.items()}
+
+
+def read_table(given: Mapping[str, Any], keys: Keys) -> dict[str, Any]:
+    """The checked values of a table; ValueError for an unknown, wrong or missing key."""
+    values: dict[str, Any] = {}
+    now = {one.formerly: name for name, one in keys.items()}
+    for word, value in given.items():
+        name = now.get(word, word)
+        if name not in keys:
+            raise ValueError(f"unknown key {word!r}; allowed are {', '.join(keys)}")
+        if name in values:
+            raise ValueError(f"{name} is given twice, once as {keys[name].formerly}")
+        if name != word:
+            text = f"the key {word} is deprecated and goes with the next version: write {name}"
+            warnings.warn(text, FutureWarning, stacklevel=2)
+        try:
+            values[name] = keys[name].read(value)
+        except ValueError as error:
+            parts = value if isinstance(value, list) else [value]
+            colon = ":" if any(isinstance(one, dict) for one in parts) else ""
+            raise ValueError(f"{name}{colon} {error}") from None
+    missing = [name for name, one in keys.items() if one.default is REQUIRED and name not in values]
+    if missing:
+        raise ValueError(f"needs the key{'s' * (len(missing) > 1)} {', '.join(missing)}")
+    return values
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableDeclaration(Declaration):
+    """A table with ``keys``, or an array of such, written as ``[[NAME]]``.
+
+    ``make`` is called with the values of each.
+    """
+
+    keys: Keys
+    array: bool = False
+
+    @property
+    def wanted(self) -> str:
+        return f"tables, each under [[{self.name}]]" if self.array else "a table"
+
+    def read(self, given: Any) -> Any:
+        """What ``make`` returns for the table, or a tuple of that for each of an array."""
+        tables = given if self.array else [given]
+        if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+            raise self.error(given)
+        values = (read_table(one, self.keys) for one in tables)
+        made = tuple(one if self.make is None else self.make(one) for one in values)
+        return made if self.array else made[0]
+
+    def described(self) -> dict[str, Any]:
+        kind = "tables" if self.array else "table"
+        return {**super().described(), "type": kind, "keys": described(self.keys)}
+
+
+def table(default: Any, meaning: str, keys: Any, make: Any = None, **more: Any) -> Any:
+    """A table with ``keys``, or one that makes ``keys``, a class of `DeclaredValues`."""
+    if isinstance(keys, type):
+        owner: Any = keys
+        keys, make = owner.declared(), make or (lambda values: owner(**values))
+    return TableDeclaration(default=default, meaning=meaning, keys=named(keys), make=make, **more)
+
+
+class DeclaredValues:
+    """Base of frozen dataclasses that check their declared values on construction.
+
+    A field is declared by a `Declaration` as its default, as in
+    ``rate: float = number(1.0, "share of the bytes", 0, 1)``. Other fields are left alone.
+
+    Attributes:
+        error: raised for a value that is not allowed.
+    """
+
+    error: ClassVar[type[ValueError]] = ValueError
+    _declared: ClassVar[dict[str, Declaration]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        own = {name: one for name, one in vars(cls).items() if isinstance(one, Declaration)}
+        cls._declared = {**cls._declared, **named(own)}
+        for name, one in own.items():
+            setattr(cls, name, field() if one.default is REQUIRED else field(default=one.default))
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        for one in self._declared.values():
+            self._check(one)
+
+    @classmethod
+    def declared(cls) -> dict[str, Any]:
+        """The declarations by name, in the order of the fields."""
+        return cls._declared
+
+    @classmethod
+    def refusal(cls, name: str, text: str) -> ValueError:
+        """The error for the value ``name``, of which ``text`` says what it must be."""
+        return cls.error(f"{name} {text}")
+
+    def check_within(self, name: str, **limits: float) -> None:
+        """Check a value against a ``low`` or ``high`` that depends on other values."""
+        self._check(replace(self._declared[name], **limits))  # type: ignore[arg-type]
+
+    def _check(self, one: Declaration) -> None:
+        try:
+            one.check(getattr(self, one.name))
+        except ValueError as error:
+            raise self.refusal(one.name, str(error)) from None
