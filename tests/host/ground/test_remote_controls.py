@@ -63,7 +63,7 @@ def test_the_token_is_that_of_the_environment(
     monkeypatch.setenv(VARIABLE, TOKEN)
     assert controlled_device(found_at) == "cubestar"
     monkeypatch.setenv(VARIABLE, "another")
-    with pytest.raises(PortOpenError, match=f"wants its token in .{VARIABLE}"):
+    with pytest.raises(PortOpenError, match=f"requires its token in .{VARIABLE}"):
         controlled_device(found_at)
 
 
@@ -73,7 +73,7 @@ def controlled_device(url: str) -> str:
 
 @pytest.mark.parametrize("url", ["nonsense", "http://127.0.0.1", "http://127.0.0.1:99999", ""])
 def test_what_is_no_address_is_told(url: str) -> None:
-    with pytest.raises(TargetError, match="is no control port"):
+    with pytest.raises(TargetError, match="is not the address of a control port"):
         ControlClient(url, "")
 
 
