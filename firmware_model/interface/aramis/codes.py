@@ -8,7 +8,7 @@ from enum import IntEnum
 
 
 class SensorState(IntEnum):
-    """What the star tracker is doing."""
+    """Activity of the star tracker."""
 
     INACTIVE = 0
     ACTIVATING = 1
@@ -18,14 +18,14 @@ class SensorState(IntEnum):
 
 
 class MeasurementMode(IntEnum):
-    """What is known beforehand."""
+    """Prior knowledge of the attitude."""
 
     LOST_IN_SPACE = 0
     AIDED = 1  #: a rough direction: only the triangles around it are searched
 
 
 class MeasurementOutcome(IntEnum):
-    """How the latest measurement ended."""
+    """Outcome of the latest measurement."""
 
     NOT_MEASURED = 0
     CONCLUSIVE = 1
@@ -34,24 +34,24 @@ class MeasurementOutcome(IntEnum):
 
 
 class Reason(IntEnum):
-    """Why a measurement ended as it did; from 16 on there was no picture or no catalogue."""
+    """Why a measurement ended as it did; from 16 on there was no image or no catalogue."""
 
     NOT_MEASURED = 0
-    UNIQUE = 1  #: one triangle of the catalogue was left
+    UNIQUE = 1  #: one triangle of the catalogue remained
     CONFIRMED = 2  #: further stars confirm the attitude
-    SEVERAL = 3  #: several triangles were left after the last pivot
+    SEVERAL = 3  #: several triangles remained after the last pivot
     TOO_FEW_STARS = 4
-    TOO_MANY_PIXELS = 5  #: too many pixels were lit to be stars
-    DEGENERATE = 6  #: the stars stand on a line
+    TOO_MANY_PIXELS = 5  #: more bright pixels than stars have
+    DEGENERATE = 6  #: the stars lie on a line
     NO_TRIANGLE = 7  #: no triangle of the catalogue has that area and moment
-    NO_SHARED_PAIR = 8  #: no candidate shared two stars with a pivot triangle's
+    NO_SHARED_PAIR = 8  #: no candidate shared two stars with that of a pivot triangle
     UNCONFIRMED = 9  #: no attitude was confirmed
     FAR_FROM_HINT = 10  #: the boresight is far from the rough direction
-    SMEAR = 11  #: motion drew the stars out
-    STRAY_LIGHT = 12  #: the sky is bright, or not evenly so
+    SMEAR = 11  #: motion blurred the stars
+    STRAY_LIGHT = 12  #: the sky is bright or uneven
     SATURATED = 13  #: parts of the field are too bright for stars: the Moon, the Earth
-    RADIATION = 14  #: too many pixels are hit by particles or hot
-    NO_TIME = 15  #: the time of a measurement was over before an attitude was confirmed
+    RADIATION = 14  #: too many pixels are hot or hit by particles
+    NO_TIME = 15  #: the measurement timed out before an attitude was confirmed
     NOT_ACTIVE = 16
     CAMERA_OFF = 17  #: its supply is switched off (latch-up action)
     CAMERA_SILENT = 18  #: it did not acknowledge on its control bus
@@ -67,7 +67,7 @@ class CatalogueState(IntEnum):
     NOT_LOADED = 0  #: the star tracker is not active
     GOOD = 1
     MISSING = 2  #: the flash holds none
-    DAMAGED = 3  #: more bits were wrong than can be corrected, or its checksum does not fit
+    DAMAGED = 3  #: uncorrectable bits, or a wrong checksum
 
 
 class LatchUpStep(IntEnum):
@@ -78,7 +78,7 @@ class LatchUpStep(IntEnum):
 
 
 class SpikeMethod(IntEnum):
-    """How spikes of noise are removed (AraMiS thesis, section 3.5)."""
+    """Removal of noise spikes (AraMiS thesis, section 3.5)."""
 
     OFF = 0
     CENTRE = 1  #: method 1: a window of 5 x 5 steps by one and judges the pixel in its middle

@@ -11,11 +11,11 @@ class AramisSwitches(Switches):
     """Switches of the algorithms; sections and appendices are those of the AraMiS thesis."""
 
     belief: str = switch(
-        "which attitude is believed",
+        "which attitude is accepted",
         "unique",
         "confirmed",
         source="sections 5.7 and 8.2, appendix E",
-        reason="a unique triangle can be another one; further stars tell, unless "
+        reason="a unique triangle can be the wrong one; further stars decide, unless "
         "SetIdentification turns Verify off",
     )
     pivots: str = switch(
@@ -23,34 +23,34 @@ class AramisSwitches(Switches):
         "always",
         "when-needed",
         source="appendix E; section 5.7 has pivots only for several candidates",
-        reason="a pivot with a false star loses the right triangle",
+        reason="a pivot with a false star discards the right triangle",
     )
     aided: str = switch(
         "what a unique triangle near a rough direction must satisfy",
         "faces",
         "filtered",
         source="section 5.9, appendix E",
-        reason="the faces reach up to 35 degrees from the direction; boresight and sides rule out "
-        "most of what is wrong",
+        reason="the faces reach up to 35 degrees from the direction; boresight and sides exclude "
+        "most wrong triangles",
     )
     identities: Literal["section-5.8", "either", "appendix-e"] = switch(
-        "how the stars of a triangle are told apart",
+        "how the stars of a triangle are distinguished",
         "section-5.8",
         "either",
         "appendix-e",
         source="section 5.8; the listing of appendix E differs and contradicts it",
-        reason="the criterion that loses can be the right one: where a triangle is checked, both "
-        "are tried",
+        reason="the criterion that loses can be the right one: if a triangle is checked, both are "
+        "tried",
     )
     noise: str = switch(
-        "noise of a direction that the bounds are made of",
+        "noise of a direction, from which the bounds are computed",
         "appendix-e",
         "setting",
         source="appendix E: 0.26 px of 582 across the field, whatever the sensor",
         reason="SetIdentification has the noise of this sensor's centroids",
     )
     weights: str = switch(
-        "what a pixel weighs in its star's centroid",
+        "weight of a pixel in its star's centroid",
         "grey-level",
         "above-mean",
         source="equation 3.10",
@@ -58,13 +58,13 @@ class AramisSwitches(Switches):
         "SetDetection turns Subtract off",
     )
     detection: str = switch(
-        "what a bright pixel is above",
+        "threshold of a bright pixel",
         "whole-picture",
         "local",
         source="section 3.5",
-        reason="stray light, the Moon, the Earth's limb or hot pixels leave no threshold for the "
-        "whole picture; each place has its own, stars are told by their shape, and twice MaxStars "
-        "are kept",
+        reason="with stray light, the Moon, the Earth's limb or hot pixels no threshold fits the "
+        "whole image; each place has its own, stars are recognised by their shape, and twice "
+        "MaxStars are kept",
     )
 
 

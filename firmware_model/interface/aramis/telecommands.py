@@ -52,7 +52,7 @@ def _components(meaning: str) -> tuple[Field, ...]:
 _USE_CASES = (
     Message(1, "Activate", "start the camera, load the catalogue, be ready to measure"),
     Message(2, "Deactivate", "stop the loop and the camera; settings stay"),
-    Message(3, "SetSystemTime", "set the clock, at the instant the telecommand came").of(
+    Message(3, "SetSystemTime", "set the clock to the time at which the telecommand arrived").of(
         u32("JulianDay", "whole Julian days, which begin at noon UT", "d"),
         u32("Millisecond", "since that noon", "ms", high=MS_PER_DAY - 1),
     ),
@@ -60,7 +60,7 @@ _USE_CASES = (
     Message(
         5,
         "GetAttitudeNearVector",
-        "measure the attitude near a direction; another length than 1 +- 0.1 is refused",
+        "measure the attitude near a direction; a length beyond 1 +- 0.1 is rejected",
     ).of(
         *(
             f32(axis, f"{axis} of the boresight's inertial unit vector").within(
@@ -82,11 +82,7 @@ _USE_CASES = (
         "LatchUpAction",
         "turn the camera unit's supply off or on; off ends a latch-up, on sets the camera up again",
     ).of(enum8("Step", "off, then on", choices=LatchUpStep, reset=LatchUpStep.ON)),
-    Message(
-        8,
-        "BeginCatalogue",
-        "begin to load a catalogue; the present one stays until CommitCatalogue",
-    ).of(
+    Message(8, "BeginCatalogue", "begin an upload; CommitCatalogue replaces the catalogue").of(
         u32("Length", "of the catalogue's image", "bytes", reset=1).within(
             1, MOST_CATALOGUE_BYTES, "UploadError"
         ),
@@ -94,11 +90,9 @@ _USE_CASES = (
     ),
     Message(9, "CatalogueBlock", "a block of the catalogue's image, in any order").of(
         u16("BlockNumber", "block n covers bytes 128 n to 128 n + 127"),
-        byte_array(BLOCK_BYTES, "Data", "bytes; those beyond the length do not count"),
+        byte_array(BLOCK_BYTES, "Data", "bytes; those beyond the length are ignored"),
     ),
-    Message(
-        10, "CommitCatalogue", "check what was loaded, write it to flash error-coded, and use it"
-    ),
+    Message(10, "CommitCatalogue", "check the upload, write it to flash error-coded, and use it"),
     Message(
         11,
         "SetBodyRotation",
@@ -107,55 +101,49 @@ _USE_CASES = (
 )
 
 _EXTENSIONS = (
-    Message(100, "StartLoop", "measure again and again").of(
+    Message(100, "StartLoop", "measure periodically").of(
         u16("Period", "of the loop", "ms", reset=1000).within(200, 60_000),
-        enum8(
-            "Mode",
-            "aided: near the latest attitude, and lost in space without one",
-            choices=MeasurementMode,
-        ),
+        enum8("Mode", "aided: near the latest attitude, if there is one", choices=MeasurementMode),
     ),
-    Message(101, "StopLoop", "stop measuring again and again"),
+    Message(101, "StopLoop", "stop measuring periodically"),
     Message(102, "SetExposure", "exposure of the image sensor").of(
         u16("Rows", "row times of 31.75 us", "rows", reset=_DEFAULT_EXPOSURE_ROWS).within(
             1, mt9m001.REGISTERS["SHUTTER_WIDTH"].field("ROWS").mask
         )
     ),
-    Message(103, "SetGain", "gain of the image sensor; it takes the nearest that it has").of(
-        u8("Gain", "amplification", scale=8, reset=mt9m001.HIGHEST_GAIN).within(
-            1, mt9m001.HIGHEST_GAIN
-        )
+    Message(103, "SetGain", "gain of the image sensor, set to the nearest possible one").of(
+        u8("Gain", "gain", scale=8, reset=mt9m001.HIGHEST_GAIN).within(1, mt9m001.HIGHEST_GAIN)
     ),
     Message(104, "SetDetection", "search for stars").of(
         u8(
             "Sigmas",
-            "a bright pixel is above the mean by so many standard deviations",
+            "a bright pixel exceeds the mean by this many standard deviations",
             scale=10,
             high=20,
             reset=2,
         ),
         enum8("Spikes", "how spikes are removed", choices=SpikeMethod, reset=SpikeMethod.CENTRE),
-        u8("Needed", "bright pixels that a window of 25 must have", reset=13).within(1, 25),
+        u8("Needed", "bright pixels required in a window of 25", reset=13).within(1, 25),
         u16("MinPixels", "smallest star", "px", low=1, reset=1),
         u16("MaxPixels", "largest star", "px", low=1, reset=2500),
         u8("MaxStars", "the brightest are kept", reset=30).within(3, 64),
-        enum8("Subtract", "take the mean level off before weighing", choices=OnOff, reset=OnOff.ON),
+        enum8("Subtract", "subtract the mean before weighting", choices=OnOff, reset=OnOff.ON),
         ordered=(("MinPixels", "MaxPixels"),),
     ),
     Message(105, "SetIdentification", "identification of the stars").of(
-        u16("Noise", "expected noise of a centroid per axis", "px", scale=1000, reset=0.151).within(
+        u16("Noise", "noise of a centroid, per axis", "px", scale=1000, reset=0.151).within(
             0.01, 10
         ),
-        u8("Pivots", "pivot triangles at most", high=3, reset=3),
+        u8("Pivots", "largest number of pivot triangles", high=3, reset=3),
         enum8(
             "Verify",
-            "further stars must confirm the attitude; off is the published way",
+            "further stars must confirm the attitude; published: off",
             choices=OnOff,
             reset=OnOff.ON,
         ),
         u16(
             "HintTolerance",
-            "a boresight farther from the rough direction is refused",
+            "a boresight farther from the rough direction is rejected",
             "deg",
             scale=100,
             high=180,
@@ -163,47 +151,33 @@ _EXTENSIONS = (
         ),
     ),
     Message(106, "SetField", "the lens").of(
-        f32("FieldOfView", "across the picture's height", "deg", reset=21.534639).within(5, 40),
+        f32("FieldOfView", "across the image's height", "deg", reset=21.534639).within(5, 40),
         enum8("Round", "only the circle of that diameter is used", choices=OnOff, reset=OnOff.ON),
     ),
-    Message(107, "SetReloadPeriod", "how often the catalogue is loaded from flash anew").of(
-        u16("Period", "0: only when it is found damaged", "s", reset=60)
+    Message(107, "SetReloadPeriod", "period at which the catalogue is reloaded from flash").of(
+        u16("Period", "0: only if it is damaged", "s", reset=60)
     ),
     Message(108, "ReloadCatalogue", "load the catalogue from flash now"),
-    Message(
-        109,
-        "RefreshCatalogue",
-        "load the catalogue, then write it to flash anew, which ends corrected errors there",
-    ),
+    Message(109, "RefreshCatalogue", "load the catalogue and rewrite it to flash without errors"),
     Message(110, "SaveConfig", "write all settings to flash"),
     Message(111, "ClearConfig", "erase the settings in flash, return to the reset values"),
     Message(112, "Reset", "restart the program, inactive"),
     Message(113, "ClearErrorFlags", "clear all flags of telemetry ErrorFlags"),
     Message(114, "ImageBlockSet", "select the block that telemetry ImageBlock returns").of(
-        u16(
-            "BlockNumber",
-            "block of the latest picture, row after row",
-            high=IMAGE_BYTES // BLOCK_BYTES - 1,
-        )
+        u16("BlockNumber", "of the latest image", high=IMAGE_BYTES // BLOCK_BYTES - 1)
     ),
-    Message(
-        115,
-        "StreamDownImage",
-        "send the latest picture as telemetry ImageBlock frames, without requests",
-    ),
+    Message(115, "StreamDownImage", "send the latest image as telemetry ImageBlock frames"),
     Message(
         116,
         "WriteCameraRegister",
-        "write an image sensor register; a measurement sets up exposure and gain again",
+        "write an image sensor register; a measurement restores exposure and gain",
     ).of(u8("Address", "register's address"), u16("Value", "value to write")),
     Message(
         117, "SelectCameraRegister", "read an image sensor register into telemetry CameraRegister"
     ).of(u8("Address", "register's address")),
 )
 
-*SET_SWITCHES, SWITCHES_SHOWN = switch_messages(
-    AramisSwitches, 118, 210, "lost at a reset, and not saved"
-)
+*SET_SWITCHES, SWITCHES_SHOWN = switch_messages(AramisSwitches, 118, 210, "not saved over a reset")
 
 TELECOMMANDS = (
     *_USE_CASES,

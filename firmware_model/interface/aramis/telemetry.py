@@ -28,17 +28,17 @@ from cubestack.firmware_model.interface.codec.node_codes import AckError
 
 #: Steps of a measurement, in the order of telemetry PhaseTimes, with their meanings.
 PHASES = {
-    "Setup": "setting the camera up",
-    "Capture": "waiting for the frame and taking it, which the processor need not attend",
+    "Setup": "setting up the camera",
+    "Capture": "waiting for the frame and its transfer by DMA",
     "Check": "the catalogue's checksum in RAM",
-    "Threshold": "mean and noise of the last five pictures, mask of the bright pixels",
+    "Threshold": "mean and noise of the last five images, mask of the bright pixels",
     "Spikes": "removing spikes from the mask",
     "Centroids": "regions and their centroids",
     "Faces": "faces of the sphere around the rough direction",
     "Triangles": "areas and moments of measured triangles",
     "Search": "candidates by the k-vectors",
     "Pivoting": "candidates that share two stars",
-    "Identities": "which star of the triangle is which",
+    "Identities": "assigning the stars of the triangle",
     "Attitude": "QUEST",
     "Verification": "confirmation by further stars",
     "Total": "from the request to the result",
@@ -60,7 +60,7 @@ def _time(what: str) -> tuple[Field, ...]:
 
 
 _NODE = (
-    Message(128, "Identification", "who answers").of(
+    Message(128, "Identification", "type, versions and uptime").of(
         u8("NodeType", "6: AraMiS star tracker"),
         u8("InterfaceVersion", "of these tables"),
         u8("FirmwareVersionMajor", "of the program"),
@@ -74,22 +74,18 @@ _NODE = (
         u16("TcmdCount", "accepted telecommands, wraps"),
         u16("TlmCount", "answered telemetry, wraps"),
     ),
-    Message(130, "ErrorFlags", "what went wrong since ClearErrorFlags").of(*flag_fields()),
-    Message(
-        131,
-        "TcmdProcessed",
-        "whether every accepted telecommand is done, and the acknowledge of the latest one",
-    ).of(
+    Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(*flag_fields()),
+    Message(131, "TcmdProcessed", "pending telecommands, and the latest acknowledge").of(
         u8("Processed", "1: all are done"),
-        u8("Waiting", "telecommands that wait"),
+        u8("Waiting", "waiting telecommands"),
         u8("Latest", "ID of the latest telecommand, accepted or not"),
         enum8("Error", "its error code", choices=AckError),
     ),
-    Message(132, "SensorStatus", "what the star tracker does").of(
+    Message(132, "SensorStatus", "state of the star tracker").of(
         enum8("State", "state", choices=codes.SensorState),
         enum8("Catalogue", "its catalogue", choices=codes.CatalogueState),
         enum8("CameraSupply", "switch of the camera unit", choices=codes.OnOff),
-        enum8("Loop", "measuring again and again", choices=codes.OnOff),
+        enum8("Loop", "periodic measurement", choices=codes.OnOff),
         u8("TimeSet", "1: the clock was set"),
     ),
     Message(133, "SystemTime", "the clock").of(
@@ -100,19 +96,19 @@ _NODE = (
 _RESULTS = (
     Message(134, "Attitude", "the latest attitude, and how the latest measurement ended").of(
         *_quaternion("v_camera = q v_inertial q*"),
-        *_time("mid-exposure of the latest measurement's picture"),
+        *_time("mid-exposure of the latest measurement's image"),
         u32("ImageUptime", "the same since power-up, wraps", "ms"),
-        u32("FrameCounter", "number of that picture since power-up"),
+        u32("FrameCounter", "number of that image since power-up"),
         enum8("Outcome", "outcome", choices=codes.MeasurementOutcome),
         enum8("Reason", "why", choices=codes.Reason),
         enum8("Mode", "mode", choices=codes.MeasurementMode),
-        u8("Valid", "1: that picture gave the quaternion, else an older one"),
-        u8("Matched", "stars that the quaternion rests on"),
-        u8("Detected", "stars in the picture"),
+        u8("Valid", "1: the quaternion is from that image, else from an older one"),
+        u8("Matched", "stars used for the quaternion"),
+        u8("Detected", "stars in the image"),
     ),
     Message(135, "BodyAttitude", "the latest attitude of the spacecraft").of(
         *_quaternion("v_body = q v_inertial q*"),
-        *_time("mid-exposure of the latest measurement's picture"),
+        *_time("mid-exposure of the latest measurement's image"),
         enum8("Reason", "why", choices=codes.Reason),
         u8("Valid", "as in Attitude"),
     ),
@@ -139,13 +135,13 @@ _REPORTS = (
         u16("Corrected", "words corrected in the latest one"),
         u16("Lost", "words with more than one wrong bit in the latest one"),
         u32("CorrectedTotal", "words corrected since power-up"),
-        u16("RamErrors", "times that RAM was found damaged"),
+        u16("RamErrors", "number of times that RAM was damaged"),
         u16("LoadTime", "of the latest one", "ms"),
     ),
     Message(202, "UploadStatus", "loading a catalogue").of(
-        u16("Blocks", "that the image has"),
-        u16("BlocksReceived", "different ones since BeginCatalogue"),
-        u16("NextBlock", "first one that is missing"),
+        u16("Blocks", "of the image"),
+        u16("BlocksReceived", "different blocks since BeginCatalogue"),
+        u16("NextBlock", "first missing block"),
     ),
     Message(203, "ImageBlock", "the block that ImageBlockSet selected").of(
         byte_array(BLOCK_BYTES, "Block", "pixels, row after row")
@@ -155,57 +151,49 @@ _REPORTS = (
         u16("Value", "its value"),
         u8("Valid", "1: the sensor answered"),
     ),
-    Message(205, "LoopStatus", "measuring again and again").of(
+    Message(205, "LoopStatus", "periodic measurement").of(
         enum8("Running", "the loop", choices=codes.OnOff),
         u16("Period", "of the loop", "ms"),
         u32("Iterations", "since power-up"),
         u16("LateIterations", "that began more than 10 ms after their time"),
     ),
-    Message(206, "DetectionSummary", "the latest picture").of(
+    Message(206, "DetectionSummary", "the latest image").of(
         u8("Detected", "stars"),
-        u8("Mean", "level of the last five pictures", "DN"),
+        u8("Mean", "level of the last five images", "DN"),
         u8("Threshold", "pixels above it are bright", "DN"),
-        u8("Pictures", "that mean and threshold rest on"),
+        u8("Pictures", "number of images used for mean and threshold"),
     ),
     Message(207, "IdentificationSummary", "the latest identification").of(
-        u16("Candidates", "triangles left when matching ended"),
+        u16("Candidates", "remaining triangles at the end of matching"),
         u8("Pivots", "pivot triangles of the last triple"),
         u16("Triples", "triples of stars tried"),
         u8("Expected", "catalogue stars in the field; 0 without verification"),
         u8("Matched", "stars identified"),
     ),
-    Message(208, "StarDetails", "a star of the latest picture, the brightest first", steps=True).of(
+    Message(208, "StarDetails", "a star of the latest image, the brightest first", steps=True).of(
         u8("StarNumber", "from 0"),
         f32("X", "centroid's column; 0 is the middle of the first pixel", "px"),
         f32("Y", "centroid's row", "px"),
         f32("Brightness", "sum of its grey levels", "DN"),
-        u8("Identified", "1: Hipparcos says which star it is"),
+        u8("Identified", "1: Hipparcos is the star's number"),
         u32("Hipparcos", "its number in the catalogue"),
     ),
-    Message(
-        209, "SupplyStatus", "the camera unit's supply; whoever asks decides what a latch-up is"
-    ).of(
+    Message(209, "SupplyStatus", "the camera unit's supply; the host detects latch-ups").of(
         enum8("Switch", "switch", choices=codes.OnOff),
         u16("Current", "present current", "mA", scale=10),
     ),
 )
 
-_QUALITY = Message(
-    211, "Quality", "what the latest attitude is worth, and what its picture was like"
-).of(
-    u8("Valid", "1: the latest picture gave an attitude that further stars confirm"),
+_QUALITY = Message(211, "Quality", "quality of the latest attitude and of its image").of(
+    u8("Valid", "1: the latest image has an attitude that further stars confirm"),
     enum8("Reason", "why", choices=codes.Reason),
     *ATTITUDE_QUALITY,
-    f32(
-        "Background",
-        "level of the sky, median over the field; 0 with detection=whole-picture",
-        "DN",
-    ),
+    f32("Background", "median level of the sky; 0 with detection=whole-picture", "DN"),
     f32("Noise", "standard deviation of a pixel there", "DN"),
     f32("Spread", "of the level over the field, between its 5th and 95th percentile", "DN"),
-    f32("Blind", "part of the field that is too bright for stars, 0 to 1"),
+    f32("Blind", "fraction of the field that is too bright for stars"),
     u32("Spikes", "bright pixels that belong to no star"),
-    u16("Rejected", "bright regions whose shape no star has"),
+    u16("Rejected", "bright regions rejected because of their shape"),
 )
 """Not in the thesis: filled with `belief=confirmed`, from Background on with `detection=local`."""
 

@@ -75,45 +75,29 @@ def _gain_register(address: int, name: str, pixels: str) -> CameraRegister:
 
 
 _REGISTERS = (
-    _register(
-        0x00, "CHIP_VERSION", CHIP_VERSION, "kind of sensor", access=RegisterAccess.READ_ONLY
-    ),
+    _register(0x00, "CHIP_VERSION", CHIP_VERSION, "sensor type", access=RegisterAccess.READ_ONLY),
     _register(0x01, "ROW_START", ARRAY_ROW, "first row of the window, an address of the array"),
-    _register(
-        0x02, "COLUMN_START", ARRAY_COLUMN, "first column of the window, even; array address"
-    ),
-    _register(0x03, "ROW_SIZE", ROWS - 1, "rows of the window, less one; at least 2"),
-    _register(0x04, "COLUMN_SIZE", COLUMNS - 1, "columns of the window, less one; odd"),
-    _register(
-        0x05,
-        "HORIZONTAL_BLANKING",
-        9,
-        "pixel clocks between lines, less 225; values below 19 count as 19",
-    ),
-    _register(
-        0x06,
-        "VERTICAL_BLANKING",
-        25,
-        "row times between frames, less one; values below 15 count as 15",
-    ),
-    _register(
-        0x07, "OUTPUT_CONTROL", 0x0002, "synchronises changes, starts and stops the read-out"
-    ).of(
-        BitField("HOLD", 0, 1, "1 keeps written values from taking effect"),
+    _register(0x02, "COLUMN_START", ARRAY_COLUMN, "first column of the window, even, of the array"),
+    _register(0x03, "ROW_SIZE", ROWS - 1, "rows of the window minus one; at least 2"),
+    _register(0x04, "COLUMN_SIZE", COLUMNS - 1, "columns of the window minus one; odd"),
+    _register(0x05, "HORIZONTAL_BLANKING", 9, "pixel clocks between lines minus 225; at least 19"),
+    _register(0x06, "VERTICAL_BLANKING", 25, "row times between frames minus one; at least 15"),
+    _register(0x07, "OUTPUT_CONTROL", 0x0002, "synchronises changes, enables the read-out").of(
+        BitField("HOLD", 0, 1, "1 delays the effect of written values"),
         BitField("CHIP_ENABLE", 1, 1, "0 stops the read-out, 1 starts with a new frame"),
         BitField("TEST_DATA", 6, 1, "1 sends a test pattern", modelled=False),
     ),
     _register(0x09, "SHUTTER_WIDTH", 0x0419, "exposure in row times").of(
-        BitField("ROWS", 0, 14, "row times; more than the frame has make it longer")
+        BitField("ROWS", 0, 14, "row times; more than the frame has extend it")
     ),
-    _register(0x0B, "RESTART", 0, "gives up the frame and starts a new one").of(
+    _register(0x0B, "RESTART", 0, "aborts the frame and starts a new one").of(
         BitField("RESTART", 0, 1, "1 restarts; reads as 0")
     ),
     _stored(0x0C, "SHUTTER_DELAY", 0, "pixel clocks by which a row's exposure is shorter").of(
         BitField("CLOCKS", 0, 11, "pixel clocks")
     ),
-    _register(0x0D, "RESET", 0, "puts all registers to their reset values").of(
-        BitField("RESET", 0, 1, "1 resets and holds, 0 lets the sensor work")
+    _register(0x0D, "RESET", 0, "sets all registers to their reset values").of(
+        BitField("RESET", 0, 1, "1 holds the sensor in reset")
     ),
     _stored(0x1E, "READ_OPTIONS_1", 0x8000, "skipping, snapshots, strobe").of(
         BitField("COLUMN_SKIP_4", 2, 1, "reads 2 of 8 columns"),
@@ -143,14 +127,9 @@ _REGISTERS = (
     _register(0x35, "GLOBAL_GAIN", 0x0008, "writes all four gains; reads as GREEN_1_GAIN").of(
         BitField("GAIN", 0, 7, "as in the four")
     ),
-    _stored(
-        0x5F,
-        "BLACK_THRESHOLDS",
-        0x0904,
-        "between which the black level is calibrated, in counts of 10 bits",
-    ).of(
+    _stored(0x5F, "BLACK_THRESHOLDS", 0x0904, "range of the black level, in counts of 10 bits").of(
         BitField("LOW", 0, 6, "lower one"),
-        BitField("MANUAL", 7, 1, "keeps both as written"),
+        BitField("MANUAL", 7, 1, "uses both as written"),
         BitField("HIGH", 8, 7, "upper one"),
         BitField("NO_GAIN_DEPENDENCE", 15, 1, "keeps both at any gain"),
     ),
@@ -164,9 +143,7 @@ _REGISTERS = (
         BitField("RECALCULATE", 12, 1, "starts a sweep; reads as 0"),
         BitField("NO_SWEEP", 15, 1, "after changes of gain"),
     ),
-    _register(
-        0xF1, "CHIP_ENABLE", 0x0001, "mirror of OUTPUT_CONTROL with both bits' places changed"
-    ).of(
+    _register(0xF1, "CHIP_ENABLE", 0x0001, "mirror of OUTPUT_CONTROL with swapped bits").of(
         BitField("CHIP_ENABLE", 0, 1, "as in OUTPUT_CONTROL"),
         BitField("HOLD", 1, 1, "as in OUTPUT_CONTROL"),
     ),

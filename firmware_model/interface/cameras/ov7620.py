@@ -42,7 +42,7 @@ def window_row(row: int) -> int:
     return _WINDOW_TOP + row // _ROWS_PER_COUNT
 
 
-_COLOUR = "a monochrome picture does not depend on it"
+_COLOUR = "a monochrome image does not depend on it"
 _FRAME = "the model's frame has 525 lines of 858 clocks"
 _PICTURE = "reset value; the Y output of the model has no such processing"
 
@@ -61,41 +61,33 @@ _REGISTERS = (
     _stored(0x07, "SHARPNESS", 0xC6, "enhancement of edges", assumed=_PICTURE),
     _stored(0x0C, "BLUE_BIAS", 0x24, "bias of the white balance, blue", assumed="reset value"),
     _stored(0x0D, "RED_BIAS", 0x24, "bias of the white balance, red", assumed="reset value"),
-    CameraRegister(
-        0x10,
-        "EXPOSURE",
-        0x7F,
-        "exposure in two line times",
-        assumed="reset value; that 0 counts as 1",
-    ),
-    _stored(
-        0x11, "CLOCK_DIVIDER", 0x00, "divides the pixel clock", assumed="the model's clock is fixed"
-    ).of(
+    CameraRegister(0x10, "EXPOSURE", 0x7F, "in two line times", assumed="reset value; 0 acts as 1"),
+    _stored(0x11, "CLOCK_DIVIDER", 0x00, "pixel clock divider", assumed="the clock is fixed").of(
         BitField("PRESCALER", 0, 6, "pixel clock / (PRESCALER + 1)"),
         BitField("SYNC_POLARITY", 6, 2, "polarity of the sync outputs"),
     ),
     CameraRegister(0x12, "COMMON_A", 0x24, "reset, mirror, automatic functions").of(
         BitField("AUTO_WHITE_BALANCE", 2, 1, "1 adjusts the colours", modelled=False),
         BitField("AUTO_GAIN", 5, 1, "1 adjusts GAIN, if AUTO_ADJUST is set"),
-        BitField("MIRROR", 6, 1, "1 sends every line from its right end"),
+        BitField("MIRROR", 6, 1, "1 sends every line from right to left"),
         BitField("RESET", 7, 1, "1 resets all registers, and itself"),
     ),
-    CameraRegister(0x13, "COMMON_B", 0x01, "automatic functions as a whole").of(
-        BitField("AUTO_ADJUST", 0, 1, "1 lets the automatic functions act")
+    CameraRegister(0x13, "COMMON_B", 0x01, "enable of the automatic functions").of(
+        BitField("AUTO_ADJUST", 0, 1, "1 enables the automatic functions")
     ),
     _stored(
-        0x14, "COMMON_C", 0x04, "size of the picture", assumed="the model always sends full size"
+        0x14, "COMMON_C", 0x04, "size of the image", assumed="the model always sends full size"
     ).of(BitField("QVGA", 5, 1, "1 sends 320 x 240 pixels")),
     CameraRegister(0x17, "HSTART", window_column(0), "first column of the window"),
-    CameraRegister(0x18, "HSTOP", window_column(640), "column behind the window"),
+    CameraRegister(0x18, "HSTOP", window_column(640), "column after the window"),
     CameraRegister(
         0x19,
         "VSTART",
         window_row(0),
         "first row of the window",
-        assumed="reset value: the whole picture",
+        assumed="reset value: the whole image",
     ),
-    CameraRegister(0x1A, "VSTOP", window_row(480), "row behind the window"),
+    CameraRegister(0x1A, "VSTOP", window_row(480), "row after the window"),
     CameraRegister(
         0x28,
         "COMMON_H",
@@ -107,13 +99,11 @@ _REGISTERS = (
         BitField("BLACK_AND_WHITE", 6, 1, "1 sends brightness only"),
     ),
     CameraRegister(0x29, "COMMON_I", 0x00, "control of the exposure").of(
-        BitField("MANUAL_EXPOSURE", 7, 1, "1 takes EXPOSURE as it is written")
+        BitField("MANUAL_EXPOSURE", 7, 1, "1 uses the written EXPOSURE")
     ),
     _stored(0x2A, "FRAME_RATE_HIGH", 0x00, "adjustment of the frame rate", assumed=_FRAME),
     _stored(0x2B, "FRAME_RATE_LOW", 0x00, "adjustment of the frame rate, low byte", assumed=_FRAME),
-    _stored(
-        0x2D, "COMMON_J", 0x81, "band filter against the flicker of lamps", assumed="reset value"
-    ),
+    _stored(0x2D, "COMMON_J", 0x81, "band filter against flickering lamps", assumed="reset value"),
 )
 
 # SCCB address 0x42 to write, 0x43 to read.

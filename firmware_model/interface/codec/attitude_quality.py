@@ -11,9 +11,9 @@ from cubestack.firmware_model.interface.codec.field import Field, Value, f32, u8
 UNKNOWN_RAD = math.pi
 
 ATTITUDE_QUALITY: tuple[Field, ...] = (
-    u8("Matched", "stars that the attitude rests on"),
-    u8("Expected", "catalogue stars that the attitude puts in the picture"),
-    f32("LogFalseAlarm", "decimal logarithm of the probability that chance confirms as much"),
+    u8("Matched", "stars used for the attitude"),
+    u8("Expected", "catalogue stars in the image with this attitude"),
+    f32("LogFalseAlarm", "decimal logarithm of the probability of such a match by chance"),
     f32("Residual", "root mean square of the stars' residuals in each axis", "rad"),
     f32("SigmaX", "standard deviation about the camera's x axis; pi: unknown", "rad"),
     f32("SigmaY", "the same about its y axis", "rad"),
@@ -21,7 +21,7 @@ ATTITUDE_QUALITY: tuple[Field, ...] = (
     f32("CorrelationXY", "correlation of the errors about x and y"),
     f32("CorrelationXZ", "the same about x and z"),
     f32("CorrelationYZ", "the same about y and z"),
-    f32("Scale", "measured focal length over the one that is set"),
+    f32("Scale", "measured focal length divided by the setting"),
 )
 
 UNRATED: dict[str, Value] = {

@@ -29,7 +29,7 @@ def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Messag
     """Telemetry 128 to 131 of a node; its ``own_flags`` follow those of the link."""
     flags = {**NODE_FLAGS, **own_flags}
     return (
-        Message(128, "Identification", "who answers").of(
+        Message(128, "Identification", "type, versions and uptime").of(
             u8("NodeType", f"always {node_type}", reset=node_type),
             u8("InterfaceVersion", "of these tables"),
             u8("FirmwareVersionMajor", "of the program"),
@@ -37,12 +37,12 @@ def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Messag
             u16("RuntimeMilliseconds", "fraction of RuntimeSeconds", "ms"),
             u16("RuntimeSeconds", "since power-up, wraps", "s"),
         ),
-        Message(130, "ErrorFlags", "what went wrong since ClearErrorFlags").of(
+        Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(
             *flags_at((bit, name, flags[name], name) for bit, name in enumerate(flags))
         ),
-        Message(131, "TcmdProcessed", "whether every accepted telecommand is done").of(
+        Message(131, "TcmdProcessed", "whether all accepted telecommands are done").of(
             u8("Processed", "1: all are done"),
-            u8("Waiting", "telecommands that wait"),
+            u8("Waiting", "waiting telecommands"),
             u8("Latest", "ID of the latest telecommand, accepted or not"),
             enum8("Error", "its error code", choices=AckError),
         ),

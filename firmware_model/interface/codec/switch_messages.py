@@ -46,20 +46,20 @@ def switch_messages(
     any_value = _choices("SwitchValue", "Values of all switches of the firmware.", every)
     of_switch = {at: values[at] for at in places.values()}
     first = min(of_switch)
-    profiles = _choices("Profile", "How switches are set.", _numbered(_PROFILES))
+    profiles = _choices("Profile", "Profiles of the switches.", _numbered(_PROFILES))
     profile = enum8("Profile", "of all switches together", choices=profiles)
     settable = profile.within(None, len(PROFILES) - 1)
-    switch = u8("Switch", "which one", choices=which, reset=first)
+    switch = u8("Switch", "switch to set", choices=which, reset=first)
     value = u8("Value", "one of that switch's values", choices=any_value, reset=min(values[first]))
-    effect = f"of the firmware from the next picture on; {kept}"
+    effect = f"of the firmware from the next image on; {kept}"
     return (
-        Message(telecommand, SET_PROFILE, f"set switches {effect}", extension=True).of(settable),
+        Message(telecommand, SET_PROFILE, f"set every switch {effect}", extension=True).of(
+            settable
+        ),
         Message(telecommand + 1, SET_SWITCH, f"set a switch {effect}", extension=True).of(
             switch, replace(value, choices_by=("Switch", of_switch))
         ),
-        Message(telemetry, SHOWN, "which algorithms the device runs", extension=True).of(
-            profile, *shown
-        ),
+        Message(telemetry, SHOWN, "algorithms in use", extension=True).of(profile, *shown),
     )
 
 

@@ -52,7 +52,7 @@ class Sram(IntEnum):
 
 
 class SramSelection(IntEnum):
-    """Which memories' over-current flags are cleared."""
+    """Memories whose over-current flags are cleared."""
 
     SRAM1 = 0
     SRAM2 = 1
@@ -60,7 +60,7 @@ class SramSelection(IntEnum):
 
 
 class ResetTarget(IntEnum):
-    """What telecommand Reset restarts."""
+    """Part that telecommand Reset restarts."""
 
     COMMUNICATION = 1
     CAMERAS = 2
@@ -68,14 +68,14 @@ class ResetTarget(IntEnum):
 
 
 class ImageLocation(IntEnum):
-    """Half of a memory; a 512 kB memory holds one picture, so only TOP is accepted."""
+    """Half of a memory; a 512 kB memory holds one image, so only TOP is accepted."""
 
     TOP = 0
     BOTTOM = 1
 
 
 class CaptureResult(IntEnum):
-    """What became of the latest capture of a camera."""
+    """Outcome of the latest capture of a camera."""
 
     START_UP = 0
     PENDING = 1
@@ -90,7 +90,7 @@ class CaptureResult(IntEnum):
 
 
 class DetectResult(IntEnum):
-    """What became of the latest detection of a camera."""
+    """Outcome of the latest detection of a camera."""
 
     START_UP = 0
     NONE_SCHEDULED = 1
@@ -103,22 +103,22 @@ class DetectResult(IntEnum):
 
 
 class Reason(IntEnum):
-    """Why a detection ended as it did, by what the firmware saw; an extension."""
+    """Why a detection ended as it did, from the firmware's measurements; an extension."""
 
-    NONE = 0  #: no detection yet, or one by the published program, which does not say
+    NONE = 0  #: no detection yet, or one by the published program, which reports none
     MEASURED = 1
     FEW_EDGES = 2
     MANY_EDGES = 3
     NO_CIRCLE = 4  #: the edges lie on no common circle with its bright side inside
     OTHER_LIGHT = 5  #: most edges lie off the best circle
     WRONG_RADIUS = 6
-    """The circle is none that an altitude of interest has, or its centre is too far away."""
+    """The circle is impossible at an altitude of interest, or its centre is too far away."""
     NO_LIGHT = 7  #: no run of bright pixels, or too few of them for a Sun
     TOO_LARGE = 8  #: more bright pixels than a Sun has: the Earth, or structure
     NOT_ROUND = 9
-    NOT_SATURATED = 10  #: the Sun's middle is; a reflection's is not
+    NOT_SATURATED = 10  #: the Sun's middle is saturated, a reflection's is not
     SHARP = 11
-    """Found, but the light ends more sharply than the Sun's image does: perhaps it is none."""
+    """Found, but the edge is sharper than that of the Sun's image: it may be no Sun."""
     OUT_OF_FIELD = 12
 
 
@@ -140,10 +140,10 @@ class Measurement(IntEnum):
 
 
 class NadirSearch(IntEnum):
-    """How the nadir camera's edges are looked for (CubeSense thesis, 6.5.1, 9.2.2); an extension.
+    """Search method for the nadir camera's edges (CubeSense thesis, 6.5.1, 9.2.2); an extension.
 
     Along scanned lines, or around samples with addresses that the processor chooses: between two
-    unlike samples by halves, or one pixel after the other.
+    differing samples by bisection, or one pixel after the other.
     """
 
     LINES = 0
@@ -152,10 +152,10 @@ class NadirSearch(IntEnum):
 
 
 class ImageSize(IntEnum):
-    """Side of a downloaded square; the square of 1024 holds the picture in its middle.
+    """Side of a downloaded square; the square of 1024 has the image in its middle.
 
-    Where the picture lies, and that a smaller square takes every n-th pixel of every n-th row from
-    the first on, is assumed.
+    The position of the image, and that a smaller square takes every n-th pixel of every n-th row
+    from the first on, are assumed.
     """
 
     SIDE_1024 = 0

@@ -15,15 +15,15 @@ class Action(Enum):
     """Action of one of the two FPGAs. "Other" is the other FPGA, its camera or its sensor."""
 
     STANDBY = "standby"
-    STORE = "own camera's picture to own memory"
-    READ = "picture in own memory to the microcontroller"
+    STORE = "own camera's image to own memory"
+    READ = "image in own memory to the microcontroller"
     EDGE = "edge data in own memory to the microcontroller"
-    SEND_PICTURE = "own camera's picture to the other FPGA"
-    STORE_OTHER = "other camera's picture to own memory"
+    SEND_PICTURE = "own camera's image to the other FPGA"
+    STORE_OTHER = "other camera's image to own memory"
     SEND_EDGE = "other sensor's edge data in own memory to the other FPGA"
     PASS_EDGE = "edge data from the other FPGA to the microcontroller"
     TAKE_ADDRESS = "address in own memory from the microcontroller"
-    READ_FROM = "picture in own memory to the microcontroller, from the taken address on"
+    READ_FROM = "image in own memory to the microcontroller, from the taken address on"
 
 
 class Actions(NamedTuple):
@@ -157,7 +157,7 @@ class ReadOut:
                 f"not {self.first_row} and {self.first_column}"
             )
         if self.first_row >= self.rows or self.first_column >= self.columns:
-            raise ValueError("the first scanned row and column must be inside of the picture")
+            raise ValueError("the first scanned row and column must be inside of the image")
         if self.window > min(self.columns, self.rows):
             raise ValueError(
                 f"a window of {self.window} does not fit into {self.columns} x {self.rows} pixels"

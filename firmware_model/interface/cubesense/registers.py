@@ -37,8 +37,8 @@ def _camera(camera: codes.Camera) -> Iterator[PointerRegister]:
         for address, (register, parameter, meaning) in enumerate(settings)
     } | {
         0x05: u8(f"{name}_AUTO", "1: the camera adjusts itself", high=1),
-        0x20: u8(f"{name}_CAPTURE", "what became of the capture", choices=codes.CaptureResult),
-        0x21: u8(f"{name}_DETECT", "what became of the detection", choices=codes.DetectResult),
+        0x20: u8(f"{name}_CAPTURE", "outcome of the capture", choices=codes.CaptureResult),
+        0x21: u8(f"{name}_DETECT", "outcome of the detection", choices=codes.DetectResult),
         0x22: u8(f"{name}_POINTS", "edges of the fit, or Sun pixels of the mean"),
         0x40: _centre(f"{name}_X", "column"),
         0x41: _centre(f"{name}_Y", "row"),
@@ -49,16 +49,14 @@ def _camera(camera: codes.Camera) -> Iterator[PointerRegister]:
 
 def _centre(name: str, line: str) -> Field:
     meaning = (
-        f"centre from the boresight, undistorted {line}; {codes.PIXELS_PER_DEGREE} px a degree"
+        f"undistorted {line} of the centre, from the boresight; {codes.PIXELS_PER_DEGREE} px/deg"
     )
     return i16(name, meaning, "px", 100)
 
 
 _COMMON = (
-    PointerRegister(
-        0x10, _WO, u8("MEASURE", "take a picture and measure in it", choices=codes.Measurement)
-    ),
-    PointerRegister(0x11, _WO, u8("CAPTURE", "take a picture only", choices=codes.Measurement)),
+    PointerRegister(0x10, _WO, u8("MEASURE", "capture and measure", choices=codes.Measurement)),
+    PointerRegister(0x11, _WO, u8("CAPTURE", "capture only", choices=codes.Measurement)),
     PointerRegister(0x12, _RW, u8("IMAGE_SRAM", "memory that IMAGE streams", choices=codes.Sram)),
     PointerRegister(
         0x13,
@@ -69,20 +67,16 @@ _COMMON = (
             choices=codes.SramSelection,
         ),
     ),
+    PointerRegister(0x14, _RW, u8("NADIR_SEARCH", "search method", choices=codes.NadirSearch)),
     PointerRegister(
-        0x14, _RW, u8("NADIR_SEARCH", "how edges are looked for", choices=codes.NadirSearch)
+        0x30, _RO, u8("OVER_CURRENT", "over-current: bit 0 SRAM1, bit 1 SRAM2", high=3)
     ),
-    PointerRegister(
-        0x30, _RO, u8("OVER_CURRENT", "bit 0: SRAM1 drew too much, bit 1: SRAM2", high=3)
-    ),
-    PointerRegister(
-        0x60, _RO, byte_array(codes.IMAGE_BYTES, "IMAGE", "640 x 480 pixels, row after row")
-    ),
+    PointerRegister(0x60, _RO, byte_array(codes.IMAGE_BYTES, "IMAGE", "640 x 480 px by row")),
 )
 
 REGISTERS = PointerMap(
     i2c_address=0x1C,
     baud=115_200,  # that of appendix E: the part has one UART
     registers=(*_camera(codes.Camera.SUN), *_camera(codes.Camera.NADIR), *_COMMON),
-    note="The protocol is published; which registers there are, and their addresses, are assumed.",
+    note="The protocol is published; the registers and their addresses are assumed.",
 )

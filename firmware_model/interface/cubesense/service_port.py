@@ -11,12 +11,12 @@ _STORED = b"Y"
 
 
 def _capture(letter: str, camera: Camera) -> Letter:
-    meaning = f"take a picture with the {camera.name} camera"
+    meaning = f"capture an image with the {camera.name} camera"
     return Letter(letter, f"TAKE_{camera.name}", meaning, len(_STORED), _STORED)
 
 
 def _download(letter: str, camera: Camera) -> Letter:
-    meaning = f"send the picture in {Sram(camera).name}, row after row"
+    meaning = f"send the image in {Sram(camera).name}, row by row"
     return Letter(letter, f"SEND_{camera.name}", meaning, IMAGE_BYTES)
 
 

@@ -10,7 +10,7 @@ class CubeSenseSwitches(Switches):
     """Switches of the vision; all sections are those of the CubeSense thesis."""
 
     distortion: str = switch(
-        "table that undoes the lens, and the projection that the Earth's edges are fitted in",
+        "table that corrects the lens, and the projection in which the Earth's edges are fitted",
         "byte-table",
         "stereographic",
         "equidistant",
@@ -19,51 +19,51 @@ class CubeSenseSwitches(Switches):
         "in stereographic pixels only (the Sun's are equidistant in any case)",
     )
     edges: str = switch(
-        "where an edge of the Earth lies",
+        "position of an edge of the Earth",
         "whole-pixel",
         "sub-pixel",
         "listing",
         source="section 6.5.2, appendix C.4; listing has the two slips of appendix C.3",
-        reason="a straight line through the two pixels of an edge tells where it meets the "
-        "threshold; the listing places edges of the last 32 rows 224 rows too high, and has the "
-        "rim of the field around (367, 237)",
+        reason="a straight line through the two pixels of an edge shows where it meets the "
+        "threshold; the listing places edges of the last 32 rows 224 rows too high, and the rim "
+        "of the field around (367, 237)",
     )
     limb: str = switch(
-        "which edges make the circle of the Earth",
+        "which edges form the circle of the Earth",
         "unchecked",
         "robust",
         source="section 6.5.3.1, appendix C.5",
         reason="the terminator, clouds, Moon, reflections and glint have edges too and pull the "
-        "circle away; robust keeps edges that are dark outside, looks for the circle that most "
-        "of them lie on, with the bright side in, says how sure it is, and refuses what is none",
+        "circle away; robust keeps edges that are dark outside, finds the circle with most of "
+        "them on it and the bright side inside, reports its uncertainty, and rejects other shapes",
     )
     sun: str = switch(
         "which pixels of the Sun's window count, and whether they are a Sun",
         "all-pixels",
         "confirmed",
         source="sections 4.4.2 and 6.6.3, appendix C.6",
-        reason="a Sun that overflows the window is cut, and its mean moves; what has not the Sun's "
-        "size, shape and saturated middle, is in pieces or outside of the field is none; what ends "
-        "too sharply is told with a sigma of 48 deg",
+        reason="a Sun larger than the window is cut, and its mean moves; light without the Sun's "
+        "size, shape and saturated middle, in pieces or outside of the field is rejected; light "
+        "with a sharp edge is reported with a sigma of 48 deg",
     )
     lens: str = switch(
-        "what each camera's lens is beside the polynomial that the firmware undoes",
+        "deviation of each camera's lens from the polynomial that the firmware corrects",
         "residuals",
         "nominal",
         source="sections 5.1.1, 7.1 and 7.2: errors left after the calibration, one polynomial for "
         "two lenses; drawn for each unit, by its seed",
-        reason="nominal shows what firmware and pixels alone do",
+        reason="nominal shows the effects of firmware and pixels alone",
         hardware=True,
     )
     gateware: str = switch(
-        "what the FPGA presents without a Sun and at the picture's border, and over the link",
+        "output of the FPGA without a Sun, at the image border, and over the link",
         "as-flown",
         "corrected",
         "one-search",
-        source="appendices D.3 and D.4; one-search: table 6.4 to the word, section 9.2.3",
-        reason="as flown the coordinates stay those of an earlier Sun or of a lone bright pixel, "
-        "and the window wraps into memory that no picture fills; one search less in each FPGA "
-        "sends whole pictures over the link, for seconds",
+        source="appendices D.3 and D.4; one-search: wording of table 6.4, section 9.2.3",
+        reason="as flown the coordinates stay those of an earlier Sun or of a single bright pixel, "
+        "and the window wraps into memory outside of the image; with one search less in each "
+        "FPGA whole images are sent over the link, for seconds",
         hardware=True,
     )
 

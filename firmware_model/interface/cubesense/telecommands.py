@@ -29,11 +29,11 @@ _EXPOSURES = {codes.Camera.SUN: 1, codes.Camera.NADIR: 4}
 _BORESIGHTS = {codes.Camera.SUN: (369.0, 250.0), codes.Camera.NADIR: (371.0, 236.0)}
 
 
-_CAMERA = u8("Camera", "camera that takes the picture", choices=codes.Camera)
+_CAMERA = u8("Camera", "camera that captures the image", choices=codes.Camera)
 _TO_SRAM = u8("Sram", "memory that stores it", choices=codes.Sram)
 _LOCATION = u8(
     "Location",
-    "half of the memory; one picture fills it",
+    "half of the memory; one image fills it",
     choices=codes.ImageLocation,
     high=codes.ImageLocation.TOP,
 )
@@ -55,20 +55,12 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
         _high(
             43 + 2 * camera, f"CameraSettings{number}", f"settings of camera {number}, {name}"
         ).of(
-            u16(
-                "Exposure",
-                "in two line times, 127 us; the camera gets at most 255",
-                reset=_EXPOSURES[camera],
-            ),
+            u16("Exposure", "in 127 us; the camera gets at most 255", reset=_EXPOSURES[camera]),
             u8("Gain", "amplification; the camera gets at most 63"),
             u8("BlueGain", "gain of the blue channel", reset=0x80),
             u8("RedGain", "gain of the red channel", reset=0x80),
         ),
-        _low(
-            50 + camera,
-            f"Boresight{number}",
-            f"pixel of the optical axis of camera {number}, {name}",
-        ).of(
+        _low(50 + camera, f"Boresight{number}", f"optical axis of camera {number}, {name}").of(
             u16("X", "column", "px", 100, high=codes.COLUMNS - 1, reset=x),
             u16("Y", "row", "px", 100, high=codes.ROWS - 1, reset=y),
         ),
@@ -102,12 +94,7 @@ def _coefficients() -> Iterator[Field]:
 
 _COMMON = (
     _high(0, "Reset", "restart a part of the node").of(
-        u8(
-            "Target",
-            "what restarts",
-            choices=codes.ResetTarget,
-            reset=codes.ResetTarget.COMMUNICATION,
-        )
+        u8("Target", "part", choices=codes.ResetTarget, reset=codes.ResetTarget.COMMUNICATION)
     ),
     _low(
         11,
@@ -115,28 +102,26 @@ _COMMON = (
         "clear over-current flags of the memories, and switch those on again",
     ).of(u8("Selection", "which memories", choices=codes.SramSelection)),
     _high(
-        20, "CaptureAndDetect", "take a picture and measure in it; results become pending at once"
+        20, "CaptureAndDetect", "capture an image and measure; results become pending at once"
     ).of(_CAMERA, _TO_SRAM),
-    _medium(21, "CaptureOnly", "take a picture; the capture result becomes pending at once").of(
+    _medium(21, "CaptureOnly", "capture an image; the capture result becomes pending at once").of(
         _CAMERA, _TO_SRAM, _LOCATION
     ),
-    _high(64, "StartImageDownload", "select a picture and its size, and prepare frame 0").of(
+    _high(64, "StartImageDownload", "select an image and its size, and prepare frame 0").of(
         u8("Sram", "memory that is read", choices=codes.Sram),
         _LOCATION,
         u8("Size", "side of the square", choices=codes.ImageSize),
     ),
-    _high(
-        65, "NextImageFrame", "prepare a frame of the picture that StartImageDownload selected"
-    ).of(
+    _high(65, "NextImageFrame", "prepare a frame of the image that StartImageDownload selected").of(
         u16(
             "Frame",
-            "number from 0, row after row; must exist in the selected size",
+            "number from 0, row by row; must exist in the selected size",
             high=codes.ImageSize.SIDE_1024.frames - 1,
         )
     ),
-    Message(
-        100, "SetNadirSearch", "how the nadir camera's edges are looked for", extension=True
-    ).of(u8("Search", "way of the search", choices=codes.NadirSearch)),
+    Message(100, "SetNadirSearch", "search method for the nadir camera's edges", extension=True).of(
+        u8("Search", "method", choices=codes.NadirSearch)
+    ),
     *SET_SWITCHES,
 )
 

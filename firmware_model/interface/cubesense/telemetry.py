@@ -39,12 +39,8 @@ def _angle(name: str, meaning: str) -> Field:
 _RESULT = (
     _angle("Alpha", "angle along the rows, x to the right"),
     _angle("Beta", "angle along the columns, y downwards"),
-    u8("Capture", "what became of the capture", choices=codes.CaptureResult),
-    u8(
-        "Detect",
-        "what became of the detection; angles count with SUCCESS only",
-        choices=codes.DetectResult,
-    ),
+    u8("Capture", "outcome of the capture", choices=codes.CaptureResult),
+    u8("Detect", "outcome; angles are valid with SUCCESS only", choices=codes.DetectResult),
 )
 
 
@@ -79,7 +75,7 @@ def _mask(camera: codes.Camera) -> Message:
 
 
 _NODE = (
-    _high(128, "Identification", "what the node is, and its uptime").of(
+    _high(128, "Identification", "type, versions and uptime").of(
         u8("NodeType", "type of node"),
         u8("InterfaceVersion", "version of this interface"),
         u8("FirmwareVersionMajor", "firmware version, major"),
@@ -88,12 +84,12 @@ _NODE = (
         u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
     ),
     _low(129, "SerialNumber", "serial number").of(
-        byte_array(6, "SerialNumber", "ASCII; zero behind a shorter one")
+        byte_array(6, "SerialNumber", "ASCII; padded with zeros")
     ),
     _low(130, "CommunicationStatus", "counters and error flags of the host's buses").of(
         u16("TcmdCount", "telecommands received"),
         u16("TlmCount", "telemetry requests received"),
-        u8("TcmdBufferOverrun", "1: a telecommand met a full buffer"),
+        u8("TcmdBufferOverrun", "1: telecommand while the buffer was full"),
         u8("I2cTlmReadError", "1: read with no telemetry ID written before"),
         u8("UartProtocolError", "1: byte outside of a frame, or unknown escape"),
         u8("UartMsgIncomplete", "1: frame that never ended"),
@@ -106,19 +102,19 @@ _NODE = (
 )
 
 _STATE = (
-    _high(154, "Power", "supply currents, and memories that drew too much").of(
+    _high(154, "Power", "supply currents and over-currents").of(
         u16("Current3V3", "of the 3.3 V supply", "mA", 10),
         u16("CurrentSram1", "of SRAM1", "mA", 10),
         u16("CurrentSram2", "of SRAM2", "mA", 10),
         u16("Current5V", "of the 5 V supply", "mA", 10),
-        u8("OverCurrent1", "1: SRAM1 drew too much since the flag was cleared"),
-        u8("OverCurrent2", "1: SRAM2 drew too much since the flag was cleared"),
+        u8("OverCurrent1", "1: over-current of SRAM1 since the flag was cleared"),
+        u8("OverCurrent2", "1: over-current of SRAM2 since the flag was cleared"),
     ),
     _high(168, "Configuration", "thresholds and camera settings").of(*_configuration_fields()),
-    _high(192, "ImageFrame", "the frame that is ready").of(
-        byte_array(codes.FRAME_BYTES, "Frame", "pixels, row after row")
+    _high(192, "ImageFrame", "the ready frame").of(
+        byte_array(codes.FRAME_BYTES, "Frame", "pixels, row by row")
     ),
-    _high(193, "ImageFrameInfo", "which frame is ready").of(
+    _high(193, "ImageFrameInfo", "number and checksum of the ready frame").of(
         u16("FrameNumber", "65535 (assumed): none is ready yet", reset=codes.EMPTY_FRAME),
         u8("Checksum", "exclusive or of the frame's bytes (assumed)"),
     ),

@@ -8,7 +8,7 @@ from enum import IntEnum
 
 
 class TaskStatus(IntEnum):
-    """What the node last did, telemetry TaskStatus."""
+    """Latest activity of the node, telemetry TaskStatus."""
 
     POWERING_UP = 0
     POWERED_UP = 1
@@ -53,7 +53,7 @@ class TaskStatus(IntEnum):
 
 
 class ResetCause(IntEnum):
-    """Why the processor started; two causes at once have numbers of their own."""
+    """Why the processor started; combinations of two causes have separate numbers."""
 
     POWER_ON = 1
     BROWN_OUT_UNREGULATED = 2
@@ -81,7 +81,7 @@ class ImageBlockSize(IntEnum):
 
 
 class IdMode(IntEnum):
-    """Identification mode that the host asks for."""
+    """Identification mode that the host requests."""
 
     TRACKING = 0
     LOST_IN_SPACE = 1
@@ -96,7 +96,7 @@ class MatchMode(IntEnum):
 
 
 class TestPattern(IntEnum):
-    """Pattern that CaptureTestPatern writes to the picture memory; its pixels are assumed."""
+    """Pattern that CaptureTestPatern writes to the image memory; its pixels are assumed."""
 
     __test__ = False  # not a test class, whatever its name says to pytest
 
@@ -121,7 +121,7 @@ class SwitchState(IntEnum):
 
 
 class Reason(IntEnum):
-    """Why the latest picture gave no attitude, or that it did; telemetry Quality."""
+    """Why the latest image has no attitude, or SOLVED; telemetry Quality."""
 
     NOT_RATED = 0
     SOLVED = 1

@@ -33,8 +33,8 @@ _LARGEST_FRAME_RATE = 39  # from 27 MHz and 1322 clocks per line: a frame must o
 )
 
 _TELECOMMANDS = (
-    Message(100, "UploadBlock", "write a block of the picture memory").of(
-        u16("BlockNumber", "block n covers bytes 128 n to 128 n + 127, row after row").within(
+    Message(100, "UploadBlock", "write a block of the image memory").of(
+        u16("BlockNumber", "block n covers bytes 128 n to 128 n + 127, row by row").within(
             None, IMAGE_BYTES // UPLOAD_BLOCK_BYTES - 1, "ImageBlockSizeError"
         ),
         byte_array(UPLOAD_BLOCK_BYTES, "Data", "pixels"),
@@ -47,13 +47,13 @@ _TELECOMMANDS = (
     Message(102, "SetFrameRate", "frame rate of the image sensor").of(
         u16(
             "FrameRate",
-            "the sensor's register; frames a second = register x crystal / 27 MHz",
+            "the sensor's register; frames per second = register x crystal / 27 MHz",
             reset=7,
         ).within(6, _LARGEST_FRAME_RATE, "ConfigChangeError")
     ),
     # The reset value is chosen: the published wait that explains the published 68 ms.
     Message(103, "SetDiscardDelay", "wait between enabling the image sensor and storing").of(
-        u16("Delay", "less than a read-out (67.7 ms) splits the picture", "ms", reset=70).within(
+        u16("Delay", "below a read-out (67.7 ms) the image is split", "ms", reset=70).within(
             None, 1000, "DelayTimeSetToLong"
         )
     ),
@@ -68,7 +68,7 @@ _TELECOMMANDS = (
     Message(
         106, "SelectCameraRegister", "read an image sensor register into telemetry CameraRegister"
     ).of(u16("Address", "register's address")),
-    Message(107, "StopLoop", "end the 1 s loop after its present iteration"),
+    Message(107, "StopLoop", "end the 1 s loop after the current iteration"),
     *_SET_SWITCHES,
 )
 
@@ -78,16 +78,16 @@ _TELEMETRY = (
         f32("Q1", "vector part, y"),
         f32("Q2", "vector part, z"),
         f32("Q3", "scalar part"),
-        u32("FrameCounter", "number of the picture since power-up"),
+        u32("FrameCounter", "number of the image since power-up"),
         u32("ImageTime", "uptime at mid-exposure", "ms"),
-        enum8("Mode", "mode that identified the picture", choices=MatchMode),
-        u8("Matched", "stars that the attitude rests on"),
-        bool1("Valid", "the latest picture gave this attitude"),
+        enum8("Mode", "mode that identified the image", choices=MatchMode),
+        u8("Matched", "stars used for the attitude"),
+        bool1("Valid", "this is the attitude of the latest image"),
     ),
-    Message(201, "PhaseTimes", "latest time of each phase of a picture").of(
+    Message(201, "PhaseTimes", "latest time of each phase of an image").of(
         u32("Idle", "waiting or restarting, imager off", "us"),
         u32("Discard", "imager on, undefined frame", "us"),
-        u32("Capture", "frame buffer stores the picture", "us"),
+        u32("Capture", "frame buffer stores the image", "us"),
         u32("Transfer", "frame buffer to processor memory", "us"),
         u32("Detect", "detection, distortion and unit vectors", "us"),
         u32("Match", "identification", "us"),
@@ -101,7 +101,7 @@ _TELEMETRY = (
         f32("Y", "measured row", "px"),
     ),
     Message(203, "UploadStatus", "progress of an upload").of(
-        u16("NextBlock", "block behind the latest one"),
+        u16("NextBlock", "number after the latest block"),
         u16("BlocksReceived", "blocks since UploadImage"),
     ),
     Message(204, "SupplyReport", "supply monitoring").of(
@@ -117,31 +117,31 @@ _TELEMETRY = (
     ),
     Message(206, "LoopStatus", "state of the main loop and of the settings that are extensions").of(
         u32("Iterations", "iterations since power-up"),
-        u8("ModeFlag", "mode for the next picture", choices=MatchMode),
+        u8("ModeFlag", "mode for the next image", choices=MatchMode),
         u16("FrameRate", "the sensor's frame-rate register"),
         u16("DiscardDelay", "wait after enabling the sensor", "ms"),
         u8("Bank", "half of the frame buffer"),
         u8("CameraPage", "page of telecommands 13 and 14"),
         bool1("Running", "the 1 s loop runs"),
     ),
-    Message(207, "MatchSummary", "how well the latest picture was identified").of(
+    Message(207, "MatchSummary", "result of the latest identification").of(
         u8("Detected", "stars detected"),
         u8("Matched", "stars identified"),
         f32("MeanConfidence", "mean confidence of the identified stars, 0 to 1"),
         u8("MaxVotes", "most verification votes of a star"),
     ),
     _SWITCHES_SHOWN,
-    Message(209, "Quality", "how good the latest picture's attitude is, and why there is none").of(
-        u32("FrameCounter", "number of the picture since power-up"),
-        enum8("Reason", "why there is no attitude, or that there is one", choices=Reason),
+    Message(209, "Quality", "quality of the latest image's attitude, or why there is none").of(
+        u32("FrameCounter", "number of the image since power-up"),
+        enum8("Reason", "why there is no attitude, or SOLVED", choices=Reason),
         *ATTITUDE_QUALITY,
         f32("Background", "mean brightness of the sky", "DN"),
-        f32("BackgroundRange", "the brightest minus the darkest part of it", "DN"),
+        f32("BackgroundRange", "brightest minus darkest part of the sky", "DN"),
         f32("Noise", "standard deviation of a pixel", "DN"),
-        f32("Saturated", "share of the picture at the end of the scale"),
-        u16("Spikes", "bright pixels that are no spots: hot ones, particles"),
-        u16("Elongated", "areas drawn out to streaks"),
-        bool1("Valid", "the latest picture gave an attitude, and this rates it"),
+        f32("Saturated", "fraction of saturated pixels"),
+        u16("Spikes", "single bright pixels: hot ones, particles"),
+        u16("Elongated", "areas elongated to streaks"),
+        bool1("Valid", "the latest image has an attitude, which this frame rates"),
     ),
 )
 

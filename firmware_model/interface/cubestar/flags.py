@@ -23,7 +23,7 @@ class ErrorFlag:
 
 _FLAGS = (
     ErrorFlag(0, "OverCurrent", "a supply current was above its limit and the switch was opened"),
-    ErrorFlag(1, "UnderCurrent", "a switched-on supply drew next to no current"),
+    ErrorFlag(1, "UnderCurrent", "a switched-on supply drew almost no current"),
     ErrorFlag(8, "UART_ProtocolError", "byte outside of a frame, or an unknown escape"),
     ErrorFlag(9, "UART_TcmdBufOfError", "telecommand while the command buffer was full"),
     ErrorFlag(10, "UART_Tcmd_TooManyParm", "telecommand with too many parameter bytes"),
@@ -35,7 +35,7 @@ _FLAGS = (
     ErrorFlag(18, "I2C_TCMD_TooFewParm", "telecommand with too few parameter bytes"),
     ErrorFlag(19, "I2C_TCMD_TooManyparm", "telecommand with too many parameter bytes"),
     ErrorFlag(24, "SPICommsError", "error on an SPI bus", never="there is no SPI bus"),
-    ErrorFlag(25, "StatusError", "a step was asked for whose input does not exist yet"),
+    ErrorFlag(25, "StatusError", "a step was requested before its input existed"),
     ErrorFlag(
         26,
         "ISSetupError",
@@ -43,7 +43,7 @@ _FLAGS = (
         "ISsetupError",
     ),
     ErrorFlag(27, "TestPatternConfigError", "unknown test pattern", "TestpatternConfigError"),
-    ErrorFlag(28, "ImageCaptureError", "no whole picture arrived in time"),
+    ErrorFlag(28, "ImageCaptureError", "no whole image arrived in time"),
     ErrorFlag(29, "ISDisableError", "the image sensor did not acknowledge being disabled"),
     ErrorFlag(30, "ConfigChangeError", "the image sensor did not acknowledge a new setting"),
     ErrorFlag(31, "ISEnableError", "the image sensor did not acknowledge being enabled"),
@@ -51,18 +51,14 @@ _FLAGS = (
     ErrorFlag(
         33, "PrincipalPointRangeError", "principal point out of range", "BoresightRangeError"
     ),
-    ErrorFlag(40, "ImageBlockSizeError", "unknown block size, or block beyond the picture"),
-    ErrorFlag(41, "TimingError", "the main loop took longer than its second", "MainLoopTimeError"),
+    ErrorFlag(40, "ImageBlockSizeError", "unknown block size, or block beyond the image"),
+    ErrorFlag(41, "TimingError", "the main loop took longer than a second", "MainLoopTimeError"),
     ErrorFlag(42, "TcmdIDError", "unknown telecommand ID"),
     ErrorFlag(43, "TlmIDError", "unknown telemetry ID"),
     ErrorFlag(44, "TriggerAlreadySet", "trigger while the loop was triggered already"),
     ErrorFlag(45, "TimerAlreadyRunning", "trigger while the delay timer was running"),
-    ErrorFlag(
-        46, "DelayTimeSetToLong", "delay time longer than one second, or none", "TimerTimeSetToLong"
-    ),
-    ErrorFlag(
-        48, "StarPixSetError", "pixel limits out of range or in the wrong order", "PixSetError"
-    ),
+    ErrorFlag(46, "DelayTimeSetToLong", "delay above one second, or 0", "TimerTimeSetToLong"),
+    ErrorFlag(48, "StarPixSetError", "pixel limits out of range or order", "PixSetError"),
     ErrorFlag(49, "MaxStarsSetError", "star limit out of range"),
     ErrorFlag(50, "MaxStarsDetection", "detection stopped at the limit of stars"),
     ErrorFlag(51, "MaxInvalidStarsDetectionError", "detection stopped at the limit of large areas"),
@@ -71,45 +67,23 @@ _FLAGS = (
     ErrorFlag(54, "MaxNoiseSetError", "noise limit out of range"),
     ErrorFlag(55, "MaxNoiseDetected", "detection stopped at the limit of small areas"),
     ErrorFlag(56, "SetIDModeError", "unknown identification mode"),
-    ErrorFlag(57, "IDModeError", "tracking asked for, but there is neither an attitude nor a hint"),
+    ErrorFlag(57, "IDModeError", "tracking requested without an attitude or a hint"),
     ErrorFlag(58, "ReducedIDListSizeError", "no catalogue star near the rough boresight"),
-    ErrorFlag(
-        59,
-        "LessThanThreeStarsInFoV",
-        "fewer than three catalogue stars near the expected boresight",
-    ),
+    ErrorFlag(59, "LessThanThreeStarsInFoV", "fewer than three catalogue stars near the boresight"),
     ErrorFlag(60, "LessThanThreeStarsDetected", "fewer than three stars detected"),
     ErrorFlag(61, "LessThanThreeStarsID", "fewer than three stars identified"),
     ErrorFlag(62, "IDError", "identification found no consistent set of stars"),
     ErrorFlag(63, "IDSearchError", "no two detected stars confirmed each other's identity"),
     ErrorFlag(64, "DeclinationSetError", "declination out of range"),
     ErrorFlag(65, "RightAscensionSetError", "right ascension out of range"),
-    ErrorFlag(66, "QuestindexError", "attitude asked for with too few identified stars"),
-    ErrorFlag(67, "RateExceeded", "tracking lost the stars: they moved further than its radius"),
+    ErrorFlag(66, "QuestindexError", "attitude requested with too few identified stars"),
+    ErrorFlag(67, "RateExceeded", "tracking lost the stars: they moved beyond its radius"),
     ErrorFlag(
-        72,
-        "FlashInvalidAreaError",
-        "flash access outside of its area",
-        never="the pages have fixed places",
+        72, "FlashInvalidAreaError", "flash access outside its area", never="pages are fixed"
     ),
-    ErrorFlag(
-        73,
-        "FlashLockedError",
-        "flash write while it was locked",
-        never="the program never locks it",
-    ),
-    ErrorFlag(
-        74,
-        "FlashTimeoutError",
-        "flash write did not end in time",
-        never="the modelled flash does not fail",
-    ),
-    ErrorFlag(
-        75,
-        "FlashUnalignedError",
-        "flash write at an unaligned address",
-        never="whole pages are written",
-    ),
+    ErrorFlag(73, "FlashLockedError", "write to locked flash", never="it is never locked"),
+    ErrorFlag(74, "FlashTimeoutError", "flash write timed out", never="modelled flash cannot fail"),
+    ErrorFlag(75, "FlashUnalignedError", "unaligned flash write", never="whole pages are written"),
 )
 
 #: Flags that this node does not raise, and why.

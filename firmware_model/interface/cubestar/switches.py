@@ -14,23 +14,23 @@ class CubeStarSwitches(Switches):
         "algorithm-2",
         "confirmed",
         source="section 4.3.3, Algorithm 2",
-        reason="votes name wrong stars among false ones; an attitude that triangles propose is "
-        "believed when chance would confirm it less than once in 10 000 pictures",
+        reason="with false stars the votes elect wrong identities; an attitude proposed by "
+        "triangles is accepted if chance confirms one in fewer than 1 of 10 000 images",
     )
     weights: str = switch(
-        "what a pixel weighs in its star's centroid",
+        "weight of a pixel in its star's centroid",
         "intensity",
         "above-threshold",
         source="equations 4.1.1 and 4.1.2",
         reason="the plain intensity pulls the centroid towards the middle of the area",
     )
     tracking: str = switch(
-        "what a tracked star must satisfy",
+        "condition on a tracked star",
         "nearest",
         "verified",
         source="section 4.5",
-        reason="a faint star near another's place is taken for it: the angles between all tracked "
-        "stars tell, and how often chance would confirm their attitude",
+        reason="a faint star near another's place is mistaken for it; the angles between all "
+        "tracked stars, and the probability of their match by chance, reveal that",
     )
     pair_limit: str = switch(
         "widest pair of stars in the list, in degrees",
@@ -38,50 +38,50 @@ class CubeStarSwitches(Switches):
         "57.3",
         "60",
         source="section 4.3.2: 42.1 is chosen for its 11 484 pairs, the text's field of view is 60",
-        reason="57.3 is the diagonal of the calibrated camera, so that every pair in a picture is "
+        reason="57.3 is the diagonal of the calibrated camera, so that every pair in an image is "
         "listed",
     )
     reduction: str = switch(
-        "radius of the reduced catalogue that a star is tracked in, in degrees",
+        "radius of the reduced catalogue for tracking, in degrees",
         "30.3",
         "35",
-        source="section 5.3.4: just wider than the field when the attitude is known well; 4.3.4 "
-        "takes 30 for the field, and tracking moves by 0.3 at most",
+        source="section 5.3.4: just wider than the field if the attitude is known well; 4.3.4 uses "
+        "30 for the field, and tracking moves by 0.3 at most",
         reason="the calibrated camera's farthest corner is 31.3 from the boresight",
     )
     flash_store: str = switch(
-        "what it costs to store attitude and mode flag",
+        "cost of storing attitude and mode flag",
         "page",
         "nothing",
-        source="section 5.3.5: quaternion and DCM go to flash at every turn",
-        reason="a page takes 20 ms to erase and stands 20 000 times, 5.6 hours of the loop",
+        source="section 5.3.5: quaternion and DCM are written to flash at every turn",
+        reason="a page takes 20 ms to erase and endures 20 000 erasures, 5.6 hours of the loop",
     )
     transitions: str = switch(
-        "how the mode flag changes, and which attitude is believed",
+        "how the mode flag changes, and which attitudes it accepts",
         "automatic",
         "confirmed",
         source="sections 5.3.4 and 6.1: the flag follows the attitude determination, and is soon "
         "tracking; after a failure (not printed): lost in space",
-        reason="a search is as wide as the body can have turned, and an attitude that contradicts "
-        "the last one has to be sure or found twice",
+        reason="a search covers the possible rotation of the body, and an attitude that "
+        "contradicts the last one must be certain or found twice",
     )
     estimate: str = switch(
-        "what a star weighs in the attitude",
+        "weight of a star in the attitude",
         "votes",
         "inverse-variance",
         source="section 5.3.4: the votes of the verification round",
-        reason="bright stars are measured better than faint ones; the weights give the attitude's "
-        "covariance too",
+        reason="bright stars are measured better than faint ones; the attitude's covariance "
+        "follows from the weights",
     )
     detection: str = switch(
-        "what a star's pixels are brighter than, and which pixels are read",
+        "threshold of a star's pixels, and which pixels are read",
         "sampled",
         "background",
         source="section 5.3.3: every third pixel of every third row against a fixed threshold; the "
         "search ends at 20 stars, counted from the top",
         reason="stray light, noise and hot pixels pass a fixed threshold, the brightest stars may "
-        "stand further down, and faint spots fall between the samples; beside the Earth's limb a "
-        "pixel is compared with what surrounds it",
+        "be further down, and faint spots fall between the samples; beside the Earth's limb a "
+        "pixel is compared with its surroundings",
     )
 
 

@@ -34,7 +34,7 @@ def _edge(name: str, meaning: str, maximum: int, reset: int) -> Field:
 _SYSTEM = (
     Message(1, "TogglePowerSW", "toggle the load switch of the imager and the frame buffer"),
     Message(2, "Reset", "restart the program; settings and counters return to power-up values"),
-    Message(3, "MCUReset", "reset the microcontroller, as its system-request reset does"),
+    Message(3, "MCUReset", "reset the microcontroller by its system-request reset"),
     Message(4, "setDelayTimerTimeout", "delay between Trigger and the first capture").of(
         u8("Time", "delay", "x 10 ms", reset=1).within(1, 100, "DelayTimeSetToLong")
     ),
@@ -45,15 +45,13 @@ _SYSTEM = (
 _OPTICS = (
     Message(7, "Exposure", "exposure of the image sensor").of(
         u16(
-            "exposure",
-            "exposure in line times (132.2 us at 10 MHz); 0: the longest the frame rate allows",
-            "lines",
+            "exposure", "line times (132.2 us at 10 MHz); 0: the longest at the frame rate", "lines"
         )
     ),
     Message(
         8,
         "setFocalLength",
-        "focal length that turns undistorted pixels into unit vectors (pixel pitch 5.6 um)",
+        "focal length that converts undistorted pixels to unit vectors (pixel pitch 5.6 um)",
     ).of(
         f32("FocalLength", "focal length", "mm", reset=6.28).within(
             5.0, 7.0, "FocalLengthRangeError"
@@ -70,7 +68,7 @@ _OPTICS = (
     Message(
         10,
         "setPrincipalPoint",
-        "principal point and centre of distortion; it may lie outside of the picture",
+        "principal point and centre of distortion; it may lie outside of the image",
     ).of(
         f32("Cx", "column, 0 is the middle of the first pixel", "px", reset=539.0).within(
             -COLUMNS, 2 * COLUMNS - 1, "PrincipalPointRangeError"
@@ -104,7 +102,7 @@ _IMAGE = (
         "write an image sensor register on the page that SetCameraRegisterPage selects",
     ).of(
         u8("Reg", "low byte of the register's address"),
-        u8("DataH", "must be 0: this sensor's registers have 8 bits").within(
+        u8("DataH", "must be 0: the sensor's registers have 8 bits").within(
             None, 0, "ISSetupError"
         ),
         u8("DataL", "value to write"),
@@ -117,25 +115,23 @@ _IMAGE = (
     Message(
         15,
         "CaptureTestPatern",
-        "write a pattern to the picture memory (the sensor's own patterns are not published)",
+        "write a pattern to the image memory (the sensor's own patterns are not published)",
     ).of(
         enum8(
             "TestPaternType",
-            "modulo 256: column plus number of the picture, column plus row, column",
+            "modulo 256: column plus number of the image, column plus row, column",
             choices=codes.TestPattern,
             range_flag="TestPatternConfigError",
         )
     ),
-    Message(16, "CaptureImage", "capture a picture and transfer it to the processor"),
-    Message(
-        17, "UploadImage", "begin an upload: clear the picture memory, which UploadBlock then fills"
-    ),
+    Message(16, "CaptureImage", "capture an image and transfer it to the processor"),
+    Message(17, "UploadImage", "begin an upload: clear the image memory; UploadBlock fills it"),
     Message(18, "ImageBlockSet", "select the block that telemetry ImageBlock returns").of(
         u16(
             "BlockNumber",
-            "block of the picture, row after row",
+            "block of the image, row by row",
             high=IMAGE_BYTES // codes.ImageBlockSize.BYTES_32.length - 1,
-            high_by=(
+            maximum_by=(
                 "BlockSize",
                 {size: IMAGE_BYTES // size.length - 1 for size in codes.ImageBlockSize},
             ),
@@ -143,7 +139,7 @@ _IMAGE = (
         ),
         enum8(
             "BlockSize",
-            "size; a shorter one fills the front of ImageBlock, 256 bytes come as two reads",
+            "size; a shorter block fills the front of ImageBlock, 256 bytes take two reads",
             choices=codes.ImageBlockSize,
             range_flag="ImageBlockSizeError",
             reset=codes.ImageBlockSize.BYTES_128,
@@ -152,11 +148,11 @@ _IMAGE = (
     Message(
         19,
         "StreamDownImage",
-        "send the whole picture as telemetry ImageBlock frames, 128 bytes each, without requests",
+        "send the whole image as telemetry ImageBlock frames, 128 bytes each, without requests",
     ),
 )
 
-_LATER = "; published: {} of a 1280 x 1024 sensor, not mapped; beyond this one refused"
+_LATER = "; published: {} of a 1280 x 1024 sensor, not mapped; more is rejected"
 
 _DETECTION = (
     Message(
@@ -165,7 +161,7 @@ _DETECTION = (
         "part of this sensor's 1024 x 512 pixels that is searched, both ends included",
     ).of(
         u8(
-            "StepSize", "look at every n-th pixel of every n-th row; 0 acts as 1", "px", reset=3
+            "StepSize", "sample every n-th pixel of every n-th row; 0 acts as 1", "px", reset=3
         ).within(None, 10, "ValidImageRangeSetError"),
         _edge("Xstart", f"first column{_LATER.format('0 to 343')}", COLUMNS - 1, 0),
         _edge("Xend", f"last column{_LATER.format('936 to 1279')}", COLUMNS - 1, COLUMNS - 1),
@@ -173,11 +169,7 @@ _DETECTION = (
         _edge("Yend", f"last row{_LATER.format('943 to 1030')}", ROWS - 1, ROWS - 1),
         ordered=(("Xstart", "Xend"), ("Ystart", "Yend")),
     ),
-    Message(
-        21,
-        "setDetectionThresholds",
-        "pixel values that make a star; higher than the threshold counts",
-    ).of(
+    Message(21, "setDetectionThresholds", "a pixel of a star is above the threshold").of(
         u8("DetectionThreshold", "for a pixel of the search", "DN", reset=6),
         u8("StarThreshold", "for a neighbour while growing", "DN", reset=6),
     ),
@@ -188,7 +180,7 @@ _DETECTION = (
         ),
         ordered=(("MinPixels", "MaxPixels"),),
     ),
-    Message(23, "setDetectionVariables", "centroiding window, and when the search stops").of(
+    Message(23, "setDetectionVariables", "centroiding window, and limits that end the search").of(
         u8(
             "GridSize",
             "side of the centroiding window; an even one acts as the next odd one",
@@ -197,24 +189,22 @@ _DETECTION = (
         ).within(None, 15, "CentroidingGridSizeSetError"),
         u8(
             "MaxStars",
-            f"stars found; more than {MOST_STARS}, the list's length, act as {MOST_STARS}, 0 as 1",
+            f"limit of stars; 0 acts as 1, more than {MOST_STARS} as {MOST_STARS}",
             reset=MOST_STARS,
         ).within(None, 99, "MaxStarsSetError"),
         u8(
             "MaxInvalidStars",
-            "more areas than this were too large; 50 is the thesis' own (section 5.3.3)",
+            "limit of too large areas; 50 is the value of the thesis (section 5.3.3)",
             also=50,
             reset=50,
         ).within(None, 15),
-        u8("MaxNoise", "more areas than this were too small", reset=255).within(
-            1, None, "MaxNoiseSetError"
-        ),
+        u8("MaxNoise", "limit of too small areas", reset=255).within(1, None, "MaxNoiseSetError"),
     ),
-    Message(24, "DetectStars", "detect stars in the picture memory"),
+    Message(24, "DetectStars", "detect stars in the image memory"),
 )
 
 _IDENTIFICATION = (
-    Message(25, "setIDMode", "how the next picture's stars are identified").of(
+    Message(25, "setIDMode", "how the next image's stars are identified").of(
         enum8(
             "IdMode",
             "tracking starts with an assisted match from setTrackingMode until the first fix",
@@ -235,7 +225,7 @@ _IDENTIFICATION = (
         u8("Margin", "tolerance", "rad", scale=10_000, low=0.0001, reset=0.001)
     ),
     Message(28, "IDStars", "identify the detected stars"),
-    Message(29, "SelectBestStars", "select the three identified stars of highest confidence"),
+    Message(29, "SelectBestStars", "select the three identified stars with the highest confidence"),
     Message(30, "EstimateAttitude", "estimate the attitude from the identified stars"),
 )
 
@@ -243,10 +233,10 @@ _OPERATION = (
     Message(31, "ReadConfig", "restore the settings that SaveConfig stored"),
     Message(32, "SaveConfig", "store the settings in flash"),
     Message(33, "ClearConfig", "erase the stored settings and return to the reset values"),
-    Message(34, "TestSRAM", "test the picture memory; the picture is lost"),
+    Message(34, "TestSRAM", "test the image memory; the image is lost"),
     Message(35, "TestWDG", "stop serving the watchdog, so that it resets the processor"),
-    Message(36, "CaptureAndProcess", "capture a picture, then detect, identify and estimate"),
-    Message(37, "ProcessImage", "detect, identify and estimate with the picture in memory"),
+    Message(36, "CaptureAndProcess", "capture an image, then detect, identify and estimate"),
+    Message(37, "ProcessImage", "detect, identify and estimate with the image in memory"),
     Message(38, "Trigger", "start the 1 s loop; it runs until StopLoop or Reset"),
 )
 

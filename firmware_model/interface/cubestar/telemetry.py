@@ -33,7 +33,7 @@ UNIT_VECTOR_SCALE = 10_000
 _identity = partial(u16, meaning="index in the onboard star list; 65535: not identified")
 _percent = partial(u8, meaning="confidence of the identification", unit="%")
 _switch = partial(u8, meaning="load switch of imager and frame buffer", choices=codes.SwitchState)
-_task = partial(enum8, meaning="what the node last did", choices=codes.TaskStatus)
+_task = partial(enum8, meaning="latest activity of the node", choices=codes.TaskStatus)
 _temperature = partial(i16, meaning="temperature of the processor", unit="degC", scale=100)
 
 _STAR_NUMBER = u8("StarNumber", "number of the detected star, from 0")
@@ -76,7 +76,7 @@ _QUATERNION = (
 )
 
 _NODE = (
-    Message(128, "Identification", "what the node is, and its uptime").of(
+    Message(128, "Identification", "type, versions and uptime").of(
         u8("NodeType", "type of node"),
         u8("InterfaceVersion", "version of this interface"),
         u8("FirmwareVersionMajor", "firmware version, major"),
@@ -92,13 +92,11 @@ _NODE = (
         u16("TcmdCount", "telecommands accepted, modulo 65536"),
         u16("TlmCount", "telemetry requests answered, modulo 65536"),
     ),
-    Message(130, "ErrorFlags", "errors since ClearErrorFlags; a flag stays up until then").of(
-        *flag_fields()
+    Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(*flag_fields()),
+    Message(131, "TcmdProcessed", "acknowledge of the last telecommand").of(
+        u8("Processed", "1: processed, 0: not yet")
     ),
-    Message(
-        131, "TcmdProcessed", "acknowledge: whether the last telecommand has been processed"
-    ).of(u8("Processed", "1: processed, 0: not yet")),
-    Message(132, "TaskStatus", "what the node last did").of(_task("taskStatus")),
+    Message(132, "TaskStatus", "latest activity of the node").of(_task("taskStatus")),
     Message(133, "StartAndLoopTime", "times of the main loop").of(
         *_times(
             ("StartupTime", "from reset to the main loop"),
@@ -115,10 +113,10 @@ _NODE = (
 )
 
 _CAMERA = (
-    Message(136, "Exposure", "exposure that is set").of(
-        u16("exposure", "line times; 0: the longest the frame rate allows", "lines")
+    Message(136, "Exposure", "current exposure").of(
+        u16("exposure", "line times; 0: as long as the frame rate allows", "lines")
     ),
-    Message(137, "ImageSetup", "part of the sensor that is read; fixed on this sensor").of(
+    Message(137, "ImageSetup", "read part of the sensor, which is fixed").of(
         u16("FirstLine", "first row", "px", reset=0),
         u16("Width", "columns", "px", reset=COLUMNS),
         u16("Height", "rows", "px", reset=ROWS),
@@ -126,7 +124,7 @@ _CAMERA = (
     Message(
         138,
         "CameraSetup",
-        "registers of a later image sensor; this node answers as to an unknown ID",
+        "registers of a later image sensor; this node rejects the ID as unknown",
         supported=False,
     ).of(
         *(
@@ -136,17 +134,15 @@ _CAMERA = (
             )
         )
     ),
-    Message(139, "FocalLengthDetails", "focal lengths that are set").of(
+    Message(139, "FocalLengthDetails", "current focal lengths").of(
         f32("FocalLength", "focal length of the unit vectors", "mm"),
         f32("Fx", "of the distortion model, along the rows", "px"),
         f32("Fy", "of the distortion model, along the columns", "px"),
     ),
-    Message(140, "PrincipalPoint", "principal point that is set").of(
+    Message(140, "PrincipalPoint", "current principal point").of(
         f32("Cx", "column", "px"), f32("Cy", "row", "px")
     ),
-    Message(
-        141, "DistortionCoef", "distortion coefficients that are set, distorted to undistorted"
-    ).of(
+    Message(141, "DistortionCoef", "current distortion coefficients, distorted to undistorted").of(
         f32("K1", "radial, of the squared radius"),
         f32("K2", "radial, of its square"),
         f32("P1", "tangential, along the columns"),
@@ -156,19 +152,19 @@ _CAMERA = (
         u8("DataH", "always 0: this sensor's registers have 8 bits"), u8("DataL", "value")
     ),
     Message(143, "ImageBlock", "block that ImageBlockSet selected").of(
-        byte_array(128, "Block", "pixels, row after row; zero behind a shorter block")
+        byte_array(128, "Block", "pixels, row by row; a shorter block is padded with zeros")
     ),
-    Message(144, "CameraTiming", "times of the image sensor's use").of(
+    Message(144, "CameraTiming", "times of the image sensor").of(
         *_times(
-            ("SetupTime", "writing the set-up"),
-            ("ExposureUpdateTime", "writing the exposure"),
-            ("CaptureTime", "from enable until the picture is stored"),
+            ("SetupTime", "set-up"),
+            ("ExposureUpdateTime", "exposure setting"),
+            ("CaptureTime", "from enable until the image is stored"),
         )
     ),
 )
 
 _DETECTION = (
-    Message(145, "DetectionRegion", "part of the picture that is searched, both ends included").of(
+    Message(145, "DetectionRegion", "part of the image that is searched, both ends included").of(
         u8("StepSize", "every n-th pixel of every n-th row", "px"),
         u16("Xstart", "first column", "px"),
         u16("Xend", "last column", "px"),
@@ -176,7 +172,7 @@ _DETECTION = (
         u16("Yend", "last row", "px"),
     ),
     Message(146, "DetectionThresholdValues", "thresholds in use").of(
-        u8("DarkThreshold", "dark level of the latest picture", "DN"),
+        u8("DarkThreshold", "dark level of the latest image", "DN"),
         u8("DetectionThreshold", "for a pixel of the search", "DN"),
         u8("StarThreshold", "for a neighbour while growing", "DN"),
     ),
@@ -184,7 +180,7 @@ _DETECTION = (
         u8("MinPixels", "fewer are noise", "px"), u8("MaxPixels", "more are an invalid star", "px")
     ),
     Message(148, "StarGrid", "centroiding window").of(u8("GridSize", "side of the window", "px")),
-    Message(149, "MaxStars", "when the search stops").of(
+    Message(149, "MaxStars", "limits that end the search").of(
         u8("maxStars", "stars found"),
         u8("maxInvalidStars", "areas that were too large"),
         u8("maxNoise", "areas that were too small"),
@@ -207,9 +203,7 @@ _DETECTION = (
     Message(152, "BodyUnitVectors", "next detected star's direction in the camera", steps=True).of(
         *_scaled("camera unit vector", "VbX", "VbY", "VbZ"), _STAR_NUMBER
     ),
-    Message(
-        153, "DetectionTimingOne", "longest times of the detection's steps since the last reset"
-    ).of(
+    Message(153, "DetectionTimingOne", "longest times of detection steps since the last reset").of(
         *_times(
             ("MaxStarSearchTime", "search and growing"),
             ("MaxCentroidFindTime", "centroids"),
@@ -223,9 +217,7 @@ _DETECTION = (
 )
 
 _IDENTIFICATION = (
-    Message(155, "IDMode", "identification mode that is set").of(
-        enum8("Mode", "mode", choices=codes.IdMode)
-    ),
+    Message(155, "IDMode", "identification mode").of(enum8("Mode", "mode", choices=codes.IdMode)),
     Message(156, "IDMargin", "tolerance of the distance between two stars").of(
         u8("Margin", "tolerance", "rad", 10_000)
     ),
@@ -236,30 +228,24 @@ _IDENTIFICATION = (
         u8("ValidationVotes", "other stars whose distance agrees"),
         _percent("Confidence"),
     ),
-    Message(
-        159, "InertialUnitVectors", "next identified star's catalogue direction", steps=True
-    ).of(
+    Message(159, "InertialUnitVectors", "next identified star's inertial direction", steps=True).of(
         *_scaled("inertial unit vector", "ViX", "ViY", "ViZ"),
         _STAR_NUMBER,
         _identity("Identity"),
         _percent("Confidence"),
     ),
-    Message(
-        160, "IDTimingOne", "longest times of the identification's first steps since the last reset"
-    ).of(
+    Message(160, "IDTimingOne", "longest times of the first matching steps since reset").of(
         *_times(
-            ("MaxModeSelectionTime", "choice of mode and star list"),
+            ("MaxModeSelectionTime", "selection of mode and star list"),
             ("MaxDistanceCalTime", "distances of the measured pairs"),
             ("MaxVoteRoundOneTime", "catalogue search and votes"),
-            ("MaxFindIDTime", "choice of the top identities"),
+            ("MaxFindIDTime", "selection of the top identities"),
         )
     ),
-    Message(
-        161, "IDTimingTwo", "longest times of the identification's last steps since the last reset"
-    ).of(
+    Message(161, "IDTimingTwo", "longest times of the last matching steps since the last reset").of(
         *_times(
             ("MaxVoteRoundTwoTime", "verification votes"),
-            ("MaxSelectID", "choice of the stars to keep"),
+            ("MaxSelectID", "selection of the stars"),
             ("MaxAlgoCompletionTime", "completion"),
         )
     ),
@@ -280,21 +266,21 @@ _ATTITUDE = (
     Message(166, "AttitudeTiming", "times of the attitude estimate since the last reset").of(
         *_times(("LatestTime", "latest"), ("MaxTime", "longest"))
     ),
-    Message(167, "PerformanceParameters", "outcome of the latest picture").of(
+    Message(167, "PerformanceParameters", "outcome of the latest image").of(
         u8("NumStarsDetected", "stars detected"),
         u8("StarImageNoise", "areas that were too small"),
         u8("InvalidStars", "areas that were too large"),
         u8("NumberOfStarsID", "stars identified"),
-        enum8("Idmode", "identification mode that is set", choices=codes.IdMode),
+        enum8("Idmode", "identification mode", choices=codes.IdMode),
         u8("ImageDarkValue", "mean of the searched pixels below the threshold", "DN"),
-        bool1("ImageCaptureSuccess", "a picture was stored"),
+        bool1("ImageCaptureSuccess", "an image was stored"),
         bool1("DetectionSuccess", "stars were detected"),
         bool1("IdentificationSuccess", "stars were identified"),
         bool1("AttitudeSuccess", "an attitude was estimated"),
         bool1("ProcessingTimeError", "processing took longer than 500 ms"),
         bool1("MaxStarsDetected", "detection stopped at the limit of stars"),
         bool1("LessThanThreeStarsInFoV", "fewer than three stars in the field"),
-        bool1("CommsError", "an error flag of the UART or I2C is up"),
+        bool1("CommsError", "an error flag of the UART or I2C is raised"),
     ),
     Message(168, "TimingSummary", "latest times").of(
         *_times(
@@ -327,7 +313,7 @@ _ATTITUDE = (
 )
 
 _LOG = (
-    Message(173, "DelayTime", "delay between Trigger and the first capture").of(
+    Message(173, "DelayTime", "from Trigger to first capture").of(
         u8("Timeout", "delay", "x 10 ms")
     ),
     Message(174, "LogStatus", "state and errors in one frame").of(
@@ -339,12 +325,12 @@ _LOG = (
         *_CURRENTS,
         *flag_fields(log_names=True),
     ),
-    Message(175, "Results", "counts of the latest picture").of(
+    Message(175, "Results", "counts of the latest image").of(
         u8("DarkValue", "mean of the searched pixels below the threshold", "DN"),
         u8("Detected", "stars detected"),
         u8("Invalid", "areas that were too large"),
         u8("Noise", "areas that were too small"),
-        u8("IDMode", "identification mode that is set", choices=codes.IdMode),
+        u8("IDMode", "identification mode", choices=codes.IdMode),
         u8("ID", "stars identified"),
     ),
 )

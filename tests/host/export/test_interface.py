@@ -156,7 +156,7 @@ def test_json_carries_registers_and_letters_where_there_are_any() -> None:
 @pytest.mark.parametrize("form", ["table", "markdown"])
 def test_readers_find_registers_letters_and_what_is_ours(form: str) -> None:
     text = render(CUBESENSE, form)
-    assert "which registers there are, and their addresses, are assumed" in text
+    assert "the registers and their addresses are assumed" in text
     assert "0x48" in text
     assert "layout only declared somewhere" in text
     assert re.search(r"\ba\b.*TAKE_NADIR.*'Y'", text)

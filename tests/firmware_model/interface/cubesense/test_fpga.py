@@ -125,7 +125,7 @@ def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int
         ({"scan_step": 48}, "power of two"),
         ({"first_row": 64}, "below scan_step 64"),
         ({"first_column": 100}, "below scan_step 64"),
-        ({"columns": 63}, "inside of the picture"),
+        ({"columns": 63}, "inside of the image"),
         ({"rows": 16, "window": 17}, "does not fit into 640 x 16"),
     ],
 )
