@@ -25,11 +25,7 @@ STREAM_BACKLOG_BYTES = 4 * BLOCK_BYTES
 
 
 class Commands(CommandExecutor):
-    """Executes telecommands.
-
-    Attributes:
-        upload: the catalogue that is being loaded.
-    """
+    """Executes telecommands."""
 
     def __init__(
         self,
@@ -46,6 +42,7 @@ class Commands(CommandExecutor):
         self._camera = camera
         self._catalogue = catalogue
         self._measuring = measuring
+        #: the catalogue that is being loaded
         self.upload = CatalogueUpload(hardware, meter, catalogue)
         self._actions |= {
             "SetSystemTime": self._set_time,

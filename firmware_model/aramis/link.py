@@ -37,7 +37,9 @@ _LENGTHS = {
 
 
 class AramisLink(QueueingLink):
-    """Decodes the host's messages and answers them."""
+    """Counts messages and checks directions; ``urgent`` runs in the interrupt."""
+
+    state: State
 
     def __init__(
         self,
@@ -49,11 +51,10 @@ class AramisLink(QueueingLink):
     ) -> None:
         """``urgent`` is called at once for each accepted telecommand."""
         super().__init__(hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry)
-        self._state = state
         self._urgent = urgent
 
     def _values(self, message: Message) -> dict[str, Any] | None:
-        self._state.telemetry += 1
+        self.state.telemetry += 1
         return super()._values(message)
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
@@ -69,5 +70,5 @@ class AramisLink(QueueingLink):
         accepted = super()._enqueue(message, values)
         if accepted:
             self._urgent(self.queue[-1])
-            self._state.telecommands += 1
+            self.state.telecommands += 1
         return accepted

@@ -24,28 +24,25 @@ SLICE_US = 5_000  #: more than a slice of a reload takes
 
 
 class AramisProgram:
-    """One run of the program, from reset to reset.
-
-    Attributes:
-        link: the satellite's interface; its methods are the UART and I2C interrupts.
-        commands: the telecommands.
-        state: the program's memory, also read by traces.
-    """
+    """One run of the program, from reset to reset."""
 
     def __init__(
         self, hardware: AramisHardware, meter: Meter, switches: AramisSwitches = DEFAULT_SWITCHES
     ) -> None:
         """Settings come from flash, ``switches`` are those of power-up."""
+        #: state: the program's memory, also read by traces
         self.state = state = State(hardware.flash, switches)
         self._camera = Camera(hardware, state, meter)
         self._catalogue = CatalogueStore(hardware, meter)
         self._measuring = Measuring(meter, state, self._camera, self._catalogue)
+        #: the telecommands
         self.commands = Commands(
             hardware, meter, state, self._camera, self._catalogue, self._measuring
         )
         telemetry = Telemetry(
             hardware, meter, state, self._camera, self._catalogue, self.commands, lambda: self.link
         )
+        #: the satellite's interface; its methods are the UART and I2C interrupts
         self.link = AramisLink(hardware, meter, state, telemetry.values, self.commands.urgent)
 
     def frame_ended(self, end: FrameEnd) -> None:

@@ -44,13 +44,7 @@ _SETTINGS = {
 
 @dataclass(eq=False)
 class Commands:
-    """Executes jobs.
-
-    Attributes:
-        reader: reads images, for every stream.
-        download: the frame that telemetry returns.
-        handled: names of the telecommands that have an effect.
-    """
+    """Executes jobs."""
 
     meter: Meter
     state: State
@@ -60,8 +54,8 @@ class Commands:
     measurement: Measurement
 
     def __post_init__(self) -> None:
-        self.reader = PictureReader(self.acquisition)
-        self.download = Download(self.meter, self.reader)
+        self.reader = PictureReader(self.acquisition)  #: reads images, for every stream
+        self.download = Download(self.meter, self.reader)  #: the frame that telemetry returns
         self._routines: dict[str, Callable[[TelecommandJob], Routine[int | None]]] = {
             "Reset": self._reset,
             "ClearOverCurrent": self._clear_over_current,
@@ -71,6 +65,7 @@ class Commands:
             "NextImageFrame": self._prepare_frame,
             "SetNadirSearch": self._set_search,
         }
+        #: names of the telecommands that have an effect
         self.handled = frozenset({*self._routines, *_SETTINGS, *SWITCH_COMMANDS})
 
     def execute(self, job: Job) -> Routine[int | None]:

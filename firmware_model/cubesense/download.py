@@ -90,21 +90,15 @@ class PictureReader:
 
 
 class Download:
-    """The frame that is being prepared, or is ready.
-
-    Attributes:
-        data: its bytes.
-        number: of the ready frame, or ``EMPTY_FRAME``.
-        checksum: of ``data`` if a frame is ready, else 0.
-    """
+    """The frame that is being prepared, or is ready."""
 
     def __init__(self, meter: Meter, reader: PictureReader) -> None:
         self._meter = meter
         self._reader = reader
         self._wanted: FrameRequest | None = None
-        self.data = np.zeros(codes.FRAME_BYTES, np.uint8)
-        self.number = codes.EMPTY_FRAME
-        self.checksum = 0
+        self.data = np.zeros(codes.FRAME_BYTES, np.uint8)  #: its bytes
+        self.number = codes.EMPTY_FRAME  #: of the ready frame, or ``EMPTY_FRAME``
+        self.checksum = 0  #: of ``data`` if a frame is ready, else 0
 
     def has(self, frame: int) -> bool:
         return self._wanted is not None and frame < self._wanted.size.frames

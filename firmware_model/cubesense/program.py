@@ -31,16 +31,7 @@ DRAIN_STEP_US = 1_000
 
 
 class CubeSenseProgram:
-    """One run of the program, from reset to reset.
-
-    Attributes:
-        node: the node protocol; its methods are the interrupts of its UART and I2C address.
-        registers: the register protocol; likewise, for its I2C address.
-        backup: the register protocol on the node's UART, where that is chosen.
-        bench: the bench protocol; likewise, for its UART.
-        idle: no job waits.
-        state: the program's memory, also read by traces.
-    """
+    """One run of the program, from reset to reset."""
 
     def __init__(
         self,
@@ -48,9 +39,9 @@ class CubeSenseProgram:
         meter: Meter,
         switches: CubeSenseSwitches = DEFAULT_SWITCHES,
     ) -> None:
-        self.idle = False
+        self.idle = False  #: no job waits
         self._hardware = hardware
-        self.state = state = State(switches)
+        self.state = state = State(switches)  #: state: the program's memory, also read by traces
         self._supply = Supply(hardware, meter, state)
         self.cameras = CameraControl(meter, state, self._supply)
         read_out = READ_OUTS[switches.gateware]
@@ -59,9 +50,13 @@ class CubeSenseProgram:
         self._jobs = jobs = JobQueue()
         self.commands = Commands(meter, state, self._supply, self.cameras, acquisition, measurement)
         reader, download = self.commands.reader, self.commands.download
+        #: the node protocol; its methods are the interrupts of its UART and I2C address
         self.node = NodeLink(jobs, Telemetry(hardware, meter, state, self._supply, download))
+        #: the register protocol; likewise, for its I2C address
         self.registers = RegisterLink(hardware, meter, state, jobs, reader)
+        #: the register protocol on the node's UART, where that is chosen
         self.backup = BackupUart(self.registers)
+        #: the bench protocol; likewise, for its UART
         self.bench = BenchLink(hardware, meter, state, jobs, reader, measurement)
 
     def main(self) -> Routine[None]:

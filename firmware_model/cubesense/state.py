@@ -105,24 +105,21 @@ class State(NodeState):
     """RAM of the program.
 
     Attributes:
-        switches: in use.
-        cameras: settings of each camera.
-        results: latest measurement of each camera.
-        over_current: by memory: it drew too much since the flag was cleared, and is kept off.
-        nadir_search: search method for the nadir camera's edges.
-        image_sram: memory that register IMAGE streams.
         telecommands, telemetries: number received, for CommunicationStatus.
         last_command, last_processed, last_error: for telemetry TcmdProcessed.
     """
 
     def __init__(self, switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> None:
         super().__init__(ERROR_FLAGS)
-        self.switches = RunningSwitches(switches)
+        self.switches = RunningSwitches(switches)  #: in use
+        #: settings of each camera
         self.cameras = {camera: CameraSettings.at_reset(camera) for camera in codes.Camera}
+        #: latest measurement of each camera
         self.results = {camera: CameraResult(sram=codes.Sram(camera)) for camera in codes.Camera}
+        #: by memory: it drew too much since the flag was cleared, and is kept off
         self.over_current = dict.fromkeys(codes.Sram, False)
-        self.nadir_search = codes.NadirSearch.LINES
-        self.image_sram = codes.Sram.SRAM1
+        self.nadir_search = codes.NadirSearch.LINES  #: search method for the nadir camera's edges
+        self.image_sram = codes.Sram.SRAM1  #: memory that register IMAGE streams
         self.reset_communication()
 
     def reset_communication(self) -> None:

@@ -23,24 +23,16 @@ STREAM_BACKLOG_BYTES = 512
 
 
 class Commands(CommandExecutor):
-    """Executes telecommands.
-
-    Attributes:
-        processing: target of the telecommands, with its camera and image.
-        memory_test: result of the last TestSRAM.
-        next_block: number after that of the latest upload block.
-        blocks_received: upload blocks since UploadImage.
-        second_half: the next ImageBlock of 256 bytes is the second half.
-    """
+    """Executes telecommands."""
 
     def __init__(self, processing: Processing) -> None:
         self.processing, self.state = processing, processing.state
         self._meter, self._capture = processing.meter, processing.capture
         super().__init__(self.state.hardware, self.state.settings, self.state.switches)
-        self.memory_test = codes.MemoryTest.NOT_RUN
-        self.next_block = 0
-        self.blocks_received = 0
-        self.second_half = False
+        self.memory_test = codes.MemoryTest.NOT_RUN  #: result of the last TestSRAM
+        self.next_block = 0  #: number after that of the latest upload block
+        self.blocks_received = 0  #: upload blocks since UploadImage
+        self.second_half = False  #: the next ImageBlock of 256 bytes is the second half
         self._actions |= {
             "Reset": self._reset,
             "MCUReset": self._reset_processor,

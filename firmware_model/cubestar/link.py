@@ -26,34 +26,34 @@ _FLAGS = LinkFlags(
 
 
 class CubeStarLink(QueueingLink):
-    """Decodes the host's messages and answers them."""
+    """Counts messages in the retained state; a rejected task sets ``TaskStatus``."""
+
+    state: State
 
     def __init__(
         self, meter: Meter, state: State, telemetry: Callable[[Message], dict[str, Any] | None]
     ) -> None:
-        """``telemetry`` returns a message's values, or None if it is not supported."""
         super().__init__(
             state.hardware, meter, state, INTERFACE, _FLAGS, SEND_BUFFER_BYTES, telemetry
         )
-        self._state = state
 
     @property
     def idle(self) -> bool:
         """True if a reset would interrupt neither a message nor an answer."""
-        return not (self.receiving or self.queue or self._hardware.uart_backlog())
+        return not (self.receiving or self.queue or self.hardware.uart_backlog())
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
         flags = super()._refusals(message, values)
         if flags and message.name in TASKS:
-            self._state.task_status = TASKS[message.name].failed or self._state.task_status
+            self.state.task_status = TASKS[message.name].failed or self.state.task_status
         return flags
 
     def _values(self, message: Message) -> dict[str, Any] | None:
         values = super()._values(message)
-        self._state.retained.telemetry += values is not None
+        self.state.retained.telemetry += values is not None
         return values
 
     def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
         accepted = super()._enqueue(message, values)
-        self._state.retained.telecommands += accepted
+        self.state.retained.telecommands += accepted
         return accepted

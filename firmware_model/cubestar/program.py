@@ -31,14 +31,7 @@ LATE_US = 10_000  #: an iteration that starts later by this is a timing error; a
 
 
 class CubeStarProgram:
-    """One run of the program, from reset to reset.
-
-    Attributes:
-        link: the satellite's interface; its methods are the UART and I2C interrupts.
-        supply: supply monitor; its ``overcurrent`` is the comparators' interrupt.
-        commands: the telecommands.
-        state: the program's memory, also read by traces.
-    """
+    """One run of the program, from reset to reset."""
 
     def __init__(
         self,
@@ -49,14 +42,17 @@ class CubeStarProgram:
         switches: CubeStarSwitches = DEFAULT_SWITCHES,
     ) -> None:
         """Restore RAM from the retention registers and flash; ``switches``: at power-up."""
+        #: state: the program's memory, also read by traces
         self.state = state = State(hardware, meter, switches)
         state.reset_cause = cause_of(hardware.reset_causes)
+        #: supply monitor; its ``overcurrent`` is the comparators' interrupt
         self.supply = SupplyMonitor(state)
         self._pictures = pictures_of(layout, state, meter, self.supply)
         self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)
         self._processing = Processing(meter, state, self._capture, catalogue)
-        self.commands = Commands(self._processing)
+        self.commands = Commands(self._processing)  #: the telecommands
         telemetry = Telemetry(self.commands, lambda: bool(self.link.queue))
+        #: the satellite's interface; its methods are the UART and I2C interrupts
         self.link = CubeStarLink(meter, state, telemetry.values)
 
     def main(self) -> Routine[None]:

@@ -28,15 +28,12 @@ def by_name(names: Iterable[str], vector: Iterable[Any]) -> Values:
 
 
 class StarReports:
-    """Values of the telemetry of detected, identified and selected stars.
-
-    Attributes:
-        sources: by name of the telemetry frame.
-    """
+    """Values of the telemetry of detected, identified and selected stars."""
 
     def __init__(self, processing: Processing) -> None:
         self._processing = processing
         self._cursors: dict[str, tuple[Results, int]] = {}
+        #: by name of the telemetry frame
         self.sources: dict[str, Callable[[], Values]] = {
             "DetectionSummary": self.summary,
             "StarPositions": self._stepping("StarPositions", self._detected, self._position),

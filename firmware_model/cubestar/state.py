@@ -144,19 +144,7 @@ class Retained:
 
 
 class State(NodeState):
-    """RAM of the program, restored from the retention registers at boot.
-
-    Attributes:
-        hardware: peripherals of the processor.
-        settings: parameters of the setting telecommands.
-        switches: in use; stored like the settings, but not in flash.
-        retained: counters that survive resets.
-        task_status: value of telemetry TaskStatus.
-        quality: of the latest image, values of telemetry Quality.
-        candidate: an attitude that contradicts the last believed one and needs confirmation.
-        reset_cause: why the program started.
-        startup_us: time from the reset to the main loop.
-    """
+    """RAM of the program, restored from the retention registers at boot."""
 
     _MAGIC = b"CSTR"
     _COUNTERS = struct.Struct(f"<{len(fields(Retained))}Q")
@@ -185,14 +173,17 @@ class State(NodeState):
         """
         self.hardware, self._meter = hardware, meter
         super().__init__(field.name for field in _FLAGS.fields)
+        #: parameters of the setting telecommands
         self.settings = Settings(INTERFACE, SETTING_COMMANDS)
+        #: in use; stored like the settings, but not in flash
         self.switches = RunningSwitches(switches)
-        self.retained = Retained()
-        self.quality = dict(UNRATED)
+        self.retained = Retained()  #: counters that survive resets
+        self.quality = dict(UNRATED)  #: of the latest image, values of telemetry Quality
+        #: an attitude that contradicts the last believed one and needs confirmation
         self.candidate: Attitude | None = None
-        self.task_status = TaskStatus.POWERING_UP
-        self.reset_cause = ResetCause.UNDETERMINED
-        self.startup_us = 0
+        self.task_status = TaskStatus.POWERING_UP  #: value of telemetry TaskStatus
+        self.reset_cause = ResetCause.UNDETERMINED  #: why the program started
+        self.startup_us = 0  #: time from the reset to the main loop
         magic = len(self._MAGIC)
         if hardware.retention[:magic] == self._MAGIC:
             data = BytesIO(hardware.retention[magic : self.RETENTION_SIZE])

@@ -78,6 +78,25 @@ TIMES_SHOWN = {
     "AttitudeTiming": {"LatestTime": "attitude", "MaxTime": "attitude"},
 }
 
+#: Telemetry of times in ``Retained``: for each field, the phases whose sum it shows.
+_PHASES_SHOWN: dict[str, dict[str, tuple[str, ...]]] = {
+    "CameraTiming": {
+        "SetupTime": ("camera_setup",),
+        "ExposureUpdateTime": ("exposure_setup",),
+        "CaptureTime": ("discard", "capture"),
+    },
+    "TimingSummary": {
+        "ImageCaptureTime": ("discard", "capture", "transfer"),
+        "DetectionTime": ("detect",),
+        "IdentificationTime": ("match",),
+    },
+    "PhaseTimes": {
+        **{name: (name.lower(),) for name in ("Idle", "Discard", "Capture", "Transfer")},
+        **{name: (name.lower(),) for name in ("Detect", "Match", "Attitude")},
+        "LoopTotal": ("loop",),
+    },
+}
+
 
 class Telemetry:
     """Answers telemetry requests; interrupt context, so nothing here waits.
@@ -103,11 +122,8 @@ class Telemetry:
             "ImageSetup": INTERFACE.telemetry("ImageSetup").reset_values,
             "IS_Register": lambda: {"DataH": 0, "DataL": self._camera_register()["Value"]},
             "ImageBlock": self._image_block,
-            "CameraTiming": self._camera_timing,
-            "TimingSummary": self._timing_summary,
             "DetectionThresholdValues": self._thresholds,
             "LogStatus": self._log_status,
-            "PhaseTimes": self._phase_times,
             "UploadStatus": lambda: {
                 "NextBlock": commands.next_block,
                 "BlocksReceived": commands.blocks_received,
@@ -135,6 +151,13 @@ class Telemetry:
             return {
                 name: (longest if name.startswith("Max") else latest).get(step, 0.0)
                 for name, step in steps.items()
+            }
+        if phases := _PHASES_SHOWN.get(message.name):
+            unit_us = 1000 if message.fields[0].unit == "ms" else 1
+            retained = self._state.retained
+            return {
+                name: sum(getattr(retained, f"{phase}_us") for phase in summed) / unit_us
+                for name, summed in phases.items()
             }
         source = self._sources.get(message.name)
         return None if source is None else source()
@@ -207,23 +230,6 @@ class Telemetry:
         address, value = self._capture.sensor.selected_register
         return {"Address": address, "Value": value or 0, "Valid": int(value is not None)}
 
-    def _camera_timing(self) -> Values:
-        retained = self._state.retained
-        return {
-            "SetupTime": retained.camera_setup_us / 1000,
-            "ExposureUpdateTime": retained.exposure_setup_us / 1000,
-            "CaptureTime": (retained.discard_us + retained.capture_us) / 1000,
-        }
-
-    def _timing_summary(self) -> Values:
-        retained = self._state.retained
-        captured_us = retained.discard_us + retained.capture_us + retained.transfer_us
-        return {
-            "ImageCaptureTime": captured_us / 1000,
-            "DetectionTime": retained.detect_us / 1000,
-            "IdentificationTime": retained.match_us / 1000,
-        }
-
     def _image_block(self) -> Values:
         setting = self._state.settings.all("ImageBlockSet")
         length = ImageBlockSize(setting["BlockSize"]).length
@@ -237,19 +243,6 @@ class Telemetry:
             self._state.raise_flag("StatusError")
             data = b""
         return {"Block": data.ljust(longest, b"\0")}
-
-    def _phase_times(self) -> Values:
-        retained = self._state.retained
-        return {
-            "Idle": retained.idle_us,
-            "Discard": retained.discard_us,
-            "Capture": retained.capture_us,
-            "Transfer": retained.transfer_us,
-            "Detect": retained.detect_us,
-            "Match": retained.match_us,
-            "Attitude": retained.attitude_us,
-            "LoopTotal": retained.loop_us,
-        }
 
     def _thresholds(self) -> Values:
         dark = self._stars.summary()["ImageDarkValue"]

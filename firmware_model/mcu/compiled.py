@@ -15,19 +15,13 @@ FILE = Path(__file__).with_name("cortex_m3_compiled.json")
 
 @dataclass(frozen=True)
 class CompiledCosts:
-    """One build on one memory.
+    """One build on one memory."""
 
-    Attributes:
-        build: options and precision, such as "-O2 own".
-        timing: wait states of the memories, as text.
-        operations: cycles by name; below 1 where a compiler hides an operation behind others.
-        phases: cycles of a whole image's phases.
-    """
-
-    build: str
-    timing: str
+    build: str  #: options and precision, such as "-O2 own"
+    timing: str  #: wait states of the memories, as text
+    #: cycles by name; below 1 where a compiler hides an operation behind others
     operations: Mapping[str, float]
-    phases: Mapping[str, int]
+    phases: Mapping[str, int]  #: cycles of a whole image's phases
 
 
 @lru_cache(maxsize=1)

@@ -13,21 +13,13 @@ LONGEST = {"address_setup": 3, "address_hold": 3, "setup": 3, "strobe": 63, "hol
 
 @dataclass(frozen=True)
 class BusTiming:
-    """Phases of a transaction in cycles of the core clock, the same for reads and writes.
+    """Phases of a transaction in cycles of the core clock, the same for reads and writes."""
 
-    Attributes:
-        address_setup: the upper address is on the lines and ALE is high.
-        address_hold: the upper address is still there, and ALE is low.
-        setup: the lower address is on the lines, with the byte of a write; chip select is low.
-        strobe: the read or write strobe is low too; a read samples its byte at the end.
-        hold: as in set-up.
-    """
-
-    address_setup: int
-    address_hold: int
-    setup: int
-    strobe: int
-    hold: int
+    address_setup: int  #: the upper address is on the lines and ALE is high
+    address_hold: int  #: the upper address is still there, and ALE is low
+    setup: int  #: the lower address is on the lines, with the byte of a write; chip select is low
+    strobe: int  #: the read or write strobe is low too; a read samples its byte at the end
+    hold: int  #: as in set-up
 
     def __post_init__(self) -> None:
         """Raise ValueError for values outside of the registers' range; no phase may be 0."""

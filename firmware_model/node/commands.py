@@ -13,11 +13,7 @@ STREAM_PAUSE_US = 20_000
 
 
 class CommandExecutor:
-    """Effects of telecommands: settings are stored, actions are immediate, routines take time.
-
-    Attributes:
-        running: whether a telecommand is being executed, including a reset that it requests.
-    """
+    """Effects of telecommands: settings are stored, actions are immediate, routines take time."""
 
     def __init__(
         self, hardware: NodeHardware, settings: Settings, switches: RunningSwitches[Any]
@@ -30,6 +26,7 @@ class CommandExecutor:
         )
         self._routines: dict[str, Callable[[QueuedCommand], Routine[Any]]] = {}
         self._reset_cause: int | None = None
+        #: whether a telecommand is being executed, including a reset that it requests
         self.running = False
 
     @property

@@ -37,68 +37,44 @@ def longest_command(interface: Interface) -> int:
 
 @dataclass(frozen=True)
 class BusFlags:
-    """Names of the error flags for messages on one bus; None: no flag.
+    """Names of the error flags for messages on one bus; None: no flag."""
 
-    Attributes:
-        overflow: telecommand while the queue is full.
-        too_few, too_many: parameter bytes of a telecommand.
-        unknown_telemetry: telemetry ID that the node does not support.
-    """
-
-    overflow: str
+    overflow: str  #: telecommand while the queue is full
+    #: too_few, too_many: parameter bytes of a telecommand
     too_few: str | None = None
     too_many: str | None = None
-    unknown_telemetry: str | None = None
+    unknown_telemetry: str | None = None  #: telemetry ID that the node does not support
 
 
 @dataclass(frozen=True)
 class LinkFlags:
-    """Names of a node's error flags for its link; None: no flag.
+    """Names of a node's error flags for its link; None: no flag."""
 
-    Attributes:
-        uart, i2c: flags that differ between the buses.
-        protocol_error: byte outside of a frame, unknown escape or empty frame.
-        incomplete: frame that never ended.
-        read_without_id: I2C read without an answer; one rejected with a flag counts as an empty
-            answer.
-        timeout: silence inside a frame.
-        unknown_command: unknown telecommand ID.
-        bad_parameter: parameter out of a range whose table names no flag.
-    """
-
+    #: uart, i2c: flags that differ between the buses
     uart: BusFlags
     i2c: BusFlags
-    protocol_error: str
-    incomplete: str
+    protocol_error: str  #: byte outside of a frame, unknown escape or empty frame
+    incomplete: str  #: frame that never ended
+    #: I2C read without an answer; one rejected with a flag counts as an empty answer
     read_without_id: str
-    timeout: str | None = None
-    unknown_command: str | None = None
-    bad_parameter: str | None = None
+    timeout: str | None = None  #: silence inside a frame
+    unknown_command: str | None = None  #: unknown telecommand ID
+    bad_parameter: str | None = None  #: parameter out of a range whose table names no flag
 
 
+@dataclass(eq=False)
 class SatelliteLink(ABC):
     """Decodes the host's messages and answers them; a node implements their meaning."""
 
-    def __init__(
-        self,
-        hardware: NodeHardware,
-        meter: Meter,
-        state: NodeState,
-        interface: Interface,
-        flags: LinkFlags,
-        send_buffer_bytes: int,
-    ) -> None:
-        """Serve ``interface``, and raise ``flags`` in ``state``.
+    hardware: NodeHardware
+    meter: Meter
+    state: NodeState  #: its error flags are raised
+    interface: Interface
+    flags: LinkFlags
+    send_buffer_bytes: int  #: capacity of the UART's send buffer
 
-        ``send_buffer_bytes`` is the capacity of the UART's send buffer.
-        """
-        self._hardware = hardware
-        self._meter = meter
-        self._flagged = state
-        self._interface = interface
-        self._flags = flags
-        self._send_buffer_bytes = send_buffer_bytes
-        self._longest = longest_command(interface)
+    def __post_init__(self) -> None:
+        self._longest = longest_command(self.interface)
         self._decoder = FrameDecoder(self._longest + 1)
         self._addressed = False
         self._written = bytearray()
@@ -119,7 +95,7 @@ class SatelliteLink(ABC):
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
         """Error flags of bad parameters, None for one without a flag; empty if all are good."""
-        return [flag or self._flags.bad_parameter for _, flag in message.violations(values)]
+        return [flag or self.flags.bad_parameter for _, flag in message.violations(values)]
 
     @property
     def receiving(self) -> bool:
@@ -129,45 +105,45 @@ class SatelliteLink(ABC):
     # --- UART -------------------------------------------------------------------------------------
 
     def uart_byte(self, byte: int) -> None:
-        self._meter.charge(uart_interrupt=1)
+        self.meter.charge(uart_interrupt=1)
         match self._decoder.feed(byte):
             case FrameEvent.FRAME | FrameEvent.TOO_LONG:  # the kept front is too long as well
                 self._uart_message(self._decoder.payload)
             case FrameEvent.INCOMPLETE:
-                self._raise(self._flags.incomplete)
+                self._raise(self.flags.incomplete)
             case FrameEvent.PROTOCOL_ERROR:
-                self._raise(self._flags.protocol_error)
+                self._raise(self.flags.protocol_error)
 
     def uart_silence(self) -> None:
         """Interrupt: nothing was received for a while."""
         if self._decoder.reset():
-            self._raise(self._flags.incomplete)
-            self._raise(self._flags.timeout)
+            self._raise(self.flags.incomplete)
+            self._raise(self.flags.timeout)
 
     def _uart_message(self, payload: bytes) -> None:
-        self._meter.charge(host_message=1)
+        self.meter.charge(host_message=1)
         if not payload:
-            self._raise(self._flags.protocol_error)
+            self._raise(self.flags.protocol_error)
         elif payload[0] & TELEMETRY_BIT:
             self._uart_answer(payload[0])
         else:
-            self._uart_send(bytes([self._accept(payload[0], payload[1:], self._flags.uart)]))
+            self._uart_send(bytes([self._accept(payload[0], payload[1:], self.flags.uart)]))
 
     def _uart_answer(self, identifier: int) -> bool:
         """Send a telemetry message; False if the host does not get it."""
-        answer = self._read_telemetry(identifier, self._flags.uart)
+        answer = self._read_telemetry(identifier, self.flags.uart)
         return answer is not None and self._uart_send(answer)
 
     def _uart_send(self, payload: bytes) -> bool:
         """Answer if the buffer has room; returns whether it had."""
         frame = encode_frame(payload)
-        room = self._hardware.uart_backlog() + len(frame) <= self._send_buffer_bytes
+        room = self.hardware.uart_backlog() + len(frame) <= self.send_buffer_bytes
         if room:
             self._transmit(frame)
         return room
 
     def _transmit(self, frame: bytes) -> None:
-        self._hardware.uart_send(frame)
+        self.hardware.uart_send(frame)
 
     # --- I2C --------------------------------------------------------------------------------------
 
@@ -177,11 +153,11 @@ class SatelliteLink(ABC):
         self._addressed = True
         self._reading = read
         if read and self._answer is None:
-            self._raise(self._flags.read_without_id)
+            self._raise(self.flags.read_without_id)
 
     def i2c_write(self, byte: int) -> bool:
         """Interrupt: a byte was received; returns False (NACK) beyond the longest telecommand."""
-        self._meter.charge(i2c_interrupt=1)
+        self.meter.charge(i2c_interrupt=1)
         if len(self._written) > self._longest:
             return False
         self._written.append(byte)
@@ -189,7 +165,7 @@ class SatelliteLink(ABC):
 
     def i2c_read(self) -> int:
         """Interrupt: the master reads a byte; beyond the end of an answer it is 255."""
-        self._meter.charge(i2c_interrupt=1)
+        self.meter.charge(i2c_interrupt=1)
         answer = self._answer or b""
         byte = answer[self._position] if self._position < len(answer) else NO_DATA
         self._position += 1
@@ -209,26 +185,26 @@ class SatelliteLink(ABC):
         """Process the message that a stop or a repeated start ended."""
         if not self._written:
             return
-        self._meter.charge(host_message=1)
+        self.meter.charge(host_message=1)
         identifier, parameters = self._written[0], bytes(self._written[1:])
         self._written.clear()
         if identifier & TELEMETRY_BIT:
             self._requested = identifier
-            self._answer = self._read_telemetry(identifier, self._flags.i2c)
-            if self._answer is None and self._flags.i2c.unknown_telemetry:
+            self._answer = self._read_telemetry(identifier, self.flags.i2c)
+            if self._answer is None and self.flags.i2c.unknown_telemetry:
                 self._answer = b""
             self._position = 0
         else:
-            self._accept(identifier, parameters, self._flags.i2c)
+            self._accept(identifier, parameters, self.flags.i2c)
 
     # --- both buses -------------------------------------------------------------------------------
 
     def _raise(self, flag: str | None) -> None:
         if flag is not None:
-            self._flagged.raise_flag(flag)
+            self.state.raise_flag(flag)
 
     def _read_telemetry(self, identifier: int, bus: BusFlags) -> bytes | None:
-        message = self._interface.find(identifier)
+        message = self.interface.find(identifier)
         values = None if message is None else self._values(message)
         if message is None or values is None:
             self._raise(bus.unknown_telemetry)
@@ -237,9 +213,9 @@ class SatelliteLink(ABC):
 
     def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
         """Queue a telecommand, or return its error."""
-        message = self._interface.find(identifier)
+        message = self.interface.find(identifier)
         if message is None or message.kind is not MessageKind.TELECOMMAND:
-            self._raise(self._flags.unknown_command)
+            self._raise(self.flags.unknown_command)
             return AckError.INVALID_ID
         if len(parameters) != message.length:
             self._raise(bus.too_few if len(parameters) < message.length else bus.too_many)
@@ -253,33 +229,20 @@ class SatelliteLink(ABC):
         if not self._enqueue(message, values):
             self._raise(bus.overflow)
             return AckError.BUFFER_FULL
-        self._hardware.wake()
+        self.hardware.wake()
         return AckError.OK
 
 
+@dataclass(eq=False)
 class QueueingLink(SatelliteLink):
-    """Queues telecommands for the main loop and answers telemetry at once.
+    """Queues telecommands for the main loop and answers telemetry at once."""
 
-    Attributes:
-        queue: accepted telecommands.
-        latest: ID and error code of the latest telecommand.
-    """
+    telemetry: Callable[[Message], dict[str, Any] | None]  #: a message's values; None: unsupported
 
-    def __init__(
-        self,
-        hardware: NodeHardware,
-        meter: Meter,
-        state: NodeState,
-        interface: Interface,
-        flags: LinkFlags,
-        send_buffer_bytes: int,
-        telemetry: Callable[[Message], dict[str, Any] | None],
-    ) -> None:
-        """``telemetry`` returns a message's values, or None if it is not supported."""
-        super().__init__(hardware, meter, state, interface, flags, send_buffer_bytes)
-        self._telemetry = telemetry
-        self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()
-        self.latest = (0, AckError.OK)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.queue: BoundedQueue[QueuedCommand] = BoundedQueue()  #: accepted telecommands
+        self.latest = (0, AckError.OK)  #: ID and error code of the latest telecommand
 
     def processed(self, running: bool) -> dict[str, int]:
         """Values of telemetry TcmdProcessed; ``running``: a telecommand is being executed."""
@@ -289,10 +252,10 @@ class QueueingLink(SatelliteLink):
         return {"Processed": int(done), "Waiting": waiting, "Latest": latest, "Error": error}
 
     def _values(self, message: Message) -> dict[str, Any] | None:
-        return self._telemetry(message)
+        return self.telemetry(message)
 
     def _enqueue(self, message: Message, values: dict[str, Any]) -> bool:
-        return self.queue.put(QueuedCommand(message, values, self._hardware.uptime_us()))
+        return self.queue.put(QueuedCommand(message, values, self.hardware.uptime_us()))
 
     def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
         error = super()._accept(identifier, parameters, bus)

@@ -13,13 +13,10 @@ class RunningSwitches(Generic[switch_messages.SwitchesT]):
     """Switches in use; a user of a switch reads ``now`` when it begins with an image.
 
     The main loop executes telecommands between its other tasks, so never during one.
-
-    Attributes:
-        now: current switches.
     """
 
     def __init__(self, at_power_up: switch_messages.SwitchesT) -> None:
-        self._at_power_up = self.now = at_power_up
+        self._at_power_up = self.now = at_power_up  #: now: current switches
 
     def change(self, telecommand: str, values: Mapping[str, Any]) -> None:
         self.now = switch_messages.apply_command(self.now, telecommand, values)

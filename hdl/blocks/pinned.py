@@ -10,14 +10,10 @@ from cubestack.hdl.blocks.stride import Stride
 
 
 class PinnedComponent(Component):
-    """A whole FPGA, or a model of several: its ports are those of a pin table.
-
-    Attributes:
-        pins: the table, with the widths of this component.
-    """
+    """A whole FPGA, or a model of several: its ports are those of a pin table."""
 
     def __init__(self, pins: Iterable[Pin]) -> None:
-        self.pins = tuple(pins)
+        self.pins = tuple(pins)  #: the table, with the widths of this component
         super().__init__(
             {
                 port.name: (Out if port.output else In)(port.width, init=port.level)

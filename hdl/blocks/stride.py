@@ -18,27 +18,16 @@ class Stride:
 
     - When storing, ``data`` is on the memory's data lines and is written while the clock is low.
     - When reading, the memory presents the byte at its address on ``source`` all the time.
-
-    Attributes:
-        name: unique in the design; lower-case letters and dashes.
-        clock: the clock pin.
-        levels: required levels of input pins.
-        state: required values of registers, by their paths in the design.
-        counter: register; the stride lasts while it is below ``last``.
-        last: highest value of the counter.
-        data: register of 8 bits.
-        source: input pin of 8 bits.
-        memory: prefix of the memory's pin names.
-        stores: True if the stride stores bytes, False if it reads them.
     """
 
-    name: str
-    clock: str
-    levels: tuple[tuple[str, int], ...]
+    name: str  #: unique in the design; lower-case letters and dashes
+    clock: str  #: the clock pin
+    levels: tuple[tuple[str, int], ...]  #: required levels of input pins
+    #: required values of registers, by their paths in the design
     state: tuple[tuple[str, int], ...]
-    counter: str
-    last: int
-    data: str
-    source: str
-    memory: str
-    stores: bool
+    counter: str  #: register; the stride lasts while it is below ``last``
+    last: int  #: highest value of the counter
+    data: str  #: register of 8 bits
+    source: str  #: input pin of 8 bits
+    memory: str  #: prefix of the memory's pin names
+    stores: bool  #: True if the stride stores bytes, False if it reads them

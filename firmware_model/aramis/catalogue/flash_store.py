@@ -46,28 +46,19 @@ def flash_image(image: bytes) -> NDArray[np.uint8]:
 
 
 class CatalogueStore:
-    """Loads, checks and writes the catalogue.
-
-    Attributes:
-        database: the copy in RAM; None if there is no good one.
-        state: of the copy in RAM.
-        loads, failures: passes over the flash, and those without a good catalogue.
-        corrected, lost: words of the latest pass.
-        corrected_total: words corrected since power-up.
-        ram_errors: how often RAM was found damaged.
-        load_us: duration of the latest pass's steps.
-        loaded_us: end of the latest pass; None before.
-    """
+    """Loads, checks and writes the catalogue."""
 
     def __init__(self, hardware: AramisHardware, meter: Meter) -> None:
         self._hardware = hardware
         self._meter = meter
-        self.database: Database | None = None
-        self.state = CatalogueState.NOT_LOADED
-        self.loads = self.failures = self.ram_errors = 0
-        self.corrected = self.lost = self.corrected_total = 0
-        self.load_us = 0
-        self.loaded_us: int | None = None
+        self.database: Database | None = None  #: the copy in RAM; None if there is no good one
+        self.state = CatalogueState.NOT_LOADED  #: of the copy in RAM
+        self.loads = self.failures = 0  #: passes over the flash, and those without a good catalogue
+        self.corrected = self.lost = 0  #: words of the latest pass
+        self.corrected_total = 0  #: words corrected since power-up
+        self.ram_errors = 0  #: how often RAM was found damaged
+        self.load_us = 0  #: duration of the latest pass's steps
+        self.loaded_us: int | None = None  #: end of the latest pass; None before
         self._length = 0
         self._checksum = 0
         self._at = 0  # next word of the image in the pass

@@ -11,7 +11,7 @@ from collections.abc import Collection
 from typing import Any
 
 from cubestack.firmware_model.cubesense.jobs import JobQueue, Measure, TelecommandJob
-from cubestack.firmware_model.cubesense.state import distortion_of
+from cubestack.firmware_model.cubesense.state import State, distortion_of
 from cubestack.firmware_model.cubesense.telemetry import Telemetry
 from cubestack.firmware_model.cubesense.vision.lens_check import invertible
 from cubestack.firmware_model.interface.codec.frames import encode_frame
@@ -34,12 +34,14 @@ _FLAGS = LinkFlags(
 
 
 class NodeLink(SatelliteLink):
-    """Decodes the host's messages and answers them."""
+    """Queues jobs for telecommands, and for results that schedule a measurement."""
+
+    state: State
 
     def __init__(self, queue: JobQueue, telemetry: Telemetry) -> None:
         """Fill ``queue``; ``telemetry`` provides values, and its state is used here too."""
-        hardware, self._state = telemetry.hardware, telemetry.state
-        super().__init__(hardware, telemetry.meter, self._state, INTERFACE, _FLAGS, SEND_BYTES)
+        hardware, state = telemetry.hardware, telemetry.state
+        super().__init__(hardware, telemetry.meter, state, INTERFACE, _FLAGS, SEND_BYTES)
         self._mcu_addressing = hardware.mcu_addressing
         self._queue = queue
         self._telemetry = telemetry
@@ -49,11 +51,11 @@ class NodeLink(SatelliteLink):
     # --- telemetry --------------------------------------------------------------------------------
 
     def _transmit(self, frame: bytes) -> None:
-        self._meter.charge(uart_interrupt=len(frame))
+        self.meter.charge(uart_interrupt=len(frame))
         super()._transmit(frame)
 
     def _read_telemetry(self, identifier: int, bus: BusFlags) -> bytes | None:
-        self._state.telemetries += 1
+        self.state.telemetries += 1
         return super()._read_telemetry(identifier, bus)
 
     def _values(self, message: Message) -> dict[str, Any]:
@@ -82,23 +84,23 @@ class NodeLink(SatelliteLink):
             return
         camera, sram = SCHEDULES[identifier]
         if self._queue.put(Measure(camera, sram, detect=True)):
-            self._state.schedule(camera, sram, detect=True)
-            self._hardware.wake()
+            self.state.schedule(camera, sram, detect=True)
+            self.hardware.wake()
         else:
-            self._state.raise_flag("TcmdBufferOverrun")
+            self.state.raise_flag("TcmdBufferOverrun")
 
     # --- telecommands -----------------------------------------------------------------------------
 
     def _accept(self, identifier: int, parameters: bytes, bus: BusFlags) -> AckError:
         """Check a telecommand and queue it; update telemetry TcmdProcessed."""
-        self._state.telecommands += 1
+        self.state.telecommands += 1
         if self._latest is not None:
             self._latest.latest = False
         self._latest = None
         error = super()._accept(identifier, parameters, bus)
-        self._state.last_command = identifier
-        self._state.last_error = error
-        self._state.last_processed = int(error is not AckError.OK)
+        self.state.last_command = identifier
+        self.state.last_error = error
+        self.state.last_processed = int(error is not AckError.OK)
         return error
 
     def _refusals(self, message: Message, values: dict[str, Any]) -> Collection[str | None]:
@@ -110,7 +112,7 @@ class NodeLink(SatelliteLink):
             case "NextImageFrame":
                 return self._download.has(int(values["Frame"]))
             case "Distortion1" | "Distortion2":
-                return invertible(distortion_of(values), self._meter)
+                return invertible(distortion_of(values), self.meter)
             case "SetNadirSearch":
                 return values["Search"] == codes.NadirSearch.LINES or self._mcu_addressing
         return True
@@ -127,7 +129,7 @@ class NodeLink(SatelliteLink):
         match job.message.name:
             case "CaptureAndDetect" | "CaptureOnly":
                 detect = job.message.name == "CaptureAndDetect"
-                self._state.schedule(
+                self.state.schedule(
                     codes.Camera(values["Camera"]), codes.Sram(values["Sram"]), detect=detect
                 )
             case "StartImageDownload" | "NextImageFrame":

@@ -86,12 +86,7 @@ class EdgeConfig:
 
 
 class EdgeList:
-    """Edges in the order in which they were found.
-
-    Attributes:
-        false: edges dropped at the rim, in a mask, of small lights, or because they are not sharp.
-        full: more edges were found than the part stores.
-    """
+    """Edges in the order in which they were found."""
 
     def __init__(self, config: EdgeConfig, meter: Meter) -> None:
         self._config = config
@@ -100,8 +95,9 @@ class EdgeList:
         self._sides: list[tuple[int, int]] = []
         self._lit: list[bool] = []
         self._begun: tuple[bool, int, int, int] | None = None
+        #: edges dropped at the rim, in a mask, of small lights, or because they are not sharp
         self.false = 0
-        self.full = False
+        self.full = False  #: more edges were found than the part stores
 
     def __len__(self) -> int:
         return len(self._points)
@@ -289,9 +285,6 @@ class NadirLines:
     """Consumer of the nadir scan: read the next bytes into ``space``, then call ``filled``.
 
     The caller charges the transfer of the bytes (``scan_byte`` each).
-
-    Attributes:
-        edges: found so far.
     """
 
     def __init__(
@@ -302,7 +295,7 @@ class NadirLines:
         buffer: NDArray[np.uint8] | None = None,
     ) -> None:
         """``buffer`` (scan_step,) receives pixels; None creates one."""
-        self.edges = EdgeList(config, meter)
+        self.edges = EdgeList(config, meter)  #: found so far
         self._config = config
         self._meter = meter
         self._pieces = _pieces(read_out)

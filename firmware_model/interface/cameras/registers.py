@@ -43,33 +43,21 @@ class BitField:
 
 @dataclass(frozen=True)
 class CameraRegister:
-    """One register.
+    """One register."""
 
-    Attributes:
-        address: of its first, most significant byte.
-        name: unique within the map.
-        reset: value after power-up and reset, unsigned.
-        meaning: effect of the value.
-        fields: declared bits; none if the value is one number.
-        width: number of addresses that it occupies.
-        access: accesses that the control bus may make.
-        needs_sync: a written value takes effect only with the sync register.
-        modelled: False if the camera model stores the value, with all its fields, but ignores it.
-        assumed: parts of this declaration that no document states; empty if all are published.
-        unit_bits: bits per address.
-    """
-
-    address: int
-    name: str
-    reset: int
-    meaning: str
-    fields: tuple[BitField, ...] = ()
-    width: int = 1
-    access: RegisterAccess = RegisterAccess.READ_WRITE
-    needs_sync: bool = False
+    address: int  #: of its first, most significant byte
+    name: str  #: unique within the map
+    reset: int  #: value after power-up and reset, unsigned
+    meaning: str  #: effect of the value
+    fields: tuple[BitField, ...] = ()  #: declared bits; none if the value is one number
+    width: int = 1  #: number of addresses that it occupies
+    access: RegisterAccess = RegisterAccess.READ_WRITE  #: accesses that the control bus may make
+    needs_sync: bool = False  #: a written value takes effect only with the sync register
+    #: False if the camera model stores the value, with all its fields, but ignores it
     modelled: bool = True
+    #: parts of this declaration that no document states; empty if all are published
     assumed: str = ""
-    unit_bits: int = 8
+    unit_bits: int = 8  #: bits per address
 
     def __post_init__(self) -> None:
         if not self.modelled:

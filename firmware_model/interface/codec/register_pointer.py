@@ -28,17 +28,12 @@ FILL = 0xFF
 
 @dataclass(frozen=True)
 class PointerRegister:
-    """One register.
+    """One register."""
 
-    Attributes:
-        address: the pointer's value.
-        access: accesses that the host may make.
-        field: name, type, meaning, unit, scale and limits; whole bytes. A ``bytesN`` is a
-            stream, anything else a number.
-    """
-
-    address: int
-    access: RegisterAccess
+    address: int  #: the pointer's value
+    access: RegisterAccess  #: accesses that the host may make
+    #: name, type, meaning, unit, scale and limits; whole bytes. A ``bytesN`` is a stream, anything
+    #: else a number.
     field: Field
 
     def __post_init__(self) -> None:

@@ -20,21 +20,13 @@ MIXED = "mixed"
 
 @dataclass(frozen=True, kw_only=True)
 class Switch(Declaration):
-    """Declaration of a switch.
+    """Declaration of a switch."""
 
-    Attributes:
-        published: value according to the documents.
-        extended: the better value.
-        source: document and section.
-        reason: why there is another value.
-        hardware: it describes the built board, so no telecommand can change it.
-    """
-
-    published: str
-    extended: str
-    source: str
-    reason: str
-    hardware: bool = False
+    published: str  #: value according to the documents
+    extended: str  #: the better value
+    source: str  #: document and section
+    reason: str  #: why there is another value
+    hardware: bool = False  #: it describes the built board, so no telecommand can change it
 
 
 def switch(meaning: str, published: str, extended: str, *others: str, **more: Any) -> Any:
