@@ -85,8 +85,7 @@ class Commands(CommandExecutor):
         self._state.sensor = SensorState.ACTIVATING
         self._measuring.restart()
         yield from self._camera.start()  # a failure raises its flag; each measurement tries again
-        yield from self._catalogue.load()
-        self._report_load()
+        yield from self._load()
         self._state.sensor = SensorState.READY
 
     def _deactivate(self, _command: QueuedCommand) -> Routine[None]:
@@ -133,6 +132,10 @@ class Commands(CommandExecutor):
     def _stop_loop(self, _command: QueuedCommand) -> None:
         self._state.looping = False
 
+    def _load(self) -> Routine[None]:
+        yield from self._catalogue.load()
+        self._report_load()
+
     def _report_load(self) -> None:
         """Raise the flags of the latest pass over the flash."""
         store = self._catalogue
@@ -152,16 +155,14 @@ class Commands(CommandExecutor):
         if not self._state.active:
             self._state.raise_flag("NotActive")
             return
-        yield from self._catalogue.load()
-        self._report_load()
+        yield from self._load()
 
     def _refresh(self, _command: QueuedCommand) -> Routine[None]:
         if not self._state.active:
             self._state.raise_flag("NotActive")
             return
         self._state.sensor = SensorState.PROGRAMMING
-        yield from self._catalogue.load()
-        self._report_load()
+        yield from self._load()
         yield from self._catalogue.refresh()
         self._state.sensor = SensorState.READY
 
@@ -179,8 +180,7 @@ class Commands(CommandExecutor):
         if not written:
             self._state.raise_flag("UploadError")
         elif before is not SensorState.INACTIVE:
-            yield from self._catalogue.load()
-            self._report_load()
+            yield from self._load()
         self._state.sensor = before
 
     def image_block(self) -> bytes:

@@ -10,38 +10,23 @@ Direction = Literal["input", "output", "tristate", "inout"]
 
 @dataclass(frozen=True)
 class Port:
-    """One side of a pin in the gateware, which has no bidirectional lines.
+    """One side of a pin in the gateware, which has no bidirectional lines."""
 
-    Attributes:
-        name: of the port.
-        output: whether the gateware drives it.
-        width: in bits.
-        level: of an undriven input, or of an output in reset.
-    """
-
-    name: str
-    output: bool
-    width: int
-    level: int = 0
+    name: str  #: of the port
+    output: bool  #: whether the gateware drives it
+    width: int  #: in bits
+    level: int = 0  #: of an undriven input, or of an output in reset
 
 
 class Pin(str):
-    """A pin of an FPGA board, or a bus of them: its name, with attributes.
+    """A pin of an FPGA board, or a bus of them: its name, with attributes."""
 
-    Attributes:
-        direction: from the FPGA's side.
-        meaning: its purpose.
-        width: number of pins.
-        level: of an undriven input, or in reset of an output that cannot be switched off.
-        enables: bits of the output enable: 0 for none, 1 for all pins, or ``width``.
-        level_in, level_out, enable: names of the gateware's ports; None if absent.
-    """
-
-    direction: Direction
-    meaning: str
-    width: int
-    level: int
-    enables: int
+    direction: Direction  #: from the FPGA's side
+    meaning: str  #: its purpose
+    width: int  #: number of pins
+    level: int  #: of an undriven input, or in reset of an output that cannot be switched off
+    enables: int  #: bits of the output enable: 0 for none, 1 for all pins, or ``width``
+    #: level_in, level_out, enable: names of the gateware's ports; None if absent
     level_in: str | None
     level_out: str | None
     enable: str | None

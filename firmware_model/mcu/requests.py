@@ -79,22 +79,14 @@ class BusAccess:
 
     The answer is the number of transactions: all, or fewer if a byte that was read exceeds
     ``above``; that byte is the last.
-
-    Attributes:
-        addresses: (n,) int32, of 24 bits each.
-        data: (n,) uint8: the bytes to write, or the destination of the bytes read.
-        write: True to write them.
-        cycles: processor cycles from one transaction to the next.
-        select: number of the chip select.
-        above: 0 to 255.
     """
 
-    addresses: NDArray[np.int32]
-    data: NDArray[np.uint8]
-    write: bool
-    cycles: int
-    select: int
-    above: int
+    addresses: NDArray[np.int32]  #: (n,) int32, of 24 bits each
+    data: NDArray[np.uint8]  #: (n,) uint8: the bytes to write, or the destination of the bytes read
+    write: bool  #: True to write them
+    cycles: int  #: processor cycles from one transaction to the next
+    select: int  #: number of the chip select
+    above: int  #: 0 to 255
 
 
 @dataclass(frozen=True)

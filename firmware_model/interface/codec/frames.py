@@ -35,18 +35,15 @@ class FrameDecoder:
     noise has opened a frame (it contains 1F 7F) and ends in an odd number of 1F, the good frame's
     first 1F completes a doubled data byte, so that frame is lost and only the one after it is
     found. A silence on the line (``reset``) ends such a state too.
-
-    Attributes:
-        payload: payload of the last complete frame, or its front.
-        escaped: the last byte was an escape; the next byte determines its meaning.
     """
 
     def __init__(self, max_length: int) -> None:
         """Accept payloads of at most ``max_length`` bytes, which also bounds the memory."""
         self._max_length = max_length
+        #: escaped: the last byte was an escape; the next byte determines its meaning
         self._inside = self.escaped = False
         self._buffer = bytearray()
-        self.payload = b""
+        self.payload = b""  #: payload of the last complete frame, or its front
 
     def feed(self, byte: int) -> FrameEvent | None:
         """Process the next ``byte``; returns what it completed or broke, else None."""

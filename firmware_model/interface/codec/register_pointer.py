@@ -17,7 +17,7 @@ and, to write, one data byte; the answer to a read is the value.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 from cubestack.firmware_model.interface.cameras.registers import RegisterAccess
 from cubestack.firmware_model.interface.codec.field import Field, InterfaceError, Value, suggestion
@@ -83,23 +83,17 @@ class PointerRegister:
         return data if self.streams else self.field.decode(int.from_bytes(data, "big"))
 
 
+@dataclass(eq=False)
 class PointerMap:
-    """All registers behind one I2C address; ``note`` describes the map as a whole.
+    """All registers behind one I2C address."""
 
-    ``baud`` is the rate of a UART with the same protocol, None if there is none.
-    """
+    i2c_address: int
+    registers: InitVar[tuple[PointerRegister, ...]]
+    note: str = ""  #: describes the map as a whole
+    baud: int | None = None  #: rate of a UART with the same protocol, None if there is none
 
-    def __init__(
-        self,
-        i2c_address: int,
-        registers: tuple[PointerRegister, ...],
-        note: str = "",
-        baud: int | None = None,
-    ) -> None:
+    def __post_init__(self, registers: tuple[PointerRegister, ...]) -> None:
         """Raise InterfaceError if registers share a name or an address."""
-        self.i2c_address = i2c_address
-        self.note = note
-        self.baud = baud
         self._by_address: dict[int, PointerRegister] = {}
         self._by_name: dict[str, PointerRegister] = {}
         for register in sorted(registers, key=lambda r: r.address):

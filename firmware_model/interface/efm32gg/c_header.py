@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from cubestack.firmware_model.interface.efm32gg.table import Layout, Register
 
 _TOP = """\
-/* Registers of the EFM32GG280F1024, made of the register tables; not to be edited. */
+/* Registers of the EFM32GG280F1024, generated from the register tables; do not edit. */
 #ifndef EFM32GG_REGISTERS_H
 #define EFM32GG_REGISTERS_H
 

@@ -6,7 +6,7 @@ from cubestack.firmware_model.interface.efm32gg.pins import LOCATIONS, ROUTES
 from cubestack.firmware_model.interface.efm32gg.table import Instance, Layout, Register
 
 _TYPES = """\
-// Made of the register tables; not to be edited.
+// Generated from the register tables; do not edit.
 #pragma once
 
 #include <cstdint>
