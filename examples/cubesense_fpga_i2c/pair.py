@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.cubesense.pins import PREFIXES
 from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent, connect_ports
-from cubestack.hdl.cubesense.pair import OWN_PORTS, driven, released
+from cubestack.hdl.cubesense.pair import OWN_PORTS, driven_level, pulled_up_level
 
 
 class CubeSenseI2cPair(PinnedComponent):
@@ -36,8 +36,8 @@ class CubeSenseI2cPair(PinnedComponent):
         m = Module()
         m.submodules.sun = sun = CubeSenseI2cFpga("sun", self.read_out)
         m.submodules.nadir = nadir = CubeSenseI2cFpga("nadir", self.read_out)
-        link_data = driven(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
-        link_control = released(
+        link_data = driven_level(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
+        link_control = pulled_up_level(
             sun.LINK_C_O, sun.LINK_C_OE.replicate(2), nadir.LINK_C_O, nadir.LINK_C_OE.replicate(2)
         )
         for prefix, fpga in zip(PREFIXES.values(), (sun, nadir), strict=True):
@@ -48,7 +48,7 @@ class CubeSenseI2cPair(PinnedComponent):
                 fpga.LINK_D_I.eq(link_data),
                 fpga.LINK_C_I.eq(link_control),
             ]
-        sda = released(sun.SDA_O, sun.SDA_OE, nadir.SDA_O, nadir.SDA_OE)
+        sda = pulled_up_level(sun.SDA_O, sun.SDA_OE, nadir.SDA_O, nadir.SDA_OE)
         m.d.comb += [
             self.SDA.eq(self.SDA_I & sda),
             self.CONTENTION.eq(

@@ -24,7 +24,7 @@ from cubesense_fpga_i2c.registers import CubeSenseI2cRegisters
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent
-from cubestack.hdl.cubesense.dataflow import Side, checked
+from cubestack.hdl.cubesense.dataflow import Side, check_side
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.writer import add_writer
 
@@ -39,7 +39,7 @@ class CubeSenseI2cFpga(PinnedComponent):
 
     def __init__(self, side: Side, read_out: ReadOut = FULL_SIZE) -> None:
         """Make one; ValueError when ``side`` is neither "sun" nor "nadir"."""
-        self.side = checked(side)
+        self.side = check_side(side)
         self.read_out = read_out
         super().__init__(resized(FPGA, SRAM_A=read_out.address_bits))
 

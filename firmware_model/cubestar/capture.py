@@ -57,7 +57,7 @@ class ImageCapture:
         state.task_status = TaskStatus.CAPTURED
         return True
 
-    def replaced(self) -> Routine[bool]:
+    def mark_replaced(self) -> Routine[bool]:
         """An upload or test pattern replaced the image; returns False if its supply was cut."""
         now_us: int = yield ReadTimer()
         self.state.retained.image_ms = now_us // 1000

@@ -149,7 +149,7 @@ class StarCatalogue:
     def sha256(self) -> str:
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
-    def limited(self, pair_limit_deg: float) -> Self:
+    def with_pair_limit(self, pair_limit_deg: float) -> Self:
         """This catalogue with a narrower pair list: the beginning of its own, which is sorted."""
         count = int(np.searchsorted(self.pairs.angle, np.float32(np.radians(pair_limit_deg))))
         first, second, angle = self.pairs.first, self.pairs.second, self.pairs.angle

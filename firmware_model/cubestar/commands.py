@@ -133,13 +133,13 @@ class Commands(CommandExecutor):
         pixels = np.broadcast_to(pattern, (ROWS, COLUMNS)).astype(np.uint8)
         yield from self._capture.pictures.write(0, pixels.reshape(-1))
         self._meter.charge(i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
-        return (yield from self._capture.replaced())
+        return (yield from self._capture.mark_replaced())
 
     def _begin_upload(self, _command: QueuedCommand) -> Routine[bool]:
         self.next_block = self.blocks_received = 0
         yield from self._capture.pictures.write(0, np.zeros(IMAGE_BYTES, np.uint8))
         self._meter.charge(loop=IMAGE_BYTES)
-        return (yield from self._capture.replaced())
+        return (yield from self._capture.mark_replaced())
 
     def _upload_block(self, command: QueuedCommand) -> Routine[bool]:
         number, pixels = command.values["BlockNumber"], np.frombuffer(command.values["Data"], "u1")

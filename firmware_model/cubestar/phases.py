@@ -8,7 +8,7 @@ from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
 from cubestack.firmware_model.mcu.requests import ReadTimer, Routine, Sleep
 
 
-def started(state: State) -> Routine[None]:
+def start_loop(state: State) -> Routine[None]:
     """Record the start of the main loop; the time since the reset counts as idle time."""
     now_us: int = yield ReadTimer()
     state.task_status = TaskStatus.POWERED_UP

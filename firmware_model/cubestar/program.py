@@ -56,7 +56,7 @@ class CubeStarProgram:
         self.link = CubeStarLink(meter, state, telemetry.values)
 
     def main(self) -> Routine[None]:
-        yield from phases.started(self.state)
+        yield from phases.start_loop(self.state)
         yield from self._pictures.start()
         retained, causes = self.state.retained, self.state.hardware.reset_causes
         retained.watchdog_resets += ResetCause.WATCHDOG in causes

@@ -48,7 +48,7 @@ def name_request_byte(interface: Interface, written: bytes, index: int, port: st
         return f"{place}, outside of a frame's payload"
     if offset == 0:
         return f"{place}, the ID"
-    identifier = (_decode(written[:index]).begun or b"\0")[0]
+    identifier = (_decode(written[:index]).open_payload or b"\0")[0]
     message = interface.find(identifier)
     if message is None:
         return f"{place}, behind unknown ID {identifier}"
@@ -79,9 +79,9 @@ def payload_offset(wire: bytes, index: int) -> int | None:
     Both bytes of an escaped pair have the offset of the byte that they encode.
     """
     decoder = _decode(wire[:index])
-    if decoder.begun is None:
+    if decoder.open_payload is None:
         return None
-    offset = len(decoder.begun)
+    offset = len(decoder.open_payload)
     here, following = wire[index : index + 1], wire[index + 1 : index + 2]
     escape = bytes([ESCAPE])
     if decoder.escaped:

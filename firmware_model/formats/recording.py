@@ -110,7 +110,7 @@ class Recording:
 
     def until(self, end_ps: int) -> "Recording":
         """The part that began up to ``end_ps``."""
-        begun = (_begun(event, end_ps) for event in self.events if event.time_ps <= end_ps)
+        begun = (_truncate(event, end_ps) for event in self.events if event.time_ps <= end_ps)
         return replace(self, events=tuple(begun))
 
     @property
@@ -216,7 +216,7 @@ def _message(content: Any) -> BusMessage:
     return BusMessage(int(content["address"]), data, read)
 
 
-def _begun(event: Event, end_ps: int) -> Event:
+def _truncate(event: Event, end_ps: int) -> Event:
     """An event without the bytes that begin after ``end_ps``."""
     if not isinstance(event, LineBytes):
         return event

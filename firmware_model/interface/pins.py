@@ -62,7 +62,7 @@ class Pin(str):
         """For copies: the smallest declaration, then all attributes."""
         return Pin, (str(self), self.direction, self.meaning), self.__dict__
 
-    def but(self, name: str = "", *, meaning: str = "", width: int = 0) -> "Pin":
+    def copy(self, name: str = "", *, meaning: str = "", width: int = 0) -> "Pin":
         """A copy with another name, meaning or width."""
         return Pin(
             name or self,
@@ -90,7 +90,7 @@ class Pin(str):
 
 def resized(pins: Iterable[Pin], **widths: int) -> tuple[Pin, ...]:
     """Copies of the pins, with other ``widths`` of the named ones."""
-    return tuple(pin.but(width=widths.get(pin, pin.width)) for pin in pins)
+    return tuple(pin.copy(width=widths.get(pin, pin.width)) for pin in pins)
 
 
 def sram_pins(address_bits: int, address: str = "SRAM address") -> tuple[Pin, ...]:

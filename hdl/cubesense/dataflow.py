@@ -18,7 +18,7 @@ Side = Literal["sun", "nadir"]
 SIDES: tuple[Side, ...] = get_args(Side)
 
 
-def checked(side: Side) -> Side:
+def check_side(side: Side) -> Side:
     """Return ``side``; raise ValueError if it is unknown."""
     if side not in SIDES:
         raise ValueError(f'side must be "sun" or "nadir", not {side!r}')
@@ -86,7 +86,7 @@ class DataflowControl(Component):
             (self.edge, command.edge),
             (self.rnw, command.rnw),
             (self.en_n, own),
-            (self.other_en_n, other if self._other_matters(command) else None),
+            (self.other_en_n, other if self._depends_on_other(command) else None),
         ]
         return Cat(line == level for line, level in levels if level is not None).all()
 
@@ -96,7 +96,7 @@ class DataflowControl(Component):
         own = [row for row in rows if getattr(row.actions, self._side) is not Action.STANDBY]
         return Cat(self._fits(row) for row in own).any()
 
-    def _other_matters(self, command: FpgaCommand) -> bool:
+    def _depends_on_other(self, command: FpgaCommand) -> bool:
         """Whether this FPGA sees the other enable and would act differently at its other level."""
         shift, edge, rnw = (int(bool(x)) for x in (command.shift, command.edge, command.rnw))
         enables = [command.sunen, command.naden]

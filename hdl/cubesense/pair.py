@@ -48,8 +48,8 @@ class CubeSensePair(PinnedComponent):
             own = [(name, prefix + name) for name in OWN_PORTS]
             connect_ports(m, fpga, self, own + [(name, name) for name in common])
 
-        link_data = driven(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
-        link_control = released(sun.LINK_C_O, sun.LINK_C_OE, nadir.LINK_C_O, nadir.LINK_C_OE)
+        link_data = driven_level(sun.LINK_D_O, sun.LINK_D_OE, nadir.LINK_D_O, nadir.LINK_D_OE)
+        link_control = pulled_up_level(sun.LINK_C_O, sun.LINK_C_OE, nadir.LINK_C_O, nadir.LINK_C_OE)
         enables = ("DATA_OE", "LINK_D_OE", "LINK_C_OE")
         both_drive = Cat(getattr(sun, name) & getattr(nadir, name) for name in enables)
         m.d.comb += [
@@ -61,18 +61,18 @@ class CubeSensePair(PinnedComponent):
             nadir.LINK_D_I.eq(link_data),
             sun.LINK_C_I.eq(link_control),
             nadir.LINK_C_I.eq(link_control),
-            self.DATA.eq(driven(sun.DATA_O, sun.DATA_OE, nadir.DATA_O, nadir.DATA_OE)),
+            self.DATA.eq(driven_level(sun.DATA_O, sun.DATA_OE, nadir.DATA_O, nadir.DATA_OE)),
             self.DATA_OE.eq(sun.DATA_OE | nadir.DATA_OE),
             self.CONTENTION.eq(both_drive),
         ]
         return m
 
 
-def driven(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
+def driven_level(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
     """Level of eight data lines that at most one FPGA drives; 0 when neither does."""
     return (sun & sun_oe.replicate(8)) | (nadir & nadir_oe.replicate(8))
 
 
-def released(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
+def pulled_up_level(sun: Value, sun_oe: Value, nadir: Value, nadir_oe: Value) -> Value:
     """Level of lines with a pull-up, which either FPGA may pull low."""
     return (sun | ~sun_oe) & (nadir | ~nadir_oe)

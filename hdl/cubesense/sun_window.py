@@ -44,12 +44,12 @@ class SunWindow(Component):
             self.byte.eq(Mux(state[0], pair[8:], pair[:8])),
         ]
         if self._read_out.as_flown:
-            self._wrapping(m, in_window)
+            self._wrap_window(m, in_window)
         else:
-            self._moved_inside(m, in_window)
+            self._move_window_inside(m, in_window)
         return m
 
-    def _wrapping(self, m: Module, in_window: Signal) -> None:
+    def _wrap_window(self, m: Module, in_window: Signal) -> None:
         """The listing loads these counters while it waits; here, while coordinates are offered."""
         size, sync = self._read_out, m.d[self._domain]
         left = (self.x - size.window_left)[: len(self.x)]
@@ -69,13 +69,13 @@ class SunWindow(Component):
             sync += shown.eq(Cat(next_column, next_row))
             m.d.comb += self.address.eq(shown)
 
-    def _moved_inside(self, m: Module, in_window: Signal) -> None:
+    def _move_window_inside(self, m: Module, in_window: Signal) -> None:
         """Address = position in the window + the window's origin."""
         size = self._read_out
         right, last_column = self._position(m, "right", size.window_left, in_window)
         down, _ = self._position(m, "down", size.window_above, in_window & last_column)
-        x = self._clamped(m, self.x, size.window_left, size.columns, in_window)
-        y = self._clamped(m, self.y, size.window_above, size.rows, in_window)
+        x = self._clamp(m, self.x, size.window_left, size.columns, in_window)
+        y = self._clamp(m, self.y, size.window_above, size.rows, in_window)
         m.d.comb += self.address.eq(Cat((x + right)[: len(x)], (y + down)[: len(y)]))
 
     def _position(self, m: Module, name: str, before: int, step: Value) -> tuple[Signal, Value]:
@@ -87,9 +87,7 @@ class SunWindow(Component):
             m.d[self._domain] += position.eq(Mux(last, -before, position + 1))
         return position, last
 
-    def _clamped(
-        self, m: Module, sun: Signal, before: int, length: int, in_window: Signal
-    ) -> Signal:
+    def _clamp(self, m: Module, sun: Signal, before: int, length: int, in_window: Signal) -> Signal:
         """The pixel that the window is placed around: ``sun``, clamped away from the border.
 
         Outside of state E it is the smallest, so that the address is 0 then.

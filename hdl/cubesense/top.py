@@ -25,7 +25,7 @@ from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE, ReadOut
 from cubestack.firmware_model.interface.cubesense.pins import ADDRESSING, FPGA
 from cubestack.firmware_model.interface.pins import resized
 from cubestack.hdl.blocks.pinned import PinnedComponent
-from cubestack.hdl.cubesense.dataflow import DataflowControl, Side, checked
+from cubestack.hdl.cubesense.dataflow import DataflowControl, Side, check_side
 from cubestack.hdl.cubesense.reader import CubeSenseReader
 from cubestack.hdl.cubesense.sun_search import SunSearch
 from cubestack.hdl.cubesense.writer import add_writer
@@ -46,7 +46,7 @@ class CubeSenseFpga(PinnedComponent):
         self, side: Side, read_out: ReadOut = FULL_SIZE, mcu_addressing: bool = False
     ) -> None:
         """Raise ValueError unless ``side`` is "sun" or "nadir"."""
-        self.side = checked(side)
+        self.side = check_side(side)
         self.read_out = read_out
         self.mcu_addressing = mcu_addressing
         pins = ADDRESSING if mcu_addressing else FPGA

@@ -118,7 +118,7 @@ class _Design:
             case "$add" | "$sub":
                 width = len(cell["connections"]["Y"])
                 signed = int(cell["parameters"]["A_SIGNED"], 2) == 1
-                a, b = _extended(a, width, signed), _extended(b, width, signed)
+                a, b = _extend(a, width, signed), _extend(b, width, signed)
                 if cell["type"] == "$sub":
                     return net.add(a, [net.not_(bit) for bit in b], TRUE)[:width]
                 return net.add(a, b)[:width]
@@ -135,8 +135,8 @@ class _Design:
     def _not_below(self, a: list[int], b: list[int]) -> int:
         """a >= b of unsigned numbers: the carry of a - b."""
         width = max(len(a), len(b))
-        inverse = [self.network.not_(bit) for bit in _extended(b, width)]
-        return self.network.add(_extended(a, width), inverse, TRUE)[-1]
+        inverse = [self.network.not_(bit) for bit in _extend(b, width)]
+        return self.network.add(_extend(a, width), inverse, TRUE)[-1]
 
     def _parallel_mux(self, a: list[int], b: list[int], select: list[int]) -> list[int]:
         """The part of ``b`` whose select bit is set, ``a`` when none is."""
@@ -146,5 +146,5 @@ class _Design:
         return a
 
 
-def _extended(bits: list[int], width: int, signed: bool = False) -> list[int]:
+def _extend(bits: list[int], width: int, signed: bool = False) -> list[int]:
     return [*bits, *[bits[-1] if signed else FALSE] * width][:width]

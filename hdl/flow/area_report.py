@@ -142,7 +142,7 @@ def recorded_areas(file: Path) -> dict[str, dict[str, Any]]:
     return designs
 
 
-def grown(row: Area, file: Path) -> list[str]:
+def find_growth(row: Area, file: Path) -> list[str]:
     """Sentences about each count of a design that exceeds that in ``file`` by more than GROWTH."""
     known = recorded_areas(file).get(row.name)
     if known is None:

@@ -45,7 +45,7 @@ def tops_in(table: TopTable) -> dict[str, Top]:
     return {name: top for name, top in table.items() if isinstance(top, Top)}
 
 
-def counted(table: TopTable) -> dict[str, Top | Block]:
+def designs_with_area(table: TopTable) -> dict[str, Top | Block]:
     """The designs whose tiles are counted: each top that is one FPGA, then each block."""
     tops = {name: top for name, top in tops_in(table).items() if top.parts == 1}
     return {**tops, **{name: top for name, top in table.items() if isinstance(top, Block)}}

@@ -17,7 +17,7 @@ from typing import TypeVar
 
 from cubestack.firmware_model.values import whole
 from cubestack.hdl.flow.area_report import area_json, area_table, areas
-from cubestack.hdl.flow.top import TopTable, counted, tops_in
+from cubestack.hdl.flow.top import TopTable, designs_with_area, tops_in
 from cubestack.hdl.flow.verilog import verilog_file
 from cubestack.hdl.proofs.prover import Proof
 from cubestack.hdl.proofs.verdicts import verdict_json, verdict_text, verdicts
@@ -136,7 +136,7 @@ def _chosen(table: Mapping[str, Entry], names: list[str], kind: str) -> dict[str
 
 
 def _area(args: argparse.Namespace) -> int:
-    table = _chosen(counted(args.tops()), args.names, "design of one FPGA")
+    table = _chosen(designs_with_area(args.tops()), args.names, "design of one FPGA")
     counting = areas(table, args.ice40, args.fmax)
     rows = list(progress(counting, len(table), "designs", quiet=args.json))
     print(area_json(rows) if args.json else "\n".join(area_table(rows)))

@@ -88,7 +88,7 @@ def running(
     if board.get("firmware"):
         return {"firmware": str(board["firmware"])}
     profile = board.get("profile", DEFAULT_PROFILE)
-    switches = device.switches.of(profile, board.get("set", "")).beside(profile)
+    switches = device.switches.of(profile, board.get("set", "")).differences(profile)
     return {"profile": profile, **({"switches": switches} if switches else {})}
 
 

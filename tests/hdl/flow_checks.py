@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from cubestack.hdl.flow.area import AGLN030_TILES, count_tiles
-from cubestack.hdl.flow.area_report import Area, count_ice40, grown
+from cubestack.hdl.flow.area_report import Area, count_ice40, find_growth
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import run_yosys
 from cubestack.hdl.flow.top import Block, Top
@@ -87,4 +87,4 @@ def area_is_as_recorded(name: str, design: Top | Block, file: Path, ice40: bool 
         assert (tiles.total <= AGLN030_TILES) == design.fits
     area = Area(name, isinstance(design, Top), tiles, count_ice40(design.make()) if ice40 else None)
     wanted = f"if it is worth it: cubestack hdl area --ice40 --fmax --json ... > {file}"
-    assert not grown(area, file), f"{grown(area, file)[0]}; {wanted}"
+    assert not find_growth(area, file), f"{find_growth(area, file)[0]}; {wanted}"

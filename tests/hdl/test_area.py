@@ -13,15 +13,15 @@ from cubestack.hdl.cubesense import tops as cubesense
 from cubestack.hdl.cubestar import tops as cubestar
 from cubestack.hdl.flow import area, area_report
 from cubestack.hdl.flow.area import TileCount, count_tiles
-from cubestack.hdl.flow.area_report import Area, Ice40Count, grown, recorded_areas
+from cubestack.hdl.flow.area_report import Area, Ice40Count, find_growth, recorded_areas
 from cubestack.hdl.flow.generate import rtlil_text
 from cubestack.hdl.flow.tools import have_nextpnr, have_yosys
-from cubestack.hdl.flow.top import Top, counted
+from cubestack.hdl.flow.top import Top, designs_with_area
 from tests.hdl import flow_checks
 from tests.tiers import quick
 
 #: Each sensor's designs, and the file with their areas.
-SENSORS = [(counted(sensor.TOPS), sensor.AREA_FILE) for sensor in (cubestar, cubesense)]
+SENSORS = [(designs_with_area(sensor.TOPS), sensor.AREA_FILE) for sensor in (cubestar, cubesense)]
 DESIGNS = {name: design for table, _ in SENSORS for name, design in table.items()}
 
 ROWS = [(name, design, file) for table, file in SENSORS for name, design in table.items()]
@@ -127,7 +127,7 @@ def test_growth_is_told_in_words():
         ("cubestar", 0, Ice40Count(lut4 * 2, 0, 0), [twice]),
         ("moon", 0, None, ["moon is not in area.json"]),
     ):
-        assert grown(Area(name, True, TileCount(tiles, 0), ice40), file) == told
+        assert find_growth(Area(name, True, TileCount(tiles, 0), ice40), file) == told
 
 
 @pytest.mark.parametrize(("table", "file"), SENSORS)

@@ -10,7 +10,7 @@ from cubesense_fpga_i2c.proofs import PROOFS
 from cubesense_fpga_i2c.tops import AREA_FILE, TOPS
 from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.hdl.flow.tools import have_yosys
-from cubestack.hdl.flow.top import Top, counted, tops_in
+from cubestack.hdl.flow.top import Top, designs_with_area, tops_in
 from cubestack.hdl.proofs.prover import prove
 from tests.hdl import flow_checks
 from tests.tiers import quick
@@ -36,10 +36,10 @@ def test_verilog_file(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @need_yosys
-@pytest.mark.parametrize("name", counted(TOPS))
+@pytest.mark.parametrize("name", designs_with_area(TOPS))
 def test_area(name: str) -> None:
-    assert list(recorded_areas(AREA_FILE)) == list(counted(TOPS))
-    design = counted(TOPS)[name]
+    assert list(recorded_areas(AREA_FILE)) == list(designs_with_area(TOPS))
+    design = designs_with_area(TOPS)[name]
     flow_checks.area_is_as_recorded(name, design, AREA_FILE, ice40=isinstance(design, Top))
 
 

@@ -64,7 +64,7 @@ class NodeLink(SatelliteLink):
     def _uart_answer(self, identifier: int) -> bool:
         sent = super()._uart_answer(identifier)
         if sent:
-            self._taken(identifier)
+            self._note_read(identifier)
         return sent
 
     def i2c_start(self, read: bool) -> None:
@@ -76,9 +76,9 @@ class NodeLink(SatelliteLink):
         """An answer is used up once a part of it was read."""
         if self._position and self._answer is not None:
             super()._finish_read()
-            self._taken(self._requested)
+            self._note_read(self._requested)
 
-    def _taken(self, identifier: int) -> None:
+    def _note_read(self, identifier: int) -> None:
         """The host has read a telemetry message, which may schedule a measurement."""
         if identifier not in SCHEDULES:
             return

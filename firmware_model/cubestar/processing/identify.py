@@ -47,7 +47,7 @@ class Searches:
         field = configuration.field(state.settings)
         if results.detection is not None and results.detection.blind is not None:
             field = field.without(results.detection.blind)
-        catalogue = self._catalogue.limited(float(switches.pair_limit))
+        catalogue = self._catalogue.with_pair_limit(float(switches.pair_limit))
         if mode is MatchMode.TRACKING and attitude is not None:
             return track(
                 vectors,

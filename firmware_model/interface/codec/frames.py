@@ -68,7 +68,7 @@ class FrameDecoder:
         return FrameEvent.TOO_LONG if len(self._buffer) > self._max_length else FrameEvent.FRAME
 
     @property
-    def begun(self) -> bytes | None:
+    def open_payload(self) -> bytes | None:
         """Payload so far of an open frame; None outside of one."""
         return bytes(self._buffer) if self._inside else None
 

@@ -68,7 +68,7 @@ class Switches(DeclaredValues):
             values[name] = value
         return cls(**values)
 
-    def beside(self, profile: str) -> dict[str, str]:
+    def differences(self, profile: str) -> dict[str, str]:
         """Values that differ from a profile, by name."""
         plain = type(self).of(profile)
         return {

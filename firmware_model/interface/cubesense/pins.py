@@ -22,7 +22,7 @@ HREF = Pin("HREF", "input", "high while a row's pixels are sent")
 PCLK = Pin("PCLK", "input", "pixel clock")
 RNW = Pin("RNW", "input", "read, not write; with SHIFT the direction across the link")
 CLK = Pin("CLK", "input", "data clock")
-EDGE = Pin("EDGE", "input", "edge data instead of the picture")
+EDGE = Pin("EDGE", "input", "edge data instead of the image")
 SHIFT = Pin("SHIFT", "input", "across the link")
 DATA = Pin("DATA", "tristate", "bytes to the microcontroller, on a bus for both FPGAs", 8)
 LINK_D = Pin("LINK_D", "inout", "data between the FPGAs", 8)
@@ -49,7 +49,7 @@ FPGA = (
     CLK,
     EDGE,
     SHIFT,
-    Pin("ACK", "output", "a whole picture is stored: SUNACK or NADACK"),
+    Pin("ACK", "output", "a whole image is stored: SUNACK or NADACK"),
     DATA,
     LINK_D,
     LINK_C,
@@ -77,8 +77,8 @@ ENABLE = (
 
 #: Signals that a whole image is stored, by memory.
 ACKNOWLEDGE = {
-    Sram.SRAM1: Pin("SUNACK", "output", "a whole picture is in the sun's memory"),
-    Sram.SRAM2: Pin("NADACK", "output", "a whole picture is in the nadir's memory"),
+    Sram.SRAM1: Pin("SUNACK", "output", "a whole image is in the sun's memory"),
+    Sram.SRAM2: Pin("NADACK", "output", "a whole image is in the nadir's memory"),
 }
 
 #: The lines whose levels form a command, in the order of table 6.4.
@@ -108,7 +108,7 @@ def pair_pins(mcu_addressing: bool = False) -> tuple[Pin, ...]:
 def halves(pins: Iterable[Pin]) -> tuple[Pin, ...]:
     """Pins that each half has separately, as pins of the pair: the sun's, then the nadir's."""
     return tuple(
-        pin.but(prefix + pin, meaning=f"{side}: {pin.meaning}")
+        pin.copy(prefix + pin, meaning=f"{side}: {pin.meaning}")
         for side, prefix in PREFIXES.items()
         for pin in pins
     )

@@ -47,7 +47,7 @@ HEADER = {
 
 PUBLISHED = (
     *(
-        pin.but(meaning=f"{pin.meaning} (header {HEADER[pin]})")
+        pin.copy(meaning=f"{pin.meaning} (header {HEADER[pin]})")
         for pin in (*_CAMERA, ENABLE, RNW, BANK, DCLK, ACK, DATA)
     ),
     *_SRAM,
@@ -56,8 +56,8 @@ PUBLISHED = (
 SHARED = (
     *_CAMERA,
     ENABLE,
-    RNW.but(meaning="the processor has the memory; else a picture is stored"),
-    BANK.but(meaning="image bank to store in, latched by ENABLE"),
+    RNW.copy(meaning="the processor has the memory; else a image is stored"),
+    BANK.copy(meaning="image bank to store in, latched by ENABLE"),
     ACK,
     *_BUS,
     *_SRAM,
@@ -66,12 +66,12 @@ SHARED = (
 DOUBLE = (
     *_CAMERA,
     ENABLE,
-    RNW.but(meaning="low: a picture is stored"),
+    RNW.copy(meaning="low: a image is stored"),
     INTO,
     ACK,
     *_BUS,
     *(
-        pin.but(pin.replace("SRAM", f"SRAM{n}"), meaning=f"{pin.meaning}, memory {n - 1}")
+        pin.copy(pin.replace("SRAM", f"SRAM{n}"), meaning=f"{pin.meaning}, memory {n - 1}")
         for n in (1, 2)
         for pin in sram_pins(19)
     ),
@@ -85,7 +85,7 @@ OWN_PINS = (ENABLE, RNW, BANK, ACK, CS_N, *_SRAM)
 TWO_BOARDS = (
     *(pin for pin in SHARED if pin not in OWN_PINS),
     *(
-        pin.but(f"{prefix}{pin}", meaning=f"board {n}: {pin.meaning}")
+        pin.copy(f"{prefix}{pin}", meaning=f"board {n}: {pin.meaning}")
         for n, prefix in enumerate(BOARD_PREFIXES, 1)
         for name in OWN_PINS
         for pin in SHARED

@@ -30,7 +30,7 @@ def catalogue_tables(epoch: float | None = None) -> dict[str, str]:
     epoch = DEFAULT_EPOCH if epoch is None else epoch
     widest = max(map(float, CubeStarSwitches.declared()["pair_limit"].choices))
     flown = onboard_catalogue(pair_limit_deg=widest, epoch=epoch)
-    catalogue = flown.limited(float(published.pair_limit))
+    catalogue = flown.with_pair_limit(float(published.pair_limit))
     cut_deg, tracked_deg = voting.CUT_RADIUS_DEG, float(published.reduction)
     about = (
         f"CubeStar's catalogue: V < {MAG_LIMIT:g}, pairs closer than {published.pair_limit} deg, "

@@ -161,6 +161,6 @@ def test_a_narrower_list_is_the_beginning_of_a_wider_one(limit_deg: float) -> No
         StarCatalogue.build(*random_sky(200, 9), mag_limit=9.0, pair_limit_deg=limit)
         for limit in (50.0, min(limit_deg, 50.0))
     )
-    found = wide.limited(limit_deg)
+    found = wide.with_pair_limit(limit_deg)
     assert found.pair_limit_deg == narrow.pair_limit_deg
     assert found.to_bytes() == narrow.to_bytes()

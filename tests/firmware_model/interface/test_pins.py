@@ -26,10 +26,10 @@ def test_ports(direction: Direction, ports: list[Port]) -> None:
 
 def test_what_changes_keeps_the_rest() -> None:
     pin = Pin("X", "inout", "a bus", 8, level=7, enables=8, bare=True)
-    other = pin.but("Y", meaning="another bus", width=4)
+    other = pin.copy("Y", meaning="another bus", width=4)
     assert [port.name for port in other.ports] == ["Y_I", "Y", "Y_OE"]
     assert (other.width, other.level, other.enables, other.meaning) == (4, 7, 8, "another bus")
-    assert [port.name for port in pin.but(width=4).ports] == ["X_I", "X", "X_OE"]
+    assert [port.name for port in pin.copy(width=4).ports] == ["X_I", "X", "X_OE"]
 
 
 def test_a_name_with_what_is_known_of_it() -> None:

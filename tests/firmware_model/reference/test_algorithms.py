@@ -53,7 +53,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Algorithms:
 
 @pytest.fixture(scope="module")
 def listed() -> StarCatalogue:
-    return onboard_catalogue(pair_limit_deg=60.0).limited(float(PUBLISHED.pair_limit))
+    return onboard_catalogue(pair_limit_deg=60.0).with_pair_limit(float(PUBLISHED.pair_limit))
 
 
 @pytest.fixture(scope="module")

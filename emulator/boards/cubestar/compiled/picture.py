@@ -89,7 +89,7 @@ def run(calls: Calls, picture: NDArray[np.uint8]) -> Solution:
 def run_model(picture: NDArray[np.uint8], catalogue: StarCatalogue, meter: Meter) -> Solution:
     """Process an image by the Python program; its cycles are those that it charges."""
     switches, settings = CubeStarSwitches(), Settings(INTERFACE, SETTING_COMMANDS)
-    listed = catalogue.limited(float(switches.pair_limit))
+    listed = catalogue.with_pair_limit(float(switches.pair_limit))
     config = detection_config(settings, plain_weights=switches.weights == "intensity")
     camera = camera_parameters(settings)
     detection = detect_stars(picture, config, meter)
