@@ -56,7 +56,7 @@ PUBLISHED = (
 SHARED = (
     *_CAMERA,
     ENABLE,
-    RNW.copy(meaning="the processor has the memory; else a image is stored"),
+    RNW.copy(meaning="the processor has the memory; else an image is stored"),
     BANK.copy(meaning="image bank to store in, latched by ENABLE"),
     ACK,
     *_BUS,
@@ -66,7 +66,7 @@ SHARED = (
 DOUBLE = (
     *_CAMERA,
     ENABLE,
-    RNW.copy(meaning="low: a image is stored"),
+    RNW.copy(meaning="low: an image is stored"),
     INTO,
     ACK,
     *_BUS,
