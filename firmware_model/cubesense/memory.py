@@ -34,7 +34,6 @@ TASK_BYTES = 32  #: state of links and main loop between two bytes or two steps:
 #: Size of each memory in bytes.
 CAPACITY = {Memory.RAM: 1536, Memory.FLASH: 32 * 1024}
 
-
 _WINDOW = "Sun window"
 
 
@@ -60,22 +59,22 @@ def budget(switches: CubeSenseSwitches = DEFAULT_SWITCHES) -> tuple[Buffer, ...]
         "telecommands, waiting and being received": (QUEUE_DEPTH + 1) * longest,
         "image frame": FRAME_BYTES,
         "answer being sent, except an image frame": max(answers),
-        "picture for the image register, ahead of the host": READ_AHEAD_BYTES,
-        "picture and letters of the bench protocol": 2 * CHUNK_BYTES + LETTERS,
+        "image bytes read ahead for the image register": READ_AHEAD_BYTES,
+        "image bytes and letters of the bench protocol": 2 * CHUNK_BYTES + LETTERS,
         "masks": len(Camera) * MASK_AREAS * 4 * INT,
         "results, settings, counters, flags": _state_bytes(),
         "state of links and main loop": TASK_BYTES,
         "software stack": STACK_BYTES,
     }
     if checked:
-        ram["sides of the edges, and which are lit or count"] = MAX_EDGES
-        ram["begin of a bright run: line, place, edges until then"] = 2 + INT
+        ram["sides of the edges, and which are lit or used"] = MAX_EDGES
+        ram["start of a bright run: line, position, edges so far"] = 2 + INT
     shared = {
         "scanned pixels": (FULL_SIZE.scan_step, _WINDOW),
         **({"edges, undistorted": (MAX_EDGES * 2 * INT, _WINDOW)} if checked else {}),
         inside: (places[inside], place),
     }
-    flash = {  # whatever the switches are, as telecommands change them
+    flash = {  # for every setting of the switches, because telecommands change them
         "distortion tables of the reset values": TABLE_ENTRIES * (1 + INT * len(Projection)),
         "distortion tables of other coefficients": TABLE_ENTRIES * INT * len(Camera),
         "distortion coefficients": len(Camera) * DISTORTION_TERMS * FLOAT,

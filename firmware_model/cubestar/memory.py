@@ -72,8 +72,8 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
     ram = {
         # centroid, undistorted point, camera vector; size, intensity, identity, votes
         "detected stars": stars * (4 * (2 + 2 + 3) + 1 + 2 + 2 + 1),
-        # place in the picture (19 bits) and value (8 bits) in one word
-        "area that is grown": pixels * 4,
+        # position in the image (19 bits) and value (8 bits) in one word
+        "area being grown": pixels * 4,
         "recursion of region growing": pixels * GROW_FRAME_BYTES,
         **_background_search(),
         # angle; first entry and number of entries in the pair list
@@ -93,7 +93,7 @@ def budget(catalogue: StarCatalogue) -> tuple[Buffer, ...]:
     }
     return (
         *(Buffer(name, Memory.RAM, size) for name, size in ram.items()),
-        Buffer("picture", Memory.EXTERNAL_RAM, IMAGE_BYTES),
+        Buffer("image", Memory.EXTERNAL_RAM, IMAGE_BYTES),
         Buffer("visited pixels", Memory.EXTERNAL_RAM, visited * 4),
         Buffer("star list", Memory.FLASH, catalogue.star_bytes),
         Buffer("pair list", Memory.FLASH, catalogue.pair_bytes),
@@ -111,20 +111,20 @@ def _background_search() -> dict[str, int]:
     window = (2 * HALF + 1) ** 2
     return {
         "level and noise of the background": cells * (2 + 2),
-        "cells that are steep, and blind ones": 2 * cells // 8,
+        "steep cells, and blind cells": 2 * cells // 8,
         "level in DN where a row is steep": COLUMNS,
         "histogram of a cell": 256 * 2,
         # the next one is read into the oldest
-        "three rows of the picture": 3 * COLUMNS,
+        "three rows of the image": 3 * COLUMNS,
         # first and last column, area
         "runs of two rows": 2 * runs * (2 + 2 + 2),
-        # pixels, first place, brightest place and signal; light, two first and three second moments
-        "areas that may go on": runs * (2 + 4 + 4 + 2 + 6 * 4),
-        # pixels, brightest place, light, place
+        # pixels; first position; brightest position, signal; light, two 1st and three 2nd moments
+        "areas that may continue": runs * (2 + 4 + 4 + 2 + 6 * 4),
+        # pixels, brightest position, light, position
         "brightest areas": MOST_AREAS * (2 + 4 + 4 + 2 * 4),
         # signal; the same cleaned, weights
         "window around a star": window * (2 + 2 + 2),
-        # width, noise, start and marks of those whose shape is looked at
+        # width, noise, start and marks of the examined ones
         "shapes of areas": MOST_SHAPES * (2 + 2 + 2 * 2 + 1),
         # centroid, undistorted point, vector, expected error; size, intensity
         "stars beyond the published list": MOST_STARS

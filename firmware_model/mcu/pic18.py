@@ -36,7 +36,7 @@ def pic18f45k20() -> CostTable:
     def measured(cycles: int) -> Cost:
         return Cost(cycles, "measured", survey)
 
-    arc = composed(5, 4, 3, 1073, "reduction and a quotient of polynomials; the rest as sdcc's has")
+    arc = composed(5, 4, 3, 1073, "reduction and a quotient of polynomials; the rest as in sdcc's")
     port = Cost(2, "measured", f"{survey}; {core}")
     strobe = 2 * port.cycles + port.cycles  # clock up, read, clock down
     array, loop, loop16, signed_loop = 18, 7, 14, 22
@@ -50,7 +50,7 @@ def pic18f45k20() -> CostTable:
                 MULTIPLY, "assumed", "nine products of the part's 8 x 8 bit multiplier"
             ),
             "f32_div": published(DIVIDE),
-            "f32_sqrt": composed(3, 2, 2, 488, "two of Newton's steps; the rest as sdcc's has"),
+            "f32_sqrt": composed(3, 2, 2, 488, "two of Newton's steps; the rest as in sdcc's"),
             "f32_atan2": arc,
             "f32_tan": Cost(arc.cycles, "assumed", "as long as the arc tangent"),
             "f32_compare": Cost(60, "assumed", "a call; signs, then four bytes one by one"),
@@ -83,7 +83,7 @@ def pic18f45k20() -> CostTable:
                 "the data lines' direction changed, and back; then a read",
             ),
             "adc_conversion": Cost(
-                120, "assumed", "acquisition of 5 us and 12 periods of 1.6 us, waited for"
+                120, "assumed", "acquisition of 5 us and 12 periods of 1.6 us, with a wait"
             ),
             "uart_interrupt": interrupt,
             "i2c_interrupt": interrupt,

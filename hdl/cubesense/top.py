@@ -71,7 +71,7 @@ class CubeSenseFpga(PinnedComponent):
             search = SunSearch(self.read_out, domain="pix" if is_sun else "link")
             m.submodules.search = search
             m.d.comb += [
-                # The gap after a complete picture starts no new search.
+                # The gap after a complete image starts no new search.
                 search.start.eq(~sun_writer.vsync & ~sun_writer.ack),
                 search.store.eq(sun_writer.store),
                 search.pixel.eq(sun_writer.data),

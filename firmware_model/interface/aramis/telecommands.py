@@ -112,7 +112,7 @@ _EXTENSIONS = (
         )
     ),
     Message(103, "SetGain", "gain of the image sensor, set to the nearest possible one").of(
-        u8("Gain", "gain", scale=8, reset=mt9m001.HIGHEST_GAIN).within(1, mt9m001.HIGHEST_GAIN)
+        u8("Gain", "factor", scale=8, reset=mt9m001.HIGHEST_GAIN).within(1, mt9m001.HIGHEST_GAIN)
     ),
     Message(104, "SetDetection", "search for stars").of(
         u8(
@@ -177,7 +177,7 @@ _EXTENSIONS = (
     ).of(u8("Address", "register's address")),
 )
 
-*SET_SWITCHES, SWITCHES_SHOWN = switch_messages(AramisSwitches, 118, 210, "not saved over a reset")
+*SET_SWITCHES, SWITCHES_SHOWN = switch_messages(AramisSwitches, 118, 210, "lost at a reset")
 
 TELECOMMANDS = (
     *_USE_CASES,

@@ -45,7 +45,7 @@ class Camera(IntEnum):
 
 
 class Sram(IntEnum):
-    """Picture memory; a camera's own one has the camera's number."""
+    """Image memory; a camera's own one has the camera's number."""
 
     SRAM1 = 0
     SRAM2 = 1

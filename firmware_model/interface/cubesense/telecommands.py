@@ -55,7 +55,7 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
         _high(
             43 + 2 * camera, f"CameraSettings{number}", f"settings of camera {number}, {name}"
         ).of(
-            u16("Exposure", "in 127 us; the camera gets at most 255", reset=_EXPOSURES[camera]),
+            u16("Exposure", "in two lines, 127 us; at most 255 are used", reset=_EXPOSURES[camera]),
             u8("Gain", "amplification; the camera gets at most 63"),
             u8("BlueGain", "gain of the blue channel", reset=0x80),
             u8("RedGain", "gain of the red channel", reset=0x80),

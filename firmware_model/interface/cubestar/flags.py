@@ -58,7 +58,7 @@ _FLAGS = (
     ErrorFlag(44, "TriggerAlreadySet", "trigger while the loop was triggered already"),
     ErrorFlag(45, "TimerAlreadyRunning", "trigger while the delay timer was running"),
     ErrorFlag(46, "DelayTimeSetToLong", "delay above one second, or 0", "TimerTimeSetToLong"),
-    ErrorFlag(48, "StarPixSetError", "pixel limits out of range or order", "PixSetError"),
+    ErrorFlag(48, "StarPixSetError", "pixel limits out of range or swapped", "PixSetError"),
     ErrorFlag(49, "MaxStarsSetError", "star limit out of range"),
     ErrorFlag(50, "MaxStarsDetection", "detection stopped at the limit of stars"),
     ErrorFlag(51, "MaxInvalidStarsDetectionError", "detection stopped at the limit of large areas"),

@@ -51,7 +51,7 @@ def test_the_catalogue_s_size(buffers: tuple[Buffer, ...], catalogue: StarCatalo
 
 
 def test_sizes_that_other_sources_give(buffers: tuple[Buffer, ...]) -> None:
-    assert size(buffers, "picture") == IMAGE_BYTES
+    assert size(buffers, "image") == IMAGE_BYTES
     retained = [buffer.size for buffer in buffers if buffer.memory is Memory.RETENTION]
     assert retained == [State.RETENTION_SIZE]
     # Section 4.3: 190 pairs of 20 stars; votes of each star for each of 405.
