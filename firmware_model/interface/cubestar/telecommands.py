@@ -131,7 +131,7 @@ _IMAGE = (
             "BlockNumber",
             "block of the image, row by row",
             high=IMAGE_BYTES // codes.ImageBlockSize.BYTES_32.length - 1,
-            maximum_by=(
+            high_by=(
                 "BlockSize",
                 {size: IMAGE_BYTES // size.length - 1 for size in codes.ImageBlockSize},
             ),
