@@ -16,8 +16,8 @@ from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.devices.registry import device
-from cubestack.host.recording.said import Said, said
 from cubestack.host.recording.tables import TABLES
+from cubestack.host.recording.transcript import TranscriptEntry, transcript
 from cubestack.host.terminal import say
 
 
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Decode; returns 0."""
     recording = load_recording(args.recording)
-    messages = said(recording, device(recording.device).interface)
+    messages = transcript(recording, device(recording.device).interface)
     if args.out is not None:
         _write(args.out, messages)
         say(f"wrote {len(messages)} messages to {args.out}")
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _write(path: Path, messages: list[Said]) -> None:
+def _write(path: Path, messages: list[TranscriptEntry]) -> None:
     kind = path.suffix.removeprefix(".")
     if kind not in TABLES:
         raise ValueError(f"{path}: a table is .csv or .parquet, not {path.suffix}")
@@ -50,13 +50,13 @@ def _write(path: Path, messages: list[Said]) -> None:
         raise ValueError(f"can not write {path}: {error.strerror}") from None
 
 
-def _object(one: Said) -> dict[str, object]:
+def _object(one: TranscriptEntry) -> dict[str, object]:
     values = {k: v.hex() if isinstance(v, bytes) else v for k, v in one.values.items()}
     about = {"time_s": one.time_s, "port": one.port, "kind": one.kind, "message": one.name}
     return about | {"error": one.error, "values": values}
 
 
-def _line(one: Said) -> str:
+def _line(one: TranscriptEntry) -> str:
     fields = () if one.message is None else one.message.fields
     told = [f"{f.name} {f.label(one.values[f.name])}" for f in fields]
     error = [f"({one.error})"] if one.error else []

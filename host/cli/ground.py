@@ -32,7 +32,7 @@ from cubestack.host.targets import EMULATED, FORMS, open_target
 from cubestack.host.terminal import say
 
 if TYPE_CHECKING:
-    from cubestack.host.ground.desk import Desk
+    from cubestack.host.ground.session import TargetSession
 
 
 LOOK_S = 0.5
@@ -75,15 +75,15 @@ def run(args: argparse.Namespace) -> int:
     _check(args.targets, options, args.record)
     with ExitStack() as stack:
         pool = stack.enter_context(ThreadPoolExecutor(len(args.targets)))
-        desks = [pool.submit(_open, text, options, args) for text in args.targets]
-        stack.callback(_close, desks)
+        sessions = [pool.submit(_open, text, options, args) for text in args.targets]
+        stack.callback(_close, sessions)
         token = new_token()
-        serving = Serving(Guard(page_app(desks), token), LOOPBACK, args.port)
+        serving = Serving(Guard(page_app(sessions), token), LOOPBACK, args.port)
         stack.enter_context(serving.running())
         address = f"{serving.url}/?token={token}"
         print(f'{{"page": "{address}"}}' if args.json else f"the page: {address}", flush=True)
-        for desk in desks:
-            desk.result()  # whatever does not open ends this
+        for session in sessions:
+            session.result()  # whatever does not open ends this
         say("Ctrl-C ends it")
         while not ended.wait(LOOK_S):  # a signal that comes just before a wait does not end it
             pass
@@ -103,7 +103,7 @@ def _check(targets: Sequence[str], options: Mapping[str, Any], record: Path | No
         raise TargetError(f"{' '.join(words(options))} is for emulated:DEVICE")
     if record is None:
         return
-    from cubestack.host.ground.played import is_recording
+    from cubestack.host.ground.playback import is_recording
 
     if len(targets) > 1 or emulated or is_recording(targets[0]):
         raise TargetError(f"--record {record} is for one device that is not emulated here")
@@ -115,19 +115,19 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "Desk":
-    from cubestack.host.ground.desk import Desk
+def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "TargetSession":
     from cubestack.host.ground.emulators import Emulator
-    from cubestack.host.ground.played import is_recording, open_recording
+    from cubestack.host.ground.playback import is_recording, open_recording
+    from cubestack.host.ground.session import TargetSession
     from cubestack.host.transport.streams import Reopening, port_of
 
     if text.startswith(EMULATED):
         emulator = Emulator(text.removeprefix(EMULATED), options)
         with ExitStack() as stack:
             stack.callback(emulator.close)
-            desk = Desk(emulator.start(), emulator)
+            session = TargetSession(emulator.start(), emulator)
             stack.pop_all()
-            return desk
+            return session
     if is_recording(text):
         target = open_recording(text)
     else:
@@ -139,10 +139,10 @@ def _open(text: str, options: Mapping[str, Any], args: argparse.Namespace) -> "D
     port = None if target.line is None else port_of(target.line)
     if isinstance(port, Reopening):
         port.reopens = True
-    return Desk(target)
+    return TargetSession(target)
 
 
-def _close(desks: "Sequence[Future[Desk]]") -> None:
-    for desk in desks:
-        if desk.exception() is None:
-            desk.result().close()
+def _close(sessions: "Sequence[Future[TargetSession]]") -> None:
+    for session in sessions:
+        if session.exception() is None:
+            session.result().close()

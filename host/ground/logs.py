@@ -5,26 +5,26 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from cubestack.firmware_model.formats.recording import load_recording
-from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.results import FORMS
-from cubestack.host.recording.said import said
+from cubestack.host.ground.session import TargetSession
 from cubestack.host.recording.tables import TABLES
+from cubestack.host.recording.transcript import transcript
 
 
-def recording(desk: Desk) -> bytes:
+def recording(session: TargetSession) -> bytes:
     """All that was said by now, in whole lines; ValueError where nothing is recorded.
 
     Raises the errors of its control port.
     """
-    if desk.controls is not None:
-        return desk.controls.client.fetch("GET", f"/devices/{desk.controls.device}/recording")
-    if desk.target.recorded is None:
-        raise ValueError(desk.about["missing"]["recording"])
-    content = desk.target.recorded.read_bytes()
+    if session.controls is not None:
+        return session.controls.client.fetch("GET", f"/devices/{session.controls.device}/recording")
+    if session.target.recorded is None:
+        raise ValueError(session.about["missing"]["recording"])
+    content = session.target.recorded.read_bytes()
     return content[: content.rfind(b"\n") + 1]
 
 
-def said_table(desk: Desk, kind: str) -> bytes:
+def said_table(session: TargetSession, kind: str) -> bytes:
     """The table that `cubestack decode` makes of the recording: "csv" or "parquet".
 
     Raises as ``recording``; ValueError for another kind, and without pyarrow.
@@ -32,15 +32,15 @@ def said_table(desk: Desk, kind: str) -> bytes:
     make: Callable[..., bytes] | None = TABLES.get(kind)
     if make is None:
         raise ValueError(f"no table {kind!r}; there are {', '.join(TABLES)}")
-    content = recording(desk)
+    content = recording(session)
     with TemporaryDirectory(prefix="cubestack-") as folder:
         path = Path(folder) / "said.rec"
         path.write_bytes(content)
-        return make(said(load_recording(path), desk.target.interface))
+        return make(transcript(load_recording(path), session.target.interface))
 
 
-def results_table(desk: Desk, kind: str) -> bytes:
+def results_table(session: TargetSession, kind: str) -> bytes:
     """Its log of results, "csv" or "parquet"; raises as ``said_table``."""
     if kind not in FORMS:
         raise ValueError(f"no table {kind!r}; there are {', '.join(FORMS)}")
-    return FORMS[kind](desk.log)
+    return FORMS[kind](session.log)

@@ -1,7 +1,7 @@
 // The pictures in an emulation's memories: the newest by itself, brightened as one likes.
 
 import { choose, labelled, make } from "./dom.js";
-import { Enlarged } from "./enlarged.js";
+import { ZoomFrame } from "./zoom.js";
 import { drawFound } from "./overlay.js";
 import { ask, fetched } from "./server.js";
 
@@ -39,7 +39,7 @@ export class Pictures {
     this.stretch = make("input", { ...stretch, oninput: () => this.draw() });
     this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
     this.canvas.onmousemove = (event) => this.point(event);
-    this.enlarged = new Enlarged(this.canvas, () => this.drawFound());
+    this.zoomFrame = new ZoomFrame(this.canvas, () => this.drawFound());
     this.untold = make("p", { className: "quiet", id: "untold" });
     const key = (kind, text) => make("li", { className: kind, textContent: text });
     this.legend = make(
@@ -61,8 +61,8 @@ export class Pictures {
         labelled("brightness", this.stretch),
         labelled("a second", rate),
       ),
-      this.enlarged.place,
-      this.enlarged.buttons,
+      this.zoomFrame.place,
+      this.zoomFrame.buttons,
       this.legend,
       this.value,
       this.untold,
@@ -143,7 +143,7 @@ export class Pictures {
   }
 
   drawFound() {
-    const left = this.enlarged.drawOver((pen, place, size) =>
+    const left = this.zoomFrame.drawOver((pen, place, size) =>
       drawFound(pen, this.found, place, size, this.magnitudes.checked),
     );
     this.untold.textContent = left ? `names without room: ${left}; enlarge it to read them` : "";

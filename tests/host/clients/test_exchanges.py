@@ -14,8 +14,8 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.devices.registry import device
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
-from cubestack.host.ground.desk import Desk
-from cubestack.host.recording.said import said
+from cubestack.host.ground.session import TargetSession
+from cubestack.host.recording.transcript import transcript
 from cubestack.host.targets import open_target
 
 from ..conftest import Slave, over_i2c
@@ -69,12 +69,12 @@ def test_a_page_tells_what_a_recording_has(tmp_path: Path) -> None:
     """Every frame that the host put on the line, those of waiting and of pictures among them."""
     path = tmp_path / "a.rec"
     target = open_target("emulated:cubesense", record=path)
-    desk = Desk(target)
-    desk.do("write DetectionThreshold1 77").result()
-    desk.read(["Configuration", "Identification"]).result()
-    desk.results().result()
-    health = desk.health
-    desk.close()
-    messages = said(load_recording(path), target.interface)
+    session = TargetSession(target)
+    session.do("write DetectionThreshold1 77").result()
+    session.read(["Configuration", "Identification"]).result()
+    session.results().result()
+    health = session.health
+    session.close()
+    messages = transcript(load_recording(path), target.interface)
     assert (health["sent"], health["answered"], health["late"]) == (len(messages), len(messages), 0)
     assert len(messages) > 5

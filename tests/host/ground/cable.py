@@ -13,7 +13,7 @@ from cubestack.emulator.ports.terminal_settings import line_format, read_setting
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.message import Interface, MessageKind
 from cubestack.host.errors import PortClosedError
-from cubestack.host.recording.said import said
+from cubestack.host.recording.transcript import transcript
 from cubestack.host.shell.language import Shell
 from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport
@@ -70,7 +70,7 @@ class RecordedNode:
         self.interface = interface
         self.told = {
             one.name: one.values
-            for one in said(load_recording(path), interface)
+            for one in transcript(load_recording(path), interface)
             if one.kind == MessageKind.TELEMETRY.value and not one.error
         }
 

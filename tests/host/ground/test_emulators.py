@@ -12,36 +12,36 @@ import pytest
 
 from cubestack.firmware_model.reference.image import reference_image
 from cubestack.host.errors import PortOpenError, TargetError
-from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.emulators import Emulator, SentFile, words
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.scenes import text_of
 from cubestack.host.ground.serving import Serving
+from cubestack.host.ground.session import TargetSession
 
 from .conftest import SOON_S, TOKEN
 
 
 @pytest.fixture(scope="module")
-def desk() -> Iterator[Desk]:
+def session() -> Iterator[TargetSession]:
     emulator = Emulator("cubestar", {"seed": 7})
-    opened = Desk(emulator.start(), emulator)
+    opened = TargetSession(emulator.start(), emulator)
     yield opened
     opened.close()
 
 
 @pytest.fixture
-def served(desk: Desk) -> Iterator[Serving]:
-    opened = Future[Desk]()
-    opened.set_result(desk)
+def served(session: TargetSession) -> Iterator[Serving]:
+    opened = Future[TargetSession]()
+    opened.set_result(session)
     serving = Serving(Guard(page_app([opened]), TOKEN), "127.0.0.1", 0)
     with serving.running():
         yield serving
 
 
-def scene(desk: Desk) -> Any:
-    assert desk.controls is not None
-    return desk.controls.client.ask("GET", "/devices/cubestar/scene")["table"]
+def scene(session: TargetSession) -> Any:
+    assert session.controls is not None
+    return session.controls.client.ask("GET", "/devices/cubestar/scene")["table"]
 
 
 def restart(served: Serving, body: object, token: str = TOKEN) -> tuple[int, Any]:
@@ -55,33 +55,35 @@ def restart(served: Serving, body: object, token: str = TOKEN) -> tuple[int, Any
         connection.close()
 
 
-def test_a_profile_is_chosen_and_scene_and_seed_stay(desk: Desk, served: Serving) -> None:
-    assert desk.controls is not None
-    shown = scene(desk) | {"ra_deg": 10.0, "hazards": {"moon": [{"direction": [12.0, 0.0]}]}}
+def test_a_profile_is_chosen_and_scene_and_seed_stay(
+    session: TargetSession, served: Serving
+) -> None:
+    assert session.controls is not None
+    shown = scene(session) | {"ra_deg": 10.0, "hazards": {"moon": [{"direction": [12.0, 0.0]}]}}
     act = {"words": ["scene", "scene"], "text": text_of(shown)}
-    desk.controls.client.ask("POST", "/devices/cubestar/act", act)
-    before, begun = desk.controls.client.url, desk.begun
+    session.controls.client.ask("POST", "/devices/cubestar/act", act)
+    before, begun = session.controls.client.url, session.begun
     status, told = restart(served, {"options": {"profile": "extended"}})
     assert (status, told["rows"]) == (200, [["seed", "7"], ["profile", "extended"]])
-    assert desk.controls.client.url != before
-    assert desk.begun == begun + 1
-    assert "recording" not in desk.about["missing"]  # the emulation records itself
-    assert scene(desk) == shown
-    now = {row["name"]: row["now"] for row in desk.about["options"]}
+    assert session.controls.client.url != before
+    assert session.begun == begun + 1
+    assert "recording" not in session.about["missing"]  # the emulation records itself
+    assert scene(session) == shown
+    now = {row["name"]: row["now"] for row in session.about["options"]}
     assert (now["profile"], now["firmware"]) == ("extended", "")
-    values = desk.do("read Identification").result()["data"]["values"]
+    values = session.do("read Identification").result()["data"]["values"]
     assert values["NodeType"] > 0
 
 
-def test_firmware_is_sent_and_runs(desk: Desk, served: Serving) -> None:
+def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> None:
     content = base64.b64encode(reference_image().read_bytes()).decode()
     own = {"name": "../../my <own>.elf", "content": content}
     status, told = restart(served, {"files": {"firmware": own}})
     assert status == 200, told
     assert "/my_own_.elf#" in dict(told["rows"])["firmware"]
-    assert desk.do("read Identification").result()["data"]["values"]["NodeType"] > 0
+    assert session.do("read Identification").result()["data"]["values"]["NodeType"] > 0
     # What runs can be kept, and has no profile.
-    kept = next(row["now"] for row in desk.about["options"] if row["name"] == "firmware")
+    kept = next(row["now"] for row in session.about["options"] if row["name"] == "firmware")
     status, told = restart(served, {"options": {"firmware": kept, "profile": "extended"}})
     assert status == 502
     assert told["error"].endswith("own firmware has no profile and no switches; leave them out")
@@ -111,20 +113,20 @@ def test_firmware_is_sent_and_runs(desk: Desk, served: Serving) -> None:
     ],
 )
 def test_what_can_not_be_started_is_one_line_and_the_old_one_runs(
-    desk: Desk, served: Serving, body: object, status: int, error: str
+    session: TargetSession, served: Serving, body: object, status: int, error: str
 ) -> None:
-    begun = desk.begun
+    begun = session.begun
     found, told = restart(served, body)
-    assert (found, desk.begun) == (status, begun)
+    assert (found, session.begun) == (status, begun)
     assert error in told["error"]
     assert "\n" not in told["error"]
-    assert desk.do("read Identification").result()["data"]["values"]["NodeType"] > 0
+    assert session.do("read Identification").result()["data"]["values"]["NodeType"] > 0
 
 
-def test_only_who_may_starts_it_again(desk: Desk, served: Serving) -> None:
-    begun = desk.begun
+def test_only_who_may_starts_it_again(session: TargetSession, served: Serving) -> None:
+    begun = session.begun
     assert restart(served, {}, "guess")[0] == 401
-    assert desk.begun == begun
+    assert session.begun == begun
 
 
 def test_one_that_does_not_start_is_told() -> None:

@@ -11,10 +11,10 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
-from cubestack.host.ground.desk import FROM_A_PAGE, LONGEST_LINE, Desk
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.serving import Serving
+from cubestack.host.ground.session import FROM_A_PAGE, LONGEST_LINE, TargetSession
 from cubestack.host.targets import open_target
 
 from .conftest import SOON_S, TOKEN
@@ -24,13 +24,13 @@ HEADERS = {"Authorization": f"Bearer {TOKEN}"}
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Serving]:
-    desk = Desk(open_target("emulated:cubestar"))
-    opened = Future[Desk]()
-    opened.set_result(desk)
+    session = TargetSession(open_target("emulated:cubestar"))
+    opened = Future[TargetSession]()
+    opened.set_result(session)
     serving = Serving(Guard(page_app([opened]), TOKEN), "127.0.0.1", 0)
     with serving.running():
         yield serving
-    desk.close()
+    session.close()
 
 
 def ask(served: Serving, method: str, path: str, body: Any = None) -> tuple[int, bytes]:
@@ -63,7 +63,9 @@ def test_the_page_and_its_parts_are_there(served: Serving) -> None:
         assert ask(served, "GET", f"/page/{part}")[0] == 200
 
 
-@pytest.mark.parametrize("path", ["/page/../desk.py", "/page/%2e%2e/desk.py", "/page/none", "/x"])
+@pytest.mark.parametrize(
+    "path", ["/page/../session.py", "/page/%2e%2e/session.py", "/page/none", "/x"]
+)
 def test_nothing_else_is(served: Serving, path: str) -> None:
     assert ask(served, "GET", path)[0] == 404
 

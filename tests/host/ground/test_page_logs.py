@@ -11,7 +11,7 @@ import pytest
 
 from cubestack.host.cli.main import main
 from cubestack.host.emulation.process import emulating
-from cubestack.host.recording.said import COLUMNS
+from cubestack.host.recording.transcript import COLUMNS
 
 from .browser import line, shown, station
 

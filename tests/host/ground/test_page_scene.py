@@ -12,7 +12,7 @@ from tests.tiers import quick
 
 from .browser import await_devices, look, shown, station
 from .hostile import HOSTILE, hostile
-from .looks import COVERED, LOOKS, PALE
+from .layout_checks import COVERED, LOOKS, PALE
 
 pytestmark = pytest.mark.xdist_group("other pages")
 

@@ -7,7 +7,7 @@ import pytest
 from tests.tiers import quick
 
 from .browser import look, shown
-from .looks import COVERED, LOOKS, PALE
+from .layout_checks import COVERED, LOOKS, PALE
 
 pytestmark = pytest.mark.xdist_group("page")  # beside others: one browser
 

@@ -7,7 +7,7 @@ import pytest
 from cubestack.firmware_model.formats.recording import BusMessage, BusTransfer, Recording
 from cubestack.firmware_model.interface.codec.message import Interface, Message
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.recording.said import COLUMNS, Said, said
+from cubestack.host.recording.transcript import COLUMNS, TranscriptEntry, transcript
 
 MESSAGES = [
     pytest.param(device(name).interface, message, id=f"{name}-{message.name}")
@@ -22,8 +22,8 @@ def transfer(interface: Interface, *parts: tuple[bytes, bool], port: str = "i2c"
     return BusTransfer(3 * 10**12, port, 4 * 10**12, messages, 0)
 
 
-def told(interface: Interface, *transfers: BusTransfer) -> list[Said]:
-    return said(Recording("a", "any", events=transfers), interface)
+def told(interface: Interface, *transfers: BusTransfer) -> list[TranscriptEntry]:
+    return transcript(Recording("a", "any", events=transfers), interface)
 
 
 @pytest.mark.parametrize(("interface", "message"), MESSAGES)
@@ -51,7 +51,7 @@ def test_each_field_has_a_number_and_what_a_reader_calls_it(
 
 
 def test_what_has_no_values_has_one_row() -> None:
-    (row,) = Said(1.5, "uart", "unknown", "77", error="not in the tables").rows()
+    (row,) = TranscriptEntry(1.5, "uart", "unknown", "77", error="not in the tables").rows()
     assert row == dict.fromkeys(COLUMNS) | {
         "time_s": 1.5,
         "port": "uart",

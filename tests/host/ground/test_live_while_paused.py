@@ -10,15 +10,15 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.remote_controls import RemoteControls
-from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.serving import LOOPBACK, Serving
+from cubestack.host.ground.session import TargetSession
 from cubestack.host.targets import Target
 
 from ..conftest import UartLink
 from .conftest import SOON_S, TOKEN
-from .hours import Changing, Hurried
+from .fast_server import Changing, Hurried
 
 
 class Held(Hurried):
@@ -33,8 +33,8 @@ def test_it_is_asked_when_time_goes_on() -> None:
     port, uart = Held(), UartLink(Changing())
     target = Target("held", INTERFACE, NodeClient(uart, INTERFACE), device=device("cubestar"))
     target.controls = RemoteControls(port, "cubestar")  # type: ignore[arg-type]
-    opened = Future[Desk]()
-    opened.set_result(Desk(target))
+    opened = Future[TargetSession]()
+    opened.set_result(TargetSession(target))
     serving = Serving(Guard(page_app([opened]), TOKEN), LOOPBACK, 0)
     address = serving.url.replace("http:", "ws:") + "/targets/0/live"
     headers = {"Authorization": f"Bearer {TOKEN}"}

@@ -17,9 +17,9 @@ from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.remote_controls import RemoteControls
 from cubestack.host.ground import page_app
-from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.serving import LOOPBACK, Serving
+from cubestack.host.ground.session import TargetSession
 from cubestack.host.pictures.images import png
 from cubestack.host.targets import Target
 from tests.host.conftest import FakeCubeStar, UartLink
@@ -93,8 +93,8 @@ def main() -> None:
     node.log = deque(maxlen=10)  # type: ignore[assignment]
     target = Target("hurried", INTERFACE, NodeClient(line, INTERFACE), device=device("cubestar"))
     target.controls = RemoteControls(hurried, "cubestar")  # type: ignore[arg-type]
-    opened = Future[Desk]()
-    opened.set_result(Desk(target))
+    opened = Future[TargetSession]()
+    opened.set_result(TargetSession(target))
     serving = Serving(Guard(page_app.page_app([opened]), "token"), LOOPBACK, 0)
     with serving.running():
         print(f"{serving.url}/?token=token", flush=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from cubestack.host.ground.desk import Desk
+from cubestack.host.ground.session import TargetSession
 from cubestack.host.targets import open_target
 from cubestack.host.transport.streams import SerialTransport
 
@@ -22,12 +22,12 @@ def test_a_cable_is_pulled_and_put_back(tmp_path: Path, uart: Any, reopens: bool
         target = open_target(str(ours), "cubestar")
         assert isinstance(target.line, SerialTransport)
         target.line.reopens = reopens
-        desk = Desk(target)
-        assert "error" not in desk.read(["Identification"]).result(SOON_S)["Identification"]
-    assert "error" in desk.read(["Identification"]).result(SOON_S)["Identification"]
-    assert "error" in desk.read(["Identification"]).result(SOON_S)["Identification"]
+        session = TargetSession(target)
+        assert "error" not in session.read(["Identification"]).result(SOON_S)["Identification"]
+    assert "error" in session.read(["Identification"]).result(SOON_S)["Identification"]
+    assert "error" in session.read(["Identification"]).result(SOON_S)["Identification"]
     with cable(ours, theirs, uart):
-        found = desk.read(["Identification"]).result(SOON_S)["Identification"]
+        found = session.read(["Identification"]).result(SOON_S)["Identification"]
         assert ("error" in found) is not reopens
-    assert desk.link.failed >= 2
-    desk.close()
+    assert session.link.failed >= 2
+    session.close()

@@ -3,7 +3,7 @@
 import { labelled, make } from "./dom.js";
 import { ask } from "./server.js";
 
-export class Played {
+export class Playback {
   // `path` leads to the target, `tell(text, kind)` tells what went wrong.
   constructor(place, about, path, tell) {
     place.hidden = !about.played;

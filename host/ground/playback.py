@@ -13,13 +13,13 @@ from cubestack.host.clients.contract import Client
 from cubestack.host.devices.registry import device
 from cubestack.host.errors import NoAnswerError, PortOpenError, TargetError
 from cubestack.host.ground.emulation import JsonObject
-from cubestack.host.recording.said import Said, said
+from cubestack.host.recording.transcript import TranscriptEntry, transcript
 from cubestack.host.targets import RECORDED, Target
 
 SUFFIX = ".rec"
 
 
-class PlayedClient(Client):
+class PlaybackClient(Client):
     """Answers telemetry as a recording has it, whatever is asked in which order.
 
     Attributes:
@@ -31,8 +31,8 @@ class PlayedClient(Client):
     ) -> None:
         """Begin at time 0; ``now`` is what goes on meanwhile, in s."""
         self.interface, self._now = interface, now
-        self._told = defaultdict[str, list[Said]](list)
-        for one in said(recording, interface):
+        self._told = defaultdict[str, list[TranscriptEntry]](list)
+        for one in transcript(recording, interface):
             if one.kind == MessageKind.TELEMETRY.value and one.values and not one.error:
                 self._told[one.name].append(one)
         self.end_s = recording.end_ps / 1e12
@@ -90,6 +90,6 @@ def open_recording(text: str) -> Target:
     except OSError as error:
         raise PortOpenError(f"can not open {path}: {error.strerror}") from error
     owner = device(recording.device)
-    node = PlayedClient(recording, owner.interface)
+    node = PlaybackClient(recording, owner.interface)
     name = f"{RECORDED}{path}"
     return Target(name, owner.interface, node, device=owner, recorded=path)

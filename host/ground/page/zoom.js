@@ -5,7 +5,7 @@ import { make } from "./dom.js";
 const LARGEST = 16; // times as wide as it is whole
 const BY = 2;
 
-export class Enlarged {
+export class ZoomFrame {
   // `changed` is called when it stands elsewhere on the screen, or in another size.
   constructor(canvas, changed) {
     this.canvas = canvas;

@@ -8,9 +8,9 @@ from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.errors import NoAnswerError, TargetError
-from cubestack.host.ground.desk import Desk
 from cubestack.host.ground.logs import recording
-from cubestack.host.ground.played import PlayedClient, is_recording, open_recording
+from cubestack.host.ground.playback import PlaybackClient, is_recording, open_recording
+from cubestack.host.ground.session import TargetSession
 from cubestack.host.targets import Target, open_target
 
 from ..conftest import LetterLine
@@ -31,7 +31,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
     clock = [100.0]
-    client = PlayedClient(load_recording(made), INTERFACE, lambda: clock[0])
+    client = PlaybackClient(load_recording(made), INTERFACE, lambda: clock[0])
     with pytest.raises(NoAnswerError, match=r"by 0\.000 s"):
         client.telemetry("Configuration")
     clock[0] += 1.0
@@ -54,24 +54,24 @@ def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
 def test_a_page_has_it_as_a_target(made: Path) -> None:
     assert is_recording(str(made))
     assert not is_recording("/dev/ttyUSB0")
-    desk = Desk(open_recording(str(made)))
-    assert {"send", "controls", "raw", "download"} <= desk.about["missing"].keys()
-    assert "recording" not in desk.about["missing"]
-    assert desk.played is not None
-    desk.played.play(desk.played.end_s, runs=False)
-    values = desk.read(["Configuration", "Result1"]).result()
+    session = TargetSession(open_recording(str(made)))
+    assert {"send", "controls", "raw", "download"} <= session.about["missing"].keys()
+    assert "recording" not in session.about["missing"]
+    assert session.played is not None
+    session.played.play(session.played.end_s, runs=False)
+    values = session.read(["Configuration", "Result1"]).result()
     assert values["Configuration"]["Threshold1"] == 9
     assert "nobody had read Result1" in values["Result1"]["error"]
     with pytest.raises(TargetError, match="takes no telecommand"):
-        desk.do("write DetectionThreshold1 7").result()
+        session.do("write DetectionThreshold1 7").result()
     with pytest.raises(ValueError, match="is a recording"):
-        desk.transfer("download")
-    desk.close()
+        session.transfer("download")
+    session.close()
 
 
 def test_what_is_not_recorded_says_how_it_would_be() -> None:
-    desk = Desk(Target("fake", INTERFACE, NodeClient(LetterLine(), INTERFACE)))
+    session = TargetSession(Target("fake", INTERFACE, NodeClient(LetterLine(), INTERFACE)))
     with pytest.raises(ValueError, match="fake is not recorded: begin with --record FILE"):
-        recording(desk)
-    assert desk.about["missing"]["recording"] == "fake is not recorded: begin with --record FILE"
-    desk.close()
+        recording(session)
+    assert session.about["missing"]["recording"] == "fake is not recorded: begin with --record FILE"
+    session.close()

@@ -8,43 +8,43 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
-from cubestack.host.ground.desk import Desk, Link
+from cubestack.host.ground.session import Link, TargetSession
 from cubestack.host.targets import Target
 
 from ..conftest import FakeCubeStar, UartLink
 
 
 class Behind:
-    """A desk, and the node at the far end of its line."""
+    """A session, and the node at the far end of its line."""
 
     def __init__(self) -> None:
         self.node = FakeCubeStar()
         line = UartLink(self.node)
-        self.desk = Desk(Target("fake", INTERFACE, NodeClient(line, INTERFACE), line))
+        self.session = TargetSession(Target("fake", INTERFACE, NodeClient(line, INTERFACE), line))
 
 
 @pytest.fixture
 def behind() -> Iterator[Behind]:
     one = Behind()
     yield one
-    one.desk.close()
+    one.session.close()
 
 
 def test_a_refusal_is_told_and_the_link_is_whole(behind: Behind) -> None:
     behind.node.refusals.append(AckError.BAD_PARAMETER)
     with pytest.raises(CommandRefusedError, match="CaptureAndProcess refused: BAD_PARAMETER"):
-        behind.desk.do("write CaptureAndProcess").result()
-    assert behind.desk.link == Link()
+        behind.session.do("write CaptureAndProcess").result()
+    assert behind.session.link == Link()
 
 
 def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) -> None:
     behind.node.lost = 100
     with pytest.raises(NoAnswerError):
-        behind.desk.do("read TaskStatus").result()
-    link = behind.desk.link
+        behind.session.do("read TaskStatus").result()
+    link = behind.session.link
     assert (link.failed, link.broken) == (1, True)
     behind.node.lost = 0
-    behind.desk.do("read TaskStatus").result()
+    behind.session.do("read TaskStatus").result()
     assert (link.failed, link.broken) == (1, False)
 
 
@@ -52,7 +52,9 @@ def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) 
 def test_what_can_not_be_asked_is_told_with_the_reason(client: str | None) -> None:
     line = UartLink(FakeCubeStar())
     known = None if client is None else device(client)
-    desk = Desk(Target("fake", INTERFACE, NodeClient(line, INTERFACE), line, device=known))
+    session = TargetSession(
+        Target("fake", INTERFACE, NodeClient(line, INTERFACE), line, device=known)
+    )
     without = {"found", "results", "download", "upload", "scene_form", "sensor_registers"}
-    assert without & desk.about["missing"].keys() == (set() if client else without)
-    desk.close()
+    assert without & session.about["missing"].keys() == (set() if client else without)
+    session.close()

@@ -20,7 +20,7 @@ from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.emulation.records import start_recorder
-from cubestack.host.recording.said import COLUMNS, LINE, Said, said
+from cubestack.host.recording.transcript import COLUMNS, LINE, TranscriptEntry, transcript
 
 INTERFACE = device("cubesense").interface
 CONFIGURATION = INTERFACE.telemetry("Configuration")
@@ -28,12 +28,12 @@ THRESHOLD = INTERFACE.telecommand("DetectionThreshold1")
 BYTE_PS = 173_611_111
 
 
-def on_the_line(*frames: tuple[str, bytes]) -> list[Said]:
+def on_the_line(*frames: tuple[str, bytes]) -> list[TranscriptEntry]:
     blocks = [
         LineBytes(index * 10**12, LINE, side, encode_frame(payload), BYTE_PS)  # type: ignore[arg-type]
         for index, (side, payload) in enumerate(frames)
     ]
-    return said(Recording("a", "cubesense", {LINE: 57600}, tuple(blocks)), INTERFACE)
+    return transcript(Recording("a", "cubesense", {LINE: 57600}, tuple(blocks)), INTERFACE)
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
@@ -48,7 +48,7 @@ def test_all_that_clients_got_is_there(name: str, tmp_path: Path) -> None:
         asked = [one.name for one in interface.telemetries if one.supported and one.length]
         got = [(one, client.telemetry(one)) for client in clients for one in asked]
         recorder.close()
-    found = said(load_recording(path), interface)
+    found = transcript(load_recording(path), interface)
     assert [(one.name, dict(one.values)) for one in found if not one.error] == got
     assert {one.port for one in found} == {"uart", "i2c"}
 
@@ -98,7 +98,7 @@ def test_other_devices_of_the_bus_are_left_out() -> None:
 
     own, other = INTERFACE.i2c_address, INTERFACE.i2c_address + 8
     events = (transfer(own, 0), transfer(other, 0), transfer(own, 6))
-    good, bad = said(Recording("a", "cubesense", events=events), INTERFACE)
+    good, bad = transcript(Recording("a", "cubesense", events=events), INTERFACE)
     assert (good.time_s, good.port, good.error) == (1.0, "i2c", "")
     assert list(good.values) == [one.name for one in CONFIGURATION.fields]
     assert (bad.error, bad.values) == ("errno 6", {})

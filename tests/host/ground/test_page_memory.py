@@ -74,7 +74,7 @@ class Page(NamedTuple):
 
 @pytest.fixture
 def server() -> Iterator[Any]:
-    call = [sys.executable, "-m", "tests.host.ground.hours"]
+    call = [sys.executable, "-m", "tests.host.ground.fast_server"]
     root, pipe = Path(__file__).parents[3], subprocess.PIPE
     with subprocess.Popen(call, cwd=root, stdin=pipe, stdout=pipe, text=True) as process:
         yield process

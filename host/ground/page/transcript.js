@@ -3,7 +3,7 @@
 import { make, save } from "./dom.js";
 import { fetched } from "./server.js";
 
-export class Said {
+export class Transcript {
   // `path` leads to the target, `tell(text, kind)` tells what went wrong.
   constructor(place, about, path, tell) {
     const { recording, parquet } = about.missing;

@@ -15,7 +15,7 @@ from cubestack.host.export.parquet import missing as parquet_missing
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import Emulator, SentFile
 from cubestack.host.ground.magnitudes import magnitude
-from cubestack.host.ground.played import PlayedClient
+from cubestack.host.ground.playback import PlaybackClient
 from cubestack.host.ground.results import ResultLog
 from cubestack.host.ground.tables import (
     pointer_row,
@@ -53,7 +53,7 @@ class Link:
     error: str = ""
 
 
-class Desk:
+class TargetSession:
     """Attributes:
     target: that is looked at.
     link: how its link is.
@@ -140,8 +140,8 @@ class Desk:
         return controls if isinstance(controls, RemoteControls) else None
 
     @property
-    def played(self) -> PlayedClient | None:
-        return self.target.node if isinstance(self.target.node, PlayedClient) else None
+    def played(self) -> PlaybackClient | None:
+        return self.target.node if isinstance(self.target.node, PlaybackClient) else None
 
     def do(self, line: str) -> "Future[JsonObject]":
         """What a line of the shell gives: ``rows`` for a reader, and ``data``.

@@ -21,7 +21,7 @@ LONGEST_PAYLOAD = 4096
 
 
 @dataclass(frozen=True)
-class Said:
+class TranscriptEntry:
     """A request and its answer.
 
     Attributes:
@@ -67,7 +67,7 @@ COLUMNS = ("time_s", "port", "kind", "message", "error", *FIELD_COLUMNS)
 """Of a row."""
 
 
-def said(recording: Recording, interface: Interface) -> list[Said]:
+def transcript(recording: Recording, interface: Interface) -> list[TranscriptEntry]:
     """All node-protocol requests of a recording, by time."""
     found = [*_on_the_line(recording.line(LINE), interface)]
     found += (one for transfer in recording.transfers if (one := _on_the_bus(transfer, interface)))
@@ -80,7 +80,7 @@ class _Asked:
     payload: bytes
 
 
-def _on_the_line(blocks: Iterable[LineBytes], interface: Interface) -> Iterator[Said]:
+def _on_the_line(blocks: Iterable[LineBytes], interface: Interface) -> Iterator[TranscriptEntry]:
     decoders = {side: FrameDecoder(LONGEST_PAYLOAD) for side in ("host", "device")}
     asked: _Asked | None = None
     for block in blocks:
@@ -101,7 +101,7 @@ def _on_the_line(blocks: Iterable[LineBytes], interface: Interface) -> Iterator[
         yield _exchange(asked, None, interface)
 
 
-def _exchange(asked: _Asked, answer: bytes | None, interface: Interface) -> Said:
+def _exchange(asked: _Asked, answer: bytes | None, interface: Interface) -> TranscriptEntry:
     message = interface.find(asked.payload[0]) if asked.payload else None
     if message is None:
         return _unknown(asked.time_s, LINE, asked.payload[:1])
@@ -116,7 +116,7 @@ def _exchange(asked: _Asked, answer: bytes | None, interface: Interface) -> Said
     return _told(asked.time_s, LINE, message, asked.payload[1:], error)
 
 
-def _on_the_bus(transfer: BusTransfer, interface: Interface) -> Said | None:
+def _on_the_bus(transfer: BusTransfer, interface: Interface) -> TranscriptEntry | None:
     """None for a transfer to another device or to its registers."""
     messages = [one for one in transfer.messages if one.address == interface.i2c_address]
     written = b"".join(one.data for one in messages if not one.read)
@@ -131,16 +131,16 @@ def _on_the_bus(transfer: BusTransfer, interface: Interface) -> Said | None:
     return _told(time_s, transfer.port, message, answer, error if transfer.errno else "")
 
 
-def _told(time_s: float, port: str, message: Message, data: bytes, error: str) -> Said:
+def _told(time_s: float, port: str, message: Message, data: bytes, error: str) -> TranscriptEntry:
     """The message that ``data`` encodes, if any; ``error`` is its error so far."""
     about = time_s, port, message.kind.value, message.name
     if not data and error:
-        return Said(*about, error=error)
+        return TranscriptEntry(*about, error=error)
     if len(data) != message.length:
-        return Said(*about, error=f"{len(data)} bytes, not {message.length}")
-    return Said(*about, message.unpack(data), message, error)
+        return TranscriptEntry(*about, error=f"{len(data)} bytes, not {message.length}")
+    return TranscriptEntry(*about, message.unpack(data), message, error)
 
 
-def _unknown(time_s: float, port: str, identifier: bytes) -> Said:
+def _unknown(time_s: float, port: str, identifier: bytes) -> TranscriptEntry:
     name = str(identifier[0]) if identifier else "nothing"
-    return Said(time_s, port, "unknown", name, error="not in the tables")
+    return TranscriptEntry(time_s, port, "unknown", name, error="not in the tables")
