@@ -52,29 +52,17 @@ FORMS = (
 
 @dataclass
 class Target:
-    """An open target.
+    """An open target."""
 
-    Attributes:
-        name: as the user wrote it.
-        interface: of its messages.
-        node: client of the node protocol.
-        line: the serial line under it; None on I2C.
-        registers: client of the register-pointer protocol, or None.
-        service_port: serial line with the one-letter protocol, or None.
-        controls: None for a device that is not emulated here.
-        device: its declaration; None for an unregistered interface.
-        recorded: file with the session so far, or None.
-    """
-
-    name: str
-    interface: Interface
-    node: Client
-    line: Transport | None = None
-    registers: RegisterClient | None = None
-    service_port: Transport | None = None
-    controls: Controls | None = None
-    device: AnyDevice | None = None
-    recorded: Path | None = None
+    name: str  #: as the user wrote it
+    interface: Interface  #: of its messages
+    node: Client  #: client of the node protocol
+    line: Transport | None = None  #: the serial line under it; None on I2C
+    registers: RegisterClient | None = None  #: client of the register-pointer protocol, or None
+    service_port: Transport | None = None  #: serial line with the one-letter protocol, or None
+    controls: Controls | None = None  #: None for a device that is not emulated here
+    device: AnyDevice | None = None  #: its declaration; None for an unregistered interface
+    recorded: Path | None = None  #: file with the session so far, or None
     on_close: list[Callable[[], None]] = field(default_factory=list)
 
     def close(self) -> None:

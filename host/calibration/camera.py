@@ -21,19 +21,16 @@ class Camera:
     With x = X/Z, y = Y/Z and r2 = x^2 + y^2, the column is
     ``cx + f (x (1 + k1 r2 + k2 r2^2) + 2 p1 x y + p2 (r2 + 2 x^2))``, the row likewise with
     ``p1 (r2 + 2 y^2) + 2 p2 x y``.
-
-    Attributes:
-        f_px: focal length.
-        cx_px, cy_px: principal point.
-        k1, k2: radial coefficients.
-        p1, p2: tangential coefficients.
     """
 
-    f_px: float
+    f_px: float  #: focal length
+    #: cx_px, cy_px: principal point
     cx_px: float
     cy_px: float
+    #: k1, k2: radial coefficients
     k1: float = 0.0
     k2: float = 0.0
+    #: p1, p2: tangential coefficients
     p1: float = 0.0
     p2: float = 0.0
 

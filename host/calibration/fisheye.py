@@ -24,20 +24,14 @@ LEAST = 8
 
 @dataclass(frozen=True)
 class Fisheye:
-    """A lens in the sensor's parameters.
+    """A lens in the sensor's parameters."""
 
-    Attributes:
-        x_px, y_px: pixel of the optical axis.
-        factors: r_d = sum of factors[k] r_u^k, both radii in px.
-        px_per_degree: r_u of a field angle.
-        field_deg: largest field angle; the rim's radius in the picture is known.
-    """
-
+    #: x_px, y_px: pixel of the optical axis
     x_px: float
     y_px: float
-    factors: tuple[float, ...]
-    px_per_degree: float
-    field_deg: float
+    factors: tuple[float, ...]  #: r_d = sum of factors[k] r_u^k, both radii in px
+    px_per_degree: float  #: r_u of a field angle
+    field_deg: float  #: largest field angle; the rim's radius in the picture is known
 
     def project(self, angles: Points) -> Points:
         """Pixels (n, 2) of lights at angles alpha and beta (n, 2), deg, off the axis."""

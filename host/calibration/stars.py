@@ -55,28 +55,21 @@ class Sight:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Result of a fit.
+    """Result of a fit."""
 
-    Attributes:
-        camera: the parameters.
-        pictures: number of images used.
-        sigma: standard deviations of the parameters by name; fixed ones have none.
-        pairs_f_px: focal length from star pairs alone; None without a pair near the middle.
-        before_px, after_px: root mean square residual of the first and of the fitted camera, each
-            image at its best attitude.
-        places, residuals: (n, 2) px: positions of the stars used, and measured minus predicted.
-        rejected: number of stars left out, with those of unusable images.
-    """
-
-    camera: Camera
-    pictures: int
-    sigma: dict[str, float]
+    camera: Camera  #: the parameters
+    pictures: int  #: number of images used
+    sigma: dict[str, float]  #: standard deviations of the parameters by name; fixed ones have none
+    #: focal length from star pairs alone; None without a pair near the middle
     pairs_f_px: float | None
+    #: before_px, after_px: root mean square residual of the first and of the fitted camera, each
+    #: image at its best attitude
     before_px: float
     after_px: float
+    #: places, residuals: (n, 2) px: positions of the stars used, and measured minus predicted
     places: Points
     residuals: Points
-    rejected: int
+    rejected: int  #: number of stars left out, with those of unusable images
 
 
 def fit_camera(

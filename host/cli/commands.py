@@ -29,17 +29,11 @@ class Listed(Protocol):
 
 @dataclass(frozen=True)
 class Command:
-    """A command.
+    """A command."""
 
-    Attributes:
-        group: of the help text.
-        summary: one phrase for lists.
-        module: has ``add_arguments(parser)``, ``run(args)`` and a docstring for the help.
-    """
-
-    group: str
-    summary: str
-    module: str
+    group: str  #: of the help text
+    summary: str  #: one phrase for lists
+    module: str  #: has ``add_arguments(parser)``, ``run(args)`` and a docstring for the help
 
     def load(self) -> Any:
         return import_module(self.module)

@@ -11,14 +11,10 @@ from cubestack.host.devices.registry import devices
 
 @dataclass
 class Reports:
-    """One command: what the devices that have it say of themselves.
+    """One command: what the devices that have it say of themselves."""
 
-    Attributes:
-        summary: one phrase for the help.
-        declared: device and report of each device that has it.
-    """
-
-    summary: str
+    summary: str  #: one phrase for the help
+    #: device and report of each device that has it
     declared: list[tuple[AnyDevice, Report]] = field(default_factory=list)
     group: str = STUDIES
 

@@ -24,16 +24,11 @@ CHANGES = (TokenKind.CHANGE_SCALAR, TokenKind.CHANGE_VECTOR, TokenKind.CHANGE_ST
 
 
 class Trace(NamedTuple):
-    """The end of a waveform.
+    """The end of a waveform."""
 
-    Attributes:
-        signals: all names.
-        levels: of each in the end.
-        moments: time in ps and changes, of the last times at which something changed.
-    """
-
-    signals: list[str]
-    levels: dict[str, str]
+    signals: list[str]  #: all names
+    levels: dict[str, str]  #: of each in the end
+    #: time in ps and changes, of the last times at which something changed
     moments: list[tuple[int, dict[str, str]]]
 
 

@@ -59,13 +59,9 @@ class Closable(ABC):
 
 
 class Client(Closable):
-    """A node's telecommands and telemetry by name.
+    """A node's telecommands and telemetry by name."""
 
-    Attributes:
-        interface: the node's messages.
-    """
-
-    interface: Interface
+    interface: Interface  #: the node's messages
 
     @cached_property
     def exchanges(self) -> Exchanges:

@@ -6,23 +6,14 @@ from typing import Self
 
 @dataclass
 class Exchanges:
-    """Counts since a client was made.
+    """Counts since a client was made."""
 
-    Attributes:
-        sent: requests: frames on a serial line, transfers on I2C.
-        answered: requests with a whole answer or an acknowledge.
-        late: requests that timed out.
-        repeated: retries.
-        refused: telecommands answered with an error.
-        streamed: image frames, which come without requests.
-    """
-
-    sent: int = 0
-    answered: int = 0
-    late: int = 0
-    repeated: int = 0
-    refused: int = 0
-    streamed: int = 0
+    sent: int = 0  #: requests: frames on a serial line, transfers on I2C
+    answered: int = 0  #: requests with a whole answer or an acknowledge
+    late: int = 0  #: requests that timed out
+    repeated: int = 0  #: retries
+    refused: int = 0  #: telecommands answered with an error
+    streamed: int = 0  #: image frames, which come without requests
 
     def ended(self, answered: bool) -> None:
         """Count a request as answered or timed out."""

@@ -15,32 +15,23 @@ from cubestack.host.errors import BadAnswerError
 
 @dataclass(frozen=True, kw_only=True)
 class AttitudeQuality:
-    """Inputs of an attitude filter, or why there are none.
+    """Inputs of an attitude filter, or why there are none."""
 
-    Attributes:
-        valid: the latest image gave an attitude, which this rates.
-        reason: why there is none, or that there is one.
-        covariance: float64 (3, 3), rad^2, of the rotation from true to reported camera axes, about
-            the camera's x, y and z.
-        false_alarm: expected number of wrong attitudes that chance would confirm.
-        matched, expected: stars used, and stars expected in the image.
-        residual_rad: root mean square of the stars' residuals in each axis.
-        scale: measured focal length over the configured one.
-        background_dn, noise_dn: the sky's brightness, and the standard deviation of a pixel.
-        spikes: number of bright pixels that are not stars (hot pixels, particles).
-    """
-
-    valid: bool
-    reason: IntEnum
+    valid: bool  #: the latest image gave an attitude, which this rates
+    reason: IntEnum  #: why there is none, or that there is one
+    #: float64 (3, 3), rad^2, of the rotation from true to reported camera axes, about the camera's
+    #: x, y and z
     covariance: NDArray[np.float64]
-    false_alarm: float
+    false_alarm: float  #: expected number of wrong attitudes that chance would confirm
+    #: matched, expected: stars used, and stars expected in the image
     matched: int
     expected: int
-    residual_rad: float
-    scale: float
+    residual_rad: float  #: root mean square of the stars' residuals in each axis
+    scale: float  #: measured focal length over the configured one
+    #: background_dn, noise_dn: the sky's brightness, and the standard deviation of a pixel
     background_dn: float
     noise_dn: float
-    spikes: int
+    spikes: int  #: number of bright pixels that are not stars (hot pixels, particles)
 
     @property
     def sigmas_rad(self) -> NDArray[np.float64]:

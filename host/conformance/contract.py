@@ -43,19 +43,12 @@ class Verdict(Enum):
 
 @dataclass
 class CheckResult:
-    """A check that ran or was skipped.
+    """A check that ran or was skipped."""
 
-    Attributes:
-        name: unique within a run.
-        verdict: its result.
-        detail: why it failed or was skipped, or what was observed.
-        observed: values by which two targets are compared.
-    """
-
-    name: str
-    verdict: Verdict
-    detail: str = ""
-    observed: tuple[str, ...] = ()
+    name: str  #: unique within a run
+    verdict: Verdict  #: its result
+    detail: str = ""  #: why it failed or was skipped, or what was observed
+    observed: tuple[str, ...] = ()  #: values by which two targets are compared
 
 
 class FailedError(Exception):
@@ -72,22 +65,15 @@ class SkippedError(Exception):
 
 @dataclass
 class CheckRun:
-    """A run of checks on one target.
+    """A run of checks on one target."""
 
-    Attributes:
-        target: what is checked.
-        allow_write: whether checks may change the device.
-        notes: the device's conformance notes.
-        checks: results so far.
-        on_check: called with each result.
-        latencies_s: answer times without the time on the wire, by telemetry frame.
-    """
-
-    target: Target
-    allow_write: bool = False
+    target: Target  #: what is checked
+    allow_write: bool = False  #: whether checks may change the device
+    #: the device's conformance notes
     notes: ConformanceNotes = field(default_factory=ConformanceNotes)
-    checks: list[CheckResult] = field(default_factory=list)
-    on_check: Callable[[CheckResult], None] = lambda _check: None
+    checks: list[CheckResult] = field(default_factory=list)  #: results so far
+    on_check: Callable[[CheckResult], None] = lambda _check: None  #: called with each result
+    #: answer times without the time on the wire, by telemetry frame
     latencies_s: dict[str, float] = field(default_factory=dict)
 
     @property

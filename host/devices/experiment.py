@@ -21,33 +21,22 @@ class Result:
 
 @dataclass(frozen=True)
 class Mark:
-    """A published error, drawn beside ours.
+    """A published error, drawn beside ours."""
 
-    Attributes:
-        error: name of ours in the results.
-        value: of it, in the unit of ours.
-        text: what it is, and its source.
-    """
-
-    error: str
-    value: float
-    text: str
+    error: str  #: name of ours in the results
+    value: float  #: of it, in the unit of ours
+    text: str  #: what it is, and its source
 
 
 @dataclass(frozen=True)
 class Section:
-    """Part of a report about many results: a table, a figure as PNG, or both.
+    """Part of a report about many results: a table, a figure as PNG, or both."""
 
-    Attributes:
-        title: of it.
-        head, rows: cells of the table; none without rows.
-        png: of the figure; empty without.
-    """
-
-    title: str
+    title: str  #: of it
+    #: head, rows: cells of the table; none without rows
     head: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
-    png: bytes = b""
+    png: bytes = b""  #: of the figure; empty without
 
 
 OpenerT = TypeVar("OpenerT")
@@ -56,26 +45,17 @@ ResultT = TypeVar("ResultT", bound=Result)
 
 
 class Experiment(ABC, Generic[OpenerT, OptionsT, ResultT]):
-    """How a command measures one device, or looks up facts about it.
+    """How a command measures one device, or looks up facts about it."""
 
-    Attributes:
-        options: what can be chosen.
-        description: for the help, with examples.
-        title, columns: of the table of results; the last column is text. No columns: no table.
-        label: says what is going on, beside the progress bar; empty for none.
-        powers_up: whether it needs the device, and not only its tables.
-        decides: options of the board that the experiment sets itself.
-        marks: published errors.
-    """
-
-    options: type[OptionsT]
-    description: str
+    options: type[OptionsT]  #: what can be chosen
+    description: str  #: for the help, with examples
+    #: title, columns: of the table of results; the last column is text. No columns: no table
     title: str = ""
     columns: tuple[str, ...] = ()
-    label: str = "measuring"
-    powers_up: bool = True
-    decides: tuple[str, ...] = ()
-    marks: tuple[Mark, ...] = ()
+    label: str = "measuring"  #: says what is going on, beside the progress bar; empty for none
+    powers_up: bool = True  #: whether it needs the device, and not only its tables
+    decides: tuple[str, ...] = ()  #: options of the board that the experiment sets itself
+    marks: tuple[Mark, ...] = ()  #: published errors
 
     def count(self, options: OptionsT) -> int:
         """Number of results to expect."""

@@ -11,19 +11,12 @@ from cubestack.host.devices.device import ConformanceNotes
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting that telemetry shows.
+    """A setting that telemetry shows."""
 
-    Attributes:
-        telecommand: that sets it.
-        parameter: its field there, with the default as reset value.
-        frame: telemetry that shows it.
-        shown: its field there.
-    """
-
-    telecommand: Message
-    parameter: Field
-    frame: Message
-    shown: Field
+    telecommand: Message  #: that sets it
+    parameter: Field  #: its field there, with the default as reset value
+    frame: Message  #: telemetry that shows it
+    shown: Field  #: its field there
 
 
 def settings(interface: Interface, notes: ConformanceNotes) -> Iterator[Setting]:

@@ -15,17 +15,11 @@ CLEAR = "clear"
 
 
 class Controls(Protocol):
-    """Actions on an emulated device, in this process or another.
+    """Actions on an emulated device, in this process or another."""
 
-    Attributes:
-        channels: supply channels.
-        faults: what ``fault`` takes: kind and target, and `CLEAR`.
-        fault_parameters: names of parameters by kind.
-    """
-
-    channels: tuple[str, ...]
-    faults: tuple[str, ...]
-    fault_parameters: Mapping[str, tuple[str, ...]]
+    channels: tuple[str, ...]  #: supply channels
+    faults: tuple[str, ...]  #: what ``fault`` takes: kind and target, and `CLEAR`
+    fault_parameters: Mapping[str, tuple[str, ...]]  #: names of parameters by kind
 
     def fault(self, words: list[str]) -> None:
         """Inject a fault; raises ValueError unless it is in ``faults``."""

@@ -179,40 +179,30 @@ def count_wrong(hipparcos: Sequence[int], directions: ArrayLike, truth: NDArray[
 
 @dataclass(frozen=True)
 class AttitudeResult(Result):
-    """Attributes are those of the JSON output; angles in degrees, None where there is no truth.
+    """Attributes are those of the JSON output; angles in degrees, None where there is no truth."""
 
-    Attributes:
-        solved: the measurement gave an attitude.
-        right: it did, and the attitude is right; None without truth.
-        centroids, matched: stars found, and stars used for the attitude.
-        wrong: identified stars with a wrong identity, whether or not they gave an attitude.
-        mode: "lis", "assisted" or "tracking".
-        error_cross_deg, error_roll_deg: across and about the boresight.
-        truth, quaternion: inertial to camera, scalar last; None without attitude.
-        reason: why there is no attitude, if the sensor says so, else None.
-        false_alarm: expected number of wrong confirmed attitudes; None if not rated.
-        sigma_deg, error_deg: claimed standard deviations, and errors, about the camera's axes.
-        phase_ms: virtual time of each step; wall_ms is wall time.
-        status: how it ended, and names of the error flags.
-    """
-
-    solved: bool
-    right: bool | None
+    solved: bool  #: the measurement gave an attitude
+    right: bool | None  #: it did, and the attitude is right; None without truth
+    #: centroids, matched: stars found, and stars used for the attitude
     centroids: int
     matched: int
+    #: identified stars with a wrong identity, whether or not they gave an attitude
     wrong: int | None
-    mode: str
+    mode: str  #: "lis", "assisted" or "tracking"
+    #: error_cross_deg, error_roll_deg: across and about the boresight
     error_cross_deg: float | None
     error_roll_deg: float | None
+    #: truth, quaternion: inertial to camera, scalar last; None without attitude
     truth: list[float] | None
     quaternion: list[float] | None
-    reason: str | None
-    false_alarm: float | None
+    reason: str | None  #: why there is no attitude, if the sensor says so, else None
+    false_alarm: float | None  #: expected number of wrong confirmed attitudes; None if not rated
+    #: sigma_deg, error_deg: claimed standard deviations, and errors, about the camera's axes
     sigma_deg: list[float] | None
     error_deg: list[float] | None
-    phase_ms: dict[str, float]
+    phase_ms: dict[str, float]  #: virtual time of each step; wall_ms is wall time
     wall_ms: float
-    status: str
+    status: str  #: how it ended, and names of the error flags
 
     @property
     def ending(self) -> str:

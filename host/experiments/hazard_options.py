@@ -27,15 +27,10 @@ from cubestack.firmware_model.values import REQUIRED, ValueKind, declare, many
 
 @dataclass(frozen=True)
 class Asked:
-    """A requested hazard.
+    """A requested hazard."""
 
-    Attributes:
-        name: of a hazard.
-        strength: on its scale; None for its usual one.
-    """
-
-    name: str
-    strength: float | None = None
+    name: str  #: of a hazard
+    strength: float | None = None  #: on its scale; None for its usual one
 
     def __str__(self) -> str:
         return self.name if self.strength is None else f"{self.name}={self.strength:g}"

@@ -29,20 +29,13 @@ def _silent(items: Iterable[Any], _total: int, _label: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Opener(Generic[BoardT_co, ClientT_co]):
-    """Powers a device up for an experiment with the user's board options.
+    """Powers a device up for an experiment with the user's board options."""
 
-    Attributes:
-        device: to power up.
-        engine: how its FPGA is run.
-        board: options of its board.
-        shown: progress display of slow first-time work.
-        opened: called with each device after power-up.
-    """
-
-    device: Device[BoardT_co, ClientT_co]
-    engine: Engine = "auto"
-    board: Mapping[str, Any] = field(default_factory=dict)
-    shown: Shown = _silent
+    device: Device[BoardT_co, ClientT_co]  #: to power up
+    engine: Engine = "auto"  #: how its FPGA is run
+    board: Mapping[str, Any] = field(default_factory=dict)  #: options of its board
+    shown: Shown = _silent  #: progress display of slow first-time work
+    #: called with each device after power-up
     opened: Callable[[EmulatedDevice[BoardT_co, ClientT_co]], object] = lambda _emulated: None
 
     @property

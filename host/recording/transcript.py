@@ -22,25 +22,16 @@ LONGEST_PAYLOAD = 4096
 
 @dataclass(frozen=True)
 class TranscriptEntry:
-    """A request and its answer.
+    """A request and its answer."""
 
-    Attributes:
-        time_s: end of the request; on I2C, start of the transfer.
-        port: where.
-        kind: telecommand or telemetry.
-        name: of the message, or its ID where the tables have none.
-        values: a telecommand's parameters, or the telemetry; empty without an answer.
-        message: its declaration; None without values.
-        error: what is wrong with it, or empty.
-    """
-
-    time_s: float
-    port: str
-    kind: str
-    name: str
+    time_s: float  #: end of the request; on I2C, start of the transfer
+    port: str  #: where
+    kind: str  #: telecommand or telemetry
+    name: str  #: of the message, or its ID where the tables have none
+    #: a telecommand's parameters, or the telemetry; empty without an answer
     values: Mapping[str, Value] = field(default_factory=dict)
-    message: Message | None = None
-    error: str = ""
+    message: Message | None = None  #: its declaration; None without values
+    error: str = ""  #: what is wrong with it, or empty
 
     def rows(self) -> list[dict[str, str | float | None]]:
         """A row per field, or one row without fields; for a table of all messages."""

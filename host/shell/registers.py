@@ -32,16 +32,11 @@ LIST = "list [NAME]"
 
 @dataclass
 class RegisterCommands:
-    """The commands on one target; the caller closes it.
-
-    Attributes:
-        names: what the target has.
-        on_row: called with each result of ``watch`` as it comes.
-    """
+    """The commands on one target; the caller closes it."""
 
     target: Target
-    names: Names
-    on_row: Callable[[CommandResult], None]
+    names: Names  #: what the target has
+    on_row: Callable[[CommandResult], None]  #: called with each result of ``watch`` as it comes
 
     def commands(self) -> list[ShellCommand]:
         return [

@@ -14,15 +14,11 @@ class ShellError(ValueError):
 
 @dataclass
 class CommandResult:
-    """What a command found.
+    """What a command found."""
 
-    Attributes:
-        rows: (name, value for a reader); a name may be empty.
-        data: the same for a program, as JSON takes it.
-    """
-
+    #: (name, value for a reader); a name may be empty
     rows: list[tuple[str, str]] = field(default_factory=list)
-    data: dict[str, Any] = field(default_factory=dict)
+    data: dict[str, Any] = field(default_factory=dict)  #: the same for a program, as JSON takes it
 
 
 @dataclass(frozen=True)

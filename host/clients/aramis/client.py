@@ -27,62 +27,41 @@ PROGRAM_TIMEOUT_S = 300.0
 
 @dataclass(frozen=True)
 class Attitude:
-    """The latest attitude, and how the latest measurement ended.
+    """The latest attitude, and how the latest measurement ended."""
 
-    Attributes:
-        quaternion: float64 (4,), unit length; None before the first attitude.
-        valid: the latest measurement computed it; otherwise it is older.
-        outcome, reason, mode: of the latest measurement.
-        matched: stars used for the quaternion.
-        detected: stars in the latest picture.
-        frame: number of that image.
-        image_uptime_s: its mid-exposure, since power-up.
-        julian_date: the same as a Julian date in days; None until the clock is set.
-    """
-
+    #: float64 (4,), unit length; None before the first attitude
     quaternion: NDArray[np.float64] | None
-    valid: bool
+    valid: bool  #: the latest measurement computed it; otherwise it is older
+    #: outcome, reason, mode: of the latest measurement
     outcome: aramis.MeasurementOutcome
     reason: aramis.Reason
     mode: aramis.MeasurementMode
-    matched: int
-    detected: int
-    frame: int
-    image_uptime_s: float
-    julian_date: float | None
+    matched: int  #: stars used for the quaternion
+    detected: int  #: stars in the latest picture
+    frame: int  #: number of that image
+    image_uptime_s: float  #: its mid-exposure, since power-up
+    julian_date: float | None  #: the same as a Julian date in days; None until the clock is set
 
 
 @dataclass(frozen=True)
 class Star:
-    """A star of the latest image.
+    """A star of the latest image."""
 
-    Attributes:
-        number: from 0, brightest first.
-        x_px, y_px: centroid.
-        brightness: sum of its grey levels.
-        hipparcos: Hipparcos number; None if not identified.
-    """
-
-    number: int
+    number: int  #: from 0, brightest first
+    #: x_px, y_px: centroid
     x_px: float
     y_px: float
-    brightness: float
-    hipparcos: int | None
+    brightness: float  #: sum of its grey levels
+    hipparcos: int | None  #: Hipparcos number; None if not identified
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quality(AttitudeQuality):
-    """Quality of the latest attitude and of its image.
+    """Quality of the latest attitude and of its image."""
 
-    Attributes:
-        spread_dn: range of the sky's level over the field.
-        blind: part of the field too bright for stars, 0 to 1.
-        rejected: regions rejected by their shape.
-    """
-
-    spread_dn: float
-    blind: float
-    rejected: int
+    spread_dn: float  #: range of the sky's level over the field
+    blind: float  #: part of the field too bright for stars, 0 to 1
+    rejected: int  #: regions rejected by their shape
 
 
 class Aramis(DeviceClient):

@@ -43,20 +43,14 @@ def direction(alpha_deg: float, beta_deg: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A camera's measurement.
+    """A camera's measurement."""
 
-    Attributes:
-        camera: the camera.
-        alpha_deg, beta_deg: parts of the field angle along x and y; valid if ``detected``.
-        capture: result of the capture.
-        detect: result of the detection.
-    """
-
-    camera: Camera
+    camera: Camera  #: the camera
+    #: alpha_deg, beta_deg: parts of the field angle along x and y; valid if ``detected``
     alpha_deg: float
     beta_deg: float
-    capture: CaptureResult
-    detect: codes.DetectResult
+    capture: CaptureResult  #: result of the capture
+    detect: codes.DetectResult  #: result of the detection
 
     @property
     def detected(self) -> bool:
@@ -76,19 +70,12 @@ class Measurement:
 
 @dataclass(frozen=True)
 class DirectionQuality:
-    """Quality of a camera's latest measurement.
+    """Quality of a camera's latest measurement."""
 
-    Attributes:
-        sigma_deg: standard deviations of alpha and beta; 0 if unknown.
-        rms_px: root mean square distance of the edges from the Earth's circle, undistorted.
-        found: number of edges found, or of Sun pixels.
-        reason: why the detection ended as it did.
-    """
-
-    sigma_deg: tuple[float, float]
-    rms_px: float
-    found: int
-    reason: codes.Reason
+    sigma_deg: tuple[float, float]  #: standard deviations of alpha and beta; 0 if unknown
+    rms_px: float  #: root mean square distance of the edges from the Earth's circle, undistorted
+    found: int  #: number of edges found, or of Sun pixels
+    reason: codes.Reason  #: why the detection ended as it did
 
 
 @dataclass(frozen=True)

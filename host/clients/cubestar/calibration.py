@@ -19,17 +19,11 @@ GRID_STEP_PX = 8
 
 @dataclass(frozen=True)
 class Calibration:
-    """Telecommands that load a camera, and how well the firmware's model describes it.
+    """Telecommands that load a camera, and how well the firmware's model describes it."""
 
-    Attributes:
-        settings: telecommand to parameters, for ``CubeStar.configure``.
-        rms_px: root mean square distance over the frame, at the focal length.
-        max_px: largest distance.
-    """
-
-    settings: dict[str, dict[str, float]]
-    rms_px: float
-    max_px: float
+    settings: dict[str, dict[str, float]]  #: telecommand to parameters, for ``CubeStar.configure``
+    rms_px: float  #: root mean square distance over the frame, at the focal length
+    max_px: float  #: largest distance
 
 
 def calibrate(camera: Camera) -> Calibration:

@@ -27,23 +27,14 @@ from cubestack.host.errors import BadAnswerError, StepFailedError
 
 @dataclass(frozen=True)
 class Attitude:
-    """An attitude as the node reports it.
+    """An attitude as the node reports it."""
 
-    Attributes:
-        quaternion: float64 (4,), unit length.
-        valid: the latest image gave it; otherwise it is older, or none.
-        matched: stars used.
-        mode: mode that identified them.
-        frame: number of the image since power-up.
-        image_time_s: uptime at mid-exposure.
-    """
-
-    quaternion: NDArray[np.float64]
-    valid: bool
-    matched: int
-    mode: MatchMode
-    frame: int
-    image_time_s: float
+    quaternion: NDArray[np.float64]  #: float64 (4,), unit length
+    valid: bool  #: the latest image gave it; otherwise it is older, or none
+    matched: int  #: stars used
+    mode: MatchMode  #: mode that identified them
+    frame: int  #: number of the image since power-up
+    image_time_s: float  #: uptime at mid-exposure
 
     @property
     def boresight(self) -> NDArray[np.float64]:
@@ -67,41 +58,28 @@ class Quality(AttitudeQuality):
     """Quality of the latest image's attitude as the node rates it (profile ``extended``).
 
     An unknown covariance has pi^2 on its diagonal.
-
-    Attributes:
-        frame: number of the image since power-up.
-        background_range_dn: range of the sky's brightness over the image.
-        saturated: share of saturated pixels, 0 to 1.
-        elongated: areas elongated to streaks.
     """
 
-    frame: int
-    background_range_dn: float
-    saturated: float
-    elongated: int
+    frame: int  #: number of the image since power-up
+    background_range_dn: float  #: range of the sky's brightness over the image
+    saturated: float  #: share of saturated pixels, 0 to 1
+    elongated: int  #: areas elongated to streaks
 
 
 @dataclass(frozen=True)
 class Star:
-    """A detected star.
+    """A detected star."""
 
-    Attributes:
-        number: from 0, in order of detection.
-        x_px, y_px: measured centroid.
-        x_undistorted_px, y_undistorted_px: the same without distortion.
-        pixels: pixels of its area.
-        intensity: sum over the centroiding window in DN.
-        hipparcos: Hipparcos number; None if not identified.
-    """
-
-    number: int
+    number: int  #: from 0, in order of detection
+    #: x_px, y_px: measured centroid
     x_px: float
     y_px: float
+    #: x_undistorted_px, y_undistorted_px: the same without distortion
     x_undistorted_px: float
     y_undistorted_px: float
-    pixels: int
-    intensity: int
-    hipparcos: int | None
+    pixels: int  #: pixels of its area
+    intensity: int  #: sum over the centroiding window in DN
+    hipparcos: int | None  #: Hipparcos number; None if not identified
 
 
 class CubeStar(DeviceClient):

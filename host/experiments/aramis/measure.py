@@ -143,24 +143,18 @@ _KEYS = (
 
 @dataclass(frozen=True)
 class AramisResult(attitudes.AttitudeResult):
-    """Attributes are those of the JSON output.
+    """Attributes are those of the JSON output."""
 
-    Attributes:
-        outcome: how the identification ended.
-        candidates, pivots, triples: of the identification.
-        far: whether the middle of the triangle (the first three identified stars) is more than a
-            field's diameter from the boresight, which appendix E counts as wrong; None without
-            truth or triangle.
-        image_time_s: mid-exposure by the star tracker's clock, since power-up.
-        flips, corrected, lost: flipped bits in flash, and corrected and lost words on loading.
-    """
-
-    outcome: str
+    outcome: str  #: how the identification ended
+    #: candidates, pivots, triples: of the identification
     candidates: int
     pivots: int
     triples: int
+    #: whether the middle of the triangle (the first three identified stars) is more than a field's
+    #: diameter from the boresight, which appendix E counts as wrong; None without truth or triangle
     far: bool | None
-    image_time_s: float
+    image_time_s: float  #: mid-exposure by the star tracker's clock, since power-up
+    #: flips, corrected, lost: flipped bits in flash, and corrected and lost words on loading
     flips: int
     corrected: int
     lost: int

@@ -96,47 +96,33 @@ class CubeSenseOptions(MeasureOptions):
 
 @dataclass(frozen=True)
 class SensorResult(Result):
-    """Attributes are those of the JSON output; angles in degrees, None where nothing was found.
+    """Attributes are those of the JSON output; angles in degrees, None where nothing was found."""
 
-    Attributes:
-        sensor: "sun" or "nadir".
-        detected: whether the angles are valid.
-        alpha_deg, beta_deg: measured angles along the picture's rows and columns.
-        truth_alpha_deg, truth_beta_deg: true angles.
-        error_deg: angle between the measured and the true direction.
-        tolerance_deg: error up to which a direction is right: the thesis' goals, sections 7.1 and
-            7.2, by sensor and, for the Sun, by its angle to the boresight; three times what the
-            device claims if that is more.
-        right: whether the direction is right, or rightly nothing was found.
-        sigma_deg: standard deviations of alpha and beta that the device claims; None where it
-            claims none.
-        reason: why the detection ended as it did; "none" in profile ``published``.
-        edges: edges that the nadir sensor's fit used; None for the sun sensor.
-        sun_pixels: pixels of the sun sensor's mean; None for the nadir sensor.
-        pixels_read: pixels that the processor read from the FPGA.
-        capture, detect: result codes by name.
-        phase_ms: virtual times: wait, store, search, centroid, total.
-        wall_ms: wall time of the measurement.
-    """
-
-    sensor: str
-    detected: bool
+    sensor: str  #: "sun" or "nadir"
+    detected: bool  #: whether the angles are valid
+    #: alpha_deg, beta_deg: measured angles along the picture's rows and columns
     alpha_deg: float | None
     beta_deg: float | None
+    #: truth_alpha_deg, truth_beta_deg: true angles
     truth_alpha_deg: float | None
     truth_beta_deg: float | None
-    error_deg: float | None
+    error_deg: float | None  #: angle between the measured and the true direction
+    #: error up to which a direction is right: the thesis' goals, sections 7.1 and 7.2, by sensor
+    #: and, for the Sun, by its angle to the boresight; three times what the device claims if that
+    #: is more
     tolerance_deg: float
-    right: bool
+    right: bool  #: whether the direction is right, or rightly nothing was found
+    #: standard deviations of alpha and beta that the device claims; None where it claims none
     sigma_deg: tuple[float, float] | None
-    reason: str
-    edges: int | None
-    sun_pixels: int | None
-    pixels_read: int
+    reason: str  #: why the detection ended as it did; "none" in profile ``published``
+    edges: int | None  #: edges that the nadir sensor's fit used; None for the sun sensor
+    sun_pixels: int | None  #: pixels of the sun sensor's mean; None for the nadir sensor
+    pixels_read: int  #: pixels that the processor read from the FPGA
+    #: capture, detect: result codes by name
     capture: str
     detect: str
-    phase_ms: dict[str, float]
-    wall_ms: float
+    phase_ms: dict[str, float]  #: virtual times: wait, store, search, centroid, total
+    wall_ms: float  #: wall time of the measurement
 
     @property
     def solved(self) -> bool:

@@ -131,15 +131,10 @@ class CubeStarOptions(attitudes.SkyOptions):
 
 @dataclass(frozen=True)
 class CubeStarResult(attitudes.AttitudeResult):
-    """Attributes are those of the JSON output.
+    """Attributes are those of the JSON output."""
 
-    Attributes:
-        threshold: of detection, in DN.
-        searched: whether it was searched first, with some skies or the image.
-    """
-
-    threshold: int
-    searched: bool
+    threshold: int  #: of detection, in DN
+    searched: bool  #: whether it was searched first, with some skies or the image
 
 
 class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions, CubeStarResult]):

@@ -7,12 +7,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Benchmark:
-    """Measures the cost of emulating a device.
+    """Measures the cost of emulating a device."""
 
-    Attributes:
-        figures: meaning of each figure, by its name in the JSON output.
-        run: measures a device: figures by name, without those that can't be measured here.
-    """
-
-    figures: Mapping[str, str]
+    figures: Mapping[str, str]  #: meaning of each figure, by its name in the JSON output
+    #: measures a device: figures by name, without those that can't be measured here
     run: Callable[[Any], Mapping[str, float]]

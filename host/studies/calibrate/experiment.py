@@ -90,27 +90,22 @@ class _Look:
 
 @dataclass(frozen=True)
 class CalibrateResult(Result):
-    """Attributes are those of the JSON output.
+    """Attributes are those of the JSON output."""
 
-    Attributes:
-        camera: the fitted parameters, as a camera file has them, and ``sigma`` their deviations.
-        pairs_f_px: focal length by star pairs near the middle; None without any.
-        pictures: images used, of all ``tried``; each part of a large image counts.
-        stars, rejected: stars used, and outliers.
-        before_px, after_px: root mean square residual with the camera at first, and fitted.
-        lens_px: root mean square distance of the fitted camera from the emulated unit's lens over
-            the picture, at the best rotation; None for pictures of an unknown lens.
-    """
-
+    #: the fitted parameters, as a camera file has them, and ``sigma`` their deviations
     camera: dict[str, float]
     sigma: dict[str, float]
-    pairs_f_px: float | None
-    pictures: int
+    pairs_f_px: float | None  #: focal length by star pairs near the middle; None without any
+    pictures: int  #: images used, of all ``tried``; each part of a large image counts
     tried: int
+    #: stars, rejected: stars used, and outliers
     stars: int
     rejected: int
+    #: before_px, after_px: root mean square residual with the camera at first, and fitted
     before_px: float
     after_px: float
+    #: root mean square distance of the fitted camera from the emulated unit's lens over the
+    #: picture, at the best rotation; None for pictures of an unknown lens
     lens_px: float | None
 
 
@@ -125,19 +120,14 @@ class StarCalibration(
 
     It uses profile ``extended``: the published one identifies few stars with a lens that is a pixel
     off.
-
-    Attributes:
-        size: columns and rows of the sensor.
-        free: parameters that are fitted.
-        mag_limit: of the emulated sky; None for none.
     """
 
     options = CalibrateOptions
     label = ""
     decides = ("profile", "set")
-    size: tuple[int, int]
-    free: Sequence[str] = PARAMETERS
-    mag_limit: float | None = None
+    size: tuple[int, int]  #: columns and rows of the sensor
+    free: Sequence[str] = PARAMETERS  #: parameters that are fitted
+    mag_limit: float | None = None  #: of the emulated sky; None for none
 
     @abstractmethod
     def tables(self) -> Optics:

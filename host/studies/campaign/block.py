@@ -22,25 +22,17 @@ WALL = "wall_ms"
 
 @dataclass(frozen=True)
 class Row:
-    """Outcome of a frame.
+    """Outcome of a frame."""
 
-    Attributes:
-        block, row: of the campaign; of the block, from 0.
-        seed: of the first frame since the device was powered up.
-        after: results since then.
-        swept: options that differ between blocks.
-        outcome: right, refused, wrong, or failed.
-        reason: why it was refused, or how it failed.
-        result: as `cubestack measure --json` has it, without its wall time; none of a failed one.
-    """
-
+    #: block, row: of the campaign; of the block, from 0
     block: int
     row: int
-    seed: int
-    after: int
-    swept: Values
-    outcome: str
-    reason: str
+    seed: int  #: of the first frame since the device was powered up
+    after: int  #: results since then
+    swept: Values  #: options that differ between blocks
+    outcome: str  #: right, refused, wrong, or failed
+    reason: str  #: why it was refused, or how it failed
+    #: as `cubestack measure --json` has it, without its wall time; none of a failed one
     result: Values
 
     @property

@@ -33,46 +33,31 @@ Values = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class FrameBlock:
-    """Frames that one worker measures in sequence; the result depends on nothing else.
+    """Frames that one worker measures in sequence; the result depends on nothing else."""
 
-    Attributes:
-        number: counts from 0 through the campaign.
-        device: name.
-        options: of the command, with what is swept.
-        swept: those of them that differ between blocks.
-        frames: how many.
-        seed: of the first one.
-        command: what measures it.
-    """
-
-    number: int
-    device: str
-    options: Values
-    swept: Values
-    frames: int
-    seed: int
-    command: str = MEASURE
+    number: int  #: counts from 0 through the campaign
+    device: str  #: name
+    options: Values  #: of the command, with what is swept
+    swept: Values  #: those of them that differ between blocks
+    frames: int  #: how many
+    seed: int  #: of the first one
+    command: str = MEASURE  #: what measures it
 
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignPlan(Options):
-    """A campaign; attributes are keys of its file.
+    """A campaign; attributes are keys of its file."""
 
-    Attributes:
-        device: what is measured.
-        command: `measure`, or another one of the device that takes ``frames`` and ``seed``.
-        options: of the command, for all frames.
-        grid: values of options; every combination is measured.
-        random: options drawn anew for each block: uniform from ``low`` to ``high``, or one ``of``.
-    """
-
-    device: str
+    device: str  #: what is measured
     frames: int = whole(REQUIRED, "at each point of the grid", 1)
+    #: `measure`, or another one of the device that takes ``frames`` and ``seed``
     command: str = MEASURE
     seed: int = whole(0, "of everything random", 0)
     block: int = whole(FRAMES, "frames for which the device is powered up once", 1)
-    options: Values = field(default_factory=dict)
+    options: Values = field(default_factory=dict)  #: of the command, for all frames
+    #: values of options; every combination is measured
     grid: Mapping[str, list[Any]] = field(default_factory=dict)
+    #: options drawn anew for each block: uniform from ``low`` to ``high``, or one ``of``
     random: Mapping[str, Values] = field(default_factory=dict)
 
     def check(self) -> None:

@@ -56,24 +56,19 @@ def errors(folder: Folder) -> dict[str, dict[Point, list[float]]]:
 
 @dataclass(frozen=True)
 class Change:
-    """Change of an outcome at a point in another campaign of the same skies.
+    """Change of an outcome at a point in another campaign of the same skies."""
 
-    Attributes:
-        point, outcome: of the rows.
-        before, after: number of rows with it.
-        lost, gained: rows with it only in the first, and only in the other campaign.
-        chance: probability of such unequal numbers if nothing changed.
-        significant: less than `SIGNIFICANCE` by the number of lines.
-    """
-
+    #: point, outcome: of the rows
     point: Point
     outcome: str
+    #: before, after: number of rows with it
     before: int
     after: int
+    #: lost, gained: rows with it only in the first, and only in the other campaign
     lost: int
     gained: int
-    chance: float
-    significant: bool
+    chance: float  #: probability of such unequal numbers if nothing changed
+    significant: bool  #: less than `SIGNIFICANCE` by the number of lines
 
     @property
     def worse(self) -> bool:

@@ -8,37 +8,26 @@ from typing import Any
 
 @dataclass(frozen=True)
 class CostMeasurement:
-    """Of one build.
+    """Of one build."""
 
-    Attributes:
-        build, timing: compiler options and precision, and waits of the memories, in words.
-        operations: cycles of each operation by name.
-        phases: cycles of each phase of the processing.
-    """
-
+    #: build, timing: compiler options and precision, and waits of the memories, in words
     build: str
     timing: str
-    operations: Mapping[str, float]
-    phases: Mapping[str, int]
+    operations: Mapping[str, float]  #: cycles of each operation by name
+    phases: Mapping[str, int]  #: cycles of each phase of the processing
 
 
 @dataclass(frozen=True)
 class CostReport:
-    """The cost measurement of a device's program.
+    """The cost measurement of a device's program."""
 
-    Attributes:
-        levels, precisions: available builds.
-        measure: measures builds of the given levels and precisions.
-        as_data: content of ``file``.
-        page: a table for ``document``, a page of docs.
-        table: cycles that the device's model charges, by name.
-    """
-
+    #: levels, precisions: available builds
     levels: tuple[str, ...]
     precisions: tuple[str, ...]
+    #: measures builds of the given levels and precisions
     measure: Callable[[Sequence[str], Sequence[str]], Iterator[CostMeasurement]]
-    as_data: Callable[[Sequence[CostMeasurement]], dict[str, Any]]
+    as_data: Callable[[Sequence[CostMeasurement]], dict[str, Any]]  #: content of ``file``
     file: Path
-    page: Callable[[Sequence[CostMeasurement]], str]
+    page: Callable[[Sequence[CostMeasurement]], str]  #: a table for ``document``, a page of docs
     document: str
-    table: Mapping[str, float]
+    table: Mapping[str, float]  #: cycles that the device's model charges, by name

@@ -51,22 +51,15 @@ class BallOptions(Options):
 
 @dataclass(frozen=True)
 class BallResult(Result):
-    """One direction; angles in degrees. Attributes are those of the JSON output.
+    """One direction; angles in degrees. Attributes are those of the JSON output."""
 
-    Attributes:
-        direction: of the ball's motion in the image.
-        detected, pictures: number of detections, and of images.
-        offset_deg: mean size of the offsets of the angle along the direction.
-        worst_deg: the largest of them.
-        sigma_deg: largest standard deviation at one angle.
-    """
-
-    direction: str
+    direction: str  #: of the ball's motion in the image
+    #: detected, pictures: number of detections, and of images
     detected: int
     pictures: int
-    offset_deg: float | None
-    worst_deg: float | None
-    sigma_deg: float | None
+    offset_deg: float | None  #: mean size of the offsets of the angle along the direction
+    worst_deg: float | None  #: the largest of them
+    sigma_deg: float | None  #: largest standard deviation at one angle
 
 
 class _Ball(Experiment[CubeSenseOpener, BallOptions, BallResult]):

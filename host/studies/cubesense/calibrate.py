@@ -89,23 +89,18 @@ class CalibrateOptions(Options):
 
 @dataclass(frozen=True)
 class CalibrateResult(Result):
-    """Attributes are those of the JSON output.
+    """Attributes are those of the JSON output."""
 
-    Attributes:
-        sensor: "sun" or "nadir".
-        boresight_px, factors: parameters of telecommands Boresight and Distortion.
-        places: number of positions fitted.
-        before_px, after_px: root mean square residual with the tables, and fitted.
-        error_before_deg, error_after_deg: mean angle between measured and true direction at random
-            poses, with the tables, and with the result loaded; None for pictures.
-    """
-
-    sensor: str
+    sensor: str  #: "sun" or "nadir"
+    #: boresight_px, factors: parameters of telecommands Boresight and Distortion
     boresight_px: tuple[float, float]
     factors: tuple[float, ...]
-    places: int
+    places: int  #: number of positions fitted
+    #: before_px, after_px: root mean square residual with the tables, and fitted
     before_px: float
     after_px: float
+    #: error_before_deg, error_after_deg: mean angle between measured and true direction at random
+    #: poses, with the tables, and with the result loaded; None for pictures
     error_before_deg: float | None
     error_after_deg: float | None
 

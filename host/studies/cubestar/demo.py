@@ -45,21 +45,13 @@ CROP = (0, 256)  # middle rows of a 1024 x 1024 photograph
 
 @dataclass(frozen=True)
 class _Subject:
-    """A subject of the demonstration.
+    """A subject of the demonstration."""
 
-    Attributes:
-        name: stem of the PNG files.
-        title: for the reader.
-        scene: text of the TOML scene.
-        truth: quaternion (4,), known to this command only.
-        camera: camera file whose parameters are loaded by telecommand, or None.
-    """
-
-    name: str
-    title: str
-    scene: str
-    truth: NDArray[np.float64]
-    camera: Path | None = None
+    name: str  #: stem of the PNG files
+    title: str  #: for the reader
+    scene: str  #: text of the TOML scene
+    truth: NDArray[np.float64]  #: quaternion (4,), known to this command only
+    camera: Path | None = None  #: camera file whose parameters are loaded by telecommand, or None
 
     def lens(self) -> Lens:
         """The lens that took the picture: the camera file's, or the emulated camera's own."""

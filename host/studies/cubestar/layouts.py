@@ -50,14 +50,6 @@ class LayoutResult(Result):
     """Measurements of a layout; the attributes are those of the JSON output.
 
     Rate, age and energy are None without attitudes.
-
-    Attributes:
-        attitudes: counted.
-        right: number of right ones; None if the scene has no truth.
-        age_ms: mean, when an attitude becomes available.
-        oldest_ms: mean, just before the next one.
-        phase_ms: the program's own times of the last turn.
-        violations: broken rules of the memories and wires.
     """
 
     layout: str
@@ -65,15 +57,15 @@ class LayoutResult(Result):
     pins: int
     tiles: int
     fits: bool
-    attitudes: int
-    right: int | None
+    attitudes: int  #: counted
+    right: int | None  #: number of right ones; None if the scene has no truth
     rate_hz: float | None
-    age_ms: float | None
-    oldest_ms: float | None
+    age_ms: float | None  #: mean, when an attitude becomes available
+    oldest_ms: float | None  #: mean, just before the next one
     power_mw: float | None
     energy_mj: float | None
-    phase_ms: dict[str, float]
-    violations: int
+    phase_ms: dict[str, float]  #: the program's own times of the last turn
+    violations: int  #: broken rules of the memories and wires
     published: str
 
 

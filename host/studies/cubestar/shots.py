@@ -28,20 +28,13 @@ PICTURES = 10
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture.
+    """One picture."""
 
-    Attributes:
-        valid: it gave an attitude.
-        right: the attitude is right.
-        tracked: it is right, and was found by tracking.
-        cross_deg: error across; NaN unless it is right.
-        detected, matched, wrong: stars found, identified, and identified wrongly.
-    """
-
-    valid: bool
-    right: bool
-    tracked: bool
-    cross_deg: float
+    valid: bool  #: it gave an attitude
+    right: bool  #: the attitude is right
+    tracked: bool  #: it is right, and was found by tracking
+    cross_deg: float  #: error across; NaN unless it is right
+    #: detected, matched, wrong: stars found, identified, and identified wrongly
     detected: int
     matched: int
     wrong: int = 0

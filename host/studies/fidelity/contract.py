@@ -15,62 +15,39 @@ Figures = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Trial:
-    """An experiment for the figures of one or more rows.
+    """An experiment for the figures of one or more rows."""
 
-    Attributes:
-        run: figures by name, of (opened, frames); nan for a missing one. ``opened`` is an
-            ``experiments.opener.Opener`` of the device in one profile.
-        frames: of a whole run; 0 if it needs none.
-        quick: of a quick one.
-        seconds: wall time of a whole run in one profile, roughly, on one core.
-        command: arguments of `cubestack` that show it; empty if only
-            `fidelity DEVICE --rows KEY` does.
-        profiles: whether the profile matters.
-    """
-
+    #: figures by name, of (opened, frames); nan for a missing one. ``opened`` is an
+    #: ``experiments.opener.Opener`` of the device in one profile
     run: Callable[[Any, int], Figures]
-    frames: int = 0
-    quick: int = 0
-    seconds: float = 1.0
+    frames: int = 0  #: of a whole run; 0 if it needs none
+    quick: int = 0  #: of a quick one
+    seconds: float = 1.0  #: wall time of a whole run in one profile, roughly, on one core
+    #: arguments of `cubestack` that show it; empty if only `fidelity DEVICE --rows KEY` does
     command: str = ""
-    profiles: bool = True
+    profiles: bool = True  #: whether the profile matters
 
 
 @dataclass(frozen=True)
 class Row:
-    """A published figure, and ours.
+    """A published figure, and ours."""
 
-    Attributes:
-        key: unique in the device; small letters, digits and dashes.
-        figure: what it is, in words.
-        source: section, table, or figure of the device's document.
-        published: as the document has it.
-        word: origin of our value.
-        trial: name of its trial.
-        ours: format of our value, with the names of the trial's figures.
-    """
-
-    key: str
-    figure: str
-    source: str
-    published: str
-    word: Word
-    trial: str
-    ours: str
+    key: str  #: unique in the device; small letters, digits and dashes
+    figure: str  #: what it is, in words
+    source: str  #: section, table, or figure of the device's document
+    published: str  #: as the document has it
+    word: Word  #: origin of our value
+    trial: str  #: name of its trial
+    ours: str  #: format of our value, with the names of the trial's figures
 
 
 @dataclass(frozen=True)
 class Fidelity:
-    """All published figures of a device.
+    """All published figures of a device."""
 
-    Attributes:
-        page: file of the documentation that has the tables.
-        trials: by name.
-        tables: rows by the name of the table in the page, in its order.
-    """
-
-    page: str
-    trials: Mapping[str, Trial]
+    page: str  #: file of the documentation that has the tables
+    trials: Mapping[str, Trial]  #: by name
+    #: rows by the name of the table in the page, in its order
     tables: Mapping[str, tuple[Row, ...]]
 
     @property

@@ -25,45 +25,31 @@ COLUMNS = ("figure", "source", "published", "`published`", "`extended`", "word",
 
 @dataclass(frozen=True)
 class Job:
-    """A trial to run.
+    """A trial to run."""
 
-    Attributes:
-        device, trial: names.
-        profile: of it; the first one where all are the same.
-        frames: how many.
-        seconds: roughly what it takes.
-    """
-
+    #: device, trial: names
     device: str
     trial: str
-    profile: str
-    frames: int
-    seconds: float
+    profile: str  #: of it; the first one where all are the same
+    frames: int  #: how many
+    seconds: float  #: roughly what it takes
 
 
 @dataclass(frozen=True)
 class Measured(Result):
-    """A row with our values; attributes are those of the JSON output.
+    """A row with our values; attributes are those of the JSON output."""
 
-    Attributes:
-        device: its name.
-        table: of the page.
-        key, figure, source, published, word: as declared.
-        command: arguments that show it.
-        ours: our measured values as text, by profile.
-        figures: their figures, by profile and name.
-    """
-
-    device: str
-    table: str
+    device: str  #: its name
+    table: str  #: of the page
+    #: key, figure, source, published, word: as declared
     key: str
     figure: str
     source: str
     published: str
     word: str
-    command: str
-    ours: Mapping[str, str]
-    figures: Mapping[str, Figures]
+    command: str  #: arguments that show it
+    ours: Mapping[str, str]  #: our measured values as text, by profile
+    figures: Mapping[str, Figures]  #: their figures, by profile and name
 
     @property
     def cells(self) -> tuple[str, ...]:

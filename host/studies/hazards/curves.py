@@ -32,17 +32,13 @@ class Job:
 
 @dataclass(frozen=True)
 class Point(Job):
-    """Result of a job.
+    """Result of a job."""
 
-    Attributes:
-        right, refused, wrong: numbers of images.
-        reasons: the device's reasons of refusals, with their numbers.
-    """
-
+    #: right, refused, wrong: numbers of images
     right: int
     refused: int
     wrong: int
-    reasons: Mapping[str, int]
+    reasons: Mapping[str, int]  #: the device's reasons of refusals, with their numbers
 
     @property
     def pictures(self) -> int:

@@ -37,37 +37,24 @@ class Interval:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State when the FPGAs are done.
+    """State when the FPGAs are done."""
 
-    Attributes:
-        data, seen: bytes that the processor read, and times of acknowledges.
-        registers: of the FPGAs.
-        memories: of all of the board, by name.
-        violations: broken rules of the memories' timing, by kind.
-    """
-
+    #: data, seen: bytes that the processor read, and times of acknowledges
     data: NDArray[np.uint8]
     seen: list[tuple[int, str, int]]
-    registers: bytes
-    memories: dict[str, NDArray[np.uint8]]
-    violations: dict[str, int]
+    registers: bytes  #: of the FPGAs
+    memories: dict[str, NDArray[np.uint8]]  #: of all of the board, by name
+    violations: dict[str, int]  #: broken rules of the memories' timing, by kind
 
 
 @dataclass(frozen=True)
 class CleanLoop:
-    """A loop without upsets.
+    """A loop without upsets."""
 
-    Attributes:
-        intervals: of the phases, in their order.
-        over_ps: time when the FPGAs are done: idle, or the end.
-        snapshot: state at that time.
-        verdict: of the answer.
-    """
-
-    intervals: list[Interval]
-    over_ps: int
-    snapshot: Snapshot
-    verdict: UpsetVerdict
+    intervals: list[Interval]  #: of the phases, in their order
+    over_ps: int  #: time when the FPGAs are done: idle, or the end
+    snapshot: Snapshot  #: state at that time
+    verdict: UpsetVerdict  #: of the answer
 
     @property
     def start_ps(self) -> int:

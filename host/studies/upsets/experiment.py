@@ -67,19 +67,12 @@ class UpsetOptions(Options):
 
 @dataclass(frozen=True)
 class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
-    """Upsets of one device.
+    """Upsets of one device."""
 
-    Attributes:
-        rig: the subject, by the options.
-        description: for the help.
-        decides: board options that the rig sets.
-        options: including those that choose the rig.
-    """
-
-    rig: Callable[[Any], Rig]
-    description: str
-    decides: tuple[str, ...] = ()
-    options: type[UpsetOptions] = UpsetOptions
+    rig: Callable[[Any], Rig]  #: the subject, by the options
+    description: str  #: for the help
+    decides: tuple[str, ...] = ()  #: board options that the rig sets
+    options: type[UpsetOptions] = UpsetOptions  #: including those that choose the rig
 
     title = "upsets, their effects, and the firmware's answers"
     columns = ("upset", "bit", "phase", "effect", "answer", "right after", "")

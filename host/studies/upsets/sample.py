@@ -33,50 +33,32 @@ memory after the loop; "late" is right, but at another time."""
 
 @dataclass(frozen=True)
 class UpsetTarget:
-    """A bit: of a register of the FPGAs, or anywhere in a memory.
+    """A bit: of a register of the FPGAs, or anywhere in a memory."""
 
-    Attributes:
-        name: path of the register, or name of the memory.
-        bit: of the register; of a memory counted through its bytes.
-        memory: whether it is a memory.
-    """
-
-    name: str
-    bit: int
-    memory: bool = False
+    name: str  #: path of the register, or name of the memory
+    bit: int  #: of the register; of a memory counted through its bytes
+    memory: bool = False  #: whether it is a memory
 
 
 @dataclass(frozen=True)
 class UpsetResult(Result):
-    """Attributes are those of the JSON output.
+    """Attributes are those of the JSON output."""
 
-    Attributes:
-        target, bit, memory: as ``UpsetTarget`` has them.
-        phase: of the loop, in which it was hit.
-        time_s: virtual time of the upset.
-        effect: one of `EFFECTS`.
-        answer: of the loop that was hit: right, refused or wrong.
-        reason: of a refusal.
-        recovered: loops until an answer was right; 0 the one that was hit, None later than `LOOPS`.
-        phases_s: how long the FPGAs are in each phase from one loop to the next.
-        period_s: from one loop to the next.
-        bits: of the whole register or memory.
-        hits_a_day: upsets of one bit a day, by flux and cross-section.
-    """
-
+    #: target, bit, memory: as ``UpsetTarget`` has them
     target: str
     bit: int
     memory: bool
-    phase: str
-    time_s: float
-    effect: Effect
-    answer: Answer
-    reason: str
+    phase: str  #: of the loop, in which it was hit
+    time_s: float  #: virtual time of the upset
+    effect: Effect  #: one of `EFFECTS`
+    answer: Answer  #: of the loop that was hit: right, refused or wrong
+    reason: str  #: of a refusal
+    #: loops until an answer was right; 0 the one that was hit, None later than `LOOPS`
     recovered: int | None
-    phases_s: Mapping[str, float]
-    period_s: float
-    bits: int
-    hits_a_day: float
+    phases_s: Mapping[str, float]  #: how long the FPGAs are in each phase from one loop to the next
+    period_s: float  #: from one loop to the next
+    bits: int  #: of the whole register or memory
+    hits_a_day: float  #: upsets of one bit a day, by flux and cross-section
 
     @property
     def right(self) -> bool:

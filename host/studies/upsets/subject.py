@@ -30,41 +30,26 @@ class UpsetVerdict:
 
 @dataclass(frozen=True)
 class Subject:
-    """How one device is put to work.
+    """How one device is put to work."""
 
-    Attributes:
-        scene: something that it should measure rightly.
-        start: has a powered-up one begin a loop, and returns at once.
-        judge: waits for the answer of its loop, and judges it.
-        state: what the FPGAs are commanded: `IDLE`, `STORING`, or another name.
-        row_bytes: of a line of the picture.
-        period_s: from one loop to the next, in use.
-        ready: waits until a device that was just powered up takes commands.
-    """
-
-    scene: Callable[[np.random.Generator], Any]
-    start: Callable[[Any], None]
-    judge: Callable[[Any], UpsetVerdict]
+    scene: Callable[[np.random.Generator], Any]  #: something that it should measure rightly
+    start: Callable[[Any], None]  #: has a powered-up one begin a loop, and returns at once
+    judge: Callable[[Any], UpsetVerdict]  #: waits for the answer of its loop, and judges it
+    #: what the FPGAs are commanded: `IDLE`, `STORING`, or another name
     state: Callable[[RtlEngine], str]
-    row_bytes: int
-    period_s: float = 1.0
+    row_bytes: int  #: of a line of the picture
+    period_s: float = 1.0  #: from one loop to the next, in use
+    #: waits until a device that was just powered up takes commands
     ready: Callable[[Any], None] = lambda _emulated: None
 
 
 @dataclass(frozen=True)
 class Rig:
-    """Whose bits are turned over, and in what work.
+    """Whose bits are turned over, and in what work."""
 
-    Attributes:
-        subjects: how it is put to work; one of them by chance.
-        wiring: of its FPGAs, for the names of their registers; the same object for the same ones.
-        phases: of a loop, those that there always are.
-        memories: of the board, by name, that are hit unless others are asked for.
-        board: keywords that choose it.
-    """
-
-    subjects: tuple[Subject, ...]
+    subjects: tuple[Subject, ...]  #: how it is put to work; one of them by chance
+    #: of its FPGAs, for the names of their registers; the same object for the same ones
     wiring: Callable[[], Wiring]
-    phases: tuple[str, ...]
-    memories: tuple[str, ...]
-    board: Mapping[str, Any] = field(default_factory=dict)
+    phases: tuple[str, ...]  #: of a loop, those that there always are
+    memories: tuple[str, ...]  #: of the board, by name, that are hit unless others are asked for
+    board: Mapping[str, Any] = field(default_factory=dict)  #: keywords that choose it
