@@ -1,19 +1,19 @@
-"""The air above a camera on the ground: what it does to the light of each star.
+"""The atmosphere above a camera on the ground: its effect on the light of each star.
 
 - Air mass: Kasten and Young 1989 (Applied Optics 28, 4735).
-- Refraction: Saemundsson 1986 (Sky and Telescope 72, 70), less with the observer's height.
+- Refraction: Saemundsson 1986 (Sky and Telescope 72, 70), reduced with the observer's height.
 - Image motion: for one axis 0.18 lambda^2 r0^(-5/3) D^(-1/3) (Sarazin and Roddier 1990, A&A 227,
-  294), with r0 = 0.98 lambda / seeing. Over an exposure the air blows across, which counts as an
-  aperture of that length: so the variance falls with the exposure's cube root (Martin 1987, PASP
-  99, 1360). Apertures below r0 are not blurred otherwise.
+  294), with r0 = 0.98 lambda / seeing. During an exposure the wind carries the air across, which
+  counts as an aperture of that length: so the variance falls with the exposure's cube root (Martin
+  1987, PASP 99, 1360). Apertures below r0 have no other blur.
 - Scintillation: Young 1967 (AJ 72, 747): 0.09 D^(-2/3) X^1.75 exp(-h / 8000 m) (2 t)^(-1/2), D in
-  cm. That holds for apertures that average the flying shadows. Their size is about the Fresnel
+  cm. That holds for apertures that average the moving shadows. Their size is about the Fresnel
   length sqrt(lambda z); integrated over the weak-turbulence spectrum, a point receives what an
   aperture of 0.84 of it does, 6 cm for z = 10 km. A smaller aperture counts as that one.
 
-Stars are drawn each by itself: what neighbours have in common is left out. So are turbulence that
-changes with time, the colour of the stars, and the glow's rise towards the horizon. Axes are those
-of the stars; the sidereal time's equinox has moved by 0.4 deg from theirs, which is left out too.
+Each star is drawn independently of its neighbours. Not modelled: turbulence that changes with time,
+the colour of the stars, the glow's rise towards the horizon, and the precession of 0.4 deg between
+the stars' axes, which are used here, and the sidereal time's equinox.
 """
 
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import REQUIRED, DeclaredValues, flag, number
 
 SIDEREAL_DEG_S = 360 / 86164.0905
-"""Rate at which the Earth turns below the stars."""
+"""Rotation rate of the Earth relative to the stars."""
 
-WAVELENGTH_M = 500e-9  # that seeing is given for
+WAVELENGTH_M = 500e-9  # of the given seeing
 SCALE_HEIGHT_M = 8000.0
-WIND_M_S = 10.0  # assumed: of the layers that move the images
+WIND_M_S = 10.0  # of the layers that cause image motion (assumed)
 POINT_CM = 6.0  # 0.84 of the Fresnel length for turbulence 10 km up (assumed)
 ARCSEC = np.pi / 648_000
 
@@ -40,7 +40,7 @@ Vectors = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Atmosphere(DeclaredValues):
-    """An observer on the Earth, and the air above; SceneError for values out of their limits."""
+    """An observer on the Earth and the air above; SceneError for a value out of its range."""
 
     error = SceneError
 
@@ -57,13 +57,12 @@ class Atmosphere(DeclaredValues):
         2.0, "width at half maximum in a large telescope, at the zenith and 500 nm", 0, 20
     )
     scintillation: bool = flag(True, "stars twinkle")
-    extinction_mag: float = number(0.25, "loss of light by one air mass", 0, 5)
+    extinction_mag: float = number(0.25, "loss of light per air mass", 0, 5)
     sky_mag: float | None = number(
-        None, "brightness of the sky, V of a square arcsecond; dark unless given", 10, 30
+        None, "brightness of the sky, V of a square arcsecond; if omitted, dark", 10, 30
     )
 
     def zenith(self, time_s: float) -> Vectors:
-        """Unit vector (3,) to the zenith."""
         latitude = np.radians(self.latitude_deg)
         sidereal = np.radians(self.sidereal_deg + SIDEREAL_DEG_S * time_s)
         across = np.cos(latitude)
@@ -79,14 +78,14 @@ class Atmosphere(DeclaredValues):
         aperture_mm: float,
         generator: np.random.Generator,
     ) -> tuple[Vectors, NDArray[np.float64]]:
-        """Where stars seem to be during one exposure, and the share of their light that arrives.
+        """Apparent directions of stars in one exposure, and the share of their light that arrives.
 
         Args:
             vectors: unit vectors (n, 3) to the stars.
-            time_s: of the middle of the exposure.
+            time_s: virtual time of the middle of the exposure.
             exposure_s: its length.
             aperture_mm: diameter of the lens' entrance pupil.
-            generator: of this exposure; the same one gives the same air.
+            generator: of this exposure; the same state gives the same air.
 
         Returns:
             Unit vectors (n, 3), and shares (n,): 0 below the horizon, around 1 without extinction.
@@ -97,7 +96,7 @@ class Atmosphere(DeclaredValues):
         air = air_mass(height_deg)
         up, sideways, scatter = generator.standard_normal((3, len(vectors)))
         motion = np.sqrt(air) * self._motion_rad(exposure_s, aperture_mm)
-        # Tangents to the sphere: towards the zenith, and square to that; any where that is nowhere.
+        # Tangent to the sphere towards the zenith; at the zenith itself there is none.
         rise = zenith - sine[:, None] * vectors
         rise /= np.maximum(np.linalg.norm(rise, axis=1), 1e-9)[:, None]
         lifted = refraction_rad(height_deg) * np.exp(-self.height_m / SCALE_HEIGHT_M)
@@ -106,13 +105,13 @@ class Atmosphere(DeclaredValues):
         moved /= np.linalg.norm(moved, axis=1)[:, None]
         light = 10 ** (-0.4 * self.extinction_mag * air)
         if self.scintillation:
-            # A log-normal distribution with the mean 1.
+            # A log-normal distribution with mean 1.
             variance = np.log1p((self._twinkle(exposure_s, aperture_mm) * air**1.75) ** 2)
             light *= np.exp(np.sqrt(variance) * scatter - variance / 2)
         return moved, np.where(height_deg > 0, light, 0.0)
 
     def _motion_rad(self, exposure_s: float, aperture_mm: float) -> float:
-        """Standard deviation of a star's place at the zenith along one axis."""
+        """Standard deviation of a star's place at the zenith, along one axis."""
         if not self.seeing_arcsec:
             return 0.0
         r0 = 0.98 * WAVELENGTH_M / (self.seeing_arcsec * ARCSEC)
@@ -127,16 +126,16 @@ class Atmosphere(DeclaredValues):
 
 
 def air_mass(height_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Air on the way to stars at these heights, in units of that to the zenith, same shape.
+    """Air mass towards stars at these heights, relative to that at the zenith; same shape.
 
-    Below the horizon as on it, 38.
+    Below the horizon it is 38, as at the horizon.
     """
     above = np.maximum(height_deg, 0)
     return np.asarray(1 / (np.sin(np.radians(above)) + 0.50572 * (above + 6.07995) ** -1.6364))
 
 
 def refraction_rad(height_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """By how much stars at these true heights are lifted, at sea level; same shape."""
+    """How far refraction lifts stars at these true heights, at sea level; same shape."""
     above = np.maximum(height_deg, 0)
     lifted = 1.02 / np.tan(np.radians(above + 10.3 / (above + 5.11)))
     return np.asarray(np.maximum(lifted, 0) * 60 * ARCSEC)
@@ -145,7 +144,7 @@ def refraction_rad(height_deg: NDArray[np.float64]) -> NDArray[np.float64]:
 def sidereal_deg(utc: datetime, longitude_deg: float) -> float:
     """Local mean sidereal time in degrees, 0 to 360, at a longitude, east positive.
 
-    A time without zone is UTC. Source: Astronomical Almanac, Greenwich mean sidereal time, its
+    A time without time zone is UTC. Source: Astronomical Almanac, Greenwich mean sidereal time, its
     linear part.
     """
     aware = utc if utc.tzinfo else utc.replace(tzinfo=UTC)
@@ -154,5 +153,5 @@ def sidereal_deg(utc: datetime, longitude_deg: float) -> float:
 
 
 def earth_rate_deg_s(quaternion: ArrayLike) -> Vectors:
-    """Body rate (3,) of a camera that stands on the Earth; its attitude (4,) at any time."""
+    """Body rate (3,) of a camera fixed to the Earth; its attitude (4,) at any time."""
     return SIDEREAL_DEG_S * matrix_from_quaternion(quaternion)[:, 2]

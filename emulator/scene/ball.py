@@ -1,11 +1,11 @@
-"""The lit ball in a dark box that stands for the Earth on the nadir sensor's bench.
+"""The lit ball in a dark box that stands for the Earth on the nadir sensor's test bench.
 
-CubeSense thesis, sections 5.4.1 (a clear ball, lit from behind; the sensor on a rotary stage), 5.5
-(30 cm in radius, 3.52 cm away: as large as the Earth from 750 km) and 5.6 (an optic point that is
-not in the stage's axis). The camera that turns sees what it would if the ball's centre went round
-it, so a ball is an Earth without glow, whose altitude is in proportion.
+CubeSense thesis, sections 5.4.1 (a translucent ball, lit from behind; the sensor on a rotary
+stage), 5.5 (30 cm in radius, 3.52 cm away: as large as the Earth from 750 km) and 5.6 (an optic
+point off the stage's axis). The turning camera sees what it would if the ball's centre moved around
+it, so a ball is an Earth without glow, with an altitude in proportion.
 
-The light is assumed to be even, as from a Sun behind the camera: a ninth less at the limb.
+The light is assumed to be even, as from a Sun behind the camera, and a ninth less at the limb.
 """
 
 from collections.abc import Sequence
@@ -21,19 +21,19 @@ from cubestack.firmware_model.values import named, number, positive, vector, who
 
 RADIUS_MM = 300.0
 DISTANCE_MM = 35.2
-"""Of the camera from the ball's surface."""
+"""Distance of the camera from the ball's surface."""
 
 BALL = named(
     {
-        "angle_deg": vector(2, (0.0, 0.0), "alpha and beta that the stage is turned to"),
+        "angle_deg": vector(2, (0.0, 0.0), "alpha and beta of the stage"),
         "radius_mm": positive(RADIUS_MM, "of the ball"),
-        "distance_mm": positive(DISTANCE_MM, "of its surface from the axis"),
-        "offset_mm": vector(3, (0.0, 0.0, 0.0), "of the optic point from the axis"),
+        "distance_mm": positive(DISTANCE_MM, "of the ball's surface from the stage's axis"),
+        "offset_mm": vector(3, (0.0, 0.0, 0.0), "of the optic point from the stage's axis"),
         "unevenness": number(0.0, "of the ball's brightness, relative", 0, 10),
         "seed": whole(0, "of the ball's surface", 0),
     }
 )
-"""Arguments of `ball_scene` that scene files have."""
+"""Arguments of `ball_scene` in scene files."""
 
 
 def ball_scene(
@@ -43,13 +43,14 @@ def ball_scene(
     offset_mm: Sequence[float] = (0.0, 0.0, 0.0),
     **others: Any,
 ) -> EarthSunScene:
-    """What the nadir camera sees with the stage turned to ``angle_deg``, (alpha, beta).
+    """The nadir camera's surroundings with the stage turned to ``angle_deg``, (alpha, beta).
 
-    The ball's centre would be at ``angle_deg`` with the optic point in the stage's axis, and
-    ``distance_mm`` is along the way to that centre. ``others`` are attributes of ``EarthSunScene``.
+    The ball's centre appears at ``angle_deg`` if the optic point is in the stage's axis;
+    ``distance_mm`` is along the line to that centre. ``others`` are attributes of
+    ``EarthSunScene``.
 
     Raises:
-        SceneError: for a size that is not above 0, or an optic point in the ball.
+        SceneError: a size that is not above 0, or an optic point inside the ball.
     """
     for name, size in (("radius_mm", radius_mm), ("distance_mm", distance_mm)):
         try:
@@ -59,7 +60,7 @@ def ball_scene(
     centre = (radius_mm + distance_mm) * vector_from_angles(*angle_deg) - np.asarray(offset_mm)
     away = float(np.linalg.norm(centre))
     if not radius_mm < away:
-        raise SceneError(f"offset_mm must leave the camera outside of the ball, not {offset_mm}")
+        raise SceneError(f"offset_mm must leave the camera outside the ball, not {offset_mm}")
     altitude_km = (away / radius_mm - 1) * EARTH_RADIUS_KM
     settings = {"unevenness": 0.0, "glow_km": 0.0, "altitude_km": altitude_km} | others
     direction = EarthSunScene().nadir_camera.matrix.T @ centre

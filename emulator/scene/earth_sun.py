@@ -1,8 +1,8 @@
-"""What sun and nadir cameras look at: the Earth below, the Sun, the Moon, and false lights.
+"""Surroundings of sun and nadir cameras: the Earth below, the Sun, the Moon, and false lights.
 
 CubeSense thesis, sections 5.1.3.2 and 5.5. Directions are unit vectors in *scene axes*, which are
-the satellite's body axes at time 0. Each camera has a mounting: the directions of its boresight and
-of its picture's right side in body axes. Alpha and beta are as in ``emulator.scene.angles``.
+the satellite's body axes at time 0. The mounting of a camera gives the directions of its boresight
+and of its picture's right side in body axes. Alpha and beta are as in ``emulator.scene.angles``.
 """
 
 from dataclasses import dataclass, field
@@ -30,16 +30,16 @@ from cubestack.firmware_model.values import (
 )
 
 FASTEST_DEG_S = 1000.0
-"""Body rate about one axis, at most (assumed)."""
+"""Largest body rate about one axis (assumed)."""
 
 HIGHEST_KM = 1e6
-"""Altitude at most (assumed): from there the Earth is half a pixel."""
+"""Largest altitude (assumed): there the Earth is half a pixel wide."""
 
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
 
 class CameraTarget(IntEnum):
-    """What a camera is there to see, which tells a satellite's two cameras apart."""
+    """What a camera is meant to see, which distinguishes a satellite's two cameras."""
 
     SUN = 0
     NADIR = 1
@@ -54,17 +54,14 @@ def _unit(name: str, vector: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Mounting(DeclaredValues):
-    """How a camera sits on the satellite; what of ``right`` is along the boresight is left out."""
+    """A camera's axes on the satellite; only the part of ``right`` across the boresight counts."""
 
     error = SceneError
 
     boresight: ArrayLike = vector(3, REQUIRED, "direction, body axes")
-    right: ArrayLike = vector(
-        3, (1.0, 0.0, 0.0), "direction that the picture's rows follow, body axes"
-    )
+    right: ArrayLike = vector(3, (1.0, 0.0, 0.0), "direction of the picture's rows, body axes")
 
     def __post_init__(self) -> None:
-        """Refuse directions that make no axes: SceneError."""
         super().__post_init__()
         if np.linalg.norm(np.cross(_unit("boresight", self.boresight), self._right)) < 1e-6:
             raise SceneError(f"right must not be along the boresight {self.boresight!r}")
@@ -83,15 +80,17 @@ class Mounting(DeclaredValues):
 
 @dataclass(frozen=True)
 class Reflection(DeclaredValues):
-    """A false light in one camera's picture: an even disc.
+    """A false light in one camera's picture: a uniform disc.
 
-    ``level`` is at the exposure that the published levels belong to.
+    ``level`` is at the exposure of the published levels.
     """
 
     error = SceneError
 
     camera: CameraTarget = choice(
-        REQUIRED, "that sees it", {camera.name.lower(): camera for camera in CameraTarget}
+        REQUIRED,
+        "the camera that sees it",
+        {camera.name.lower(): camera for camera in CameraTarget},
     )
     alpha_deg: float = number(REQUIRED, "of its centre")
     beta_deg: float = number(REQUIRED, "of its centre")
@@ -101,11 +100,11 @@ class Reflection(DeclaredValues):
 
 @dataclass(frozen=True, eq=False)
 class SensorTruth:
-    """What a sensor should measure. For whoever compares results; never for the firmware.
+    """What a sensor should measure. For comparisons with results; the firmware never gets it.
 
     Attributes:
         vector: unit vector (3,) in camera axes, to the Sun or to the Earth's centre.
-        alpha_deg, beta_deg: the same as the sensor's angles.
+        alpha_deg, beta_deg: the same direction as the sensor's angles.
         visible: whether the Sun, or any part of the Earth, is in the camera's field.
     """
 
@@ -120,10 +119,10 @@ class EarthSunScene(DeclaredValues):
     """Surroundings of a satellite with a sun and a nadir camera; directions are in scene axes.
 
     Attributes:
-        moon: its phase follows from the Sun's direction.
-        nadir_camera, sun_camera: how they are mounted.
+        moon: the Sun's direction gives its phase.
+        nadir_camera, sun_camera: their mountings.
         reflections: false lights.
-        hazards: what else gives light; some say where Earth and Sun stand.
+        hazards: other sources of light; some also place Earth and Sun.
     """
 
     error = SceneError
@@ -133,7 +132,7 @@ class EarthSunScene(DeclaredValues):
     )
     sun: ArrayLike = vector(3, (0.0, 0.0, -1.0), "direction of the Sun", role="direction")
     moon: ArrayLike | None = vector(
-        3, None, "direction of the Moon; without it there is none", role="direction"
+        3, None, "direction of the Moon; if omitted, there is none", role="direction"
     )
     altitude_km: float = positive(750.0, "of the satellite", high=HIGHEST_KM)
     rate_deg_s: ArrayLike = vector(
@@ -152,7 +151,6 @@ class EarthSunScene(DeclaredValues):
     seed: int = whole(0, "of the Earth's surface", 0)
 
     def __post_init__(self) -> None:
-        """Refuse surroundings that can not be; directions become unit vectors."""
         super().__post_init__()
         for name in ("nadir", "sun", "moon"):
             if getattr(self, name) is not None:
@@ -174,7 +172,7 @@ class EarthSunScene(DeclaredValues):
     ) -> "EarthSunScene":
         """A scene whose sensors should measure these (alpha, beta) at time 0.
 
-        ``others`` are attributes as of the class; ``sun`` or ``nadir`` with None for its angles.
+        ``others`` are attributes of the class; for ``sun`` or ``nadir``, pass None for its angles.
         """
         mounted = cls(**others)
         if sun_deg is not None:
@@ -185,7 +183,6 @@ class EarthSunScene(DeclaredValues):
 
     @property
     def earth(self) -> Earth:
-        """The Earth below."""
         clouds = [hazard.shine for hazard in self.hazards if isinstance(hazard, Clouds)]
         shine = clouds[-1] if clouds else None
         return Earth(self.altitude_km, self.unevenness, self.glow_km, self.seed, shine)

@@ -12,17 +12,17 @@ V = TypeVar("V")
 
 
 class SceneError(ValueError):
-    """A scene that can not be: a wrong value, key, file or picture. The text is one line."""
+    """An impossible scene: a wrong value, key, file or picture. The text is one line."""
 
 
 DEVICE_KEYS = ("profile", "set")
-"""Keys of a scene file that are for the device that looks at it: which switches it runs with."""
+"""Keys of a scene file for the device: the switches that it runs with."""
 
 
 def device_keys(path: Path) -> dict[str, str]:
-    """What a scene file says of the device that looks at it, by key; SceneError for no text.
+    """The keys of a scene file for the device; SceneError if one is not text.
 
-    Nothing for a file that can not be read as TOML: what is wrong with it, its reader tells.
+    A file that can not be read as TOML gives none: the reader of the scene reports the error.
     """
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
@@ -38,11 +38,9 @@ def device_keys(path: Path) -> dict[str, str]:
 def read_scene_file(
     path: Path, kinds: Mapping[str, Callable[[dict[str, Any]], V]], right: str
 ) -> V:
-    """What the reader of its ``kind`` makes of the file's other keys; ``right`` tells the kinds.
+    """Read a scene file with the reader of its ``kind``; ``right`` names the accepted kinds.
 
-    The keys of ``DEVICE_KEYS`` are left out, as a scene knows no device.
-
-    Raises as ``read_file``.
+    The reader gets the file's other keys, without ``DEVICE_KEYS``. Raises as ``read_file``.
     """
 
     def scene(table: dict[str, Any]) -> V:
@@ -56,17 +54,18 @@ def read_scene_file(
 
 
 def read_file(path: Path, reader: Callable[[dict[str, Any]], V]) -> V:
-    """What ``reader`` makes of a TOML file.
+    """Return what ``reader`` makes of a TOML file.
 
-    Raises SceneError, with the file's name, for one that can not be read or is no TOML, and for
-    what ``reader`` refuses by a ValueError.
+    Raises:
+        SceneError: the file can not be read or is not TOML, or ``reader`` raised a ValueError. The
+            text starts with the file's name.
     """
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise SceneError(f"{path} can not be read: {error.strerror or error}") from None
     except ValueError as error:
-        raise SceneError(f"{path} is no TOML file: {error}") from None
+        raise SceneError(f"{path} is not a TOML file: {error}") from None
     try:
         return reader(table)
     except ValueError as error:
@@ -74,6 +73,6 @@ def read_file(path: Path, reader: Callable[[dict[str, Any]], V]) -> V:
 
 
 def values_for(owner: Any, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of ``values`` that the dataclass ``owner`` has a field for."""
+    """Those of ``values`` that are fields of the dataclass ``owner``."""
     names = {field.name for field in fields(owner)}
     return {key: value for key, value in values.items() if key in names}

@@ -1,5 +1,5 @@
-"""What tools can do with scenes beside reading their files: tell their keys, write one down as the
-table of a file, and say where on a map of the sky it puts cameras and bodies.
+"""Scenes for tools: the declared keys of scene files, a scene as the table of such a file, and the
+places of cameras and bodies on a map of the sky.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,18 +18,18 @@ Table = dict[str, Any]
 V = TypeVar("V")
 
 DIGITS = 9
-"""Of angles in degrees, and of directions on the map: what is beyond them, conversions make."""
+"""Digits of angles in degrees and of directions on the map; more would be rounding errors."""
 
 WRITTEN_DIGITS = 6
-"""Of unit vectors in scene files: 0.2 arcsec, and still read by people."""
+"""Digits of unit vectors in scene files: 0.2 arcsec, and still readable."""
 
 
 @dataclass(frozen=True, eq=False)
 class CameraField:
-    """What a camera sees of the sky.
+    """A camera's field of view in the sky.
 
     Attributes:
-        name: of the camera, and when, if it is not at time 0.
+        name: of the camera.
         axes: (3, 3), its x (right), y (down) and boresight as rows, in the scene's axes.
         outline: (n, 3), directions along the border of its picture, in order, in the scene's axes.
     """
@@ -45,10 +45,10 @@ class Sight:
 
     Attributes:
         title: what these axes are.
-        fields: of its cameras, which ``now`` are elsewhere where they turn.
-        now: whether each of ``fields`` is one at the time now, and not at time 0.
-        bodies: what stands where at time 0.
-        marks: points by which one finds one's way.
+        fields: of its cameras at time 0.
+        now: of its cameras at the current time, if they have turned since time 0.
+        bodies: their places at time 0.
+        marks: points for orientation on the map.
         stars: whether the axes are those of the stars.
         turn: (3, 3), from the scene's axes to those of the map, whose z is up.
     """
@@ -62,7 +62,7 @@ class Sight:
     turn: Matrix = field(default_factory=lambda: np.eye(3))
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """The JSON object of the map."""
         return {
             "title": self.title,
             "fields": [_field(one) for one in self.fields],
@@ -83,13 +83,13 @@ class Sight:
 
 @dataclass(frozen=True)
 class SceneForm(Generic[V]):
-    """Scenes of one kind of device.
+    """What tools need of the scenes of one kind of device.
 
     Attributes:
         keys: of scene files, by kind, as ``values.described`` has them.
-        view: what the cameras of a board see, and are like, as the reader of scene files gives it.
-        table: of a scene file that gives such a view again.
-        sight: such a view on the map, and where it is at a time in ps.
+        view: the scene and condition that the cameras of a board have.
+        table: the scene file's table that gives such a view again.
+        sight: the map of such a view, with its state at a time in ps.
     """
 
     keys: Mapping[str, Mapping[str, Any]]
@@ -103,12 +103,12 @@ def _field(one: CameraField) -> dict[str, Any]:
 
 
 def rounded(values: Any, digits: int = DIGITS) -> Any:
-    """Numbers, of any shape, to so many digits behind the point, as lists; never -0."""
+    """Numbers of any shape, rounded to ``digits`` after the point, as lists; never -0."""
     return (np.round(np.asarray(values, np.float64), digits) + 0.0).tolist()
 
 
 def differing(thing: Any, usual: Any, *without: str) -> Table:
-    """Fields of a dataclass that are not as in ``usual``, and can be written down; by name."""
+    """Fields of a dataclass that differ from ``usual`` and can be written in TOML, by name."""
     found = {}
     for one in fields(thing):
         if one.init and one.name not in without:
@@ -119,7 +119,7 @@ def differing(thing: Any, usual: Any, *without: str) -> Table:
 
 
 def hazard_table(hazards: tuple[Hazard, ...], seed: int) -> Table:
-    """The key ``hazards`` of a file with this ``seed``, if there are any."""
+    """The key ``hazards`` of a file with this ``seed``, if there are any hazards."""
     found: dict[str, list[Table]] = {}
     for one in hazards:
         own = differing(one, type(one)(), "seed")
@@ -130,7 +130,7 @@ def hazard_table(hazards: tuple[Hazard, ...], seed: int) -> Table:
 
 
 def bodies_of(hazards: tuple[SkyHazard, ...]) -> tuple[Body, ...]:
-    """What hazards of light say of where something stands, each once."""
+    """Bodies that hazards of light place in the sky, each once."""
     found: dict[tuple[str, tuple[float, ...]], Body] = {}
     for hazard in hazards:
         for body in hazard.bodies:

@@ -7,11 +7,11 @@ hazards = true                 # Earth, Sun and Moon disturb cameras that look a
 altitude_km = 600.0
 inclination_deg = 97.8
 node_deg = 20.0                # right ascension of the ascending node
-along_deg = 0.0                # from there, at the start
+along_deg = 0.0                # angle from the node at the start
 [attitude]
 kind = "nadir"                 # "inertial" or "waypoints"
 offset_deg = [0.0, 0.0, 0.0]
-[mountings.NAME]              # of a device; body axes
+[mountings.NAME]               # of a device's camera; body axes
 boresight = [0.0, -1.0, 0.0]
 right = [1.0, 0.0, 0.0]
 """
@@ -52,7 +52,7 @@ from cubestack.firmware_model.values import (
 
 
 def load_orbit(path: Path) -> Orbit:
-    """What the file says; SceneError names it, and the key that is wrong."""
+    """Read an orbit file; SceneError names the file and the wrong key."""
     return read_file(path, _orbit)
 
 
@@ -68,14 +68,14 @@ def _orbit(given: dict[str, Any]) -> Orbit:
 
 def _start(found: datetime) -> datetime:
     if found.tzinfo is None:
-        raise SceneError(f"must say its time zone, as {found.isoformat()}Z")
+        raise SceneError(f"must have a time zone, as in {found.isoformat()}Z")
     if not 1958 <= found.year <= 2049:
         raise SceneError(f"must be in 1958..2049, not {found.year}")
     return found
 
 
 def _lines(value: tuple[str, str]) -> Satrec:
-    """Two-line elements whose check sums are right."""
+    """Two-line elements; SceneError for a wrong form or check sum."""
     for count, line in enumerate(value, 1):
         if len(line) != 69 or line[0] != str(count):
             raise SceneError(f"line {count} must have 69 characters, the first a {count}")
@@ -85,9 +85,9 @@ def _lines(value: tuple[str, str]) -> Satrec:
     try:
         satellite = Satrec.twoline2rv(*value)
     except (ValueError, RuntimeError) as error:
-        raise SceneError(f"are no elements: {error}") from None
+        raise SceneError(f"are not valid elements: {error}") from None
     if satellite.error:
-        raise SceneError("are no elements of an orbit")
+        raise SceneError("are not the elements of an orbit")
     return satellite
 
 
@@ -120,11 +120,16 @@ _ATTITUDES: dict[str, TableDeclaration] = {
         {"offset_deg": vector(3, (0.0, 0.0, 0.0), "rotation vector", -360, 360)},
         lambda values: NadirPointing(**values),
     ),
-    "inertial": table(None, "at one place of the sky, or turning from there", _INERTIAL, _inertial),
+    "inertial": table(
+        None,
+        "at a fixed place of the sky, or turning from there at a constant rate",
+        _INERTIAL,
+        _inertial,
+    ),
     "waypoints": table(
         None,
-        "quaternions at times",
-        {"points": table(REQUIRED, "in the order of time", _POINT, array=True)},
+        "quaternions at given times",
+        {"points": table(REQUIRED, "in order of time", _POINT, array=True)},
         lambda values: Waypoints(tuple((p["at_s"], p["quaternion"]) for p in values["points"])),
     ),
 }
@@ -135,8 +140,8 @@ def _attitude(given: dict[str, Any]) -> Attitude:
     kind = values.pop("kind", None)
     if kind not in _ATTITUDES:
         raise SceneError(f"kind must be one of {', '.join(_ATTITUDES)}")
-    made: Attitude = _ATTITUDES[kind].read(values)
-    return made
+    attitude: Attitude = _ATTITUDES[kind].read(values)
+    return attitude
 
 
 def _mountings(given: dict[str, Any]) -> dict[str, Mounting]:
@@ -157,7 +162,7 @@ _KEYS = named(
                 "altitude_km": number(REQUIRED, "above the Earth", 160, 40_000),
                 "inclination_deg": number(REQUIRED, "of the orbit", 0, 180),
                 "node_deg": number(REQUIRED, "right ascension of the ascending node", -360, 360),
-                "along_deg": number(0.0, "from there, at the start", -360, 360),
+                "along_deg": number(0.0, "angle from the node at the start", -360, 360),
             },
         ),
         "hazards": flag(True, "Earth, Sun and Moon disturb cameras that look at the sky"),

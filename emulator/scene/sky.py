@@ -1,4 +1,4 @@
-"""What a camera looks at: the night sky from a moving spacecraft, or a picture."""
+"""Scenes of cameras that look at the sky: the night sky from a moving spacecraft, or a picture."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,23 +18,23 @@ from cubestack.firmware_model.values import DeclaredValues, flag, number, vector
 __all__ = ["FASTEST_DEG_S", "PictureScene", "Pose", "Scene", "SceneError", "SkyScene"]
 
 FASTEST_DEG_S = 100.0
-"""Body rate about one axis, at most (assumed): a star smears over the picture's whole height.
+"""Largest body rate about one axis (assumed): a star smears over the picture's whole height.
 
-The time to render a frame grows with the rate; it is ten seconds there.
+The time to render a frame grows with the rate, to ten seconds at this one.
 """
 
 EPOCHS = (1800.0, 2200.0)
-"""Julian years in which proper motions, which are taken as straight, still are."""
+"""Julian years within which proper motions are straight, as assumed."""
 
 MAGNITUDES = (-30.0, 30.0)
-"""From brighter than the Sun to fainter than any telescope sees."""
+"""From brighter than the Sun to fainter than any telescope can detect."""
 
 MOST_FALSE_STARS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
 class Pose(DeclaredValues):
-    """An attitude and a constant body rate from some time on.
+    """An attitude and a constant body rate, valid from a time on.
 
     ``quaternion`` (4,), scalar last, inertial to camera, is the attitude at ``at_s``.
     """
@@ -45,15 +45,13 @@ class Pose(DeclaredValues):
     rate_deg_s: ArrayLike = vector(
         3, (0.0, 0.0, 0.0), "body rate about the camera axes", -FASTEST_DEG_S, FASTEST_DEG_S
     )
-    at_s: float = number(0.0, "virtual time from which the pose holds", formerly="start_s")
+    at_s: float = number(0.0, "virtual time from which the pose is valid", formerly="start_s")
 
     def __post_init__(self) -> None:
-        """Refuse what is no attitude or no rate: SceneError."""
         super().__post_init__()
         check_quaternion(self.quaternion)
 
     def at(self, time_s: float) -> NDArray[np.float64]:
-        """Quaternion (4,) at ``time_s``."""
         return propagate(self.quaternion, self.rate_deg_s, time_s - self.at_s)
 
 
@@ -64,9 +62,9 @@ class SkyScene(DeclaredValues):
     Attributes:
         quaternion: attitude (4,) at time 0, scalar last, inertial (ICRS at ``epoch``) to camera.
         rate_deg_s: body rate (3,) in camera axes.
-        poses: later poses, each holding from its start on; in the order of their starts.
-        atmosphere: the air that the stars, and only they, are seen through; None in space.
-        hazards: what else gives light, or stands in the stars' way.
+        poses: later poses, each valid from its time on; in order of time.
+        atmosphere: between camera and stars, but no other lights; None in space.
+        hazards: what else gives light, or covers stars.
     """
 
     error = SceneError
@@ -75,46 +73,47 @@ class SkyScene(DeclaredValues):
     rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
     poses: tuple[Pose, ...] = ()
     epoch: float = number(
-        DEFAULT_EPOCH, "Julian year to which proper motion carries the stars", *EPOCHS
+        DEFAULT_EPOCH, "Julian year to which proper motion moves the stars", *EPOCHS
     )
-    mag_limit: float | None = number(None, "only stars with V below it are seen", *MAGNITUDES)
+    mag_limit: float | None = number(None, "only stars with a lower V are visible", *MAGNITUDES)
     false_stars: int = whole(
-        0, "lights at random places that no catalogue has", 0, MOST_FALSE_STARS
+        0, "lights at random places that are in no catalogue", 0, MOST_FALSE_STARS
     )
     false_star_mag: tuple[float, float] = vector(
         2, (2.0, 3.8), "range of their V, brightest first", *MAGNITUDES
     )
     atmosphere: Atmosphere | None = None
     hazards: tuple[SkyHazard, ...] = ()
-    still: bool = flag(False, "stars stand still during each exposure, as at its middle")
-    seed: int = whole(0, "of false stars and air", 0)
+    still: bool = flag(
+        False, "stars do not move during an exposure: each stays where it is in the middle of it"
+    )
+    seed: int = whole(0, "of false stars and atmosphere", 0)
 
     def __post_init__(self) -> None:
-        """Refuse a sky that can not be: SceneError."""
         super().__post_init__()
         starts = [pose.at_s for pose in self.all_poses]
         if sorted(starts) != starts:
-            raise SceneError(f"poses must start one after the other from 0 s on, not at {starts}")
+            raise SceneError(f"poses must be in order of time from 0 s on, not at {starts}")
         refuse_strangers(self.hazards)
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:
             raise SceneError(
-                f"false_star_mag must not fall, not from {brightest:g} to {faintest:g}"
+                f"false_star_mag must have the brightest first, not {brightest:g}, {faintest:g}"
             )
 
     @classmethod
     def pointing(cls, ra_deg: float, dec_deg: float, roll_deg: float = 0.0) -> "SkyScene":
-        """The sky along a boresight, the picture's up direction ``roll_deg`` east of north."""
+        """The sky along a boresight; the picture's up is ``roll_deg`` east of north."""
         return cls(quaternion_from_pointing(ra_deg, dec_deg, roll_deg))
 
     @cached_property
     def all_poses(self) -> tuple[Pose, ...]:
-        """That at time 0, and the later ones."""
+        """The pose at time 0, followed by the later ones."""
         return (Pose(self.quaternion, self.rate_deg_s), *self.poses)
 
     @cached_property
     def speed_deg_s(self) -> float:
-        """Largest body rate of all poses during an exposure, deg/s."""
+        """Largest body rate that smears stars during an exposure."""
         return (
             0.0
             if self.still
@@ -122,7 +121,6 @@ class SkyScene(DeclaredValues):
         )
 
     def pose_at(self, time_ps: int) -> Pose:
-        """The pose that holds at a time."""
         begun = [pose for pose in self.poses if pose.at_s * PS_PER_S <= time_ps]
         return begun[-1] if begun else self.all_poses[0]
 
@@ -131,16 +129,16 @@ class SkyScene(DeclaredValues):
         return self.pose_at(time_ps).at(time_ps / PS_PER_S)
 
     def false_lights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Places (n, 2) of the lights that no catalogue has, and their magnitudes (n,).
+        """Places (n, 2) of the lights that are in no catalogue, and their magnitudes (n,).
 
-        A place is column and row as a fraction of the way from the first to the last one.
+        A place is column and row, each relative: 0 for the first pixel, 1 for the last.
         """
         generator = np.random.default_rng([self.seed, 0xFA15E])
         places = generator.random((self.false_stars, 2))
         return places, generator.uniform(*self.false_star_mag, self.false_stars)
 
     def turned(self, rotation_deg: ArrayLike) -> "SkyScene":
-        """The same sky, all poses turned by a rotation vector (3,) in camera axes, in degrees."""
+        """The same sky, all poses rotated by a rotation vector (3,), camera axes, degrees."""
         first, *later = (
             replace(pose, quaternion=propagate(pose.quaternion, rotation_deg, 1.0))
             for pose in self.all_poses

@@ -2,8 +2,8 @@
 
 CubeStar thesis, section 3.4.4 (equation 3.4.2), section 4.1.4 (Brown's model, equations 4.1.3 to
 4.1.5) and section 4.1.5 (equation 4.1.6). Equation 3.4.2 multiplies aperture, transmission,
-bandwidth and the flux of the star; transmission, bandwidth and quantum efficiency are one factor
-here, an effective width.
+bandwidth and the flux of the star; an effective width replaces transmission, bandwidth and quantum
+efficiency here.
 """
 
 from dataclasses import dataclass, replace
@@ -29,13 +29,13 @@ PHOTONS_V0 = 1000.0
 """Flux of a star of V = 0 in photons / (s cm^2 Angstrom) (published, eq. 3.4.2)."""
 
 WIDEST_PSF_PX = 20.0
-"""Standard deviation of a spot in px, at most (assumed): few stars would still show."""
+"""Largest standard deviation of a spot in px (assumed): few stars would still be visible."""
 
 Pixels = NDArray[np.float64]
 
 
 class Distortion(Enum):
-    """Which way the distortion coefficients map."""
+    """The direction in which the distortion coefficients map."""
 
     INVERSE = "inverse"
     TOOLBOX = "toolbox"
@@ -45,10 +45,10 @@ class Distortion(Enum):
 class Optics(DeclaredValues):
     """A lens in front of the sensor. Pixel coordinates have (0, 0) at the first pixel's centre.
 
-    Coefficients are those of eqs. 4.1.3 and 4.1.4, which INVERSE makes exact; TOOLBOX has the
-    calibration toolbox's model with the same coefficients in inverted sign. ``psf_sigma_px`` has
-    defocus included; a vignetting of 4 is the natural one. ``residuals`` are what neither
-    coefficients nor focal length say of where the picture is.
+    Coefficients are those of eqs. 4.1.3 and 4.1.4, for which INVERSE is exact; TOOLBOX is the model
+    of the calibration toolbox, which has the same coefficients with inverted sign. ``psf_sigma_px``
+    includes defocus; natural vignetting is 4. ``residuals`` are displacements of the picture that
+    neither coefficients nor focal length describe.
     """
 
     error = SceneError
@@ -56,24 +56,24 @@ class Optics(DeclaredValues):
     focal_length_mm: float = positive(REQUIRED, "scale of directions")
     pixel_pitch_um: float = positive(REQUIRED, "of the sensor")
     fx: float = positive(
-        REQUIRED, "scale of the distortion's normalised coordinates across", unit="px"
+        REQUIRED, "scale of the distortion's normalised coordinates along a row", unit="px"
     )
-    fy: float = positive(REQUIRED, "the same along a column", unit="px")
+    fy: float = positive(REQUIRED, "likewise along a column", unit="px")
     cx: float = number(REQUIRED, "principal point, column", unit="px")
     cy: float = number(REQUIRED, "principal point, row", unit="px")
     k1: float = number(0.0, "radial coefficient, distorted to undistorted")
-    k2: float = number(0.0, "the next one")
+    k2: float = number(0.0, "next radial coefficient")
     p1: float = number(0.0, "tangential coefficient")
-    p2: float = number(0.0, "the other one")
+    p2: float = number(0.0, "other tangential coefficient")
     distortion: Distortion = choice(
-        Distortion.INVERSE, "which way the coefficients map", {one.value: one for one in Distortion}
+        Distortion.INVERSE,
+        "direction in which the coefficients map",
+        {one.value: one for one in Distortion},
     )
     psf_sigma_px: float = positive(
         REQUIRED, "standard deviation of a star's spot", high=WIDEST_PSF_PX
     )
-    vignetting: float = number(
-        0.0, "power of the cosine of the field angle by which the light falls off"
-    )
+    vignetting: float = number(0.0, "power of the cosine of the field angle: fall-off of the light")
     columns: int = whole(REQUIRED, "pixels of a row", 1)
     rows: int = whole(REQUIRED, "pixels of a column", 1)
     aperture_mm: float = positive(REQUIRED, "diameter of the entrance pupil")
@@ -81,12 +81,11 @@ class Optics(DeclaredValues):
         REQUIRED, "bandwidth in Angstrom times transmission times quantum efficiency"
     )
     field_stop_deg: float = positive(
-        360.0, "diameter of the round field that a shade lets through; 360: none"
+        360.0, "diameter of the round field behind a shade; 360: no shade"
     )
     residuals: tuple[Residual, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a lens that can not make pictures: ValueError."""
         super().__post_init__()
         y, x = np.mgrid[-0.5 : self.rows - 0.5 : 5j, -0.5 : self.columns - 0.5 : 9j]
         sensor = np.stack([x.ravel(), y.ravel()], axis=1)
@@ -95,18 +94,18 @@ class Optics(DeclaredValues):
         if not np.allclose(there_and_back, sensor, rtol=0, atol=1e-9):
             raise ValueError(
                 f"distortion k1={self.k1} k2={self.k2} p1={self.p1} p2={self.p2} folds the picture "
-                "within the sensor; smaller coefficients would be right"
+                "within the sensor; choose smaller coefficients"
             )
 
     @property
     def basics(self) -> Lens:
-        """What hazards may change of it."""
+        """The part of it that hazards can change."""
         f_number = self.focal_length_mm / self.aperture_mm
         shape = self.rows, self.columns
         return Lens(f_number, self.pixel_pitch_um, shape, self.psf_sigma_px, 1.0, self.residuals)
 
     def changed(self, lens: Lens) -> "Optics":
-        """These optics with what ``lens`` has otherwise; the very same where that is nothing."""
+        """These optics with the values of ``lens``; the same object if none differs."""
         if lens == self.basics:
             return self
         return replace(
@@ -121,20 +120,20 @@ class Optics(DeclaredValues):
     def project(self, vectors: NDArray[np.float64]) -> Pixels:
         """Pixel coordinates (n, 2) of directions (n, 3) in camera axes, exact to 1e-9 px.
 
-        Directions that this lens can not image come out as NaN: those behind it, and those more
-        than a tenth further out than the sensor's corners, where the polynomial folds back.
+        Directions that this lens can not image become NaN: those behind it, and those more than a
+        tenth beyond the sensor's corners, where the polynomial folds back.
         """
         v = np.asarray(vectors, np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
             plane = v[:, :2] / v[:, 2:]
-        seen = (v[:, 2] > 0) & (np.hypot(plane[:, 0], plane[:, 1]) < self._edge_of_field)
+        imaged = (v[:, 2] > 0) & (np.hypot(plane[:, 0], plane[:, 1]) < self._edge_of_field)
         pixels = np.full((len(v), 2), np.nan)
-        undistorted = plane[seen] * self._focal_px / self._scale
+        undistorted = plane[imaged] * self._focal_px / self._scale
         if self.distortion is Distortion.TOOLBOX:
             distorted = self._polynomial(undistorted, -1)
         else:
             distorted = self._inverse_polynomial(undistorted, +1)
-        pixels[seen] = displaced(distorted * self._scale + (self.cx, self.cy), self.residuals)
+        pixels[imaged] = displaced(distorted * self._scale + (self.cx, self.cy), self.residuals)
         return pixels
 
     def unproject(self, pixels: Pixels) -> NDArray[np.float64]:
@@ -159,19 +158,19 @@ class Optics(DeclaredValues):
         return light
 
     def electrons_per_second(self, v_mag: ArrayLike) -> NDArray[np.float64]:
-        """Electrons a second that stars of magnitude ``v_mag`` give on the axis, same shape."""
+        """Electrons per second on the axis from stars of magnitude ``v_mag``; same shape."""
         area_cm2 = np.pi * (self.aperture_mm / 20) ** 2
         flux = PHOTONS_V0 * 10 ** (-0.4 * np.asarray(v_mag, np.float64))
         return np.asarray(area_cm2 * self.effective_width_a * flux, np.float64)
 
     @property
     def pixel_arcsec2(self) -> float:
-        """Solid angle of a pixel on the axis, square arcseconds."""
+        """Solid angle of a pixel on the axis in square arcseconds."""
         return float(np.degrees(1 / self._focal_px) * 3600) ** 2
 
     @cached_property
     def even_light(self) -> NDArray[np.float32]:
-        """What each pixel (rows, columns) gets of an evenly bright sky, 1 on the axis."""
+        """Relative light of each pixel (rows, columns) under a uniform sky, 1 on the axis."""
         y, x = np.mgrid[: self.rows, : self.columns]
         directions = self.unproject(np.stack([x.ravel(), y.ravel()], axis=1))
         return self.transmission(directions).reshape(self.rows, self.columns).astype(np.float32)
@@ -183,7 +182,7 @@ class Optics(DeclaredValues):
 
     @property
     def _corners(self) -> Pixels:
-        """The sensor's outer corners, px."""
+        """The sensor's outer corners (4, 2), px."""
         x, y = self.columns - 0.5, self.rows - 0.5
         return np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]])
 
@@ -211,9 +210,9 @@ class Optics(DeclaredValues):
         down = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
         return np.stack([across, down], axis=1)
 
-    @np.errstate(all="ignore")  # a search without a result may go anywhere
+    @np.errstate(all="ignore")  # a search that does not converge may leave the range of numbers
     def _inverse_polynomial(self, targets: Pixels, sign: int) -> Pixels:
-        """Points that ``_polynomial`` maps to ``targets``, by Newton's method; NaN without any."""
+        """Points that ``_polynomial`` maps to ``targets``, by Newton's method; NaN if none."""
         points = targets.copy()
         p1, p2 = sign * self.p1, sign * self.p2
         for _ in range(20):

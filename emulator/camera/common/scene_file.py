@@ -5,9 +5,9 @@
     dec_deg = -5.4
     roll_deg = 30.0                # angle of the picture's up direction, east of north
     rate_deg_s = [0.0, 0.1, 0.0]   # body rate in camera axes: x right, y down, z out of the lens
-    mag_limit = 3.8                # leave out to see all stars
+    mag_limit = 3.8                # if omitted, all stars are visible
     mount = "earth"                # the camera turns with the Earth
-    [atmosphere]                   # what the stars are seen through
+    [atmosphere]                   # between camera and stars
     latitude_deg = -33.9
     sidereal_deg = 200.0           # right ascension of the zenith at time 0
     [hazards.moon]                 # see docs/scene-keys.md
@@ -17,11 +17,11 @@
     file = "night.jpg"             # relative to the scene file
     crop = [0, 256]                # column and row of the first pixel used
 
-Each key goes to the scene or to the camera's condition, whichever has it; ``seed`` to both.
+Each key belongs to the scene or to the camera's condition; ``seed`` to both.
 
-A picture is light as it is: the camera gives its grey values unchanged, whatever exposure is set.
-Only an undefined frame differs, in proportion to its exposure. With ``exposure_ms``, the exposure
-that the picture was taken with, it scales with any exposure.
+The camera gives the grey values of a picture unchanged, whatever exposure is set; only an undefined
+frame differs, in proportion to its exposure. With ``exposure_ms``, the exposure of the picture, its
+light scales with every exposure.
 """
 
 from collections.abc import Mapping
@@ -61,10 +61,10 @@ from cubestack.firmware_model.values import (
 def load_scene(
     path: Path, condition: SkyCondition, uncertain: Mapping[str, float] = MappingProxyType({})
 ) -> SkyView:
-    """What the TOML file ``path`` gives; SceneError names the key that is wrong.
+    """Read a scene file; SceneError names the wrong key.
 
-    ``condition`` stands for what the file leaves open of lens and sensor, ``uncertain`` has the
-    standard deviations of its optics by name.
+    ``condition`` has the values of lens and sensor that the file omits, ``uncertain`` the standard
+    deviations of its optics by name.
     """
     kinds = {
         "sky": lambda table: _sky(table, condition, uncertain),
@@ -74,7 +74,7 @@ def load_scene(
 
 
 def hazard_tables(kinds: Mapping[str, type[Hazard]], seed: int = 0) -> HazardTables:
-    """The key ``hazards``, of ``kinds`` beside those of any sensor and lens."""
+    """The key ``hazards``, of ``kinds`` and those of any sensor and lens."""
     return HazardTables(kinds={**kinds, **SENSOR_HAZARDS}, seed=seed)
 
 
@@ -82,7 +82,7 @@ def _with_defaults(keys: Keys, owner: Any) -> Keys:
     return {name: replace(one, default=getattr(owner, name)) for name, one in keys.items()}
 
 
-#: Keys of the table "optics"; the sensor's size is the device's.
+#: Keys of the table "optics"; the device gives the sensor's size.
 _OPTICS: Keys = {
     name: one for name, one in Optics.declared().items() if name not in ("columns", "rows")
 }
@@ -148,11 +148,13 @@ def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int
                     False, "earth: the camera turns with the Earth", {"sky": False, "earth": True}
                 ),
                 "poses": table((), "later poses, in order of time", _LATER, array=True),
-                "atmosphere": table(None, "the air that stars are seen through", _AIR, _atmosphere),
+                "atmosphere": table(
+                    None, "the atmosphere between camera and stars", _AIR, _atmosphere
+                ),
                 **SkyScene.declared(),
                 **_with_defaults(SkyCondition.declared(), condition),
-                "seed": whole(0, "of noise, air, false stars and hot pixels", 0),
-                "optics": table(None, "how the lens differs", optics, lens),
+                "seed": whole(0, "of noise, atmosphere, false stars and hot pixels", 0),
+                "optics": table(None, "values of the lens that differ", optics, lens),
                 "hazards": hazard_tables(SKY_HAZARDS, seed),
             }
         ),
@@ -170,7 +172,7 @@ def _picture_keys(condition: SkyCondition) -> Keys:
 
 
 def sky_keys(condition: SkyCondition, uncertain: Mapping[str, float]) -> dict[str, Any]:
-    """What the keys of each kind are, as JSON has it; arguments as of `load_scene`."""
+    """Declared keys of each kind as JSON; arguments as of `load_scene`."""
     sky = _sky_keys(condition, uncertain)
     return {"sky": described(sky), "picture": described(_picture_keys(condition))}
 
@@ -183,7 +185,7 @@ def _sky(
     poses: list[Pose] = []
     for pose in values.pop("poses", ()):
         if not _ATTITUDE.keys() & pose.keys():
-            # It goes on from where the one before has turned to.
+            # It continues from the attitude that the previous pose has reached.
             pose["quaternion"] = (poses or [first])[-1].at(pose.get("at_s", 0.0))
         poses.append(_pose(pose))
     if values.pop("mount", False):
@@ -210,9 +212,9 @@ def split_hazards(
 
 
 def drawn_optics(optics: Optics, uncertain: Mapping[str, float], seed: int) -> Optics:
-    """A lens as it may be, where ``optics`` is what its calibration found."""
+    """A random lens whose calibration found ``optics``; SceneError if nothing is uncertain."""
     if not uncertain:
-        raise SceneError("drawn must be left out for this lens")
+        raise SceneError("this lens has no uncertainties to draw from; omit drawn")
     generator = np.random.default_rng([seed, 0x1E25])
     off = {name: sigma * generator.standard_normal() for name, sigma in uncertain.items()}
     return replace(optics, **{name: getattr(optics, name) + by for name, by in off.items()})

@@ -30,13 +30,13 @@ from cubestack.firmware_model.values import plain
 TITLE = "right ascension and declination, degrees"
 
 BORDER = 24
-"""Points along each side of a picture."""
+"""Number of points along each side of a picture."""
 
 
 def sky_form(
     condition: SkyCondition, uncertain: Mapping[str, float] = MappingProxyType({})
 ) -> SceneForm[SkyView]:
-    """Of a device whose files leave open what ``condition`` says; arguments as of `load_scene`."""
+    """Form of a device with this default condition; arguments as of `load_scene`."""
     return SceneForm(sky_keys(condition, uncertain), _view, partial(_table, condition), _sight)
 
 

@@ -17,9 +17,9 @@ C = TypeVar("C")
 
 @dataclass(frozen=True, eq=False)
 class View(Generic[S, C]):
-    """A scene, and the condition of the camera that looks at it: what a scene file gives.
+    """A scene and the condition of the camera that looks at it: the contents of a scene file.
 
-    It can be assigned wherever a scene can; the camera then takes over both.
+    It can be assigned wherever a scene can; the camera then takes both.
     """
 
     scene: S
@@ -27,16 +27,16 @@ class View(Generic[S, C]):
 
 
 TEMPERATURES_C = (-60.0, 125.0)
-"""That sensors work at."""
+"""Range in which sensors work."""
 
 
 @dataclass(frozen=True)
 class SkyCondition(DeclaredValues):
-    """What a camera that looks at the sky is like.
+    """Properties of a camera that looks at the sky.
 
     Attributes:
         optics: the lens.
-        hazards: what else is wrong with lens and sensor.
+        hazards: faults of lens and sensor.
     """
 
     error = SceneError
@@ -45,13 +45,12 @@ class SkyCondition(DeclaredValues):
     noise: bool = flag(True, "false: no shot, dark and read noise, no defects")
     seed: int = whole(0, "of noise and hot pixels", 0)
     temperature_c: float = number(
-        20.0, "of the sensor; 8 degrees double the dark current", *TEMPERATURES_C
+        20.0, "of the sensor; the dark current doubles every 8 degrees", *TEMPERATURES_C
     )
-    hot_pixels: int = whole(20, "pixels that radiation has made hot", 0)
+    hot_pixels: int = whole(20, "pixels made hot by radiation", 0)
     hazards: tuple[SensorHazard, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
         super().__post_init__()
         pixels = self.optics.columns * self.optics.rows
         if self.hot_count > pixels:
@@ -60,12 +59,12 @@ class SkyCondition(DeclaredValues):
 
     @property
     def hot_count(self) -> int:
-        """All hot pixels, those of the hazards included."""
+        """Number of hot pixels, including those of the hazards."""
         return self.hot_pixels + effects.hot(self.hazards)
 
     @cached_property
     def lens(self) -> Optics:
-        """The optics as the hazards make them; the firmware is told of no change."""
+        """The optics with the changes by hazards, of which the firmware does not know."""
         return self.optics.changed(
             effects.lens(self.optics.basics, self.hazards, self.temperature_c)
         )

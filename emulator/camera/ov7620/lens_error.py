@@ -1,4 +1,4 @@
-"""How a camera's own lens differs from the polynomial that the firmware undoes.
+"""Difference between a camera's own lens and the polynomial that the firmware assumes.
 
 CubeSense thesis, sections 5.2.1 (one polynomial, fitted to the nadir camera every 5 deg, serves
 both cameras), 7.1 (figure 7.1: mean offsets of 0.12, 0.16, 0.13 and 0.15 deg in four directions)
@@ -6,15 +6,15 @@ and 7.2 (the Sun's offsets: below 0.3 deg to 40 deg, up to 1 deg to 60, up to 1.
 to none at 90; nearly all of one sign). Table 5.1 gives both boresights in whole pixels, and 226 px
 as the radius of both rims, so errors end at the rim.
 
-What is read from these, what is chosen, and what is drawn for each unit:
+Which values are published, which are chosen, and which are random for each unit:
 
-- The optical axis is anywhere in the pixel of table 5.1: drawn, evenly.
-- The nadir lens differs at four field angles by `NADIR_SIGMA_DEG`: fitted, so that units have in
-  the mean the error of figure 7.1 together with what the printed firmware makes. Drawn, normally.
-- The Sun lens has the published offsets at the ends of their ranges: read; the greatest at 75 deg:
-  chosen. They are the largest of four directions, so a unit has `SUN_SHARE` of them: chosen, drawn
-  evenly.
-- Decentring by `DECENTRING_SIGMA_DEG`: chosen, as four directions differ by 0.04 deg; drawn.
+- The optical axis is anywhere in the pixel of table 5.1: random, uniform.
+- The nadir lens differs at four field angles by `NADIR_SIGMA_DEG`: fitted, so that units have on
+  average the error of figure 7.1 together with that of the printed firmware. Random, normal.
+- The Sun lens has the published offsets at the ends of their ranges; that the greatest is at 75 deg
+  is chosen. They are the largest of four directions, so a unit has `SUN_SHARE` of them: chosen,
+  random, uniform.
+- Decentring by `DECENTRING_SIGMA_DEG`: chosen, as four directions differ by 0.04 deg; random.
 """
 
 from dataclasses import dataclass
@@ -32,14 +32,14 @@ FIELD_DEG = 95.0
 
 NADIR_NODES_DEG = (20.0, 40.0, 60.0, 80.0)  # chosen
 NADIR_SIGMA_DEG = 0.12  # fitted to figure 7.1
-# Published; their places within the ranges are chosen, as are the share and the decentring.
+# Published; their angles within the ranges are chosen, as are the share and the decentring.
 SUN_OFFSETS_DEG = ((40.0, 0.3), (60.0, 1.0), (75.0, 1.85), (90.0, 0.0))
 SUN_SHARE = (0.6, 1.0)
 DECENTRING_SIGMA_DEG = 0.04
 
 MOST_PX = 20.0
 STEEPEST = 0.5
-"""Steepest change of the error by field angle that is taken: the picture must not fold."""
+"""Greatest accepted slope of the error over the field angle: the picture must not fold."""
 
 _INVERSION_STEPS = 50
 _INVERSION_DEG = 1e-9
@@ -49,30 +49,29 @@ Angles = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LensError(DeclaredValues):
-    """What the polynomial does not say of one lens; by default nothing.
+    """The part of one lens that the polynomial does not describe; none by default.
 
-    A direction is imaged where the polynomial images another one: its angles alpha and beta, plus
-    this error.
+    This lens images a direction where the polynomial images another one, whose angles alpha and
+    beta are those of the first plus this error.
 
     The boresight is that of table 5.1. Field angles rise within 0 and 95 deg; a smooth curve goes
-    through their errors, 0 on the axis and at the rim, and exceeds none. Decentring is in deg at
-    the rim, but falls off towards it. ``residuals`` displace the picture beside all this.
+    through their errors, 0 on the axis and at the rim, without exceeding them. Decentring is in deg
+    at the rim, but falls off towards it. ``residuals`` are further displacements of the picture.
     """
 
     error = SceneError
 
     centre_px: tuple[float, float] = vector(
-        2, (0.0, 0.0), "optical axis less the boresight", -MOST_PX, MOST_PX
+        2, (0.0, 0.0), "optical axis minus boresight", -MOST_PX, MOST_PX
     )
     radial_deg: tuple[tuple[float, float], ...] = many(
-        (), "pairs of field angle, and error outwards there", vector(2, REQUIRED, "")
+        (), "pairs of field angle and outward error there", vector(2, REQUIRED, "")
     )
     decentring_deg: tuple[float, float] = vector(2, (0.0, 0.0), "Brown's p1 and p2")
     scale: float = number(1.0, "of the picture about the optical axis", 0.85, 1.15)
     residuals: tuple[Residual, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a lens that can not be: SceneError."""
         super().__post_init__()
         nodes = [0.0, *(angle for angle, _ in self.radial_deg), FIELD_DEG]
         if not np.all(np.diff(nodes) > 0):
@@ -106,17 +105,17 @@ class LensError(DeclaredValues):
 
     def restored(self, displaced: ArrayLike) -> Angles:
         """Inverse of `displaced`, to 1e-9 deg within the field."""
-        seen = np.asarray(displaced, np.float64)
-        true = seen
+        apparent = np.asarray(displaced, np.float64)
+        true = apparent
         for _ in range(_INVERSION_STEPS):
-            missed = seen - self.displaced(true)
+            missed = apparent - self.displaced(true)
             true = true + missed
             if not np.abs(missed).max() > _INVERSION_DEG:
                 break
         return true
 
     def _radial(self, theta: Angles) -> Angles:
-        """Error outwards at field angles: Hermite's cubics, extremes at nodes only (Fritsch)."""
+        """Outward error at field angles: Hermite's cubics, extremes at nodes only (Fritsch)."""
         pairs = [(0.0, 0.0), *self.radial_deg, (FIELD_DEG, 0.0)]
         nodes, values = np.array(pairs).T
         rise = np.diff(values) / np.diff(nodes)
@@ -131,12 +130,12 @@ class LensError(DeclaredValues):
         return np.asarray((1 - s) ** 2 * begins + s**2 * ends)
 
 
-#: A lens that is exactly as the firmware takes it to be.
+#: A lens that is exactly as the firmware assumes.
 NOMINAL = LensError()
 
 
 def drawn_lens(camera: CameraTarget, serial: int) -> LensError:
-    """The lens of ``camera`` of the unit with that serial number."""
+    """The lens of ``camera`` in the unit with that serial number."""
     rng = np.random.default_rng([serial, camera])
     centre_x, centre_y = rng.uniform(-0.5, 0.5, 2)
     p1, p2 = rng.normal(0, DECENTRING_SIGMA_DEG, 2)

@@ -1,19 +1,19 @@
-"""Scene files for sun and nadir cameras: TOML, every key but ``kind`` may be left out::
+"""Scene files for sun and nadir cameras: TOML, every key except ``kind`` is optional::
 
     kind = "earth-sun"
     altitude_km = 750.0
     nadir = [0.0, 0.0, 1.0]        # towards the Earth's centre; or, as the nadir camera sees it at
                                    # time 0, nadir_deg = [alpha, beta]
     sun = [0.0, 0.0, -1.0]         # or, as the sun camera sees it, sun_deg = [alpha, beta]
-    moon = [1.0, 0.0, 0.0]         # leave out for none
+    moon = [1.0, 0.0, 0.0]         # if omitted, there is none
     rate_deg_s = [0.0, 0.1, 0.0]   # body rate in body axes
     bloom_px = 7.0                 # radius of the Sun's image
     [nadir_camera]
     boresight = [0.0, 0.0, 1.0]    # in body axes
     right = [1.0, 0.0, 0.0]
-    [nadir_lens]                   # how it differs from the firmware's polynomial
-    centre_px = [0.3, -0.2]        # optical axis beside the boresight
-    radial_deg = [[40.0, 0.1], [70.0, 0.4]]  # field angles, and errors outwards there
+    [nadir_lens]                   # its differences from the firmware's polynomial
+    centre_px = [0.3, -0.2]        # optical axis minus boresight
+    radial_deg = [[40.0, 0.1], [70.0, 0.4]]  # field angles and outward errors there
     decentring_deg = [0.0, 0.05]   # Brown's p1 and p2
     [[reflections]]
     camera = "sun"
@@ -23,9 +23,9 @@
     [hazards.clouds]               # see docs/scene-keys.md
     contrast = 0.8
 
-Directions are in scene axes, the satellite's body axes at time 0. Each key goes to the scene or to
-the cameras' condition, whichever has it; ``seed`` to both.
-The ball of the nadir sensor's bench is another kind, "ball", with the arguments of ``ball_scene``.
+Directions are in scene axes, the satellite's body axes at time 0. Each key belongs to the scene or
+to the cameras' condition; ``seed`` to both. The ball of the nadir sensor's test bench is another
+kind, "ball", with the arguments of ``ball_scene``.
 """
 
 from pathlib import Path
@@ -52,7 +52,7 @@ from cubestack.firmware_model.values import (
 
 
 def load_earth_sun_scene(path: Path) -> EarthSunView:
-    """What the TOML file ``path`` gives; SceneError names the key that is wrong."""
+    """Read a scene file; SceneError names the wrong key."""
     kinds = {"earth-sun": _view, "ball": _ball}
     return read_scene_file(path, kinds, '"earth-sun" or "ball" for a sun and nadir sensor')
 
@@ -90,7 +90,7 @@ def _reflection(values: dict[str, Any]) -> Reflection:
 
 def _own_lens(camera: str) -> Any:
     keys = {name: one for name, one in LensError.declared().items() if name != "scale"}
-    meaning = f"how the {camera} camera's differs from the firmware's polynomial"
+    meaning = f"differences of the {camera} camera's lens from the firmware's polynomial"
     return table(None, meaning, keys, lambda values: LensError(**values))
 
 
@@ -101,8 +101,8 @@ def _scene_keys(seed: int = 0) -> Keys:
             **EarthSunScene.declared(),
             "nadir_deg": vector(2, None, "its angles in the nadir camera", instead=("nadir",)),
             "sun_deg": vector(2, None, "its angles in the Sun camera", instead=("sun",)),
-            "nadir_camera": table(None, "how it is mounted; else +z", Mounting),
-            "sun_camera": table(None, "how it is mounted; else -z", Mounting),
+            "nadir_camera": table(None, "its mounting; if omitted, +z", Mounting),
+            "sun_camera": table(None, "its mounting; if omitted, -z", Mounting),
             "nadir_lens": _own_lens("nadir"),
             "sun_lens": _own_lens("sun"),
             "reflections": table((), "false lights", _REFLECTION, _reflection, array=True),
@@ -122,5 +122,5 @@ _BALL: Keys = {
 
 
 def earth_sun_keys() -> dict[str, Any]:
-    """What the keys of each kind are, as JSON has it."""
+    """Declared keys of each kind as JSON."""
     return {"earth-sun": described(_SCENE), "ball": described(_BALL)}

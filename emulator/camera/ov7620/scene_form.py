@@ -30,7 +30,7 @@ from cubestack.firmware_model.values import plain
 TITLE = "the satellite's body axes at time 0; y is down"
 
 TURN = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""The map has +z, where the nadir camera usually looks, in its middle, and -y on top."""
+"""Puts +z, where the nadir camera usually looks, in the middle of the map, and -y on top."""
 
 _AROUND = np.radians(np.arange(0, 360, 5))
 RIM = vector_from_angles(FIELD_DEG * np.cos(_AROUND), FIELD_DEG * np.sin(_AROUND))
@@ -44,7 +44,7 @@ MARKS = {
 
 
 def earth_sun_form() -> SceneForm[EarthSunView]:
-    """Of a device with a sun and a nadir camera."""
+    """Form of a device with a sun and a nadir camera."""
     return SceneForm(earth_sun_keys(), _view, _table, _sight)
 
 

@@ -1,4 +1,4 @@
-"""What a sun or nadir camera is like, and what it sees."""
+"""Properties of sun and nadir cameras, and what they see."""
 
 from dataclasses import dataclass
 
@@ -13,22 +13,22 @@ from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, ROWS
 from cubestack.firmware_model.values import DeclaredValues, flag, number, positive, whole
 
 MOST_STUCK = ROWS * COLUMNS // 4
-"""Single pixels and pairs that find a place each."""
+"""Largest number of single pixels and pairs, so that each finds a place."""
 
 IN_FOCUS = Lens(F_NUMBER, PITCH_UM, (ROWS, COLUMNS), SPOT_PX)
-"""What hazards may change of the lens."""
+"""The part of the lens that hazards can change."""
 
 
 @dataclass(frozen=True)
 class FisheyeCondition(DeclaredValues):
-    """What a camera behind a fisheye is like.
+    """Properties of a camera with a fisheye lens.
 
     The Sun's image ends where its level crosses from background to object at the published
     exposure; the CubeSense thesis has 8 px and 6 px, between which the default is chosen.
 
     Attributes:
-        nadir_lens, sun_lens: what is particular to a camera's lens; None: the unit's own.
-        hazards: what else is wrong with lenses and sensors, drawn for each camera.
+        nadir_lens, sun_lens: errors of a camera's lens; None: those of the unit.
+        hazards: faults of lenses and sensors, drawn for each camera.
     """
 
     error = SceneError
@@ -46,7 +46,6 @@ class FisheyeCondition(DeclaredValues):
     hazards: tuple[SensorHazard, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
         super().__post_init__()
         effects.lens(IN_FOCUS, self.hazards, self.temperature_c)
         if self.hot_count + self.hot_pairs > MOST_STUCK:
@@ -57,7 +56,7 @@ class FisheyeCondition(DeclaredValues):
 
     @property
     def hot_count(self) -> int:
-        """All single stuck pixels, those of the hazards included."""
+        """Number of single stuck pixels, including those of the hazards."""
         return self.hot_pixels + effects.hot(self.hazards)
 
 

@@ -1,7 +1,7 @@
-"""Hazards of light: what makes real skies hard for star and Earth sensors; one module a kind.
+"""Hazards of light: what makes real skies hard for star and Earth sensors; one module per kind.
 
-``SKY_HAZARDS`` is the one list of those that any camera may meet, by name; ``EARTH_HAZARDS`` that
-of those which need an Earth below the satellite.
+``SKY_HAZARDS`` has those that any camera can meet, by name; ``EARTH_HAZARDS`` those that need an
+Earth below the satellite.
 """
 
 from cubestack.emulator.scene.hazards.aberration import Aberration

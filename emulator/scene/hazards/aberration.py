@@ -1,7 +1,7 @@
-"""Aberration of light: stars seem to stand nearer to where a moving observer goes.
+"""Aberration of light: stars appear displaced towards the observer's direction of motion.
 
 Exact by special relativity (Explanatory Supplement to the Astronomical Almanac, section 7.2.3). The
-Earth's motion around the Sun makes 20.5 arcsec of it, that of a satellite around the Earth 5.
+Earth's motion around the Sun causes 20.5 arcsec of it, a satellite's motion around the Earth 5.
 """
 
 from dataclasses import dataclass
@@ -21,17 +21,18 @@ FASTEST_KM_S = 3000.0
 
 @dataclass(frozen=True, kw_only=True)
 class Aberration(SkyHazard):
-    """The observer's velocity."""
+    """Aberration by the observer's velocity."""
 
     velocity_km_s: tuple[float, float, float] | None = vector(
-        3, None, "of the observer; else that of the Earth at the date and that of the orbit"
+        3, None, "of the observer; otherwise the sum of the Earth's at the date and of the orbit's"
     )
     julian_date: float = number(
         ephemeris.NEW_YEAR_2026, "Julian date at time 0", ephemeris.FIRST_DATE, ephemeris.LAST_DATE
     )
     orbit_km_s: float = number(7.6, "speed around the Earth", 0, 12)
     orbit_towards: tuple[float, ...] = heading(
-        (0.0, 0.0, 1.0), "where that goes: three numbers, or right ascension and declination in deg"
+        (0.0, 0.0, 1.0),
+        "direction of that: three numbers, or right ascension and declination in deg",
     )
 
     name: ClassVar[str] = "aberration"
@@ -39,9 +40,7 @@ class Aberration(SkyHazard):
     strength: ClassVar[Strength] = Strength("speed", "km/s", (0.0, 7.6, 15.0, 22.0, 30.0, 38.0))
 
     def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
         super().__post_init__()
-        direction("orbit_towards", self.orbit_towards)
         speed = float(np.linalg.norm(self.velocity_km_s or 0.0))
         if not speed <= FASTEST_KM_S:
             raise SceneError(
@@ -51,21 +50,19 @@ class Aberration(SkyHazard):
 
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """This speed to any side."""
         del looking
         towards = generator.standard_normal(3)
         x, y, z = (strength * towards / np.linalg.norm(towards)).tolist()
         return cls(velocity_km_s=(x, y, z))
 
     def velocity(self, time_s: float) -> Vectors:
-        """Velocity (3,) of the observer, km/s."""
+        """Velocity (3,) of the observer in km/s."""
         if self.velocity_km_s is not None:
             return np.array(self.velocity_km_s)
         orbit = self.orbit_km_s * direction("orbit_towards", self.orbit_towards)
         return ephemeris.earth_velocity_km_s(self.julian_date + time_s / ephemeris.DAY_S) + orbit
 
     def seen(self, looking: Looking, vectors: Vectors) -> Vectors:
-        """Unit vectors (n, 3) to where the light seems to come from."""
         beta = self.velocity(looking.time_s) / LIGHT_KM_S
         root = np.sqrt(1 - beta @ beta)
         along = vectors @ beta

@@ -1,11 +1,11 @@
-"""What a hazard of light is: something in front of a camera that no catalogue of stars has.
+"""The base of all hazards of light: something in front of a camera that is in no star catalogue.
 
-A hazard gives points of light, a glow, or both; it may also hide what is beyond it, and move where
-starlight comes from. It knows no sensor. Directions are unit vectors in the scene's axes: ICRS for
-the night sky, the satellite's body axes at time 0 for Earth and Sun.
+A hazard gives points of light, a glow, or both. It may also hide what is behind it, and shift the
+apparent direction of starlight. It knows no sensor. Directions are unit vectors in the scene's
+axes: ICRS for the night sky, the satellite's body axes at time 0 for Earth and Sun.
 
-Brightness is counted in stars of V = 0: for a light, 10^(-0.4 V) of them; for a glow, stars a
-steradian.
+Brightness is in units of a star of V = 0: a light has 10^(-0.4 V) of it; a glow is in such stars
+per steradian.
 """
 
 import math
@@ -25,17 +25,17 @@ SUN_V = -26.74
 """Apparent magnitude of the Sun from the Earth (Allen's Astrophysical Quantities, section 14.2)."""
 
 SUN_RADIUS_DEG = 0.2666
-"""Of its disc, at 1 au (likewise)."""
+"""Angular radius of its disc at 1 au (likewise)."""
 
 EARTH_RADIANCE = 0.3 / math.pi * 10 ** (-0.4 * SUN_V)
-"""Radiance 1 of ``emulator.scene.earth`` in V = 0 stars a steradian: its albedo is 0.3."""
+"""Radiance 1 of ``emulator.scene.earth``, in V = 0 stars per steradian; for an albedo of 0.3."""
 
 Vectors = NDArray[np.float64]
 Brightness = NDArray[np.float32]
 
 
 class Depth(IntEnum):
-    """In which order hazards stand one behind the other, the farthest first."""
+    """Order of hazards along the line of sight, the farthest first."""
 
     SKY = 0
     PLANETS = 1
@@ -55,7 +55,7 @@ class Lights:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Something in the sky, for a map: its name, unit vector (3,) to its centre, its radius."""
+    """Something in the sky, for a map: its name, unit vector (3,) to its centre, angular radius."""
 
     name: str
     direction: Vectors
@@ -64,11 +64,9 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Ring:
-    """Where a glow is not smooth: between two angles around a direction.
+    """Region where a glow is not smooth: between two angles around a direction.
 
-    Attributes:
-        centre: unit vector (3,).
-        inner_rad, outer_rad: angles from there.
+    ``centre`` is a unit vector (3,); the angles count from there.
     """
 
     centre: Vectors
@@ -78,14 +76,14 @@ class Ring:
 
 @dataclass(frozen=True, eq=False)
 class Looking:
-    """What a hazard may know of who looks, at one instant of an exposure.
+    """The camera at one instant of an exposure, as far as hazards need it.
 
     Attributes:
-        axes: (3, 3), the camera's x, y and boresight as its rows, in the scene's axes.
-        width_deg, height_deg: of the picture, as angles from edge to edge through its middle.
+        axes: (3, 3), the camera's x, y and boresight as rows, in the scene's axes.
+        width_deg, height_deg: of the picture, as angles from edge to edge through its centre.
         half_field_deg: angle from the boresight beyond which no light reaches the picture.
-        pixel_rad: angle that a pixel covers on the boresight.
-        time_s: the instant.
+        pixel_rad: angle of a pixel on the boresight.
+        time_s: virtual time of the instant.
         exposure_s: of each pixel.
     """
 
@@ -99,11 +97,10 @@ class Looking:
 
     @property
     def boresight(self) -> Vectors:
-        """Unit vector (3,)."""
         return np.asarray(self.axes[2])
 
     def anywhere(self, generator: np.random.Generator) -> Vectors:
-        """A random direction (3,) in the picture, uniform in its angles."""
+        """A random direction (3,) within the picture, uniform in its angles."""
         while True:
             across, down = generator.uniform(-0.5, 0.5, 2) * (self.width_deg, self.height_deg)
             if math.hypot(across, down) <= self.half_field_deg:
@@ -118,49 +115,54 @@ class Looking:
 
 @dataclass(frozen=True, kw_only=True)
 class SkyHazard(Hazard):
-    """Light that no catalogue has, or that stands in the stars' way; by itself nothing at all.
+    """Base of hazards of light; by itself it has no effect.
 
-    Attributes:
-        depth: it hides glow and lights of those behind it.
+    It hides glow and lights of the hazards that are farther away by ``depth``.
     """
 
     depth: ClassVar[Depth] = Depth.SKY
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, declaration in self.declared().items():
+            value = getattr(self, name)
+            if declaration.role == "direction" and value is not None:
+                direction(name, value)
+
     @property
     def speed_deg_s(self) -> float:
-        """How fast its lights move against the stars."""
+        """Angular rate of its lights against the stars."""
         return 0.0
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """What it says of where something stands at time 0."""
+        """Bodies whose place at time 0 it gives."""
         return ()
 
     def lights(self, looking: Looking) -> Lights | None:
-        """Its points of light at an instant."""
         del looking
         return None
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness | None:
-        """Its surface brightness (n,) along ``vectors`` (n, 3), V = 0 stars a steradian.
+        """Its surface brightness (n,) along ``vectors`` (n, 3), V = 0 stars per steradian.
 
-        The mean over a round pixel of ``looking.pixel_rad``, where that matters.
+        Where it changes within a pixel: the mean over a round pixel of ``looking.pixel_rad``.
         """
         del looking, vectors
         return None
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        """Where its glow changes from pixel to pixel; elsewhere, a line over 16 px follows it."""
+        """Where its glow changes from pixel to pixel; elsewhere it is linear over 16 px."""
         del looking
         return ()
 
     def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_] | None:
-        """Which of ``vectors`` (n, 3) to things behind it are hidden, (n,); None for none."""
+        """Which directions ``vectors`` (n, 3) it covers, (n,); None for none."""
         del looking, vectors
         return None
 
     def seen(self, looking: Looking, vectors: Vectors) -> Vectors:
-        """Where light of points at ``vectors`` (n, 3) seems to come from."""
+        """Apparent directions (n, 3) of points at ``vectors`` (n, 3)."""
         del looking
         return vectors
 
@@ -168,7 +170,8 @@ class SkyHazard(Hazard):
 def direction(name: str, values: ArrayLike) -> Vectors:
     """Unit vector (3,) of three numbers, or of right ascension and declination in degrees.
 
-    SceneError names ``name`` when it is neither.
+    Raises:
+        SceneError: ``values`` are neither; the text starts with ``name``.
     """
     v = np.asarray(values, np.float64)
     if v.shape == (2,) and np.all(np.isfinite(v)):
@@ -188,7 +191,7 @@ def direction(name: str, values: ArrayLike) -> Vectors:
 
 
 def angles_rad(vectors: Vectors, centre: Vectors) -> NDArray[np.float64]:
-    """Angles (n,) between unit vectors (n, 3) and one (3,), exact for small ones too."""
+    """Angles (n,) between unit vectors (n, 3) and one (3,), exact for small angles too."""
     chord = np.linalg.norm(vectors - centre, axis=-1)
     return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)))
 
@@ -202,7 +205,7 @@ def aside(centre: Vectors, angle_deg: float, generator: np.random.Generator) -> 
 
 
 def refuse_strangers(hazards: Sequence[object]) -> None:
-    """Raise SceneError for what is no hazard of light."""
+    """Raise SceneError if one of ``hazards`` is not a hazard of light."""
     for hazard in hazards:
         if not isinstance(hazard, SkyHazard):
             raise SceneError(f"hazards must be hazards of light, not {hazard!r}")

@@ -1,7 +1,7 @@
-"""Something in orbit that crosses the field during an exposure: a streak as of a star that moves.
+"""An object in orbit that crosses the field during an exposure: its image is a streak.
 
-It goes along a great circle at a constant rate, as bright all the way. Debris below 1000 km passes
-at 0.1 to 2 deg/s, and shines with V 0 to 6 (assumed; a passing satellite is at V 4 to 6).
+It moves along a great circle at a constant rate and with constant brightness. Debris below 1000 km
+passes at 0.1 to 2 deg/s and has V 0 to 6 (assumed; a passing satellite has V 4 to 6).
 """
 
 import math
@@ -31,14 +31,14 @@ class Debris(SkyHazard):
     """One object that moves against the stars."""
 
     direction: tuple[float, ...] = heading(
-        (0.0, 0.0, 1.0), "where it is at `at_s`: three numbers, or ra and dec in deg"
+        (0.0, 0.0, 1.0), "its place at `at_s`: three numbers, or ra and dec in deg"
     )
     towards: tuple[float, ...] = heading(
-        (1.0, 0.0, 0.0), "a direction on its way, less than half a turn on, likewise"
+        (1.0, 0.0, 0.0), "a later place on its path, less than half a turn ahead, likewise"
     )
-    rate_deg_s: float = number(0.5, "how fast it moves", 0, 20)
+    rate_deg_s: float = number(0.5, "angular rate", 0, 20)
     v_mag: float = number(2.0, "its magnitude", -10, 10)
-    at_s: float = number(0.0, "when it is there", -1e6, 1e6, formerly="time_s")
+    at_s: float = number(0.0, "time when it is at `direction`", -1e6, 1e6, formerly="time_s")
 
     name: ClassVar[str] = "debris"
     meaning: ClassVar[str] = "an object that crosses the field"
@@ -48,15 +48,14 @@ class Debris(SkyHazard):
     depth: ClassVar[Depth] = Depth.ORBIT
 
     def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
         super().__post_init__()
         here, there = direction("direction", self.direction), direction("towards", self.towards)
         if np.linalg.norm(np.cross(here, there)) < 1e-9:
-            raise SceneError(f"towards of the hazard {self.name} must be another way, not along it")
+            raise SceneError(f"towards of the hazard {self.name} must not be along direction")
 
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """One of this magnitude, anywhere in the picture in the exposure's middle."""
+        """One of this magnitude, anywhere in the picture in the middle of the exposure."""
         here = looking.anywhere(generator)
         rate = math.exp(generator.uniform(math.log(SLOWEST_DEG_S), math.log(FASTEST_DEG_S)))
         return cls(
@@ -69,16 +68,13 @@ class Debris(SkyHazard):
 
     @property
     def speed_deg_s(self) -> float:
-        """Its rate."""
         return self.rate_deg_s
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The object, where it is said to be at its time."""
         return (Body("debris", direction("direction", self.direction)),)
 
     def lights(self, looking: Looking) -> Lights:
-        """Where it is at the instant."""
         here, there = direction("direction", self.direction), direction("towards", self.towards)
         ahead = there - (there @ here) * here
         ahead /= np.linalg.norm(ahead)

@@ -1,9 +1,9 @@
-"""Hazards of an Earth that is part of the scene: its clouds, its night, its place beside the Sun.
+"""Hazards of an Earth that is part of the scene: clouds, night side, a place near the Sun.
 
-They matter to scenes with an Earth below the satellite only. Albedos: thick clouds 0.6, the sea
+They only matter to scenes with an Earth below the satellite. Albedos: thick clouds 0.6, the sea
 under clear air 0.12, the whole Earth 0.3 (Allen's Astrophysical Quantities, 4th edition, section
-11.5; the sea's with the air above it). How clouds are spread is assumed: a seeded sum of waves on
-the surface, cut at a level.
+11.5; that of the sea includes the air above it). The distribution of clouds is assumed: a seeded
+sum of waves on the surface, with a threshold.
 """
 
 from dataclasses import dataclass
@@ -20,24 +20,24 @@ from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
 
 CLOUD, CLEAR = 0.6 / 0.3, 0.12 / 0.3
-"""Brightness by that of the mean Earth."""
+"""Brightness relative to that of the mean Earth."""
 
 WAVES, LONGEST_KM, SHORTEST_KM = 32, 4000.0, 80.0
 EDGE = 0.15
-"""Width of a cloud's edge, in standard deviations of the waves' sum."""
+"""Width of a cloud's edge, in standard deviations of the sum of waves."""
 
 
 class EarthHazard(SkyHazard):
-    """One that says how Earth and Sun stand; by itself it leaves them.
+    """A hazard that places Earth and Sun; this base leaves them where they are.
 
     Attributes:
-        cameras: that it makes it harder for.
+        cameras: names of those that it makes it harder for.
     """
 
     cameras: ClassVar[tuple[str, ...]] = ("nadir",)
 
     def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
-        """Directions (3,) of the Earth's centre and of the Sun; the Earth has this radius."""
+        """Directions (3,) of the Earth, whose angular radius is ``radius_rad``, and Sun."""
         del radius_rad
         return nadir, sun
 
@@ -46,7 +46,7 @@ class EarthHazard(SkyHazard):
 class Clouds(EarthHazard):
     """Clouds over a sea."""
 
-    contrast: float = number(1.0, "1: white clouds on a dark sea; 0: even", 0, 1)
+    contrast: float = number(1.0, "1: white clouds on a dark sea; 0: uniform", 0, 1)
     cover: float = number(0.5, "share of the surface under clouds", 0.01, 0.99)
 
     name: ClassVar[str] = "clouds"
@@ -55,7 +55,10 @@ class Clouds(EarthHazard):
     depth: ClassVar[Depth] = Depth.EARTH
 
     def shine(self, places: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Brightness (n,) of the surface at unit vectors (n, 3) of its own axes, by the mean's."""
+        """Brightness (n,) of the surface relative to its mean.
+
+        ``places`` are unit vectors (n, 3) in the Earth's own axes.
+        """
         vectors, phases = self._waves
         total = np.zeros(len(places), np.float32)
         for vector, phase in zip(vectors, phases, strict=True):
@@ -80,9 +83,11 @@ class Clouds(EarthHazard):
 
 @dataclass(frozen=True, kw_only=True)
 class Terminator(EarthHazard):
-    """Where the Sun stands, by how much of the Earth below is lit."""
+    """The Sun's place, given by how much of the Earth below is lit."""
 
-    phase_deg: float = number(90.0, "angle at the Earth from satellite to Sun; 0: full", 0, 180)
+    phase_deg: float = number(
+        90.0, "angle at the Earth between satellite and Sun; 0: fully lit", 0, 180
+    )
     towards_deg: float = number(0.0, "direction of the Sun around the nadir", -360, 360)
 
     name: ClassVar[str] = "terminator"
@@ -94,21 +99,19 @@ class Terminator(EarthHazard):
 
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """This phase, the Sun to any side."""
         del looking
         return cls(phase_deg=strength, towards_deg=float(generator.uniform(0, 360)))
 
     def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
-        """The Sun moves."""
         del sun, radius_rad
         return nadir, _turned(-nadir, np.radians(self.phase_deg), np.radians(self.towards_deg))
 
 
 @dataclass(frozen=True, kw_only=True)
 class EarthInSunCamera(EarthHazard):
-    """The Earth in the Sun camera's field, close to the Sun, or in front of it."""
+    """The Earth in the Sun camera's field: near the Sun or in front of it."""
 
-    above_deg: float = number(5.0, "of the Sun above the limb; below 0 it has set", -90, 120)
+    above_deg: float = number(5.0, "of the Sun above the limb; negative: it has set", -90, 120)
     towards_deg: float = number(0.0, "direction of the Earth around the Sun", -360, 360)
 
     cameras: ClassVar[tuple[str, ...]] = ("sun",)
@@ -121,19 +124,17 @@ class EarthInSunCamera(EarthHazard):
 
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """The limb at this angle from the Sun, to any side."""
         del looking
         return cls(above_deg=strength, towards_deg=float(generator.uniform(0, 360)))
 
     def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
-        """The Earth moves."""
         del nadir
         away = radius_rad + np.radians(self.above_deg)
         return _turned(sun, min(float(away), np.pi), np.radians(self.towards_deg)), sun
 
 
 def _turned(centre: Vectors, away_rad: float, around_rad: float) -> Vectors:
-    """The unit vector (3,) at an angle from ``centre``, to a side."""
+    """The unit vector (3,) at ``away_rad`` from ``centre``, to the side ``around_rad``."""
     one = np.cross(centre, np.eye(3)[np.argmin(np.abs(centre))])
     one /= np.linalg.norm(one)
     side = np.cos(around_rad) * one + np.sin(around_rad) * np.cross(centre, one)

@@ -1,14 +1,14 @@
 """The Earth in front of the stars: its lit or dark disc, the air along the limb, the airglow above.
 
-Disc and scattered light are those of ``emulator.scene.earth``, with the scale height of the air in
-which it is thin enough to be seen through (7 km, US Standard Atmosphere, 30 to 80 km). Airglow is a
+Disc and scattered light are those of ``emulator.scene.earth``, with the scale height of the air
+where it is thin enough to see through (7 km, US Standard Atmosphere, 30 to 80 km). Airglow is a
 layer 95 km up, the height of the green line of oxygen, with a Gaussian profile of 4 km (half-width
 10 km) that gives 145 S10 to an observer on the ground, straight up (Benn and Ellison 1998, New
-Astronomy Reviews 42, 503: Sun's minimum). Along the limb the line of sight is in it for some 500
-km, and in front of the night side it is seen as well. Left out: city lights, lightning, moonlit
-ground, aurora, the bending and reddening of starlight in the air; and light that the lens scatters,
-unless ``scatter`` says so: without a baffle a hundredth of the lit Earth's light drowns all stars
-of the picture.
+Astronomy Reviews 42, 503: Sun's minimum). A line of sight along the limb passes through some 500 km
+of it; it also shows in front of the night side. Not modelled: city lights, lightning, moonlit
+ground, aurora, refraction and reddening of starlight in the air. Light that the lens scatters is
+off unless ``scatter`` sets it: without a baffle, one hundredth of the lit Earth's light hides all
+stars of the picture.
 """
 
 import math
@@ -42,18 +42,20 @@ from cubestack.firmware_model.values import number
 AIRGLOW_KM, AIRGLOW_SIGMA_KM, AIRGLOW_S10 = 95.0, 4.0, 145.0
 TOP_KM = AIRGLOW_KM + 5 * AIRGLOW_SIGMA_KM
 GLOW_HEIGHTS = 20.0
-"""After which the lit air is as dark as the sky: star trackers see a millionth of the ground."""
+"""Scale heights above which the lit air is as dark as the sky: star trackers can detect a
+millionth of the ground's brightness."""
 
 DUSK = 0.02
-"""Sine of the Sun's depth below the horizon in which the ground's light falls to 1/e.
+"""Sine of the Sun's depth below the horizon at which the ground's light falls to 1/e.
 
-With the Earth's own twilight it is a 25 000th of the day's where the Sun is 6 deg down: 3.4 lux
-(Seidelmann, Explanatory Supplement to the Astronomical Almanac, section 9.33).
+Together with the twilight of ``emulator.scene.earth``, the ground has a 25 000th of its daylight
+where the Sun is 6 deg below the horizon: 3.4 lux (Seidelmann, Explanatory Supplement to the
+Astronomical Almanac, section 9.33).
 """
 
-PARTS = 400  # of the disc, whose scattered light is added up
+PARTS = 400  # of the disc, for the sum of its scattered light
 SUN_AWAY_DEG = 60.0
-"""A random Sun is at least so far from the boresight (assumed): pointing is planned so."""
+"""Least angle of a random Sun from the boresight (assumed: pointing avoids the Sun)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,16 +66,16 @@ class EarthLimb(SkyHazard):
         (0.0, 0.0, -1.0), "of its centre: three numbers, or right ascension and declination in deg"
     )
     sun: tuple[float, ...] | None = heading(
-        None, "direction of the Sun, likewise; without it, in the satellite's zenith"
+        None, "direction of the Sun, likewise; if omitted, the satellite's zenith"
     )
     altitude_km: float = number(600.0, "of the satellite", 150, 40_000)
     unevenness: float = number(
         0.1, "standard deviation of the surface's brightness, relative", 0, 1
     )
     glow_km: float = number(
-        7.0, "height in which the lit air's glow falls to 1/e; 0 for none", 0, 50
+        7.0, "height over which the lit air's glow falls to 1/e; 0 for none", 0, 50
     )
-    airglow: float = number(1.0, "airglow by what is published", 0, 100)
+    airglow: float = number(1.0, "airglow relative to the published one", 0, 100)
     scatter: float = number(0.0, "share of its light that the lens scatters", 0, 0.2)
 
     name: ClassVar[str] = "earth-limb"
@@ -83,14 +85,9 @@ class EarthLimb(SkyHazard):
     )
     depth: ClassVar[Depth] = Depth.EARTH
 
-    def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
-        super().__post_init__()
-        self._nadir, self._sun  # noqa: B018
-
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """The limb at this angle from the boresight, to any side; any Sun that is not in view."""
+        """The limb at this angle from the boresight, to any side; a Sun that is not in view."""
         radius = angular_radius_deg(600.0)
         nadir = looking.beside(min(radius + strength, 180), generator)
         lowest = math.cos(math.radians(SUN_AWAY_DEG))
@@ -101,7 +98,6 @@ class EarthLimb(SkyHazard):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """Earth and Sun."""
         radius_deg = angular_radius_deg(self.altitude_km)
         return Body("Earth", self._nadir, radius_deg), Body("Sun", self._sun, SUN_RADIUS_DEG)
 
@@ -122,7 +118,6 @@ class EarthLimb(SkyHazard):
         return EARTH_RADIUS_KM + self.altitude_km
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        """Surface, lit air, airglow and what the lens scatters of the surface."""
         total = np.zeros(len(vectors), np.float32)
         earth = Earth(
             self.altitude_km, self.unevenness, self.glow_km, self.seed, glow_heights=GLOW_HEIGHTS
@@ -143,7 +138,7 @@ class EarthLimb(SkyHazard):
         return total
 
     def _night(self, vectors: Vectors) -> Brightness:
-        """What dusk leaves (n,) of the ground's light where lines of sight meet it: 1 by day."""
+        """Factor (n,) of dusk on the ground's light along ``vectors``: 1 by day."""
         far = self._distance_km / EARTH_RADIUS_KM
         ahead = far * (vectors @ self._nadir)
         to_ground = ahead - np.sqrt(np.maximum(ahead**2 + 1 - far**2, 0))
@@ -152,7 +147,7 @@ class EarthLimb(SkyHazard):
         return np.asarray(np.exp(np.minimum(sine, 0) / DUSK), np.float32)
 
     def _scattered(self, vectors: Vectors, angles: NDArray[np.float64]) -> Brightness:
-        """What the lens scatters (n,) of the lit disc, at ``angles`` from nadir."""
+        """Light of the lit disc that the lens scatters (n,), at ``angles`` from nadir."""
         heights, turns, light = _scattered_light(self)
         right, down, _ = self._axes
         turn = np.abs(np.arctan2(vectors @ down, vectors @ right))
@@ -167,7 +162,7 @@ class EarthLimb(SkyHazard):
 
     @property
     def _axes(self) -> Vectors:
-        """Axes (3, 3) around the third, nadir; the Sun is on the first's side."""
+        """Axes (3, 3): the third is nadir, the Sun is on the side of the first."""
         across = self._sun - (self._sun @ self._nadir) * self._nadir
         if np.linalg.norm(across) < 1e-9:
             across = np.cross(self._nadir, np.eye(3)[np.argmin(np.abs(self._nadir))])
@@ -186,14 +181,12 @@ class EarthLimb(SkyHazard):
         return EARTH_RADIANCE * light
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        """The limb up to the airglow's top."""
         top_km = EARTH_RADIUS_KM + max(TOP_KM, GLOW_HEIGHTS * self.glow_km)
         top = math.asin(min(top_km / self._distance_km, 1))
         inner = self._radius_rad - 2 * looking.pixel_rad
         return (Ring(self._nadir, inner, max(top, self._radius_rad + 2 * looking.pixel_rad)),)
 
     def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
-        """What is behind the disc."""
         del looking
         return angles_rad(vectors, self._nadir) < self._radius_rad
 
@@ -203,7 +196,7 @@ def airglow_s10(nearest_km: NDArray[np.float64], surface: NDArray[np.bool_]) -> 
 
     Args:
         nearest_km: their least height above the Earth, negative for those that would go through it.
-        surface: which of them end there: they meet the layer once.
+        surface: which of them end at the ground: they pass the layer only once.
     """
     heights, light = _airglow_profile()
     through = np.interp(nearest_km, heights, light, right=0)
@@ -212,10 +205,10 @@ def airglow_s10(nearest_km: NDArray[np.float64], surface: NDArray[np.bool_]) -> 
 
 @lru_cache(maxsize=1)
 def _airglow_profile() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Least heights (n,), and the airglow of a whole line of sight there, S10."""
+    """Least heights (n,) in km, and the airglow (n,) of a whole line of sight, S10."""
     deep = -np.geomspace(EARTH_RADIUS_KM, 1, 200)
     heights = np.concatenate([deep, np.arange(0, TOP_KM + 0.25, 0.25)])
-    # Along a line that comes as near as r to the centre, the height h is sqrt((R + h)^2 - r^2) on.
+    # A line of sight at least r from the centre has height h at sqrt((R + h)^2 - r^2) from there.
     layer = np.arange(AIRGLOW_KM - 5 * AIRGLOW_SIGMA_KM, TOP_KM, 0.05)
     away = (layer - AIRGLOW_KM) / AIRGLOW_SIGMA_KM
     emission = np.exp(-0.5 * away**2) * AIRGLOW_S10 / (AIRGLOW_SIGMA_KM * math.sqrt(2 * math.pi))
@@ -229,14 +222,14 @@ def _airglow_profile() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _scattered_light(
     limb: EarthLimb,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """What a lens scatters of the lit disc: a map around nadir.
+    """A map around nadir of the lit disc's light that a lens scatters.
 
     Returns:
         Angles (n,) from nadir, angles (m,) around it from the Sun's side, 0 to pi, and surface
         brightness (n, m): the sum over equal parts of the disc.
     """
     radius = math.radians(angular_radius_deg(limb.altitude_km))
-    # The golden angle spreads the parts.
+    # Steps of the golden angle spread the parts evenly.
     cosine = 1 - (np.arange(PARTS) + 0.5) / PARTS * (1 - math.cos(radius))
     turned = np.arange(PARTS, dtype=np.float64) * (math.pi * (3 - math.sqrt(5)))
     parts = _around(np.arccos(cosine), np.asarray(turned))
@@ -246,7 +239,7 @@ def _scattered_light(
     turns = np.linspace(0, math.pi, 40)
     places = _around(np.repeat(heights, len(turns)), np.tile(turns, len(heights)))
     apart = np.arccos(np.clip(places @ parts.T, -1, 1))
-    # A part stands for all directions in it: none is closer than it is wide.
+    # A part has an area: scattered light does not peak within its radius.
     scattered = aureole(np.maximum(apart, math.sqrt(area / math.pi)), limb.scatter) @ light
     return heights, turns, scattered.reshape(len(heights), len(turns))
 

@@ -1,9 +1,9 @@
 """Reflections of the Sun in a lens: faint images across the optical axis, and veiling glare.
 
-Light that is reflected by two surfaces of a lens makes a ghost: out of focus, on the line through
-the optical axis and the Sun, mostly beyond the axis. A coated surface reflects half a per cent to
-one (Smith, Modern Optical Engineering, section 7.9), so a ghost has up to 1e-4 of the light. Where
-ghosts lie and how wide they are is drawn: assumed. Only a Sun within the field makes them.
+Light reflected by two surfaces of a lens makes a ghost: an unfocused image on the line through the
+optical axis and the Sun, mostly beyond the axis. A coated surface reflects 0.5 to 1 per cent
+(Smith, Modern Optical Engineering, section 7.9), so a ghost has up to 1e-4 of the light. Places and
+widths of ghosts are random (assumed). Only a Sun within the field makes them.
 """
 
 from dataclasses import dataclass
@@ -30,23 +30,23 @@ from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number, whole
 
 PLACES = (-1.1, 0.5)
-"""Where a ghost may lie, by the Sun's angle from the axis; below 0 beyond the axis."""
+"""Range of a ghost's place, as a factor on the Sun's angles; negative: beyond the axis."""
 
 WIDTHS = (0.005, 0.03)
-"""Standard deviation of a ghost's light, by the half field."""
+"""Range of the standard deviation of a ghost's light, relative to the half field."""
 
 REACH_SIGMAS = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ghosts(SkyHazard):
-    """What the lens makes of the Sun beside its image."""
+    """Images that the lens makes of the Sun beside the sharp one."""
 
     sun: tuple[float, ...] | None = heading(
-        None, "direction of the Sun; without it, the scene's, or none where a scene has none"
+        None, "direction of the Sun; if omitted, that of the scene, if it has one"
     )
-    share: float = number(1e-4, "of the Sun's light that the brightest ghost has", 0, 1)
-    count: int = whole(5, "ghosts, each with half of the light of the one before", 0, 50)
+    share: float = number(1e-4, "of the Sun's light in the brightest ghost", 0, 1)
+    count: int = whole(5, "ghosts, each with half the light of the previous one", 0, 50)
     scatter: float = number(SHARE, "share of the Sun's light that the lens scatters", 0, 0.2)
 
     name: ClassVar[str] = "ghosts"
@@ -56,27 +56,19 @@ class Ghosts(SkyHazard):
     )
     depth: ClassVar[Depth] = Depth.LENS
 
-    def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
-        super().__post_init__()
-        if self.sun is not None:
-            direction("sun", self.sun)
-
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """Of a Sun anywhere in the picture, with this share of its light in the brightest one."""
+        """Of a Sun anywhere in the picture; the brightest ghost has this share of its light."""
         sun = tuple(looking.anywhere(generator).tolist())
         return cls(share=strength, sun=sun, seed=int(generator.integers(2**31)))
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The Sun, where it is said."""
         if self.sun is None:
             return ()
         return (Body("Sun", direction("sun", self.sun), SUN_RADIUS_DEG),)
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        """All ghosts, and the light scattered around the Sun."""
         total = np.zeros(len(vectors), np.float32)
         if self.sun is None:
             return total
@@ -94,7 +86,6 @@ class Ghosts(SkyHazard):
         return total
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        """The ghosts."""
         if self.sun is None:
             return ()
         places = self._places(looking, direction("sun", self.sun))

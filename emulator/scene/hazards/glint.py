@@ -1,8 +1,8 @@
 """Glint: sunlit structure of the satellite at the border of the field, always at the same place.
 
-Brightness is counted by the Sun's surface: a mirror shows 1 of it, glass 0.04 (Fresnel), a white
-surface that scatters it 1.5e-5 (albedo 0.7). Each patch is a bar with sharp ends; their places,
-lengths and widths are drawn: assumed.
+Brightness is relative to the Sun's surface: a mirror shows 1 of it, glass 0.04 (Fresnel), a white
+surface that scatters it 1.5e-5 (albedo 0.7). Each patch is a bar with sharp ends; places, lengths
+and widths are random (assumed).
 """
 
 import math
@@ -26,18 +26,18 @@ from cubestack.firmware_model.values import number, whole
 
 SUN_RADIUS_RAD = math.radians(0.2666)
 SUN_SURFACE = 10 ** (-0.4 * SUN_V) / (math.pi * SUN_RADIUS_RAD**2)
-"""Brightness of the Sun's disc, V = 0 stars a steradian."""
+"""Brightness of the Sun's disc, V = 0 stars per steradian."""
 
 PLACES = (0.7, 0.98)
 LENGTHS, WIDTHS = (0.01, 0.15), (0.004, 0.02)
-"""Distance from the boresight, half length and half width of a patch, by the half field."""
+"""Distance from the boresight, half length, half width of a patch, in half fields: ranges."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Glint(SkyHazard):
-    """Bright patches that stand still in the picture."""
+    """Bright patches at a fixed place in the picture."""
 
-    surface: float = number(1e-4, "brightness by that of the Sun's surface", 0, 1)
+    surface: float = number(1e-4, "brightness relative to the Sun's surface", 0, 1)
     count: int = whole(2, "patches", 0, 50)
 
     name: ClassVar[str] = "glint"
@@ -48,7 +48,7 @@ class Glint(SkyHazard):
     depth: ClassVar[Depth] = Depth.LENS
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        """The patches, each with an edge of a pixel."""
+        """The patches, each with an edge one pixel wide."""
         total = np.zeros(len(vectors), np.float32)
         for centre, along, across, length, width in self._patches(looking):
             near = np.flatnonzero(vectors @ centre > math.cos(length + width + looking.pixel_rad))
@@ -60,12 +60,11 @@ class Glint(SkyHazard):
         return total
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        """The patches."""
         patches = self._patches(looking)
         return tuple(Ring(centre, 0.0, length + width) for centre, _, _, length, width in patches)
 
     def _patches(self, looking: Looking) -> list[tuple[Vectors, Vectors, Vectors, float, float]]:
-        """Centre, two sides (3,) each, half length and half width in radians of each patch."""
+        """Centre, two sides (3,) each, half length and half width in rad of each patch."""
         generator = np.random.default_rng([self.seed, 0x611E7])
         patches = []
         for _ in range(self.count):

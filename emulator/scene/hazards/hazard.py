@@ -1,4 +1,4 @@
-"""What all hazards have in common: a name, checked keys, and a scale of strength.
+"""Base of all hazards: a name, declared values, and a scale of strength.
 
 A hazard is a frozen dataclass of declared values, the keys of its table ``[hazards.NAME]`` in scene
 files.
@@ -29,13 +29,13 @@ from cubestack.firmware_model.values import (
 
 @dataclass(frozen=True)
 class Strength:
-    """The scale on which a hazard is swept.
+    """The scale on which experiments vary a hazard.
 
     Attributes:
-        key: what is swept: a field, or what ``placed`` makes of it.
+        key: what varies: a field, or a quantity that ``placed`` converts.
         unit: of its values, empty for a plain number.
         values: from harmless to worst.
-        default: that of a hazard asked for without a strength; None: the last of ``values``.
+        default: of a hazard without a given strength; None: the last of ``values``.
     """
 
     key: str
@@ -45,7 +45,7 @@ class Strength:
 
     @property
     def usual(self) -> float:
-        """The strength where none is said."""
+        """The strength where none is given."""
         return self.values[-1] if self.default is None else self.default
 
 
@@ -56,12 +56,12 @@ def heading(default: Any, meaning: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Hazard(DeclaredValues):
-    """One thing that makes pictures hard; SceneError for a value that is out of its range.
+    """Something that makes pictures hard to use; SceneError for a value out of its range.
 
     Attributes:
         name: of its table in scene files and on the command line.
         meaning: what it is, one phrase.
-        strength: on which scale it is swept.
+        strength: the scale on which experiments vary it.
     """
 
     name: ClassVar[str]
@@ -69,7 +69,7 @@ class Hazard(DeclaredValues):
     strength: ClassVar[Strength]
 
     error = SceneError
-    seed: int = whole(0, "of all that is drawn for it", 0, 2**63 - 1)
+    seed: int = whole(0, "of everything random in it", 0, 2**63 - 1)
 
     @classmethod
     def refusal(cls, name: str, text: str) -> SceneError:
@@ -77,9 +77,9 @@ class Hazard(DeclaredValues):
 
     @classmethod
     def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
-        """One of this strength for one frame, drawn from ``generator``.
+        """A hazard of this strength for one frame, drawn from ``generator``.
 
-        ``looking`` says where the camera looks, for hazards that are somewhere.
+        ``looking`` is the camera, for hazards that have a place in the sky.
         """
         del looking
         counted = cls.declared()[cls.strength.key].kind is WHOLE

@@ -1,9 +1,9 @@
 """The Moon: its lit disc, and the light that the lens scatters around it.
 
-Allen's Astrophysical Quantities (4th edition, section 12.3): magnitude by phase angle, radius by
-mean distance. The light is spread over the disc by the law of Lommel and Seeliger, which makes a
-full Moon even, as it is; the whole has the magnitude above. Left out: dark plains, earthshine
-(ten thousand times fainter), parallax.
+Allen's Astrophysical Quantities (4th edition, section 12.3): magnitude by phase angle, radius at
+the mean distance. The law of Lommel and Seeliger spreads the light over the disc, which makes a
+full Moon uniform, as it is; the total has the magnitude above. Not modelled: dark plains,
+earthshine (ten thousand times fainter), parallax.
 """
 
 import math
@@ -31,24 +31,24 @@ from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number
 
 RADIUS_RAD = math.radians(0.2591)
-"""Of the disc at the mean distance."""
+"""Angular radius of the disc at the mean distance."""
 
 STEEP_RAD = math.radians(3.0)
-"""Within it the scattered light is not a line over a few pixels."""
+"""Within this angle the scattered light is not linear over a few pixels."""
 
-PARTS = 5  # of a pixel each way, for its mean
-LEAST_LIT = 1e-9  # of the phase integral: a new Moon has no light to spread
+PARTS = 5  # of a pixel along each axis, for its mean
+LEAST_LIT = 1e-9  # of the phase integral, which is 0 for a new Moon
 
 
 @dataclass(frozen=True, kw_only=True)
 class Moon(SkyHazard):
-    """The Moon in some direction."""
+    """The Moon at a fixed direction, its phase given by the Sun's."""
 
     direction: tuple[float, ...] = heading(
         (0.0, 0.0, 1.0), "of its centre: three numbers, or right ascension and declination in deg"
     )
     sun: tuple[float, ...] | None = heading(
-        None, "direction of the Sun, likewise, which gives the phase; without it, full"
+        None, "direction of the Sun, likewise, which gives the phase; if omitted, full"
     )
     scatter: float = number(SHARE, "share of its light that the lens scatters", 0, 0.2)
 
@@ -57,14 +57,9 @@ class Moon(SkyHazard):
     strength: ClassVar[Strength] = Strength("lit", "", (0.01, 0.05, 0.2, 0.5, 0.8, 1.0))
     depth: ClassVar[Depth] = Depth.MOON
 
-    def __post_init__(self) -> None:
-        """Refuse a Moon that can not be: SceneError."""
-        super().__post_init__()
-        self._centre, self._sun  # noqa: B018
-
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        """Anywhere in the picture, with this share of its disc lit, 0 to 1."""
+        """Anywhere in the picture; ``strength`` is the share of its disc that is lit, 0 to 1."""
         centre = looking.anywhere(generator)
         phase_deg = math.degrees(math.acos(min(max(2 * strength - 1, -1), 1)))
         sun = aside(centre, 180 - phase_deg, generator)
@@ -80,22 +75,20 @@ class Moon(SkyHazard):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The Moon, and the Sun where it is said."""
         moon = Body("Moon", self._centre, math.degrees(RADIUS_RAD))
         return (moon,) if self.sun is None else (moon, Body("Sun", self._sun, SUN_RADIUS_DEG))
 
     @property
     def phase_deg(self) -> float:
-        """Angle at the Moon between the Sun, which is far away, and the observer; 0 when full."""
+        """Angle at the Moon between Sun and observer; 0 when full."""
         return 180 - math.degrees(float(angles_rad(self._sun[None], self._centre)[0]))
 
     @property
     def v_mag(self) -> float:
-        """Magnitude of the whole Moon, V = -12.73 when full."""
+        """Magnitude of the whole Moon, -12.73 when full."""
         return -12.73 + 0.026 * self.phase_deg + 4e-9 * self.phase_deg**4
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        """Disc and scattered light."""
         angles = angles_rad(vectors, self._centre)
         light = 10 ** (-0.4 * self.v_mag)
         glow = light * aureole(angles, self.scatter)
@@ -104,11 +97,11 @@ class Moon(SkyHazard):
         return glow.astype(np.float32)
 
     def _disc(self, vectors: Vectors, pixel_rad: float) -> NDArray[np.float64]:
-        """Brightness (n,) a steradian of the disc, whose whole light is 1: means over pixels."""
+        """Brightness (n,) per steradian of a disc whose total light is 1; means over pixels."""
         half_phase = math.radians(self.phase_deg) / 2
         lit = 1.0
         if half_phase > 1e-6:
-            # The phase integral of that law, 1 when full.
+            # Phase integral of Lommel and Seeliger's law, 1 when full.
             cotangent = 1 / math.tan(half_phase / 2)
             lit -= math.sin(half_phase) * math.tan(half_phase) * math.log(cotangent)
         # Axes of the disc's plane; the third points at the observer.
@@ -123,16 +116,15 @@ class Moon(SkyHazard):
         facing = np.sqrt(np.maximum(1 - x * x - y * y, 0))
         sunlit = np.maximum(x * sun[0] + y * sun[1] + facing * sun[2], 0)
         sunlit[facing == 0] = 0
-        seen = 2 * sunlit / np.maximum(sunlit + facing, 1e-12)
+        shine = 2 * sunlit / np.maximum(sunlit + facing, 1e-12)
         even = 1 / (math.pi * RADIUS_RAD**2 * max(lit, LEAST_LIT))
-        return np.asarray(even * seen.mean(axis=(1, 2)))
+        return np.asarray(even * shine.mean(axis=(1, 2)))
 
     def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        """The disc and what is next to it."""
         del looking
         return (Ring(self._centre, 0.0, STEEP_RAD),)
 
     def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
-        """What is behind the disc, lit or not."""
+        """What is behind the disc, lit or dark."""
         del looking
         return angles_rad(vectors, self._centre) < RADIUS_RAD

@@ -1,8 +1,8 @@
-"""Planets: lights as bright as the brightest stars, which no catalogue has.
+"""Planets: lights as bright as the brightest stars that are in no catalogue.
 
 Positions: ``ephemeris``. Magnitudes: the Astronomical Almanac's since 1984 (Meeus, Astronomical
-Algorithms, chapter 41), by distances and phase angle; Saturn with its ring, whose longitude angle
-is taken for the phase angle, which it differs little from.
+Algorithms, chapter 41), by distances and phase angle. For Saturn with its ring, the phase angle
+replaces the difference of longitudes, which is nearly the same.
 """
 
 from dataclasses import dataclass
@@ -35,31 +35,25 @@ MAGNITUDES = {
 }
 
 SATURN_POLE = direction("pole", (40.589, 83.537))
-"""Right ascension and declination of the ring's axis (IAU)."""
+"""Unit vector along the ring's axis, from its right ascension and declination (IAU)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Planets(SkyHazard):
-    """All planets at a date, or one bright light somewhere."""
+    """All planets at a date, or a single bright light."""
 
     julian_date: float = number(
         ephemeris.NEW_YEAR_2026, "Julian date at time 0", ephemeris.FIRST_DATE, ephemeris.LAST_DATE
     )
     direction: tuple[float, ...] | None = heading(
-        None, "of one planet, instead of all of the date: three numbers, or ra and dec in deg"
+        None, "of one planet, instead of all at the date: three numbers, or ra and dec in deg"
     )
-    v_mag: float = number(-2.5, "magnitude of that one", -5.0, 10.0)
+    v_mag: float = number(-2.5, "magnitude of that planet", -5.0, 10.0)
 
     name: ClassVar[str] = "planets"
     meaning: ClassVar[str] = "planets among the stars"
     strength: ClassVar[Strength] = Strength("v_mag", "mag", (6.0, 4.0, 2.0, 0.0, -2.5, -4.5), -2.5)
     depth: ClassVar[Depth] = Depth.PLANETS
-
-    def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
-        super().__post_init__()
-        if self.direction is not None:
-            direction("direction", self.direction)
 
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
@@ -68,14 +62,12 @@ class Planets(SkyHazard):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The one, or all of the date."""
         if self.direction is not None:
             return (Body("planet", direction("direction", self.direction)),)
         there = {one: ephemeris.geocentric(one, self.julian_date) for one in MAGNITUDES}
         return tuple(Body(one.title(), at / np.linalg.norm(at)) for one, at in there.items())
 
     def lights(self, looking: Looking) -> Lights:
-        """One light a planet."""
         if self.direction is not None:
             return Lights(direction("direction", self.direction)[None], np.array([self.v_mag]))
         date = self.julian_date + looking.time_s / ephemeris.DAY_S
@@ -89,7 +81,7 @@ class Planets(SkyHazard):
 
 
 def magnitude(planet: str, from_sun: Vectors, from_earth: Vectors) -> float:
-    """V magnitude of a planet at these positions (3,), au."""
+    """V magnitude of a planet at ``from_sun`` and ``from_earth`` (3,), au."""
     r, distance = float(np.linalg.norm(from_sun)), float(np.linalg.norm(from_earth))
     cosine = float(from_sun @ from_earth) / (r * distance)
     phase_deg = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))

@@ -1,11 +1,11 @@
 """The glow of the dark sky: zodiacal light and Milky Way.
 
-Zodiacal light: Leinert et al. 1998 (A&AS 127, 1), table 17, 500 nm, divided by 1.28 into S10, stars
-of V = 10 a square degree; between its values, the logarithm is linear. Closer to the Sun than the
-table goes, it is as bright as the brightest value. Milky Way: 30 S10 at the galactic poles, 160 on
-the equator away from the centre and 640 towards it (Schlyter, Radiometry and photometry in
-astronomy, after Allen). Assumed between those: a slab of stars and dust, brighter towards the
-centre within 15 deg of the equator. Clouds, rifts and stars of the catalogue are left out.
+Zodiacal light: Leinert et al. 1998 (A&AS 127, 1), table 17, 500 nm, divided by 1.28 to get S10,
+stars of V = 10 per square degree; the logarithm is interpolated linearly. Closer to the Sun than
+the table, it has the table's greatest value. Milky Way: 30 S10 at the galactic poles, 160 on the
+equator away from the centre and 640 towards it (Schlyter, Radiometry and photometry in astronomy,
+after Allen). Assumed between those: a slab of stars and dust, brighter towards the centre within 15
+deg of the equator. Clouds, rifts and catalogue stars are not included.
 """
 
 import math
@@ -21,10 +21,10 @@ from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
 
 S10 = 1e-4 * (180 / math.pi) ** 2
-"""In V = 0 stars a steradian."""
+"""In V = 0 stars per steradian."""
 
 W_PER_S10 = 1.28
-"""Unit of table 17, 1e-8 W / (m^2 sr um), of one S10 with the Sun's colour at 500 nm."""
+"""One S10 of the Sun's colour at 500 nm in the unit of table 17, 1e-8 W / (m^2 sr um)."""
 
 LONGITUDES_DEG = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60, 75, 90, 105, 120, 135, 150, 165, 180)
 LATITUDES_DEG = (0, 5, 10, 15, 20, 25, 30, 45, 60, 75, 90)
@@ -52,12 +52,12 @@ ZODIACAL = (
 )
 
 POLE_S10, EQUATOR_S10, CENTRE_S10 = 30.0, 400.0, 240.0
-"""Milky Way: at the poles; on the equator, the mean, and by how much more towards the centre."""
+"""Milky Way: at the poles; the mean on the equator; how much more it is towards the centre."""
 
 BULGE_DEG = 15.0
 DAYS_PER_DEG = 365.2422 / 360
 SLAB = -math.log(1 - POLE_S10 / EQUATOR_S10)
-"""Optical depth of the slab across."""
+"""Optical depth of the slab, perpendicular to its plane."""
 
 TO_GALACTIC = np.array(
     [
@@ -66,21 +66,21 @@ TO_GALACTIC = np.array(
         [-0.8676661490, -0.1980763734, +0.4559837762],
     ]
 )
-"""Rotation from ICRS (The Hipparcos and Tycho Catalogues, volume 1, section 1.5.3)."""
+"""Rotation (3, 3) from ICRS (The Hipparcos and Tycho Catalogues, volume 1, section 1.5.3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SkyGlow(SkyHazard):
-    """The sky's own light, in ICRS axes."""
+    """Light of the sky itself, in ICRS axes."""
 
     julian_date: float = number(
         ephemeris.NEW_YEAR_2026,
-        "Julian date, which tells where the Sun is",
+        "Julian date, for the Sun's place",
         ephemeris.FIRST_DATE,
         ephemeris.LAST_DATE,
     )
-    zodiacal: float = number(1.0, "zodiacal light by what is published", 0, 100)
-    milky_way: float = number(1.0, "Milky Way by what is published", 0, 100)
+    zodiacal: float = number(1.0, "zodiacal light relative to the published one", 0, 100)
+    milky_way: float = number(1.0, "Milky Way relative to the published one", 0, 100)
 
     name: ClassVar[str] = "sky-glow"
     meaning: ClassVar[str] = "zodiacal light and Milky Way"
@@ -95,19 +95,17 @@ class SkyGlow(SkyHazard):
         wanted = math.degrees(math.atan2(y, x)) + strength * generator.choice([-1, 1])
         date = ephemeris.NEW_YEAR_2026
         date += (wanted - ephemeris.sun_longitude_deg(date)) % 360 * DAYS_PER_DEG
-        for _ in range(2):  # the Sun's speed differs by 3 % over the year
+        for _ in range(2):  # the Sun's speed varies by 3 % over the year
             missed = (wanted - ephemeris.sun_longitude_deg(date) + 180) % 360 - 180
             date += missed * DAYS_PER_DEG
         return cls(julian_date=float(date))
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        """Both."""
         del looking
         s10 = self.zodiacal * self._zodiacal(vectors) + self.milky_way * milky_way(vectors)
         return np.asarray(S10 * s10, np.float32)
 
     def _zodiacal(self, vectors: Vectors) -> NDArray[np.float64]:
-        """S10 (n,) of the zodiacal light."""
         x, y, z = (vectors @ ephemeris.FROM_ECLIPTIC).T
         sun_deg = ephemeris.sun_longitude_deg(self.julian_date)
         from_sun = np.abs((np.degrees(np.arctan2(y, x)) - sun_deg + 180) % 360 - 180)
@@ -115,7 +113,7 @@ class SkyGlow(SkyHazard):
 
 
 def zodiacal(longitude_deg: NDArray[np.float64], latitude_deg: NDArray[np.float64]) -> Vectors:
-    """S10 (n,) at ecliptic longitudes from the Sun's, 0 to 180, and latitudes, 0 to 90."""
+    """Zodiacal light (n,), S10, at longitudes from the Sun's, 0 to 180, and latitudes, 0 to 90."""
     table = np.log(np.array(ZODIACAL) / W_PER_S10)
     row, down = _between(longitude_deg, LONGITUDES_DEG)
     column, right = _between(latitude_deg, LATITUDES_DEG)
@@ -125,7 +123,7 @@ def zodiacal(longitude_deg: NDArray[np.float64], latitude_deg: NDArray[np.float6
 
 
 def milky_way(vectors: Vectors) -> NDArray[np.float64]:
-    """S10 (n,) along ICRS ``vectors`` (n, 3)."""
+    """Light of the Milky Way (n,), S10, along ICRS ``vectors`` (n, 3)."""
     x, y, z = (vectors @ TO_GALACTIC.T).T
     slab = EQUATOR_S10 * -np.expm1(-SLAB / np.maximum(np.abs(z), 1e-6))
     latitude_deg = np.degrees(np.arcsin(np.clip(np.abs(z), 0, 1)))
@@ -137,7 +135,7 @@ def milky_way(vectors: Vectors) -> NDArray[np.float64]:
 def _between(
     values: NDArray[np.float64], nodes: tuple[int, ...]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Index of the node below each value, and how far it is to the next, 0 to 1."""
+    """Index of the node below each value, and its relative distance from there, 0 to 1."""
     places = np.interp(values, nodes, np.arange(len(nodes)))
     index = np.minimum(places.astype(np.int64), len(nodes) - 2)
     return index, places - index

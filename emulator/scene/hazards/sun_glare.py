@@ -1,12 +1,12 @@
-"""Stray light of a bright source outside of the field: what of it gets past the baffle.
+"""Stray light of a bright source outside the field: the part that gets past the baffle.
 
-A baffle's point source transmittance falls by decades with the source's angle from the boresight
-(measured curves of star trackers are nearly straight on a logarithmic scale up to the angle beyond
-which the source lights nothing that the lens sees). Here it is counted by what the picture shows:
-brightness a steradian of the sky by the source's light, which is 4 N^2 / pi times the irradiance
-ratio behind a lens of the f-number N. Assumed: 1e-7 at 45 deg (an irradiance ratio of 5e-8 at
-f/1.25, of a small baffle), a decade in 15 deg; and across the picture the stray light falls
-exponentially with the angle towards the source, to 1/e in ``slope_deg``.
+The point source transmittance of a baffle falls by decades with the source's angle from the
+boresight: measured curves of star trackers are nearly straight on a logarithmic scale up to the
+angle beyond which the source lights no surface that the lens sees. Here it is the brightness per
+steradian of the sky relative to the source's light, which is 4 N^2 / pi times the irradiance ratio
+behind a lens of the f-number N. Assumed: 1e-7 at 45 deg (an irradiance ratio of 5e-8 at f/1.25, of
+a small baffle), a decade in 15 deg; across the picture the stray light falls exponentially with the
+angle from the source, to 1/e in ``slope_deg``.
 """
 
 import math
@@ -32,12 +32,12 @@ from cubestack.firmware_model.values import number
 
 REFERENCE_DEG = 45.0
 MOST = 1.0
-"""Transmittance at most, a steradian: even within the field."""
+"""Largest transmittance per steradian, also for a source within the field."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SunGlare(SkyHazard):
-    """A source beside the field."""
+    """A bright source beside the field."""
 
     direction: tuple[float, ...] = heading(
         (0.0, 0.0, 1.0), "of the source: three numbers, or right ascension and declination in deg"
@@ -45,9 +45,11 @@ class SunGlare(SkyHazard):
     v_mag: float = number(
         SUN_V, "its magnitude: Sun -26.74, lit Earth about -25, full Moon -12.73", -30, 30
     )
-    transmittance: float = number(1e-7, "brightness a steradian at 45 deg, by its light", 0, 1)
-    decade_deg: float = number(15.0, "angle in which that falls to a tenth", 1, 180)
-    slope_deg: float = number(30.0, "angle across the picture in which it falls to 1/e", 1, 1e6)
+    transmittance: float = number(
+        1e-7, "brightness per steradian at 45 deg, relative to its light", 0, 1
+    )
+    decade_deg: float = number(15.0, "angle over which that falls to a tenth", 1, 180)
+    slope_deg: float = number(30.0, "angle across the picture over which it falls to 1/e", 1, 1e6)
 
     name: ClassVar[str] = "sun-glare"
     meaning: ClassVar[str] = "stray light of the Sun beside the field"
@@ -56,11 +58,6 @@ class SunGlare(SkyHazard):
     )
     depth: ClassVar[Depth] = Depth.LENS
 
-    def __post_init__(self) -> None:
-        """Refuse what can not be: SceneError."""
-        super().__post_init__()
-        direction("direction", self.direction)
-
     @classmethod
     def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
         """The Sun at this angle from the boresight, to any side."""
@@ -68,12 +65,10 @@ class SunGlare(SkyHazard):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The source; the Sun where it is as bright."""
         name = "Sun" if self.v_mag == SUN_V else "stray light"
         return (Body(name, direction("direction", self.direction), SUN_RADIUS_DEG),)
 
     def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        """Light that gets to each part of the picture."""
         source = direction("direction", self.direction)
         aside_rad = float(angles_rad(looking.boresight[None], source)[0])
         decades = (math.degrees(aside_rad) - REFERENCE_DEG) / self.decade_deg

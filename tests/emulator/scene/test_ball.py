@@ -45,5 +45,5 @@ def test_it_is_lit_and_nothing_glows() -> None:
 def test_places_that_can_not_be() -> None:
     with pytest.raises(SceneError, match="distance_mm must be above 0 mm, not 0"):
         ball_scene(distance_mm=0)
-    with pytest.raises(SceneError, match="offset_mm must leave the camera outside of the ball"):
+    with pytest.raises(SceneError, match="offset_mm must leave the camera outside the ball"):
         ball_scene(offset_mm=(0, 0, 36))

@@ -61,7 +61,7 @@ def test_each_attitude(tmp_path: Path) -> None:
         (CIRCLE, "needs the key start"),
         (START, "needs either tle, or the table circular"),
         (START + TLE + CIRCLE, "needs either tle, or the table circular"),
-        ("start = 2026-11-24T12:00:00\n" + CIRCLE, "start must say its time zone"),
+        ("start = 2026-11-24T12:00:00\n" + CIRCLE, "start must have a time zone"),
         ("start = 1900-01-01T00:00:00Z\n" + CIRCLE, "start must be in 1958..2049, not 1900"),
         ("start = 5\n" + CIRCLE, "start must be a date and time"),
         (START + CIRCLE.replace("600", "100"), "circular: altitude_km must be 160 to 40000"),
@@ -75,7 +75,7 @@ def test_each_attitude(tmp_path: Path) -> None:
         (START + CIRCLE + "[mountings.star]\nright = [1, 0, 0]\n", "needs the key boresight"),
         (START + CIRCLE + "[mountings.star]\nboresight = [1, 0, 0]\n", "right must not be along"),
         (START + "speed = 5\n", "unknown key 'speed'"),
-        ("not toml", "is no TOML file"),
+        ("not toml", "is not a TOML file"),
     ],
 )
 def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:

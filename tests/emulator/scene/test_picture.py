@@ -42,9 +42,7 @@ def test_sixteen_bits_give_their_upper_eight_and_colours_their_luma(tmp_path: Pa
 
 def test_crops_that_do_not_fit(tmp_path: Path) -> None:
     Image.new("L", (1024, 600)).save(tmp_path / "small.png")
-    message = (
-        "small.png is 1024 x 600 pixels; with crop 0,100 it would have to be at least 1024 x 612"
-    )
+    message = "small.png is 1024 x 600 pixels; with crop 0,100 it must be at least 1024 x 612"
     with pytest.raises(SceneError, match=f"^{message}$"):
         PictureScene(tmp_path / "small.png", crop=(0, 100)).part(1024, 512)
     with pytest.raises(SceneError, match="crop must be at least 0, not -1"):
@@ -56,9 +54,9 @@ def test_wrong_formats(tmp_path: Path) -> None:
     (tmp_path / "text.png").write_text("hello")
     Image.new("F", (1024, 512)).save(tmp_path / "float.tif")
     for name, message in (
-        ("a.bmp", r"a\.bmp is a BMP picture; right would be PNG, JPEG, TIFF"),
-        ("text.png", r"text\.png is no picture; right would be PNG, JPEG, TIFF"),
-        ("float.tif", r"float\.tif has pixels of kind F; right would be 8 or 16"),
+        ("a.bmp", r"a\.bmp is a BMP picture; accepted are PNG, JPEG, TIFF"),
+        ("text.png", r"text\.png is not a picture; accepted are PNG, JPEG, TIFF"),
+        ("float.tif", r"float\.tif has pixels of kind F; accepted are 8 or 16"),
     ):
         with pytest.raises(SceneError, match=message):
             load_picture(tmp_path / name)

@@ -64,5 +64,5 @@ def test_poses_come_one_after_the_other(starts: tuple[float, ...], right: bool) 
     if right:
         assert SkyScene(q, poses=poses).poses == poses
         return
-    with pytest.raises(SceneError, match="poses must start one after the other from 0 s on"):
+    with pytest.raises(SceneError, match="poses must be in order of time from 0 s on"):
         SkyScene(q, poses=poses)

@@ -1,4 +1,4 @@
-"""Lenses that are not as the firmware takes them to be: out of focus, longer, crooked."""
+"""Lenses that differ from the one that the firmware assumes: out of focus, longer, distorted."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,19 +13,19 @@ from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
 
 CALIBRATED_C = 20.0
-"""Temperature at which lenses are in focus and as long as the firmware takes them to be."""
+"""Temperature at which lenses have the focus and focal length that the firmware assumes."""
 
 ORDERS = range(2, 5)
-"""Of the residual's polynomials: lower ones would be a turn, a scale, or a shear of the picture."""
+"""Of the residual's polynomials: lower ones would turn, scale or shear the picture."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Defocus(SensorHazard):
-    """A point's image is wider.
+    """A wider image of each point.
 
-    A cone of light that ends before or behind the sensor is a disc there, as wide as the distance
-    by the f-number; its standard deviation along one axis is a quarter of that. It is given that
-    standard deviation, but its shape is Gaussian.
+    A cone of light that ends before or behind the sensor is a disc there; its diameter is the
+    distance divided by the f-number, its standard deviation along one axis a quarter of that. The
+    spot gets that standard deviation, but its shape is Gaussian.
     """
 
     name: ClassVar[str] = "defocus"
@@ -33,10 +33,9 @@ class Defocus(SensorHazard):
     strength: ClassVar[Strength] = Strength("sigma_px", "px", (1, 1.5, 2, 3, 4, 6), 3)
 
     sigma_px: float | None = number(None, "standard deviation of the whole spot", 0.3, 20)
-    um_per_k: float = number(0.5, "else: shift of the focus, um for each K away from 20 C", -50, 50)
+    um_per_k: float = number(0.5, "if omitted: shift of the focus in um per K from 20 C", -50, 50)
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
-        """The lens with another spot."""
         if self.sigma_px is not None:
             return replace(lens, spot_px=self.sigma_px)
         disc_um = self.um_per_k * (temperature_c - CALIBRATED_C) / lens.f_number
@@ -45,44 +44,41 @@ class Defocus(SensorHazard):
 
 @dataclass(frozen=True, kw_only=True)
 class FocalLength(SensorHazard):
-    """The picture is larger or smaller about its principal point, distortion and all."""
+    """A picture that is larger or smaller about its principal point, distortion included."""
 
     name: ClassVar[str] = "focal-length"
     meaning: ClassVar[str] = "another focal length than calibrated"
     strength: ClassVar[Strength] = Strength("percent", "%", (0, 0.1, 0.3, 0.5, 1, 3), 1)
 
-    percent: float = number(0.0, "longer at 20 C, per cent", -10, 10)
-    ppm_per_k: float = number(20.0, "longer for each K above 20 C, millionths", -500, 500)
+    percent: float = number(0.0, "increase at 20 C, per cent", -10, 10)
+    ppm_per_k: float = number(20.0, "increase per K above 20 C, millionths", -500, 500)
 
     @classmethod
     def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
-        """Longer or shorter by this."""
         return replace(
             super().placed(strength, looking, generator),
             percent=strength * float(generator.choice([-1, 1])),
         )
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
-        """The longer lens."""
         warm = 1 + self.ppm_per_k * 1e-6 * (temperature_c - CALIBRATED_C)
         return replace(lens, scale=lens.scale * (1 + self.percent / 100) * warm)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LensResiduals(SensorHazard):
-    """A smooth distortion beside the calibrated one: polynomials of second to fourth order, drawn.
+    """A smooth distortion beside the calibrated one: random polynomials of second to fourth order.
 
-    They are Legendre's, so in the mean over the sensor they neither shift nor scale nor turn it.
+    They are Legendre polynomials: on average over the sensor they do not shift, scale or turn it.
     """
 
     name: ClassVar[str] = "lens-residuals"
-    meaning: ClassVar[str] = "a smooth distortion that no calibration knows"
+    meaning: ClassVar[str] = "a smooth distortion that the calibration lacks"
     strength: ClassVar[Strength] = Strength("rms_px", "px", (0, 0.1, 0.2, 0.5, 1, 2), 0.5)
 
     rms_px: float = number(0.3, "root of the mean squared displacement over the sensor", 0, 10)
 
     def lens(self, lens: Lens, temperature_c: float) -> Lens:
-        """The lens that displaces."""
         del temperature_c
         generator = np.random.default_rng([self.seed, 0x2E5])
         size = ORDERS.stop
@@ -92,7 +88,7 @@ class LensResiduals(SensorHazard):
         odd = 2 * np.arange(size) + 1
         square = (coefficients**2 / np.outer(odd, odd)).sum()
         coefficients *= self.rms_px / math.sqrt(square)
-        # The columns of this matrix are Legendre's polynomials.
+        # The columns of this matrix are Legendre polynomials.
         powers = np.array([np.pad(leg2poly(row), (0, size))[:size] for row in np.eye(size)]).T
         across, down = (tuple(map(tuple, (powers @ c @ powers.T).tolist())) for c in coefficients)
         return replace(lens, residuals=(*lens.residuals, Residual(lens.shape, across, down)))

@@ -1,4 +1,4 @@
-"""Pixels that are not alike: hot ones, and an uneven response."""
+"""Pixels that differ from each other: hot pixels, and an uneven response."""
 
 import math
 from dataclasses import dataclass
@@ -11,32 +11,31 @@ from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number, whole
 
 DUST_PX = (3.0, 15.0)
-"""Radii of the shadows of dust, a few pixels before the sensor (chosen)."""
+"""Radii of the shadows of dust that lies a few pixels in front of the sensor (chosen)."""
 
 DUST_SHARE = 5.0
-"""How deep the deepest shadow is, in standard deviations of the pixels' response (chosen)."""
+"""Depth of the deepest shadow in standard deviations of the pixels' response (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HotPixels(SensorHazard):
-    """More of the pixels that the condition's key ``hot_pixels`` counts, and hot as those."""
+    """More hot pixels, of the same kind as those of the condition's key ``hot_pixels``."""
 
     name: ClassVar[str] = "hot-pixels"
-    meaning: ClassVar[str] = "pixels that radiation has made hot, by their number"
+    meaning: ClassVar[str] = "pixels made hot by radiation"
     strength: ClassVar[Strength] = Strength("count", "", (0, 300, 1000, 3000, 10_000, 20_000))
 
     count: int = whole(1000, "number of hot pixels beside those of the key `hot_pixels`", 0, 75_000)
 
     def hot(self) -> int:
-        """All of them."""
         return self.count
 
 
 @dataclass(frozen=True, kw_only=True)
 class Response(SensorHazard):
-    """Gain that differs from pixel to pixel and from column to column, and shadows of dust.
+    """Gain that differs between pixels and between columns, and shadows of dust.
 
-    Image sensors have about 1 % of the first (EMVA standard 1288, photo response non-uniformity).
+    Image sensors have about 1 % between pixels (EMVA standard 1288, photo response non-uniformity).
     """
 
     name: ClassVar[str] = "response"
@@ -45,12 +44,12 @@ class Response(SensorHazard):
 
     percent: float = number(1.0, "standard deviation of the pixels' gain, per cent", 0, 30)
     columns_percent: float | None = number(
-        None, "of the columns' gain; else half of `percent`", 0, 30
+        None, "of the columns' gain; if omitted, half of `percent`", 0, 30
     )
     dust: int = whole(10, "number of shadows, each up to five times `percent` deep", 0, 1000)
 
     def response(self, shape: tuple[int, int]) -> Field | None:
-        """Gain (rows, columns), 1 in the mean, at least 0."""
+        """Gain (rows, columns), 1 on average, at least 0."""
         generator = np.random.default_rng([self.seed, 0x926])
         rows, columns = shape
         sigma = self.percent / 100
@@ -66,7 +65,7 @@ class Response(SensorHazard):
             patch = gain[top : int(y) + reach + 1, left : int(x) + reach + 1]
             down, over = np.ogrid[: patch.shape[0], : patch.shape[1]]
             distance2 = (over + left - x) ** 2 + (down + top - y) ** 2
-            # Nearly even inside, as the shadow of a disc in a wide beam.
+            # Nearly uniform inside, as the shadow of a disc in a wide beam.
             patch *= (1 - depth * np.exp(-((distance2 / radius**2) ** 2))).astype(np.float32)
         uneven: Field = np.maximum(gain, 0)
         return uneven

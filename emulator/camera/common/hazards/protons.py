@@ -1,12 +1,12 @@
-"""Charged particles through the sensor: each leaves a track of charge in the frame it hits.
+"""Charged particles through the sensor: each leaves a track of charge in the frame that it hits.
 
 Energy loss: Review of Particle Physics, section "Passage of particles through matter", equations
 for the mean (Bethe) and for the most probable loss in a thin layer (Landau), whose distribution is
-taken to be Moyal's. Fast secondary electrons that a layer this thin does not hold back are
-left out of both and drawn on their own (delta rays, the same section); their range is that of
-Kanaya and Okayama, J. Phys. D 5 (1972) 43. Assumed: directions are isotropic, so that the cosine
-of the angle of incidence has a density that rises with it; the track is straight; of the density
-effect, of nuclear reactions and of ions heavier than protons there is nothing.
+approximated by Moyal's. Neither includes fast secondary electrons that leave a layer this thin;
+those are drawn separately (delta rays, the same section), with the range of Kanaya and Okayama,
+J. Phys. D 5 (1972) 43. Assumed: directions are isotropic, so that the density of the cosine of
+the angle of incidence rises with it; tracks are straight. Not modelled: the density effect, nuclear
+reactions, ions heavier than protons.
 """
 
 import math
@@ -29,8 +29,8 @@ class Population:
 
     Attributes:
         hits_cm2_s: through a flat sensor, from both sides.
-        median_mev: of their energies, whose logarithm is normally distributed.
-        spread: factor of one standard deviation of that.
+        median_mev: median energy; its logarithm has a normal distribution.
+        spread: standard deviation of that, as a factor on the energy.
     """
 
     hits_cm2_s: float
@@ -43,9 +43,9 @@ ORBITS = {
     "anomaly": Population(500.0, 60.0, 2.5),
     "solar": Population(3000.0, 40.0, 2.0),
 }
-"""Chosen, by the order of magnitude.
+"""Chosen to the order of magnitude.
 
-Quiet: galactic cosmic rays, some of 4 / (cm2 s) that the magnetic field lets into a low orbit.
+Quiet: galactic cosmic rays, the part of 4 / (cm2 s) that the magnetic field lets into a low orbit.
 Anomaly: the heart of the South Atlantic anomaly 500 to 800 km up, where the model AP-8 has some
 1000 / (cm2 s) beyond 30 MeV from all sides, of which a flat sensor meets half. Solar: over a pole
 at the peak of an event as in October 1989, some 1000 / (cm2 s sr) beyond 30 MeV from above.
@@ -53,45 +53,46 @@ at the peak of an event as in October 1989, some 1000 / (cm2 s sr) beyond 30 MeV
 
 SLOWEST_MEV, FASTEST_MEV = 5.0, 1e5
 STEEPEST = 0.02
-"""Smallest cosine of the angle of incidence: the track is then fifty times the layer's depth."""
+"""Smallest cosine of the angle of incidence: the path is then fifty times the layer's depth."""
 
 ELECTRON_MASS_EV, PROTON_MASS_MEV = 0.511e6, 938.272
 SILICON_EV = 173.0  # mean excitation energy
 SILICON_XI_KEV_UM = 0.01783
 """Half of 0.307 MeV cm2/g, by Z / A = 0.498 and 2.33 g/cm3."""
 
-PAIR_EV = 3.65  # for one electron, silicon
-MOYAL_MEAN = 1.2704  # Euler's constant and ln 2
+PAIR_EV = 3.65  # per freed electron, silicon
+MOYAL_MEAN = 1.2704  # Euler's constant plus ln 2
 DELTA_KEV = 10.0
-"""Secondary electrons with more are drawn one by one (chosen): they leave the proton's track."""
+"""Faster secondary electrons are drawn individually (chosen): they leave the proton's track."""
 
 DIFFUSION_UM = 2.0
-"""Standard deviation of where charge arrives beside where it was freed (assumed)."""
+"""Standard deviation of the charge's sideways diffusion (assumed)."""
 
-PACKETS_PER_PX = 64  # into which a track's charge is split
+PACKETS_PER_PX = 64  # of a track's charge
 
 
 @dataclass(frozen=True, kw_only=True)
 class Protons(SensorHazard):
-    """Tracks of protons in each frame."""
+    """Tracks of protons, new ones in each frame."""
 
     name: ClassVar[str] = "protons"
-    meaning: ClassVar[str] = "tracks of protons, others in each exposure"
+    meaning: ClassVar[str] = "tracks of protons, new ones in each exposure"
     strength: ClassVar[Strength] = Strength("hits", "a frame", (0, 3, 10, 30, 100, 300), 100)
 
     orbit: str = choice(
         "anomaly", "quiet, over the South Atlantic anomaly, or in a solar event", tuple(ORBITS)
     )
-    hits: int | None = whole(None, "tracks a frame; else by orbit, area and exposure", 0, 20_000)
-    depth_um: float = number(8.0, "of the layer that gathers charge", 1, 50)
+    hits: int | None = whole(
+        None, "tracks per frame; if omitted, by orbit, area and exposure", 0, 20_000
+    )
+    depth_um: float = number(8.0, "of the layer that collects charge", 1, 50)
 
     def mean_hits(self, exposure: Exposure) -> float:
-        """Expected number in one frame."""
         rate = ORBITS[self.orbit].hits_cm2_s * exposure.area_cm2
         return rate * exposure.seconds if self.hits is None else self.hits
 
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
-        """Tracks of one frame; as many as Poisson says, or as are given."""
+        """Tracks of one frame: a Poisson number, or ``hits`` if given."""
         count = generator.poisson(self.mean_hits(exposure)) if self.hits is None else self.hits
         if not count:
             return None
@@ -117,7 +118,7 @@ class Protons(SensorHazard):
 
 
 def mean_loss_kev(energies_mev: Numbers, paths_um: Numbers) -> Numbers:
-    """Mean energy (n,) that protons lose on a path through silicon."""
+    """Mean energy (n,) that protons lose along a path through silicon."""
     beta2, momentum2 = _speed(energies_mev)
     largest = _largest_delta_ev(energies_mev)
     logarithm = np.log(2 * ELECTRON_MASS_EV * momentum2 * largest / SILICON_EV**2)
@@ -125,11 +126,11 @@ def mean_loss_kev(energies_mev: Numbers, paths_um: Numbers) -> Numbers:
 
 
 def lost_kev(energies_mev: Numbers, paths_um: Numbers, generator: np.random.Generator) -> Numbers:
-    """Energy (n,) that protons leave near their path through thin silicon, drawn."""
+    """Energy (n,) that protons leave near their path through thin silicon, random."""
     beta2, momentum2 = _speed(energies_mev)
     xi = SILICON_XI_KEV_UM * paths_um / beta2
     logarithm = np.log(2 * ELECTRON_MASS_EV * momentum2 / SILICON_EV * xi * 1000 / SILICON_EV)
-    # In a layer that stops more than the largest delta ray, Landau's tail would lose too much.
+    # In a layer that stops the largest delta ray, Landau's tail would lose too much energy.
     likely = np.minimum(
         xi * (logarithm + 0.2 - beta2), mean_loss_kev(energies_mev, paths_um) - MOYAL_MEAN * xi
     )
@@ -140,7 +141,7 @@ def lost_kev(energies_mev: Numbers, paths_um: Numbers, generator: np.random.Gene
 def _deltas(
     energies_mev: Numbers, paths_um: Numbers, depth_um: float, generator: np.random.Generator
 ) -> tuple[NDArray[np.int64], Numbers, Numbers]:
-    """Delta rays: whose, the energy in keV that they leave in the layer, and how far across, um."""
+    """Delta rays: index of the proton, energy left in the layer (keV), distance across it (um)."""
     beta2, _ = _speed(energies_mev)
     largest = _largest_delta_ev(energies_mev) / 1000
     share = np.maximum(1 - DELTA_KEV / largest, 0)
@@ -154,7 +155,7 @@ def _deltas(
 
 
 def _speed(energies_mev: Numbers) -> tuple[Numbers, Numbers]:
-    """Squares of protons' speed, and of their momentum by mass, in units of the speed of light."""
+    """Squares (n,) of speed and of momentum by mass, in units of the speed of light."""
     gamma = 1 + energies_mev / PROTON_MASS_MEV
     return 1 - gamma**-2, gamma**2 - 1
 
@@ -166,7 +167,7 @@ def _largest_delta_ev(energies_mev: Numbers) -> Numbers:
 
 
 def _turned(lengths: Numbers, generator: np.random.Generator) -> Numbers:
-    """Vectors (n, 2) of these lengths, each in a direction of its own."""
+    """Vectors (n, 2) of these lengths in random directions."""
     angles = 2 * math.pi * generator.random(len(lengths))
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return np.asarray(lengths[:, None] * vectors)
@@ -188,8 +189,8 @@ def _tracks(
     places += DIFFUSION_UM / exposure.pitch_um * generator.standard_normal(places.shape)
     x, y = np.rint(places).astype(np.int64).T
     rows, columns = exposure.shape
-    seen = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
     image: Field = np.zeros(exposure.shape, np.float32)
-    weights = (electrons / packets)[track[seen]].astype(np.float32)
-    np.add.at(image.ravel(), y[seen] * columns + x[seen], weights)
+    weights = (electrons / packets)[track[inside]].astype(np.float32)
+    np.add.at(image.ravel(), y[inside] * columns + x[inside], weights)
     return image

@@ -1,6 +1,6 @@
-"""Light that lies over the picture: stand-ins for stray light, by grey values.
+"""Uniform or sloping light over the whole picture: stray light given in grey values.
 
-Whatever the exposure and the gain, they bring the grey values that they are declared with.
+These hazards add their declared grey values whatever the exposure and the gain.
 """
 
 import math
@@ -23,10 +23,9 @@ class Gradient(SensorHazard):
     meaning: ClassVar[str] = "a slope of stray light across the picture"
     strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 60), 60)
 
-    counts: float = number(30.0, "grey values at its bright end; 0 at the other one", 0, 255)
+    counts: float = number(30.0, "grey values at its bright end; 0 at the other end", 0, 255)
 
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
-        """The slope's light."""
         del generator
         return _slope(self.seed, exposure.shape) * np.float32(
             self.counts * exposure.electrons_per_count
@@ -35,34 +34,33 @@ class Gradient(SensorHazard):
 
 @dataclass(frozen=True, kw_only=True)
 class Background(SensorHazard):
-    """An even level, with noise beyond its own shot noise."""
+    """A uniform level, with more noise than its own shot noise."""
 
     name: ClassVar[str] = "background"
-    meaning: ClassVar[str] = "an even level of stray light, and noise"
+    meaning: ClassVar[str] = "a uniform level of stray light, and noise"
     strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 80), 20)
 
-    counts: float = number(20.0, "grey values that it adds", 0, 255)
-    sigma: float = number(4.0, "standard deviation of further noise, grey values", 0, 100)
+    counts: float = number(20.0, "grey values added", 0, 255)
+    sigma: float = number(4.0, "standard deviation of the additional noise, grey values", 0, 100)
 
     @classmethod
     def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
-        """With noise of a fifth of the level."""
+        """With additional noise of a fifth of the level."""
         return replace(super().placed(strength, looking, generator), sigma=strength / 5)
 
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
-        """The level."""
         del generator
         level = np.float32(self.counts * exposure.electrons_per_count)
         return np.full(exposure.shape, level, np.float32)
 
     def noise(self, exposure: Exposure) -> float:
-        """The further noise."""
+        """Standard deviation of the additional noise, electrons."""
         return self.sigma * exposure.electrons_per_count
 
 
 @lru_cache(maxsize=4)
 def _slope(seed: int, shape: tuple[int, int]) -> Field:
-    """From 0 to 1 in the direction that ``seed`` stands for."""
+    """From 0 to 1 in the direction that ``seed`` gives."""
     angle = 2 * math.pi * np.random.default_rng([seed, 0x62AD]).random()
     y, x = np.ogrid[-1 : 1 : shape[0] * 1j, -1 : 1 : shape[1] * 1j]
     slope = math.cos(angle) * x + math.sin(angle) * y

@@ -91,7 +91,7 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
     [
         ("", 'kind must be "earth-sun" or "ball" for a sun and nadir sensor, not None'),
         ('kind = "sky"', "not 'sky'"),
-        ("kind", "is no TOML file"),
+        ("kind", "is not a TOML file"),
         (f"{KIND}height = 3", "unknown key 'height'; allowed are nadir, sun, moon"),
         (f"{KIND}sun = [1, 0, 0]\nsun_deg = [1, 0]", "give either sun or sun_deg, not both"),
         (f"{KIND}nadir = [0, 0, 0]", "nadir must be 3 numbers, not all 0, not (0.0, 0.0, 0.0)"),
@@ -124,7 +124,7 @@ def test_the_ball_of_the_bench(tmp_path: Path) -> None:
     assert (view.condition.noise, view.condition.seed, view.scene.seed) == (False, 4, 4)
     for wrong, complaint in (
         ("radius_mm = 0", "radius_mm must be above 0 mm, not 0"),
-        ("offset_mm = [0, 0, 40]", "offset_mm must leave the camera outside of the ball"),
+        ("offset_mm = [0, 0, 40]", "offset_mm must leave the camera outside the ball"),
         ("nadir = [0, 0, 1]", "unknown key 'nadir'; allowed are angle_deg"),
     ):
         check_refused(load_earth_sun_scene, save(tmp_path, f'kind = "ball"\n{wrong}'), complaint)

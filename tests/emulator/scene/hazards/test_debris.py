@@ -61,5 +61,7 @@ def test_stars_are_no_other_than_without() -> None:
 
 
 def test_refuses_a_way_to_nowhere() -> None:
-    with pytest.raises(SceneError, match="towards of the hazard debris must be another way"):
+    with pytest.raises(
+        SceneError, match="towards of the hazard debris must not be along direction"
+    ):
         Debris(direction=(1.0, 0.0, 0.0), towards=(2.0, 0.0, 0.0))
