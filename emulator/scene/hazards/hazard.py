@@ -96,7 +96,7 @@ class HazardTables(Declaration):
         seed: of a hazard whose table has none.
     """
 
-    meaning: str = "what makes the picture hard"
+    meaning: str = "what makes the picture hard to use"
     default: Any = None
     kind: ValueKind = TABLE
     kinds: Mapping[str, type[Hazard]]
