@@ -162,7 +162,7 @@ def ready_library(wanted: Recipe, folder: Path | None = None) -> Path | None:
     if not os.environ.get("CXX") and (library := _intact(SHIPPED, hash_of(wanted.inputs))):
         return library
     compiler = compilers.find_compiler()
-    return compiler and _found(folder or cache_folder(), wanted.key(compiler))
+    return _found(folder or cache_folder(), wanted.key(compiler)) if compiler else None
 
 
 def _intact(folder: Path, key: str) -> Path | None:

@@ -181,7 +181,7 @@ def _power_up(args: argparse.Namespace, stack: ExitStack) -> tuple[list[AnyEmula
     """The devices in their order, sharing kernel and I2C bus; ``stack`` closes them."""
     opened: list[AnyEmulated] = []
     setups: list[Setup] = []
-    stack.callback(lambda: [one.close() for one in opened])  # those that replaced others, too
+    stack.callback(_close_all, opened)  # also those that replace others in the list
     for name in args.devices:
         found = device(name)
         options = device_options.chosen_options(args, found)
@@ -200,6 +200,11 @@ def _power_up(args: argparse.Namespace, stack: ExitStack) -> tuple[list[AnyEmula
         setups.append(emulated_setup(args.seed, args.scene, args.faults, options))
         device_options.show_notices(found, options, say)
     return opened, setups
+
+
+def _close_all(opened: list[AnyEmulated]) -> None:
+    for one in opened:
+        one.close()
 
 
 def _follow_orbit(path: Path, opened: list[AnyEmulated]) -> None:
