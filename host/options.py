@@ -48,7 +48,6 @@ class Options(DeclaredValues):
     """
 
     def __post_init__(self) -> None:
-        """Check every value, then all together."""
         groups: dict[str, str] = {}
         for name, one in self.declared().items():
             if not self.given(name):

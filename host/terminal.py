@@ -45,7 +45,6 @@ def hush(quiet: bool) -> None:
 
 
 def say(text: str) -> None:
-    """Print a message on standard error."""
     _errors.print(text, markup=False, highlight=False, soft_wrap=True)
 
 

@@ -37,7 +37,6 @@ def add_start_arguments(
 
 
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the option that says how the FPGA is run."""
     parser.add_argument(
         "--engine",
         choices=get_args(Engine),
@@ -116,7 +115,6 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options about firmware of the user's own."""
     add_value(
         parser,
         "gdb",

@@ -229,7 +229,6 @@ def _announce(args: argparse.Namespace, opened: list[AnyEmulated], served: Serve
 
 
 def _report_events(emulated: AnyEmulated) -> None:
-    """Print what board and faults report."""
     emulated.board.connect_console(say)
     emulated.faults.on_event = lambda event: say(str(event))
 

@@ -62,7 +62,6 @@ def make_parser(asked: str | None = None) -> Parser:
 
 
 def _with_names(text: str) -> str:
-    """Put names of registered devices into the examples of a help text."""
     for place, name in zip(("{first}", "{second}", "{third}"), device_names(), strict=False):
         text = text.replace(place, name)
     return text

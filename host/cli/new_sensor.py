@@ -57,7 +57,6 @@ def run(args: argparse.Namespace) -> None:
 
 
 def rendered(name: str) -> Iterator[tuple[str, str]]:
-    """Paths and texts of the files of a new sensor."""
     taken = {one.interface.i2c_address for one in devices()}
     address = next(one for one in ADDRESSES if one not in taken)
     for path, template in FILES.items():

@@ -13,7 +13,6 @@ from cubestack.host.terminal import busy, say
 
 
 def add_target_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the target and its options."""
     parser.add_argument("target", metavar="TARGET", help=FORMS)
     parser.add_argument(
         "--device", choices=device_names(), help="needed if TARGET does not name it"

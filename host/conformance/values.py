@@ -32,7 +32,6 @@ def values_to_try(message: Message) -> Iterator[dict[str, Value]]:
 
 
 def limits_of(field: Field) -> tuple[float, float]:
-    """Smallest and largest allowed value of a field."""
     if field.choices is not None:
         values = [int(choice) for choice in field.choices]
         return min(values), max(values)

@@ -73,7 +73,6 @@ def read_back(
 
 
 def keys_of(message: Message, notes: ConformanceNotes) -> dict[str, Value]:
-    """Key fields and the values to try."""
     reset = message.reset_values()
     return {name: value for name, value in reset.items() if name in notes.keys}
 

@@ -108,15 +108,12 @@ class History:
 
     @property
     def again(self) -> bool:
-        """Whether a replay is running."""
         return bool(self._replays)
 
     def controls(self) -> list[EmulatedControls]:
-        """The recorded controls of each device."""
         return [self._controls(*one) for one in zip(self.devices, self._kept, strict=True)]
 
     def file(self, number: int) -> Path:
-        """Text of a device's recording up to now."""
         self._kept[number].recorder.flush()
         return self._kept[number].path
 
@@ -154,7 +151,6 @@ class History:
         ]
 
     def arrive(self) -> None:
-        """End the replay and connect the ports to the new devices."""
         for replay in self._replays:
             replay.stop()
         self._replays.clear()

@@ -83,7 +83,6 @@ class VirtualClock:
             device.wait(seconds)
 
     def _followed(self, caller: Any) -> bool:
-        """Whether the caller is code under test."""
         top = str(caller.f_globals.get("__name__")).partition(".")[0]
         return (
             bool(self._devices)

@@ -63,7 +63,6 @@ class SkyOptions(MeasureOptions):
 
     @property
     def is_random(self) -> bool:
-        """Whether each frame has a random sky."""
         return self.scene is None and self.image is None
 
 
@@ -106,7 +105,6 @@ def errors(measured: NDArray[np.floating[Any]], truth: NDArray[np.float64]) -> t
 
 
 def is_right(cross_deg: float, roll_deg: float) -> bool:
-    """Whether errors are those of a right attitude."""
     return cross_deg < RIGHT_CROSS_DEG and abs(roll_deg) < RIGHT_ROLL_DEG
 
 
@@ -285,7 +283,6 @@ class AttitudeExperiment(Experiment[OpenerT, SkyOptionsT, AttitudeResultT]):
         return any(result.solved for result in results)
 
     def sections(self, results: Iterable[Mapping[str, Any]]) -> Iterator[Section]:
-        """A map of right results over the sky."""
         known = [each for each in results if each.get("truth") is not None]
         if known:
             looking = [pointing_deg(np.array(each["truth"])) for each in known]

@@ -69,7 +69,6 @@ def experiment_of(device: AnyDevice, command: str = MEASURE) -> AnyExperiment:
 
 
 def board_options(device: AnyDevice, experiment: AnyExperiment) -> Mapping[str, BoardOption]:
-    """Board options that the experiment leaves to the user."""
     options = device.all_options if experiment.powers_up else ()
     return {one.name: one for one in options if one.name not in experiment.decides}
 

@@ -14,7 +14,6 @@ def outcome(result: Any) -> Outcome:
 
 
 def why_refused(result: Any) -> str:
-    """The device's reason for a refusal."""
     return str(result.reason or result.ending)
 
 

@@ -4,7 +4,6 @@ from cubestack.firmware_model.interface.codec.field import Choices, Field
 
 
 def field_type(field: Field) -> str:
-    """Type and scale."""
     return field.type if field.scale == 1 else f"{field.type} / {field.scale:g}"
 
 

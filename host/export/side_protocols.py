@@ -36,7 +36,6 @@ def side_table(interface: Interface) -> Iterator[str]:
 
 
 def side_markdown(interface: Interface) -> Iterator[str]:
-    """A section for the registers and one for the letters."""
     if interface.registers is not None:
         yield from (
             "",
@@ -73,7 +72,6 @@ def side_markdown(interface: Interface) -> Iterator[str]:
 
 
 def side_json(interface: Interface) -> dict[str, object]:
-    """The members of a JSON object."""
     content: dict[str, object] = {}
     if interface.registers is not None:
         content["registers"] = {

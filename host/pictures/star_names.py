@@ -66,7 +66,6 @@ _NAMES = {
 
 
 def is_named(hipparcos: int) -> bool:
-    """Whether a star has a proper name here."""
     return hipparcos in _NAMES
 
 

@@ -109,7 +109,6 @@ def _default_scene() -> "Scene":
 
 
 def _layout_notice(value: str) -> str | None:
-    """A warning for a layout that the published parts cannot build."""
     if value == Layout.COPIED.value:
         return None
     from cubestack.emulator.boards.cubestar.layouts import fpga_of

@@ -23,7 +23,6 @@ Found = Message | PointerRegister
 
 
 def number_of(found: Found) -> str:
-    """Name that a line can use."""
     return str(found.id) if isinstance(found, Message) else f"{ADDRESS}{found.address:#04x}"
 
 

@@ -77,7 +77,6 @@ class CubeSMBus(SMBus):
         self._pec = 0
 
     def enable_pec(self, enable: bool = True) -> None:
-        """Enable or disable packet error codes."""
         self._ioctl(Ioctl.PEC, int(enable))
         self._pec = int(enable)
 

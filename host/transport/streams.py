@@ -65,7 +65,6 @@ class Reopening(Transport, ABC):
 
     @contextmanager
     def _used(self) -> Iterator[None]:
-        """Converts failures of the block to PortClosedError."""
         try:
             if self._gone and self.reopens:
                 self._open_again()

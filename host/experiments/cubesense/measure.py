@@ -126,7 +126,6 @@ class SensorResult(Result):
 
     @property
     def solved(self) -> bool:
-        """The name that star trackers' results use."""
         return self.detected
 
 
@@ -347,7 +346,6 @@ def measure_once(
 def is_right(
     emulated: EmulatedDevice[CubeSenseBoard, CubeSense], sensor: Camera, measured: Measurement
 ) -> bool:
-    """Whether the error is within the thesis' goal."""
     truth = emulated.board.truth(sensor) if measured.capture.stored else None
     if truth is None or not truth.visible:
         return False

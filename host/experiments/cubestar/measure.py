@@ -191,7 +191,6 @@ class _Experiment(attitudes.AttitudeExperiment["CubeStarOpener", CubeStarOptions
 
 
 def wait_started(emulated: CubeStarEmulated) -> None:
-    """Wait for own firmware to start."""
     if emulated.board.firmware:
         emulated.wait(START_S)
 

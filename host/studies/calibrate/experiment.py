@@ -130,12 +130,10 @@ class StarCalibration(
     mag_limit: float | None = None  #: of the emulated sky; None for none
 
     @abstractmethod
-    def tables(self) -> Optics:
-        """The lens that the device's tables have."""
+    def tables(self) -> Optics: ...
 
     @abstractmethod
-    def condition(self, options: CalibrateOptions) -> SkyCondition:
-        """The camera of the emulated unit."""
+    def condition(self, options: CalibrateOptions) -> SkyCondition: ...
 
     @abstractmethod
     def load(self, client: ClientT, camera: Camera, light: Path | None) -> None:
@@ -146,13 +144,11 @@ class StarCalibration(
         """Capture an image; returns the identified stars if there is an attitude."""
 
     def board(self, camera: Camera) -> Mapping[str, Any]:
-        """Board options for a camera."""
         return {}
 
     def run(
         self, opened: "_Opener[ClientT]", options: CalibrateOptions
     ) -> Iterator[CalibrateResult]:
-        """Identify and fit repeatedly."""
         given = options.camera
         guess = camera = self._like(self.tables()) if given is None else load_camera(given)
         looks = self._looks(options)
@@ -219,7 +215,6 @@ class StarCalibration(
                 yield Sight(places, sky.vectors[rows])
 
     def _like(self, optics: Optics) -> Camera:
-        """The camera closest to a lens over the image."""
         f_px = 1000 * optics.focal_length_mm / optics.pixel_pitch_um
         return self._over_picture(optics, Camera(f_px, optics.cx, optics.cy), self.free).camera
 

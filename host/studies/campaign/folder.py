@@ -122,7 +122,6 @@ def _line(row: Row) -> str:
 
 
 def _replace(path: Path, lines: Iterable[str]) -> None:
-    """Write a file atomically."""
     new = path.with_suffix(".new")
     with new.open("w", encoding="utf-8") as file:
         file.writelines(lines)

@@ -109,7 +109,6 @@ class CampaignPlan(Options):
 
     @property
     def points(self) -> list[dict[str, Any]]:
-        """Every combination of the grid's values."""
         return [
             dict(zip(self.grid, values, strict=True)) for values in product(*self.grid.values())
         ]

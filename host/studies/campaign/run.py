@@ -35,7 +35,6 @@ def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[
 
 
 def count(plan: CampaignPlan) -> int:
-    """Number of rows of a campaign."""
     return sum(map(rows_of, plan.blocks()))
 
 
@@ -61,5 +60,4 @@ def again(
 
 
 def default_folder(path: Path) -> Path:
-    """Folder for the results of a plan's file."""
     return Path(f"{path.stem}.campaign")

@@ -52,7 +52,6 @@ class Demo:
             node.close()
 
     def finish(self, *pictures: str, virtual_s: float | None = None) -> None:
-        """Print the duration and the names of the written pictures."""
         wall = f"{time.monotonic() - self._started:.1f} s of wall time"
         times = wall if virtual_s is None else f"{virtual_s:.1f} s of virtual time in {wall}"
         names = ", ".join(str(self.out / picture) for picture in pictures)
@@ -85,6 +84,5 @@ def download(what: str, fetch: Callable[[Progress], NDArray[np.uint8]]) -> NDArr
 
 
 def tell_times(phases_ms: dict[str, float], indent: str = "") -> None:
-    """Print the virtual times of a measurement's steps."""
     times = ", ".join(f"{name} {ms:.1f} ms" for name, ms in phases_ms.items())
     tell(f"{indent}virtual time: {times}")

@@ -190,7 +190,6 @@ def markdown(rows: Sequence[Measured]) -> str:
 
 
 def marks(table: str) -> tuple[str, str]:
-    """Marker lines around a table of a page."""
     return f"<!-- rows: {table} -->\n", "<!-- end of rows -->\n"
 
 

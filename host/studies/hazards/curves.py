@@ -50,7 +50,6 @@ class Point(Job):
 
 
 def devices_with_hazards() -> list[str]:
-    """Names of the devices whose experiment takes hazards."""
     return [
         device.name
         for device in devices()

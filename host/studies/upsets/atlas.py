@@ -28,7 +28,6 @@ class Part:
 
     @property
     def bits(self) -> int:
-        """Of the whole register or memory."""
         return self.results[0].bits
 
     @cached_property
@@ -41,7 +40,6 @@ class Part:
 
     @property
     def seen(self) -> int:
-        """Upsets that the processor noticed."""
         return sum(map(_is_seen, self.results))
 
     @property
@@ -95,7 +93,6 @@ def rows(parts: Sequence[Part]) -> Iterator[list[str]]:
 
 
 def lines(results: Iterable[UpsetResult]) -> Iterator[str]:
-    """Lines of text for each part."""
     for part in atlas(results):
         effects = ", ".join(f"{part.effects[e]} {e}" for e in EFFECTS if part.effects[e])
         answers = "".join(f", {part.answers[a]} answers {a}" for a in BAD if part.answers[a])

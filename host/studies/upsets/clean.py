@@ -62,7 +62,6 @@ class CleanLoop:
 
     @property
     def end_ps(self) -> int:
-        """Time when all activity ended."""
         return self.intervals[-1].end_ps
 
     def seconds(self, period_s: float) -> dict[str, float]:
@@ -133,7 +132,6 @@ def take(sites: Sites, watch: PortWatch) -> Snapshot:
 
 
 def render(clean: CleanLoop, sites: Sites) -> None:
-    """Render the loop's images once for all copies."""
     for one in clean.intervals:
         if one.camera is None:
             continue

@@ -119,7 +119,6 @@ class UpsetExperiment(Experiment[Opener[Any, Any], UpsetOptions, UpsetResult]):
                 del upsets[: len(outcomes)]
 
     def row(self, number: int, result: UpsetResult) -> tuple[str, ...]:
-        """The target and the effect."""
         later = {0: "at once", None: "never"}.get(result.recovered, f"{result.recovered} loops")
         return (
             *(result.target, str(result.bit), result.phase, result.effect, result.answer, later),

@@ -160,7 +160,6 @@ def _out_of_sight(found: Snapshot, running: Running) -> bool:
 
 
 def _judged(running: Running, *, again: bool = False) -> UpsetVerdict:
-    """Verdict on the current loop or the next one."""
     kernel, clean = running.emulated.board.kernel, running.clean
     try:
         end_ps = clean.end_ps

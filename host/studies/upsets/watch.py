@@ -31,7 +31,6 @@ class PortWatch:
 
     @property
     def running(self) -> int:
-        """Cameras whose clocks are made now."""
         return self._engine.running
 
     @property
@@ -39,7 +38,6 @@ class PortWatch:
         return None
 
     def attend(self, reached_ps: int, end: int, camera: int, until_ps: int) -> int:
-        """A burst of a driver ended."""
         return self._engine.attend(reached_ps, end, camera, until_ps)
 
     def set_pin(self, name: str, value: int) -> None:
@@ -61,7 +59,6 @@ class PortWatch:
         return done
 
     def access(self, transactions: Transactions, until_ps: int) -> int:
-        """Make transactions on the external bus."""
         done = self._engine.access(transactions, until_ps)
         if not transactions.write:
             self.data += transactions.data[:done].tobytes()
