@@ -1,8 +1,6 @@
 """One measurement: picture, catalogue, stars, identities, attitude, and the time of each step.
-
-AraMiS thesis, sections 2.2 (getStarAttitudeQuaternion) and 7.3; figure 8.1. The processing itself
-is :mod:`cubestack.firmware_model.aramis.pipeline`; this is the only place that calls it.
-"""
+AraMiS thesis, sections 2.2 (getStarAttitudeQuaternion) and 7.3; figure 8.1. Only this module calls
+the processing, :mod:`cubestack.firmware_model.aramis.pipeline`."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -74,7 +72,7 @@ def configuration(
 
 @dataclass
 class Measuring:
-    """Measures, and keeps what one measurement leaves to the next."""
+    """Measures, and keeps the state between measurements."""
 
     _meter: Meter
     _state: State
@@ -85,7 +83,7 @@ class Measuring:
         self.restart()
 
     def restart(self) -> None:
-        """Pictures from now on have nothing to do with those before."""
+        """Forget the pictures so far."""
         self._background = LevelHistory()
 
     def latest_boresight(self) -> Floats | None:
@@ -182,7 +180,7 @@ class Measuring:
 
     @contextmanager
     def _phases(self, result: MeasurementResult) -> Iterator[None]:
-        """Book the cycles of each phase that the block charges."""
+        """Record the cycles of each phase that the block charges."""
         before = dict(self._meter.phases)
         yield
         for name in aramis.PHASES:

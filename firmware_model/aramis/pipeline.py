@@ -1,15 +1,12 @@
-"""From a picture to an attitude: the whole of the star tracker's processing.
-
-AraMiS thesis, figure 8.1 and section 7.3: threshold over five pictures, spike removal, centroids,
-identification and attitude.
-"""
+"""From a picture to an attitude. AraMiS thesis, figure 8.1 and section 7.3: threshold over five
+pictures, spike removal, centroids, identification and attitude."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.aramis.arrays import Floats
+from cubestack.firmware_model.aramis.arrays import Floats, Mask
 from cubestack.firmware_model.aramis.catalogue.database import Database
 from cubestack.firmware_model.aramis.detection import charges
 from cubestack.firmware_model.aramis.detection.background import LevelHistory
@@ -19,7 +16,6 @@ from cubestack.firmware_model.aramis.detection.spikes import HALF, SpikeRemoval,
 from cubestack.firmware_model.aramis.detection.spots import find_spots
 from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.identification import identify
-from cubestack.firmware_model.aramis.reasons import is_hit, true_reason
 from cubestack.firmware_model.aramis.solution import (
     PictureLight,
     Profile,
@@ -27,7 +23,7 @@ from cubestack.firmware_model.aramis.solution import (
     StarList,
     unsolved,
 )
-from cubestack.firmware_model.interface.aramis import Reason
+from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.background import (
     UNIT,
@@ -35,6 +31,7 @@ from cubestack.firmware_model.star_tracker.background import (
     estimate,
     sample_offsets,
 )
+from cubestack.firmware_model.star_tracker.quality import DisturbanceLimits
 from cubestack.firmware_model.values import DeclaredValues, flag, number, whole
 
 STEP = 2  #: distance of the background's samples in px
@@ -44,6 +41,19 @@ LEAST_NOISE = 19
 
 BLIND = 240  #: level from which on no star can be told from its surroundings
 SPIKE_SIGMAS = 8.0  #: a pixel is far above its surroundings from so many standard deviations on
+
+
+#: Share of hit pixels: one in a window of 25, which distinguishes a spike from a star.
+MOST_HIT = 0.04
+
+#: Share of the field: the Moon's disc with its glare, not a bright star. Counts: a dark sky stays
+#: below both. Pixels above noise that no star explains: a quiet picture has fewer (all measured).
+LIMITS = DisturbanceLimits(saturated=0.004, background=20.0, background_range=10.0, spikes=40)
+
+WIDE_PX = 2500  #: a bright region that no star fills
+
+#: Of a search that found no attitude, which says nothing of the cause.
+_OPEN = (Reason.UNCONFIRMED, Reason.NO_TRIANGLE, Reason.NO_TIME, Reason.TOO_FEW_STARS)
 
 
 @dataclass(frozen=True)
@@ -101,6 +111,14 @@ def _check_size(picture: NDArray[np.uint8], field: CameraField) -> None:
         )
 
 
+def _without_spikes(mask: Mask, settings: DetectionSettings, meter: Meter) -> Mask:
+    with meter.phase("spikes"):
+        stars, cleared = remove_spikes(mask, settings.spikes, settings.needed)
+        rows, columns = mask.shape
+        charges.charge_spikes((rows, columns), settings.spikes, cleared, meter)
+    return stars
+
+
 def detect(
     picture: NDArray[np.uint8],
     background: LevelHistory,
@@ -108,13 +126,9 @@ def detect(
     settings: DetectionSettings,
     meter: Meter,
 ) -> StarList | None:
-    """Stars of a picture (rows, columns) in the field; None when too many pixels are lit.
-
-    The picture is added to `background`. Phases: `threshold`, `spikes`, `centroids`.
-
-    Raises:
-        ValueError: for a picture of another size than the field's.
-    """
+    """Stars of a picture (rows, columns) in the field; None when too many pixels are lit. The
+    picture is added to `background`. Phases: `threshold`, `spikes`, `centroids`. Raises ValueError
+    for a picture of another size than the field's."""
     _check_size(picture, field)
     with meter.phase("threshold"):
         background.add(picture, field, meter)
@@ -122,7 +136,7 @@ def detect(
         mask = (picture > level) & field.mask
         pixels = field.pixels
         meter.charge(pixel_read=pixels, i32_add=pixels, ram_write=picture.size // 4, loop=pixels)
-    mask = remove_spikes(mask, settings.spikes, settings.needed, meter)
+    mask = _without_spikes(mask, settings, meter)
     with meter.phase("centroids"):
         regions = find_regions(mask)
         charges.charge_regions(mask.size, regions, meter)
@@ -149,11 +163,8 @@ def solve(
     """Attitude of a picture (rows, columns), or why there is none.
 
     Without a local threshold the picture is added to ``background``. ``hint`` (3,) is a rough unit
-    vector of the boresight in inertial axes; None: lost in space. ``exposure_rows``: how long each
-    row was exposed, in times of a row; None: the rows were exposed all at once.
-
-    Raises:
-        ValueError: for a picture of another size than the configuration's.
+    vector of the boresight in inertial axes; None: lost in space. ``exposure_rows``: exposure of
+    each row in row times; None: all rows at once. Raises ValueError for a picture of another size.
     """
     field, profile = configuration.field, configuration.profile
     until = meter.total + profile.within_ms * meter.table.clock_hz / 1000
@@ -176,13 +187,8 @@ def solve(
 def detect_locally(
     picture: NDArray[np.uint8], field: CameraField, settings: DetectionSettings, meter: Meter
 ) -> StarList:
-    """Stars of a picture (rows, columns) in the field, and what else it shows.
-
-    Phases: `threshold`, `spikes`, `centroids`.
-
-    Raises:
-        ValueError: for a picture of another size than the field's.
-    """
+    """Stars of a picture (rows, columns) in the field, and its light. Phases and errors as
+    ``detect``."""
     _check_size(picture, field)
     with meter.phase("threshold"):
         rows, columns = picture.shape
@@ -193,7 +199,7 @@ def detect_locally(
         far = sky.brighter(picture, SPIKE_SIGMAS) & field.mask
         for _ in (mask, far):
             charges.charge_thresholds(rows, columns, meter)
-    large = remove_spikes(mask, settings.spikes, settings.needed, meter)
+    large = _without_spikes(mask, settings, meter)
     spikes = int(np.count_nonzero(far & ~large))
     with meter.phase("centroids"):
         regions = find_regions(large & field.mask)
@@ -220,3 +226,18 @@ def detect_locally(
         )
         kept = stars.of(np.arange(min(len(stars), settings.max_stars)))
     return StarList(kept.centroids, kept.brightness, smear_px, sigma_px=kept.sigma_px, light=light)
+
+
+def is_hit(stars: StarList, field: CameraField) -> bool:
+    """Whether a picture has so many hits that no star in it is reliable."""
+    return stars.light is not None and stars.light.spikes > MOST_HIT * field.pixels
+
+
+def true_reason(solution: Solution) -> Reason:
+    """The reason of a solution; without attitude, what disturbed the picture."""
+    light = solution.measured.light
+    found = solution.outcome is not MeasurementOutcome.NONE
+    if light is None or found or solution.reason not in _OPEN:
+        return solution.reason
+    disturbance = LIMITS.exceeded(light, large=light.widest > WIDE_PX)
+    return solution.reason if disturbance is None else Reason[disturbance.name]

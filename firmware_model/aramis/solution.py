@@ -1,7 +1,5 @@
-"""What goes into an identification and what comes out: settings, stars, outcome.
-
-AraMiS thesis, sections 5.7 (the three outcomes), 5.9 (rough direction) and appendix E.
-"""
+"""Settings, stars and outcome of an identification. AraMiS thesis, sections 5.7 (the three
+outcomes), 5.9 (rough direction) and appendix E."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,8 +9,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.aramis.arrays import Floats
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
-from cubestack.firmware_model.star_tracker.disturbance import SkyStatistics
-from cubestack.firmware_model.star_tracker.rating import Rating
+from cubestack.firmware_model.star_tracker.quality import Rating, SkyStatistics
 from cubestack.firmware_model.values import DeclaredValues, choice, flag, number, whole
 
 NONE = -1  #: mark of a measured star without identity
@@ -83,7 +80,7 @@ class Profile(DeclaredValues):
 
 @dataclass(frozen=True)
 class PictureLight(SkyStatistics):
-    """What a picture has beside stars, in counts."""
+    """Light of a picture beside stars, in counts."""
 
     threshold: float  #: median level of a bright pixel
     widest: int  #: pixels of the largest bright region
@@ -109,7 +106,7 @@ class StarList:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What became of one picture."""
+    """Outcome of one picture."""
 
     outcome: MeasurementOutcome  #: conclusive, ambiguous or none
     reason: Reason  #: why

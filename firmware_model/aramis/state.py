@@ -1,4 +1,4 @@
-"""What the program remembers in RAM: flags, counters, the clock, the latest result."""
+"""The program's state in RAM: flags, counters, clock, latest result."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,7 @@ class Clock:
         return self._zero_ms is not None
 
     def set(self, day: int, millisecond: int, uptime_us: int) -> None:
-        """It is ``millisecond`` after the noon that begins Julian ``day`` at ``uptime_us``."""
+        """Set it to ``millisecond`` after the noon that begins Julian ``day`` at ``uptime_us``."""
         self._zero_ms = day * MS_PER_DAY + millisecond - uptime_us // 1000
 
     def at(self, uptime_us: int) -> tuple[int, int]:

@@ -1,1 +1,1 @@
-"""Attitude from vectors, in single precision: what both star trackers share."""
+"""Attitude from vectors, in single precision: what all star trackers share."""

@@ -1,17 +1,16 @@
-"""How uncertain an attitude from unit vectors is: the covariance of its rotation's error.
+"""Covariance of an attitude's error, from unit vectors of stars.
 
 M. D. Shuster and S. D. Oh, "Three-axis attitude determination from vector observations", Journal of
-Guidance and Control 4 (1981), section "covariance analysis": a star whose direction b has the
-standard deviation sigma in each axis across it tells w (I - b b^T) about the rotation, w = 1 /
-sigma^2, and the inverse of the sum is the covariance of the best estimate.
+Guidance and Control 4 (1981), section "covariance analysis": a star of direction b and standard
+deviation sigma in each axis across it contributes the information w (I - b b^T), w = 1 / sigma^2,
+about the rotation. The inverse of the sum is the covariance of the best estimate.
 
-The declared sigmas are a belief. The residuals of the fit correct it, as far as so few can: the
-variance's scale is the mean of its posterior distribution (scaled inverse chi squared; A. Gelman et
-al., "Bayesian Data Analysis", 3rd edition, section 3.2), in which the belief counts as much as
-`PRIOR_DEGREES` squares of residuals. The mean is larger than the best guess of the scale, and so
-makes up for the long tails that a scale guessed from few squares leaves the errors.
-
-What moves all stars alike leaves no residual, and is not in it.
+The residuals of the fit correct the declared sigmas, as far as so few can. The scale of the
+variance is the mean of its posterior distribution (scaled inverse chi squared; A. Gelman et al.,
+"Bayesian Data Analysis", 3rd edition, section 3.2), in which the declaration counts as
+`PRIOR_DEGREES` squares of residuals. The mean exceeds the most likely scale, which covers the long
+tails of errors whose scale is estimated from few squares. An error common to all stars leaves no
+residual and is not included.
 """
 
 import numpy as np
@@ -38,20 +37,20 @@ def covariance(
     excess: float = 1.0,
     beyond: float = 1.0,
 ) -> NDArray[np.float32]:
-    """Covariance (3, 3) of the small rotation that separates the true camera axes from the
-    estimated ones, in rad^2, about the camera's axes, for weights of 1 / sigma^2.
+    """Covariance (3, 3) in rad^2 of the small rotation, about the camera's axes, from the true
+    camera axes to the axes estimated with weights of 1 / sigma^2.
 
     Args:
-        directions: (n, 3) unit vectors in camera axes of the stars used, n at least 2.
-        residuals: (n,) angles in rad between them and the catalogue's, turned by the attitude.
-        sigmas: (n,) declared standard deviation of a direction, in rad, in each axis across it.
+        directions: (n, 3) unit vectors of the stars in camera axes, n at least 2.
+        residuals: (n,) angles in rad between these and the rotated vectors of the catalogue.
+        sigmas: (n,) declared standard deviation of a direction in rad, in each axis across it.
         meter: charged with every operation.
-        excess: factor of the variance that residuals show beyond the declared one: more than 1
-            where its cause moves neighbouring stars alike, as a lens does.
-        beyond: multiple of the declared variance from which on it counts.
+        excess: factor of the variance that the residuals show above ``beyond`` declared variances:
+            more than 1 where the cause moves neighbouring stars alike, as a lens does.
+        beyond: see ``excess``.
 
     Raises:
-        AttitudeError: for fewer than two stars, or stars that all lie in one direction.
+        AttitudeError: for fewer than two stars, or stars that are all in one direction.
     """
     count = len(directions)
     if count < 2:

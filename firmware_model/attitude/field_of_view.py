@@ -1,8 +1,8 @@
-"""Which directions lie in the picture: its border, with the lens' distortion undone.
+"""The part of the sky that an image shows: its border with the lens distortion removed.
 
-A rectangle of pixels is a pincushion or a barrel of directions. Each of its sides is a parabola
-here, through its two corners and its middle, in tangents of field angles; for the lens of the
-CubeStar thesis it stays within 2 px of the true one.
+A rectangle of pixels is a pincushion or a barrel of directions. Each side is modelled as a parabola
+through its two corners and its middle, in tangents of field angles. For the lens of the CubeStar
+thesis it is within 2 px of the true border.
 """
 
 from dataclasses import dataclass, replace
@@ -36,17 +36,15 @@ class FieldOfView:
     blind: NDArray[np.bool_] | None = None
 
     def without(self, blind: NDArray[np.bool_]) -> Self:
-        """The field of which some cells (down, across), of equal size, say nothing."""
+        """The field without cells (down, across), of equal size, in which no star can be seen."""
         if not blind.any():
             return self
         share = 1 - float(blind.mean())
         return replace(self, blind=blind, solid_angle_sr=share * self.solid_angle_sr)
 
     def contains(self, directions: Floats, meter: Meter, factor: float = 1.0) -> NDArray[np.bool_]:
-        """Whether unit vectors (n, 3) in camera axes, z above 0, lie where stars can be seen.
-
-        ``factor`` is that by which measured tangents are multiplied to make directions of them.
-        """
+        """Which unit vectors (n, 3) in camera axes, z above 0, are where stars can be seen;
+        ``factor``: by which tangents of measured field angles are multiplied."""
         count = len(directions)
         meter.charge(
             f32_div=2 * count,
@@ -72,7 +70,7 @@ class FieldOfView:
 
 @lru_cache(maxsize=8)
 def field_of_view(camera: CameraParameters, columns: int, rows: int) -> FieldOfView:
-    """The field of a camera with so many pixels; made when a camera's parameters change."""
+    """The field of a camera with ``columns`` by ``rows`` pixels."""
     x, y = (
         np.array([-0.5, columns / 2 - 0.5, columns - 0.5]),
         np.array([-0.5, rows / 2 - 0.5, rows - 0.5]),
@@ -102,7 +100,7 @@ def field_of_view(camera: CameraParameters, columns: int, rows: int) -> FieldOfV
 def _tangents(
     camera: CameraParameters, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Tangents (rows, columns, 2) of the field angles of pixels at all of x and y."""
+    """Tangents (rows, columns, 2) of the field angles of the pixels at all x and y."""
     meter = Meter(CORTEX_M3)
     points = np.stack(np.meshgrid(x, y), axis=2).astype(np.float32)
     rays = unit_vectors(undistort(points.reshape(-1, 2), camera, meter), camera, meter)

@@ -80,7 +80,7 @@ def cosine(x: Floats) -> Floats:
 
 
 def _wave(x: Floats, ahead: int) -> Floats:
-    """Sine of the angle and so many quarters of a turn."""
+    """Sine of the angle plus ``ahead`` quarters of a turn."""
     turns = x * _QUARTERS
     quarters = (turns + np.where(turns < 0, -_HALF, _HALF)).astype(np.int32)
     count = quarters.astype(np.float32)

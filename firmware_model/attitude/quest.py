@@ -49,15 +49,13 @@ def quest(
     """Quaternion (4,), scalar last and not negative, of the rotation reference to measured.
 
     Args:
-        measured: (n, 3) unit vectors in camera axes, n at least 2.
-        reference: (n, 3) unit vectors of the same stars in inertial axes.
+        measured, reference: (n, 3) unit vectors of the same stars in camera and inertial axes.
         weights: (n,) not negative, not all zero; in the thesis votes of the verification.
         meter: charged with every operation.
         eigenvalue: finds the largest eigenvalue; None takes 1, as the thesis does.
 
     Raises:
-        AttitudeError: for fewer than two vectors, weights without weight, or vectors that all point
-            the same way.
+        AttitudeError: for fewer than two vectors, weights of 0, or vectors in one direction.
     """
     if len(measured) < 2:
         raise AttitudeError(f"an attitude needs at least 2 vectors, not {len(measured)}")

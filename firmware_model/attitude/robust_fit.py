@@ -1,15 +1,14 @@
 """Attitude, focal length and covariance from identified stars of which some may be displaced.
 
-QUEST, repeated with weights that trust a star less the further it is from where the attitude puts
-it: those of errors with the tails of Student's t distribution (K. L. Lange, R. J. A. Little and
-J. M. G. Taylor, "Robust statistical modeling using the t distribution", Journal of the American
-Statistical Association 84 (1989), section 3). A star at the edge of the picture, beside a hot
-pixel or with a neighbour is displaced by many of its sigmas, and would turn the attitude.
+QUEST is repeated with smaller weights for stars that are far from where the attitude puts them: the
+weights of errors with the tails of Student's t distribution (K. L. Lange, R. J. A. Little and J. M.
+G. Taylor, "Robust statistical modeling using the t distribution", Journal of the American
+Statistical Association 84 (1989), section 3). A star at the edge of the image, beside a hot pixel
+or with a neighbour is displaced by many of its sigmas, and would rotate the attitude.
 
-Beside the rotation the stars tell by what factor the focal length differs from the one that is
-set. The factor is used only where it is significant: stars on one side of the boresight can hardly
-tell it from a rotation, and a camera in its calibration has none. Then the covariance has what it
-adds to the rotation's uncertainty.
+The stars also determine the ratio of the focal length to its setting. It is corrected only where
+the difference is significant: stars on one side of the boresight can hardly separate it from a
+rotation, and a camera as calibrated has none. The covariance then includes its uncertainty.
 """
 
 from dataclasses import dataclass
@@ -33,7 +32,7 @@ _HALF_CHI2 = 0.693  #: median of half the squared length of an error in two axes
 
 @dataclass(frozen=True, eq=False)
 class AttitudeFit:
-    """An attitude with what is known of its error."""
+    """An attitude and its error."""
 
     quaternion: Floats  #: (4,), scalar last, reference to camera
     covariance: Floats  #: (3, 3) of the small rotation's error about the camera's axes, rad^2
@@ -97,7 +96,7 @@ def robust_fit(
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """By what the stars are too far from the boresight, beside an attitude that fits best."""
+    """Relative excess of the stars' distances from the boresight, beside the best attitude."""
 
     #: part of the tangents of their field angles, and its standard deviation
     factor: float
@@ -108,7 +107,7 @@ class _Stretch:
 
     @property
     def is_significant(self) -> bool:
-        """Whether chance would not feign it, errors being as large as the residuals left."""
+        """Whether it exceeds chance, for errors as large as the residuals left."""
         return bool(abs(self.factor) > SIGNIFICANT * self.sigma * max(self.spread, 1.0) ** 0.5)
 
     @classmethod

@@ -7,7 +7,7 @@ import numpy as np
 
 from cubestack.firmware_model.cubestar.detection import Detection
 from cubestack.firmware_model.cubestar.processing.chain import Processing
-from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.telemetry import UNIT_VECTOR_SCALE
 

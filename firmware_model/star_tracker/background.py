@@ -49,8 +49,8 @@ class SkyBackground:
         return value // (CELL * CELL)
 
     def brighter(self, picture: NDArray[np.uint8], sigmas: float, least: int = 0) -> Marks:
-        """Which pixels (rows, columns) exceed the level by so many sigmas of the noise, and by
-        ``least`` 1/16 DN."""
+        """Which pixels (rows, columns) exceed the level by ``sigmas`` of the noise and by ``least``
+        1/16 DN."""
         height, width = picture.shape
         y, x = np.arange(height)[:, None], np.arange(BLOCK // 2, width + BLOCK, BLOCK)[None, :]
         above = np.maximum(sigmas * self.interpolated(self.noises, y, x), least)
@@ -60,8 +60,8 @@ class SkyBackground:
         return bright
 
     def smoothed(self) -> Self:
-        """Each cell's values replaced by the medians of the cell and its eight neighbours, so that
-        a spot that fills a cell does not count."""
+        """Each cell replaced by the median of it and its eight neighbours, which removes spots that
+        fill a cell."""
         return replace(self, levels=_medians(self.levels), noises=_medians(self.noises))
 
 
@@ -78,15 +78,13 @@ def _medians(cells: Ints) -> Ints:
 
 
 def cell_middles(size: int) -> Ints:
-    """Places of the cells' middles along a side of a picture, in the picture."""
+    """Places of the cells' middles along a side of a picture, none outside of it."""
     return np.minimum(np.arange(max(2, -(-size // CELL))) * CELL + CELL // 2, size - 1)
 
 
 def sample_offsets(rows: int, columns: int, step: int) -> tuple[Ints, Ints]:
-    """Rows and columns of the samples in a region, ``step`` px apart.
-
-    A cell that reaches beyond the region repeats its last ones.
-    """
+    """Rows and columns of the samples in a region, ``step`` px apart. A cell that reaches beyond
+    the region repeats its last ones."""
     across = CELL // step
     down, along = (
         np.minimum(step // 2 + step * np.arange(across * max(2, -(-size // CELL))), size - 1)

@@ -1,20 +1,18 @@
-"""Whether an attitude can be believed: the stars that it predicts, beside the measured ones.
+"""Acceptance of an attitude by the stars that it predicts.
 
-An attitude puts catalogue stars into the picture. Those that stand where a star was measured speak
-for it, those that are missing against it. Say N stars are predicted besides those that the attitude
-was made from, and f of them are found. If it is wrong, a predicted star has a measured one in its
-reach by chance: with a probability c, the area of all reaches over that of the picture. If it is
-right, it is seen with a probability s that nobody knows: clouds of light, a high threshold or a
-short exposure hide stars. So every s from 0 to 1 counts alike, and the ratio of the likelihoods is
+Let N catalogue stars be predicted besides those that define the attitude, and f of them be found.
+If the attitude is wrong, a measured star is within the radius of a predicted one with probability
+c: the area of all radii over that of the image. If it is right, a star is seen with an unknown
+probability s: stray light, a high threshold or a short exposure hide stars. All s from 0 to 1 are
+equally likely, so the likelihood ratio is
 
     L = integral of s^f (1 - s)^(N - f) ds / (c^f (1 - c)^(N - f))
       = 1 / ((N + 1) * C(N, f) * c^f * (1 - c)^(N - f))
 
-A wrong attitude reaches a ratio of L with a probability of at most 1 / L, whatever L is (Markov's
-inequality, as a ratio's mean over wrong ones is 1). With the number of wrong attitudes that could
-have been met on the way, 1 / L gives the false alarms to be expected in a picture: the measure of
-belief. A likelihood ratio decides so in Lang et al. 2010, "Astrometry.net", section 2.3, with a
-share of seen stars that is set.
+A wrong attitude reaches L with a probability of at most 1 / L (Markov's inequality, as the mean
+ratio of wrong ones is 1). Multiplied by the expected number of wrong attitudes among those tried, 1
+/ L is the expected number of false alarms per image. Lang et al. 2010, "Astrometry.net", section
+2.3, decides by such a ratio, with a fixed share of seen stars.
 """
 
 from math import comb, hypot, pi
@@ -36,11 +34,11 @@ _SIDES = ((0, 1), (0, 2), (1, 2))
 def matched(
     measured: Floats, predicted: Floats, radius_rad: float, meter: Meter
 ) -> tuple[Indices, Indices, Floats]:
-    """Measured (n, 3) and predicted (m, 3) unit vectors that are nearest to each other.
+    """Rows of ``measured`` and ``predicted`` unit vectors (n, 3) and (m, 3) that are nearest to
+    each other, and their distances in rad (k,), at most a small ``radius_rad``.
 
-    Returns rows of ``measured``, rows of ``predicted`` (k,) and their distances in rad; at most
-    ``radius_rad``, which must be small. Compared are squares of chords, which single precision
-    resolves better than cosines; most candidates fall out by the first component, as an integer.
+    Squares of chords are compared, which single precision resolves better than cosines; most pairs
+    are excluded by the first component, as an integer.
     """
     count, compared = len(measured) + len(predicted), len(measured) * len(predicted)
     if compared == 0:
@@ -71,14 +69,13 @@ def matched(
 
 
 def false_alarm(hypotheses: float, expected: int, found: int, chance: float, meter: Meter) -> float:
-    """Wrong attitudes to be expected that are confirmed as well as this one.
+    """Expected number of wrong attitudes that are confirmed as well as this one.
 
     Args:
-        hypotheses: wrong attitudes to be expected among those tried so far; at least as many as
-            were tried where nothing better is known.
-        expected: catalogue stars predicted in the picture, besides those that made the attitude.
+        hypotheses: expected wrong attitudes among those tried so far.
+        expected: catalogue stars predicted in the image, besides those that define the attitude.
         found: how many of them were found.
-        chance: that a measured star lies in reach of a predicted one by chance; see ``by_chance``.
+        chance: that a measured star is near a predicted one by chance; see ``by_chance``.
         meter: charged with the product, factor by factor.
     """
     squares = 2 * max(expected - found, 1).bit_length()  # (1 - c)^(N - f)
@@ -91,19 +88,17 @@ def false_alarm(hypotheses: float, expected: int, found: int, chance: float, met
 
 
 def by_chance(spare: int, radius_rad: float, solid_angle_sr: float) -> float:
-    """Probability that one of ``spare`` measured stars, strewn over a picture of a solid angle,
-    lies within a radius of a place."""
+    """Probability that one of ``spare`` measured stars, at random in a picture of a solid angle, is
+    within a radius of a place."""
     return min(spare * pi * radius_rad**2 / solid_angle_sr, 0.5)
 
 
 def correction(
     measured: Floats, predicted: Floats, meter: Meter, *, with_scale: bool
 ) -> tuple[Floats, float]:
-    """Small rotation (3, 3) of the predicted unit vectors (n, 3) and factor for the tangents of the
-    measured ones (n, 3) that bring both together by least squares; without scale the factor is 1.
-
-    Differences are taken as small: some 0.01 rad are left as 0.0001.
-    """
+    """Small rotation (3, 3) of the predicted unit vectors (n, 3), and factor of the tangents of the
+    measured ones (n, 3), that fit both by least squares; without scale the factor is 1. It is
+    linear: differences of 0.01 rad leave 0.0001."""
     x, y, z = predicted.T
     size, count = 4 if with_scale else 3, len(predicted)
     # What turns about x, y, z and scale change, and what is to be explained.
@@ -141,11 +136,8 @@ def correction(
 
 
 def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
-    """Direction cosine matrix (3, 3), reference to measured axes, of three unit vectors (3, 3).
-
-    The pair that is widest apart gives it, half of its misfit to each star; the third star decides
-    nothing.
-    """
+    """Direction cosine matrix (3, 3), reference to measured axes, of three unit vectors (3, 3): of
+    the widest pair, half of its misfit at each star."""
     meter.charge(f32_mul=9 + 2 * 24 + 27, f32_add=6 + 2 * 18 + 18, f32_sqrt=4, f32_div=4)
     vectors, known = measured.tolist(), reference.tolist()
     cosines = {(i, j): sum(map(mul, vectors[i], vectors[j])) for i, j in _SIDES}
@@ -155,8 +147,8 @@ def from_three(measured: Floats, reference: Floats, meter: Meter) -> Floats:
 
 
 def volume(vectors: Floats) -> float:
-    """Six times the volume that three vectors (3, 3) span; its sign says which way they turn.
-    The caller charges the meter."""
+    """Six times the volume spanned by three vectors (3, 3), signed by their orientation; not
+    charged."""
     (a, b, c), (d, e, f), (g, h, i) = vectors.tolist()
     return float(a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g))
 

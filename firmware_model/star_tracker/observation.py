@@ -1,8 +1,8 @@
-"""What an attitude predicts in a picture, and how much of it was measured.
+"""Prediction of the stars in an image by an attitude, and the false-alarm probability.
 
-``confirmation`` says how the false-alarm probability is calculated. An attitude is refined with the
-stars that it predicts, within three margins first, then within one. Places that agree within a
-small part of the margin say more, so such parts are tried as well, and count as tries.
+The attitude is refined with the predicted stars that were measured, within three margins first,
+then within one. Agreement within a small part of the margin is stronger evidence, so such parts are
+tried as well, and count as tries.
 """
 
 from bisect import bisect
@@ -55,7 +55,7 @@ class CatalogueStars(Protocol):
 
 
 class View(Protocol):
-    """The part of the sky that a picture shows."""
+    """The part of the sky that an image shows."""
 
     @property
     def smallest_cosine(self) -> np.float32:
@@ -65,7 +65,7 @@ class View(Protocol):
     def solid_angle_sr(self) -> float: ...
 
     def contains(self, directions: Floats, meter: Meter, factor: float = 1.0) -> NDArray[np.bool_]:
-        """Which unit vectors (n, 3) lie where stars can be seen; ``factor``: by which tangents of
+        """Which unit vectors (n, 3) are where stars can be seen; ``factor``: by which tangents of
         measured field angles are multiplied."""
 
 
@@ -110,12 +110,11 @@ class Observation:
         factor: float = 1.0,
         largest: float = LARGEST_FALSE_ALARM,
     ) -> Candidate:
-        """Refine an attitude, and say how often chance confirms one so well.
+        """Refine an attitude ``rotation`` (3, 3), inertial to camera, and compute its false alarms.
 
         Args:
-            rotation: (3, 3) inertial to camera.
             given: stars that propose the attitude.
-            tries: wrong attitudes that such stars propose, to be expected so far.
+            tries: expected wrong attitudes that such stars have proposed so far.
             factor: by which tangents of field angles are multiplied.
             largest: false alarms above which the attitude is not refined.
         """
@@ -150,7 +149,7 @@ class Observation:
         return Candidate(rows, near.take(predicted), apart, rotation, factor, len(near), least)
 
     def _predict(self, rotation: Floats, factor: float) -> tuple[Indices, Floats, Floats]:
-        """Stars (m,) in the picture, and their unit vectors (m, 3) in inertial and camera axes."""
+        """Stars (m,) in the image, and their unit vectors (m, 3) in inertial and camera axes."""
         meter, vectors = self.meter, self.stars.vectors
         near = self.stars.within(rotation[2], self.view.smallest_cosine, meter)
         ahead = vectors.take(near, axis=0)
@@ -160,7 +159,7 @@ class Observation:
         return near.take(inside), ahead.take(inside, axis=0), places.take(inside, axis=0)
 
     def _chance(self, expected: int, found: int, given: int, level: float, tries: float) -> float:
-        """False alarms where so many places agree within a part of the margin."""
+        """False alarms where ``found`` places agree within a part of the margin."""
         spare = len(self.directions) - given
         chance = by_chance(spare, level * self.margin_rad, self.view.solid_angle_sr)
         further, missing = found - given, expected - found
@@ -177,6 +176,6 @@ class Observation:
 
 @lru_cache(maxsize=256)
 def so_few(expected: int, stars: int, solid_angle_sr: float) -> float:
-    """Part of the sky where so many of all its stars, or fewer, are in a picture; at most."""
+    """Largest share of the sky with at most ``expected`` of all its ``stars`` in an image."""
     mean = _UNEVEN * stars / (4 * pi) * solid_angle_sr
     return exp(-mean) * sum(mean**number / factorial(number) for number in range(expected + 1))

@@ -1,9 +1,9 @@
-"""Search for an attitude: triangles propose attitudes, and one is believed only beyond chance.
+"""Search for an attitude: triangles propose attitudes, and one is accepted only beyond chance.
 
-A sensor's catalogue proposes triangles of measured and of catalogue stars, pass by pass. Each gives
-an attitude, which `observation` refines and rates by its expected false alarms. The first one with
-`sure` or fewer is taken at once. Where there is none, the search goes on for rivals, and the best
-below `largest` is taken unless another attitude, or the mirrored sky, is below it too.
+A sensor's catalogue proposes triangles of measured and catalogue stars, pass by pass. Each defines
+an attitude, which ``observation`` refines and rates by its expected false alarms. The first one
+with at most `sure` is accepted at once. Otherwise the search continues for rivals, and accepts the
+best one with at most `largest`, unless another attitude or the mirrored sky has so few too.
 """
 
 from collections.abc import Iterable, Iterator
@@ -52,8 +52,8 @@ class Triangles:
 
 @dataclass(frozen=True, eq=False)
 class SearchPass:
-    """One pass over an observation: steps of triangles, and None where it ends before all of
-    them; whether the observation is a mirrored one, which can only rule out what was found."""
+    """One pass over an observation: steps of triangles, None where it ends before all of them. A
+    mirrored observation can only rule out what was found."""
 
     observation: Observation
     steps: Iterator[Triangles | None]
@@ -72,7 +72,7 @@ class AttitudeSearch:
     tried: int = 0  #: attitudes tried
 
     def run(self, passes: Iterable[SearchPass]) -> Candidate | MatchOutcome:
-        """The attitude that is believed, or why there is none."""
+        """The accepted attitude, or why there is none."""
         weak: list[Candidate] = []
         for each in passes:
             if weak and not each.mirrored:
@@ -111,8 +111,8 @@ class AttitudeSearch:
     def _candidates(
         self, step: Triangles, observation: Observation, seen: list[dict[int, int]]
     ) -> Iterator[Candidate]:
-        """Attitudes of triangles, but of none that one of ``seen`` contains: the star of each
-        centroid, by the attitudes tried so far."""
+        """Attitudes of triangles, except of those in ``seen``: the star of each centroid, by the
+        attitudes tried so far."""
         meter = observation.meter
         for row, (centroids, stars) in enumerate(zip(step.centroids, step.stars, strict=True)):
             if self._late(observation):

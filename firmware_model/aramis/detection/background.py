@@ -1,9 +1,6 @@
-"""The threshold between sky and stars, from the last five pictures.
-
-AraMiS thesis, section 3.5: mean grey level of the last five pictures plus twice the noise. The
-noise is taken as the standard deviation over all pixels that the mean is taken of (the thesis does
-not say how it is measured); stars are in it, but they cover too few pixels to matter.
-"""
+"""The threshold between sky and stars, from the last five pictures. AraMiS thesis, section 3.5:
+their mean grey level plus twice the noise. The noise is the standard deviation over the same pixels
+(the thesis does not define it); stars cover too few pixels to matter."""
 
 from collections import deque
 
@@ -28,7 +25,7 @@ class LevelHistory:
         self.sums: deque[tuple[int, int, int]] = deque(maxlen=FRAMES)
 
     def add(self, picture: NDArray[np.uint8], field: CameraField, meter: Meter) -> None:
-        """Take a picture (rows, columns) into account; pixels outside the field do not count."""
+        """Count a picture (rows, columns), without the pixels outside the field."""
         levels = np.bincount(picture[field.mask], minlength=256).astype(np.int64)
         values, pixels = np.arange(256), field.pixels
         self.sums.append((pixels, int(levels @ values), int(levels @ values**2)))
@@ -41,7 +38,7 @@ class LevelHistory:
         return (total + pixels // 2) // pixels if pixels else 0
 
     def threshold(self, sigmas: float, meter: Meter) -> int:
-        """Level that a star's pixel is above: mean plus so many standard deviations."""
+        """Level above which a pixel is a star's: mean plus ``sigmas`` standard deviations."""
         pixels, total, squares = self._totals()
         # The two products have 62 bits, of four 32-bit ones each.
         meter.charge(i32_add=3 * FRAMES + 8, i32_mul=8, f32_convert=3, f32_div=2, f32_sqrt=1)

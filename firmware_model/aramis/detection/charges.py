@@ -1,7 +1,5 @@
-"""What the search for stars costs the part: operations for each thing that it did.
-
-Masks and histograms are bytes of the processor's own memory, pictures are in external memory.
-"""
+"""Cost of the search for stars: the part's operations for each thing done. Masks and histograms are
+bytes of the processor's own memory, pictures are in external memory."""
 
 from math import ceil, log2
 
@@ -9,6 +7,7 @@ import numpy as np
 
 from cubestack.firmware_model.aramis.detection.regions import Regions
 from cubestack.firmware_model.aramis.detection.smear import LARGEST
+from cubestack.firmware_model.aramis.detection.spikes import WINDOW, SpikeRemoval
 from cubestack.firmware_model.aramis.detection.spots import RING, StarSpots
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.background import BLOCK, CELL, SkyBackground
@@ -24,13 +23,25 @@ def charge_background(sky: SkyBackground, meter: Meter) -> None:
 
 
 def charge_thresholds(height: int, width: int, meter: Meter) -> None:
-    """Each pixel compared with the threshold of its block, which steps on from block to block; the
-    step is calculated for each row of a cell."""
+    """Each pixel compared with the threshold of its block; its step is calculated for each row of a
+    cell."""
     pixels, blocks = height * width, height * -(-width // BLOCK)
     steps = height * -(-width // CELL)
     meter.charge(pixel_read=pixels, i32_add=pixels, ram_write=pixels // 4, loop=pixels)
     meter.charge(i32_add=6 * blocks + 12 * steps, i32_mul=4 * steps, table_byte=4 * steps)
     meter.charge(loop=blocks)
+
+
+def charge_spikes(shape: tuple[int, int], method: SpikeRemoval, cleared: int, meter: Meter) -> None:
+    """Method 1: two running sums, an addition and a subtraction for each pixel. Method 2: all
+    pixels added up, the windows compared, and some ``cleared``."""
+    pixels = shape[0] * shape[1]
+    if method is SpikeRemoval.CENTRE:
+        meter.charge(table_byte=4 * pixels, i32_add=5 * pixels, loop=2 * pixels)
+        meter.charge(ram_write=2 * pixels)
+    elif method is SpikeRemoval.WINDOW:
+        steps = pixels + -(-shape[0] // WINDOW) * -(-shape[1] // WINDOW)
+        meter.charge(table_byte=pixels, i32_add=steps, loop=steps, ram_write=cleared * WINDOW**2)
 
 
 def charge_regions(mask_size: int, regions: Regions | None, meter: Meter) -> None:

@@ -1,10 +1,7 @@
-"""How far the stars were drawn out while the picture was taken. An extension: the thesis has none.
-
-A star that moves during the exposure leaves a streak. Its second moments along and across differ by
-the square of the streak's length over twelve, as those of a line do, whatever the star's own width.
-Streaks of a turn lie the same way: along one direction, or around the boresight. Tracks of protons
-lie in all directions; they are no stars.
-"""
+"""How far motion drew the stars out during the exposure. An extension: the thesis has none. The
+second moments of a streak along and across differ by the square of its length over twelve, as those
+of a line do, whatever the star's width. Streaks of a turn are parallel, or around the boresight.
+Tracks of protons have all directions and are no stars."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +23,8 @@ TRACK_PX = 6.0  #: beside stars at rest, what is longer is a track
 
 
 def smear_px(picture: NDArray[np.uint8], regions: Regions, floor: int) -> float:
-    """Upper quartile of the lengths of the largest regions, weighed by grey levels above `floor`.
-
-    0 without regions.
-    """
+    """Upper quartile of the lengths of the largest regions, weighted by grey levels above `floor`;
+    0 without regions."""
     if not regions.count:
         return 0.0
     grey = picture[regions.rows, regions.columns].astype(np.float32)

@@ -1,10 +1,10 @@
-"""Who is who: which star of the matched triangle each measured star is.
+"""Assignment of the stars of a matched triangle to the measured ones.
 
-AraMiS thesis, section 5.8 (tables 5.1 to 5.3). Two criteria put a score into a 3 x 3 matrix of
+AraMiS thesis, section 5.8 (tables 5.1 to 5.3). Two criteria add a score to a 3 x 3 matrix of
 measured against catalogue stars: the order of brightness, and the order of the sides. Each scores
 its coefficient of variation (standard deviation over mean of the three measured values), so the
-criterion whose values differ more decides where both disagree. A side stands for the star opposite
-to it. `assign_plainly` follows the listing of appendix E, which differs.
+criterion with the larger differences decides. A side represents the star opposite to it.
+`assign_plainly` follows the listing of appendix E, which differs.
 """
 
 from dataclasses import dataclass

@@ -1,11 +1,8 @@
-"""From measured stars to an attitude that further stars confirm, within the time there is.
-
-An extension: the AraMiS thesis believes every unique triangle, and many of its results are wrong
-(section 8.2). Here triples propose attitudes one after the other (``triple_triangles``) to the
-search that all star trackers share (``star_tracker.search``). The one that is believed is put at
-the middle row's time where stars moved, fitted to its stars, and refused where they leave too much
-doubt about its angles.
-"""
+"""Attitudes that further stars confirm, within the time limit. An extension: the AraMiS thesis
+accepts every unique triangle, and many of its results are wrong (section 8.2). Here triples propose
+attitudes (``triple_triangles``) to the search that all star trackers share
+(``star_tracker.search``). The accepted one is corrected to the middle row's time where stars moved,
+fitted to its stars, and refused where its angles are too uncertain."""
 
 from dataclasses import replace
 
@@ -23,7 +20,7 @@ from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.observation import Candidate, Observation
-from cubestack.firmware_model.star_tracker.rating import Rating
+from cubestack.firmware_model.star_tracker.quality import Rating
 from cubestack.firmware_model.star_tracker.search import AttitudeSearch, MatchOutcome
 
 FEWEST_STARS = 4
@@ -93,7 +90,7 @@ def _solution(
     field: CameraField,
     profile: Profile,
 ) -> Solution:
-    """Fit a confirmed attitude, or say why its angles are in too much doubt."""
+    """Fit a confirmed attitude, or refuse it where its angles are too uncertain."""
     meter, named = picture.meter, found.centroids
     expected = found.expected
     sigmas = np.sqrt(sigma_px[named] ** 2 + FLOOR_PX**2) * np.float32(field.scale[1])
@@ -140,7 +137,7 @@ def _at_middle_row(
     profile: Profile,
 ) -> tuple[Floats, Floats] | None:
     """Directions (k, 3) of the stars at one instant and their errors (k,) in rad, ``sigmas`` where
-    they did not move; None where the turn about the boresight is in too much doubt."""
+    they did not move; None where the turn about the boresight is too uncertain."""
     named, meter = found.centroids, picture.meter
     vectors = picture.directions[named]
     still = measured.smear_px <= profile.smear_px or measured.skew_px <= 0

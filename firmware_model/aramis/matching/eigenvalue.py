@@ -3,10 +3,10 @@
 AraMiS thesis, section 6.2 (equation 6.8), in single precision: Newton's method from 1. The printed
 constant term is corrected to ab + cs - d.
 
-In a narrow field the two largest roots are so close that the rounding of the coefficients would
-move the root by more than the noise of the directions does, and the attitude by degrees. A value of
-the quartic within `ROUNDING` therefore counts as 0. With matching stars that leaves the root at 1,
-as the thesis says of Shuster's shortcut; with contradicting ones it moves.
+In a narrow field the two largest roots are so close that rounding of the coefficients would move
+the root by more than the noise of the directions, and the attitude by degrees. So a value of the
+quartic within `ROUNDING` counts as 0. With matching stars the root remains 1, as in Shuster's
+shortcut; with contradicting ones it moves.
 """
 
 import numpy as np

@@ -1,14 +1,11 @@
 """From measured stars to an attitude: triples, pivots, identities, QUEST and the outcome.
 
 AraMiS thesis, sections 5.5 to 5.9 and 6.2. In the published profile the three brightest stars are
-the main triangle, the next three the pivots, and a unique triangle is believed. A rough direction
-leaves the triangles around it; an extension is that it also must be close to the boresight found,
-and that the sides must agree with the identities, of which the second choice will do. Appendix E
+the main triangle, the next three the pivots, and a unique triangle is accepted. A rough direction
+selects the triangles around it; extensions are that it must be close to the boresight found, and
+that the sides must agree with the identities, if need be by the second criterion. Appendix E
 differs from the text: it measures a pivot even for a unique triangle, so it needs a fourth star,
-and it tells stars apart in its own way.
-
-With verification (an extension), further triples are tried until further stars confirm an attitude:
-`confirmed.py`.
+and it assigns stars by its own listing. With verification (an extension), see `confirmed`.
 """
 
 from dataclasses import dataclass, replace

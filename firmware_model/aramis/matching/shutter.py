@@ -1,14 +1,11 @@
-"""Stars put back to where they were when the middle row was exposed.
+"""Correction of star directions to the time at which the middle row was exposed. An extension.
 
-An extension: the thesis has none.
-
-The rows of a frame are exposed one after the other. When the camera turns, each star is measured
-at its own row's time, and as stars are not spread evenly over the rows, the attitude of all of them
-is not that of one instant. A turn moves a star at `u` of the frame's height from the middle row by
-(a + u b) x v, with `a` what is still wrong with the attitude and `b` the turn from the first row to
-the last; both come from least squares over the stars that are already identified. Streaks that fall
-apart or join have wrong centroids, and the outer ones have most say in `b`, so stars that fit badly
-count less, the more so the worse: a weight of 1 / (1 + (distance / twice the median)^2).
+The rows of a frame are exposed one after the other. When the camera turns, each star is measured at
+its own row's time, so the attitude of all of them is not that of one instant. A turn moves a star
+at `u` of the frame's height from the middle row by (a + u b) x v, with `a` the error of the
+attitude and `b` the turn from the first row to the last; least squares over the identified stars
+yield both. Streaks that fall apart or join have wrong centroids, and the outer ones influence `b`
+most, so stars that fit badly weigh 1 / (1 + (distance / twice the median)^2).
 """
 
 import numpy as np
@@ -34,18 +31,14 @@ _ONE = np.float32(1)
 def at_middle_row(
     vectors: Floats, predicted: Floats, heights: Floats, moved_rad: float, meter: Meter
 ) -> tuple[Floats, Floats, float]:
-    """Directions as the middle row's exposure would have measured them.
+    """Unit vectors (n, 3) as the middle row's exposure would have measured them, to first order;
+    weights (n,) of 0 to 1; and the standard deviation in rad of the turn about the boresight.
 
     Args:
         vectors: (n, 3) measured unit vectors in camera axes, n at least `FEWEST`.
         predicted: (n, 3) where the attitude puts those stars.
         heights: (n,) rows from the middle row, in heights of the picture, -0.5 to 0.5.
-        moved_rad: how far the stars moved from the first row's exposure to the last's, above 0.
-        meter: charged.
-
-    Returns:
-        Unit vectors (n, 3) to first order of the turn, weights (n,) of 0 to 1, and the standard
-        deviation in rad that they leave of the turn about the boresight.
+        moved_rad: motion of the stars from the first row's exposure to the last's, above 0.
     """
     count = len(vectors)
     design = _design(predicted, heights)

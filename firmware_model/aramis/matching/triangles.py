@@ -1,10 +1,10 @@
-"""A planar triangle of three star directions: area, polar moment, and how well they are known.
+"""A planar triangle of three star directions: area, polar moment, and their standard deviations.
 
 AraMiS thesis, section 5.5 (equations 5.7 to 5.21), in single precision. Side a joins stars 1 and 2,
-b joins 2 and 3, c joins 1 and 3; they are chords of the unit sphere, so they have no unit. Three
-printed slips are set right: the covariance of equation 5.13 is sigma squared times the projector,
-the derivative of the area by c is (u1 + u2 + u3 - u4) / 4A, and the three derivatives of equation
-5.19 are A a / 18, A b / 18 and A c / 18.
+b joins 2 and 3, c joins 1 and 3; they are chords of the unit sphere, without a unit. Three printed
+slips are corrected: the covariance of equation 5.13 is sigma squared times the projector, the
+derivative of the area by c is (u1 + u2 + u3 - u4) / 4A, and the three derivatives of equation 5.19
+are A a / 18, A b / 18 and A c / 18.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Triangle:
 
 
 def charge_triangles(count: int, meter: Meter) -> None:
-    """Charge ``count`` triangles whose stars do not stand on a line."""
+    """Charge ``count`` triangles whose stars are not on a line."""
     _charge_sides(count, meter)
     meter.charge(f32_sqrt=3 * count, f32_add=68 * count, f32_mul=75 * count, f32_div=17 * count)
     meter.charge(f32_compare=2 * count, loop=6 * count)

@@ -85,17 +85,16 @@ def match_triple(
     meter: Meter,
     enough: int | None = 1,
 ) -> Match:
-    """Match the triangle of three stars, with pivots as long as too many candidates are left.
+    """Match the triangle of three stars, with pivots while too many candidates are left.
 
     Phases: `triangles`, `search` and `pivoting`.
 
     Args:
         vectors: (n, 3) unit vectors of the stars in camera axes, with noise ``sigma_rad`` per axis.
-        main: the three stars of the main triangle, the brightest first.
-        pivots: further stars, at most three are used.
+        main, pivots: stars of the main triangle, the brightest first; at most three further stars.
         faces: (f,) which faces count; None: all.
-        enough: no pivot is needed when so few candidates are left, 1 in section 5.7; None: as in
-            appendix E, one at least, and further ones until one candidate is left, not none.
+        enough: candidates for which no pivot is needed, 1 in section 5.7; None: as in appendix E,
+            one pivot at least, and further ones until one candidate is left, not none.
     """
     with meter.phase("triangles"):
         triangle = measure_triangle(vectors[list(main)], sigma_rad, meter)

@@ -1,8 +1,6 @@
-"""Finding stars in a picture, by the published search or by that above the background.
-
-A search names the pixels that it reads and writes, in its order, and leaves the accesses to whoever
-has the picture: an array here, a memory behind an FPGA elsewhere.
-"""
+"""Detection of stars in an image: the published search, and the one above the background. A search
+yields the pixels that it reads and writes in order; the caller performs the accesses, on an array
+or on a memory behind an FPGA."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +34,10 @@ __all__ = [
 
 
 def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter) -> Detection:
-    """Find the stars of a picture (rows, columns) of 8-bit values; the picture is not changed.
+    """Find the stars of an image (rows, columns) of 8-bit values, which is not changed.
 
-    Charges what ``search_stars`` charges, and every access to the picture.
-
-    Raises:
-        DetectionConfigError: when the region reaches beyond the picture.
+    Charges what ``search_stars`` charges, and every access. Raises DetectionConfigError when the
+    region reaches beyond the image.
     """
     rows, columns = image.shape
     pixels = image.reshape(-1).copy()
@@ -64,11 +60,8 @@ def detect_stars(image: NDArray[np.uint8], config: DetectionConfig, meter: Meter
 
 
 def search_stars(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
-    """Find the stars of a picture of so many 8-bit values that is somewhere else.
-
-    Charges all but the accesses that it yields. Phases: `search` and `centroid`. Raises as
-    ``detect_stars`` does.
-    """
+    """Find the stars of an image of ``rows`` by ``columns`` 8-bit values; phases `search` and
+    `centroid`. The yielded accesses are not charged. Raises as ``detect_stars`` does."""
     config.check_region(rows, columns)
     search = background_search if config.background else sampled_search
     return search(rows, columns, config, meter)

@@ -1,17 +1,15 @@
-"""The search above the picture's own background: all pixels, the brightest stars, and true reasons.
+"""The search above the local background: all pixels, the brightest stars, and statistics.
 
 1. Samples of the region give level and noise of the sky in cells (``star_tracker.background``).
-2. Row by row, each pixel is compared with the level, plus the star threshold or `SIGMAS` of the
-   noise, whichever is more; near the Earth's limb or the Moon with what surrounds it (`steep`).
-   What is sharper than a spot is dropped; the rest forms areas (`areas`).
-   A part of the picture that is bright all over is its own background, and nothing is found there.
-3. Areas that are too large, too small, too faint or drawn out are counted and dropped. Of the rest
-   the brightest are kept. Where those of the minimum size are too few, smaller ones fill the list,
-   as in pictures of sharp and faint spots.
-4. Around each brightest pixel a window is read again: its shape decides, and gives the centroid
-   (`spots`).
+2. Row by row, each pixel is compared with the level plus the star threshold or `SIGMAS` of the
+   noise, whichever is more; near the Earth's limb or the Moon with its surroundings (`steep`).
+   Pixels sharper than a spot are dropped; the rest forms areas (`areas`).
+3. Areas that are too large, too small, too faint or elongated are counted and dropped. The
+   brightest others are kept. Where those of the minimum size are too few, smaller ones fill the
+   list, as in images of sharp and faint spots.
+4. A window around each brightest pixel is read again, judged by its shape and measured (`spots`).
 
-The time is limited: rows that are not reached by then are not searched, and the search ends so.
+Time is limited: rows that are not reached are not searched. What it costs is in `charges`.
 """
 
 from collections.abc import Generator
@@ -60,7 +58,7 @@ Bytes = NDArray[np.uint8]
 
 
 def background_search(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
-    """Find the stars of a picture of so many 8-bit values; see ``search_stars``."""
+    """Find the stars of an image of ``rows`` by ``columns``; see ``search_stars``."""
     region = _Region(config.y_start, config.x_start, config.y_end, config.x_end, columns)
     limit = meter.total + LIMIT_MS * meter.table.clock_hz // 1000
     with meter.phase("search"):
@@ -128,8 +126,8 @@ def _read(region: _Region, meter: Meter) -> Generator[Look, Any, tuple[SkyBackgr
 def _bright(
     region: _Region, picture: Bytes, sky: SkyBackground, config: DetectionConfig, meter: Meter
 ) -> Generator[Look, Any, tuple[Marks, steep.LocalBackground, bool]]:
-    """Pixels above the sky around them, of all but the outermost ones; this sky; and whether all
-    slopes were searched."""
+    """Pixels above the sky around them, except the outermost ones; this sky; and whether all slopes
+    were searched."""
     height, width = picture.shape
     least = UNIT * config.star_threshold // 2
     bright = sky.brighter(picture, SIGMAS, least)
@@ -153,10 +151,8 @@ def _bright(
 def _areas(
     picture: Bytes, bright: Marks, sky: steep.LocalBackground, limit: int, meter: Meter
 ) -> tuple[Areas, int, bool]:
-    """Areas without spikes, the number of these, and whether the time sufficed for all rows.
-
-    It must not take longer than until the meter's total reaches ``limit``.
-    """
+    """Areas without spikes, the number of spikes, and whether all rows were searched before the
+    meter's total reached ``limit``."""
     (height, width), pixels = bright.shape, picture.reshape(-1)
     runs = Runs.of(bright)
     places = runs[areas.short(runs)].places()
@@ -183,8 +179,8 @@ def _areas(
 
 @dataclass(frozen=True, eq=False)
 class _Stars:
-    """Stars of the candidates: their centroids, brightest pixels (n, 2) in the picture and areas
-    (n,), the candidates that are particles, and the width of the stars' spots."""
+    """Stars among the candidates: centroids, brightest pixels (n, 2) in the image, areas (n,),
+    number of particles, and width of the spots."""
 
     measured: spots.Centroids
     peaks: Ints

@@ -1,4 +1,4 @@
-"""What the search above the background costs the part: operations for each thing that it did."""
+"""Cost of the search above the background: the part's operations for each thing done."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +48,8 @@ def charge_background(sky: SkyBackground, meter: Meter) -> None:
 
 
 def charge_thresholds(height: int, width: int, meter: Meter) -> None:
-    """A comparison and a branch for each pixel; the threshold steps on with each block, and its
-    step is calculated for each row of a cell."""
+    """A comparison and a branch per pixel; the threshold changes with each block, and its step is
+    calculated for each row of a cell."""
     blocks, steps = height * -(-(width + BLOCK // 2) // BLOCK), height * max(2, -(-width // CELL))
     meter.charge(i32_add=2 * height * width + 6 * blocks + 12 * steps, loop=blocks + steps)
     meter.charge(ram_read=4 * steps, i32_mul=4 * steps)
@@ -61,8 +61,8 @@ def rows_in_time(
     cycles: int,
     meter: Meter,
 ) -> int:
-    """Rows that can be searched in so many ``cycles``; ``rows_of``: rows of things, the operations
-    of one, and their share."""
+    """Number of rows that ``cycles`` suffice for; ``rows_of``: rows of things, operations of one,
+    and their share."""
     spent = np.zeros(height)
     for rows, operations, share in rows_of:
         each = sum(meter.table.operations[name].cycles * n for name, n in operations.items())

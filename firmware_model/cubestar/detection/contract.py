@@ -1,4 +1,4 @@
-"""What every star search is asked and answers, and how it reaches a picture that is elsewhere."""
+"""Settings, results and memory accesses of a star search."""
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.firmware_model.star_tracker.disturbance import SkyStatistics
+from cubestack.firmware_model.star_tracker.quality import SkyStatistics
 from cubestack.firmware_model.values import DeclaredValues, flag, whole
 
 
@@ -71,11 +71,8 @@ class DetectionConfig(DeclaredValues):
         return max(self.detection_threshold, self.star_threshold)
 
     def check_region(self, rows: int, columns: int) -> None:
-        """Refuse a region that reaches beyond a picture of so many rows and columns.
-
-        Raises:
-            DetectionConfigError: naming the edge that does.
-        """
+        """Raise DetectionConfigError, naming the edge, for a region beyond an image of ``rows`` by
+        ``columns``."""
         self.check_within("x_end", high=columns)
         self.check_within("y_end", high=rows)
 
@@ -122,10 +119,8 @@ class Detection:
 
 @dataclass(frozen=True)
 class Look:
-    """Read pixels one after the other, up to and with the first one above ``above``.
-
-    The answer are the values read, uint8, at most as many as ``offsets``, (n,) int32.
-    """
+    """Read pixels ``offsets`` (n,) int32 one after the other, up to and including the first above
+    ``above``. The answer is their values, uint8."""
 
     offsets: NDArray[np.int32]
     above: int = 255

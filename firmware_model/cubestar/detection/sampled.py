@@ -1,20 +1,20 @@
 """The published search: image plane search, region growing, centroids.
 
-CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. What the text leaves open is settled here:
+CubeStar thesis, sections 4.1.1 to 4.1.3 and 5.3.3. Not in the text, so chosen here:
 
 - A sample above both thresholds starts an area; a neighbour above the star threshold joins it. The
   published firmware has one threshold for both, so both default to 6.
 - Growing is recursive, neighbours in the order left, right, up, down. An area that would exceed the
-  maximum size stops growing and is invalid; the rest of a large blob is then met again by the
-  search, and ends it through the limit of invalid areas.
+  maximum size stops growing and is invalid; the search meets the rest of a large blob again, and
+  ends at the limit of invalid areas.
 - Areas below the minimum size are noise. They are counted, and too many of them end the search.
 - A pixel of the centroid's grid counts when it was grown. It weighs its value, as printed, or its
-  value above the star threshold: the plain value pulls the centroid towards the grid's middle as
-  soon as there is background. Among equally bright pixels (a saturated star) the grid is centred
-  on their mean.
+  value above the star threshold: the plain value pulls the centroid towards the middle of the grid
+  where there is background. Among equally bright pixels (a saturated star) the grid is centred on
+  their mean.
 - The dark value is the mean of the samples that were not bright enough to start an area.
-- Visited pixels are zeroed during the search and written back from a list at its end, because the
-  ground downloads the same picture afterwards.
+- Visited pixels are zeroed during the search and restored from a list at its end, because the
+  ground downloads the same image afterwards.
 """
 
 from collections.abc import Generator
@@ -45,7 +45,7 @@ class _Area:
 
 
 def sampled_search(rows: int, columns: int, config: DetectionConfig, meter: Meter) -> Search:
-    """Find the stars of a picture of so many 8-bit values; see ``search_stars``."""
+    """Find the stars of an image of ``rows`` by ``columns``; see ``search_stars``."""
     along = np.arange(config.x_start, config.x_end, config.step, dtype=np.int32)
     down = np.arange(config.y_start, config.y_end, config.step, dtype=np.int32)
     samples = (down[:, None] * columns + along).reshape(-1)
@@ -106,10 +106,7 @@ def sampled_search(rows: int, columns: int, config: DetectionConfig, meter: Mete
 def _grow(
     seed: int, value: int, columns: int, rows: int, config: DetectionConfig
 ) -> Generator[Look | Put, Any, _Area]:
-    """Collect the seed's area depth first and zero its pixels.
-
-    What the recursion still has to look at is a stack, its top the next place.
-    """
+    """Collect the seed's area depth first and zero its pixels. A stack replaces the recursion."""
     offsets, values = [seed], [value]
     yield _zero(seed)
     stack, looked_at = _neighbours(seed, columns, rows), 0

@@ -1,13 +1,12 @@
-"""Which bright spots are stars, and where exactly: shape tests and weighted centroids.
+"""Shape tests and weighted centroids of bright spots.
 
-A centroid is the place about which the signal, weighed with a Gaussian of the spots' own width,
-balances: unbiased where a window cuts the spot, and as accurate as a fit of the spot. The width is
-the median of those of the picture's stars. What stands out above the Gaussian, a hot pixel or a
-neighbour, is replaced by it. The program works in whole numbers with a table of weights; only the
-last division is in floating point.
+A centroid is the place about which the signal, weighted with a Gaussian of the spots' own width, is
+balanced: unbiased where a window cuts the spot, and as accurate as a fit. The width is the median
+of the image's stars. Signal above the Gaussian, a hot pixel or a neighbour, is replaced by it. The
+program uses whole numbers and a table of weights; only the last division is in floating point.
 
-Expected errors: Cramer-Rao bounds of a Gaussian spot of width s and light F. Noise n in each pixel
-makes n s^2 sqrt(8 pi) / F, the light's own noise s / sqrt(electrons).
+Expected errors are Cramer-Rao bounds of a Gaussian spot of width s and light F: n s^2 sqrt(8 pi) /
+F for noise n in each pixel, s / sqrt(electrons) for the light's own noise.
 """
 
 from dataclasses import dataclass
@@ -86,11 +85,11 @@ def too_sharp(windows: Ints, noises: Ints) -> NDArray[np.bool_]:
 
 
 def shapes(windows: Ints, starts: Reals, saturated: Marks, noises: Ints) -> tuple[Marks, float]:
-    """Which ``windows`` have a star in them, and the width of the stars' spots in px.
+    """Which ``windows`` contain a star, and the width of the stars' spots in px.
 
     A spot of variance v has 1 / (1/v + 1/w) under weights of variance w. The usual width is that of
-    the brightest round spots: particles leave narrow ones, haze faint and wide ones. For the
-    arguments see ``centre``; the brightest window comes first.
+    the brightest round spots: particles leave narrow ones, haze faint and wide ones. Arguments as
+    for ``centre``; the brightest window comes first.
     """
     at, count = _in_parts(starts), len(windows)
     variances = _Weights.about(at, np.full(count, WIDE_SIGMA_PX)).variances(windows)
@@ -115,13 +114,12 @@ def _disturbed(windows: Ints, at: Ints, sigmas: Reals, noises: Ints) -> Reals:
 
 
 def centre(windows: Ints, starts: Reals, saturated: Marks, noises: Ints, sigma: float) -> Centroids:
-    """Centroids of ``windows``: signal (n, 9, 9) in 1/16 DN, looked for from ``starts`` (n, 2).
+    """Centroids of ``windows``: signal (n, 9, 9) in 1/16 DN around the brightest pixel of a spot.
 
     Args:
-        windows: around the brightest pixel of each spot.
-        starts: from the windows' middles, in px.
-        saturated: whose flat middle says nothing; weighed more widely (n,).
-        noises: of a pixel in 1/16 DN (n,).
+        starts: (n, 2) first places from the windows' middles, in px.
+        saturated: (n,) whose flat middle has no information, so they are weighted more widely.
+        noises: (n,) of a pixel in 1/16 DN.
         sigma: of a spot in px.
     """
     spread = np.where(saturated, np.maximum(WIDE_SIGMA_PX, sigma), sigma)

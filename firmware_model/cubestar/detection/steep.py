@@ -1,9 +1,9 @@
-"""Where the sky's brightness changes within a cell: at the Earth's limb, beside the Moon.
+"""Detection where the sky's brightness changes within a cell: at the Earth's limb, near the Moon.
 
-There a level interpolated between cells is wrong by more than stars are bright. A pixel is compared
-with the middles of the lines between pixels on opposite sides instead, along the row, the column
-and both diagonals: on a slope all agree, along an edge one does, and only a spot is above them all.
-The row is in memory already; the other directions are read for what stands out along it.
+There a level interpolated between cells is wrong by more than the brightness of stars. A pixel is
+compared with the middles of the lines between pixels on opposite sides instead, along the row, the
+column and both diagonals: on a slope all agree, along an edge one does, and only a spot exceeds
+them all. The row is in memory already; the other directions are read for what exceeds it.
 """
 
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ class Places:
 
 
 def steep(sky: SkyBackground, height: int, width: int) -> Marks:
-    """Which pixels (height, width) are in a cell that differs much from one of its neighbours."""
+    """Which pixels (height, width) are in a cell that differs from one of its neighbours."""
     padded = np.pad(sky.levels, 1, mode="edge")
     around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
     most = max(STEEP_DN * UNIT, STEEP_SIGMAS * int(np.median(sky.noises)))
@@ -56,7 +56,7 @@ def steep(sky: SkyBackground, height: int, width: int) -> Marks:
 
 
 def along_rows(picture: NDArray[np.uint8], marks: Marks, sky: SkyBackground, least: int) -> Places:
-    """Marked pixels that stand out along their row, by ``least`` (1/16 DN) at least."""
+    """Marked pixels that exceed their row by ``least`` (1/16 DN) at least."""
     rows, columns = np.nonzero(marks)
     last = picture.shape[1] - 1
     one = picture[rows, np.maximum(columns - REACH, 0)].astype(np.int64)
@@ -79,7 +79,7 @@ def all_ways(
     sky: SkyBackground,
     least: int,
 ) -> Places:
-    """Which of the places stand out above the pixels ``beside`` (6 n,) too."""
+    """Which places exceed the pixels ``beside`` (6 n,) too."""
     pairs = beside.reshape(3, 2, -1).sum(axis=1, dtype=np.int64)
     levels = np.maximum(places.levels, (pairs.max(axis=0, initial=0) + 1) // 2 * UNIT)
     return _standing_out(picture, Places(places.rows, places.columns, levels, levels), sky, least)
@@ -88,8 +88,8 @@ def all_ways(
 def _standing_out(
     picture: NDArray[np.uint8], places: Places, sky: SkyBackground, least: int
 ) -> Places:
-    """Places above their level by four times the noise of the sky and of the light there, where
-    that is not so bright that the end of the scale makes an edge."""
+    """Places that exceed their level by four times the noise of the sky and of its light, where
+    that is not so bright that the end of the scale looks like an edge."""
     dark = int(np.median(sky.noises))
     light = UNIT * places.levels / ELECTRONS_PER_DN
     noises = np.sqrt(1.5 * (dark * dark + light)).astype(np.int64)

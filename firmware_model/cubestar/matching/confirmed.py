@@ -84,19 +84,15 @@ def identify(
     """Identify centroids of unit vectors (n, 3): lost in space, or near a `boresight` (3,).
 
     Phases: `reduction` (assisted only), `distances`, `votes`, `identities`, `verification`,
-    `selection`; in each, all tries together.
+    `selection`, each summed over all tries.
 
     Args:
         directions: in camera axes, by the calibration.
-        brightness: (n,) the order in which centroids are tried; None is the given order.
-        catalogue: stars and pairs.
-        field: what of the sky is in the picture.
-        meter: charged with every operation.
-        boresight: only stars within `radius_deg` of it count.
-        radius_deg: half the field plus the largest error of the boresight.
+        brightness: (n,) decides the order in which centroids are tried; None keeps it.
+        radius_deg: only stars within it of the `boresight` count: half the field plus its error.
         margin_rad: largest distance of a star from its predicted place.
         limit_s: the part's time, which is not exceeded.
-        largest_false_alarm: highest expected number of false alarms per picture.
+        largest_false_alarm: highest expected number of false alarms per image.
         passes: searches, one after the other.
     """
     count = len(directions)

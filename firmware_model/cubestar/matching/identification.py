@@ -1,9 +1,8 @@
-"""What every matching mode returns, and the verification that they share.
+"""Results of all matching modes, and the verification that they share.
 
 CubeStar thesis, section 4.3.3 (verification round, stars within one vote of the maximum) and
-section 5.3.4 (the weights are the verification votes). The text leaves open what happens when the
-kept stars contradict each other; they can be thinned until every pair of them agrees. Two centroids
-that share an identity then count as a contradiction, however close they are.
+section 5.3.4 (the weights are the verification votes). Kept stars may contradict each other; they
+can be thinned until every pair agrees. Two centroids with one identity then contradict each other.
 """
 
 from dataclasses import dataclass, field
@@ -49,22 +48,21 @@ class Identification:
 
     @property
     def confidence(self) -> NDArray[np.float32]:
-        """(n,) votes as a part of the most that so many centroids could give, 0 to 1; 0 for a
-        centroid without identity."""
+        """(n,) votes over the largest number possible; 0 for a centroid without identity."""
         most = max(len(self.stars) - 1, 1)
         part = self.votes.astype(np.float32) / np.float32(most)
         return np.where(self.stars != NONE, part, np.float32(0))
 
 
 def unidentified(count: int, outcome: MatchOutcome) -> Identification:
-    """Identification of `count` centroids that gave nothing."""
+    """Identification of ``count`` centroids without a result."""
     return Identification(
         np.full(count, NONE, dtype=np.int32), np.zeros(count, dtype=np.uint8), outcome
     )
 
 
 def identified(centroids: NDArray[np.intp], confirmed: Candidate, count: int) -> Identification:
-    """Identification of `count` centroids by an attitude that so many of them confirm."""
+    """Identification of ``count`` centroids by an attitude that some of them confirm."""
     stars = np.full(count, NONE, np.int32)
     residuals = np.full(count, nan, np.float32)
     votes = np.zeros(count, np.uint8)
@@ -118,11 +116,10 @@ def verify(
     *,
     thinned: bool,
 ) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    """Let every pair of centroids vote for its identities, and keep those that all agree.
+    """Let every pair of centroids vote for its identities (n,), indices into ``vectors`` or -1.
 
-    ``identities`` (n,) are indices into ``vectors`` (stars, 3) or -1. Returns the votes (n,) of the
-    verification round, and the identities with -1 for what was not kept: votes below one less than
-    the maximum or, if ``thinned``, no vote or a contradiction with the other kept stars.
+    Returns the votes (n,), and the identities with -1 for what was dropped: votes below one less
+    than the maximum or, if ``thinned``, no vote or a contradiction with the other kept stars.
     """
     named = (identities[pairs.first] != NONE) & (identities[pairs.second] != NONE)
     first, second = pairs.first[named], pairs.second[named]

@@ -1,12 +1,11 @@
 """Triangles of centroids that agree with triangles of catalogue stars, from the pair list.
 
-An extension. Centroids come in an order, the brightest first. Each new one is paired with all
-before it; every entry of the pair list as wide as such a pair names the new centroid with one of
-its stars, and the older one with the other. Two entries that give the new centroid the same star
-name two older centroids: if these two stars stand as far apart as the centroids do, and turn the
-same way, there is a triangle. So each triple is tried once, all triples of bright centroids before
-any with a fainter one, and a false star spoils only those that it is in. (Pyramid, Mortari et al.
-2004, has the same aim with its order of triples.)
+An extension. Each centroid, the brightest first, is paired with all before it. Every entry of the
+pair list as wide as such a pair assigns one of its stars to the new centroid, and the other to the
+older one. Two entries that assign the same star to the new centroid also name two older ones: with
+a third side as wide as theirs, and the same orientation, it is a triangle. So each triple is tried
+once, all triples of bright centroids before any with a fainter one, and a false star spoils only
+its own. (Pyramid, Mortari et al. 2004, orders triples for the same purpose.)
 """
 
 from collections.abc import Iterator
@@ -90,8 +89,8 @@ class PairTriangles:
         self, newest: int, angles: Floats, cosines: Floats, sines: Floats, tolerance_rad: float
     ) -> tuple[Indices, Indices, Floats, int] | None:
         """Triangles of the newest centroid, those first whose new star has most of them: centroids
-        and stars (t, 3), largest difference of the sides (t,) in rad, and entries of the pair list;
-        None where these, or the time for them, are too many."""
+        and stars (t, 3), largest difference of the sides (t,) in rad, and number of entries of the
+        pair list; None where these are too many or time is over."""
         catalogue, tolerance = self._catalogue, np.float32(tolerance_rad)
         pairs, count = catalogue.pairs, len(catalogue)
         start, end = pairs.angle.searchsorted(np.array((angles - tolerance, angles + tolerance)))

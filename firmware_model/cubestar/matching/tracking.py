@@ -1,16 +1,15 @@
-"""Tracking: centroids are the stars that the last attitude predicts nearest to them.
+"""Tracking: a centroid is the star that the last attitude predicts nearest to it.
 
-CubeStar thesis, section 4.5. No voting: the stars near the last boresight are turned into camera
-axes with the last attitude, and a centroid within 0.3 deg of one takes its identity, so the camera
-may turn up to 0.3 deg in an iteration and two stars are enough. Assumed: the nearest star is taken
-when several are in reach.
+CubeStar thesis, section 4.5. The stars near the last boresight are rotated into camera axes with
+the last attitude, and a centroid within 0.3 deg of one takes its identity, so the camera may turn
+by 0.3 deg in an iteration, and two stars are enough. Assumed: the nearest of several stars in
+reach.
 
-An extension: the verification round drops what contradicts the other stars, as when a star fainter
-than the catalogue stands near the predicted place of another; those left correct the attitude, and
-this is confirmed as one that a triangle proposes (``prediction``). Two stars propose it here. Wrong
-attitudes to be expected are the pairs of wrong stars: with F centroids that chance puts in reach of
-a predicted star, F^2 / 2 of them, and the part whose sides agree, the margin over the reach. So the
-camera may look elsewhere, or the last attitude be wrong, and neither is believed.
+An extension: the verification round drops what contradicts the other stars; the rest corrects the
+attitude, which is confirmed like one that a triangle proposes (``star_tracker.observation``).
+Expected wrong attitudes are pairs of wrong stars: F^2 / 2 for F centroids in reach of a predicted
+star by chance, times the part whose sides agree, the margin over the reach. So neither a camera
+that looks elsewhere nor a wrong last attitude is accepted.
 """
 
 from math import radians, sin
@@ -56,17 +55,13 @@ def track(
     margin_rad: float = DEFAULT_MARGIN_RAD,
     radius_deg: float = CUT_RADIUS_DEG,
 ) -> Identification:
-    """Identify centroids from the attitude of the iteration before.
+    """Identify centroids of unit vectors (n, 3) from the attitude of the iteration before.
 
     Phases: `reduction`, `prediction` and, if verified, `distances`, `verification`.
 
     Args:
-        directions: (n, 3) unit vectors of the centroids in camera axes.
-        catalogue: the stars.
         attitude: (3, 3) direction cosine matrix, inertial to camera, of the last solution.
-        meter: charged with every operation.
-        field: what of the sky is in the picture, to verify the stars; None does not, and all of
-            them weigh the same.
+        field: for the verification; None does not verify, and all stars weigh the same.
         margin_rad: largest difference between a measured and a catalogue angle, in rad.
         radius_deg: of the reduced catalogue, about the boresight.
     """
@@ -119,10 +114,8 @@ def _nearest(
     attitude: NDArray[np.float32],
     meter: Meter,
 ) -> NDArray[np.int32]:
-    """Star among `stars` (k,) predicted nearest to each centroid (n, 3), -1 when out of reach.
-
-    Compared by the square of the chord, which single precision resolves better than a cosine.
-    """
+    """Star among `stars` (k,) predicted nearest to each centroid (n, 3), -1 when out of reach; by
+    squares of chords, which single precision resolves better than cosines."""
     count, candidates = len(directions), len(stars)
     compared = count * candidates
     meter.charge(

@@ -2,16 +2,15 @@
 
 CubeStar thesis, section 4.3 (Algorithm 2, after Kolomenkin 2008) and section 5.3.4 (binary search,
 angles computed once, preassigned arrays). For each pair of centroids the pair list is searched for
-pairs of stars as far apart, and both centroids get a vote from both stars; the star with the most
+pairs of stars as far apart, and both centroids get a vote from both stars. The star with the most
 votes becomes a centroid's identity; a verification round and a selection follow.
 
 Assisted matching (section 4.3.4) votes among the stars near a rough boresight: the catalogue is cut
-to 35 deg, the 5 deg by which the boresight may be wrong and 30 deg of field. Pairs with a star
-outside are dropped with it; nothing else differs from lost in space.
+to 35 deg, 5 deg of error and 30 deg of field. Pairs with a star outside are dropped.
 
-What the text leaves open is taken to the letter: the first star with the most votes is taken, stars
-within one vote of the best verified are kept, so all of them where the best has one vote or none,
-and nothing is refused but fewer than three. A star without votes weighs nothing in QUEST.
+Where the text is open it is taken literally: the first star with the most votes is taken; stars
+within one vote of the best are kept, so all where that is one or none; only fewer than three are
+refused. A star without votes has no weight in QUEST.
 """
 
 import numpy as np
@@ -77,11 +76,8 @@ def identify(
 def _vote(
     pairs: CentroidPairs, listed: PairList, stars: int, margin_rad: float, meter: Meter
 ) -> NDArray[np.intp]:
-    """Votes (centroids, stars) of the entries of the pair list within the margin of each pair.
-
-    A hypothesis is a centroid with an identity, numbered centroid x stars + star. Each entry ties
-    two pairs of hypotheses together, for either centroid may be either star.
-    """
+    """Votes (centroids, stars) of the entries of the pair list within the margin of each pair;
+    either centroid may be either star."""
     margin = np.float32(margin_rad)
     start = _search(listed.angle, pairs.angle - margin, meter)
     # The walk from the start ends at the first entry beyond the margin.

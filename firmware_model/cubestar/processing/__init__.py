@@ -1,1 +1,1 @@
-"""From picture to attitude: the steps, what is told of their outcome, which search is next."""
+"""From image to attitude: the steps, the report of their outcome, and the next search."""

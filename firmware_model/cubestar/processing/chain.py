@@ -1,7 +1,5 @@
-"""The chain from picture to attitude: detection, matching and QUEST, with the time of each step.
-
-CubeStar thesis, sections 5.3.3 to 5.3.5. Which search identifies a picture is decided in
-``transitions``; why a picture gives no attitude, in ``reasons``.
+"""The chain from image to attitude: detection, matching and QUEST, with the time of each step.
+CubeStar thesis, sections 5.3.3 to 5.3.5. ``transitions`` decides which search identifies an image.
 """
 
 from collections.abc import Iterator
@@ -22,9 +20,9 @@ from cubestack.firmware_model.cubestar.processing.estimate import Estimate, by_e
 from cubestack.firmware_model.cubestar.processing.identify import (
     FEWEST_STARS,
     OUTCOME_FLAGS,
+    Results,
     Searches,
 )
-from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.cubestar.processing.transitions import Automatic, transitions_of
 from cubestack.firmware_model.cubestar.state import UNRATED, Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import Reason, TaskStatus
@@ -64,7 +62,7 @@ class Processing:
             yield from self.process()
         else:
             self.discard_results()
-            self._tell(Reason.NO_PICTURE)
+            self._report(Reason.NO_PICTURE)
 
     @property
     def transitions(self) -> Automatic:
@@ -100,14 +98,16 @@ class Processing:
         self.state.retained.solved = 0
         self.state.quality = dict(UNRATED)
 
-    def _tell(self, reason: Reason) -> None:
-        """Telemetry Quality says why there is no attitude, if the switches want it rated."""
+    def _report(self, reason: Reason) -> None:
+        """Report in telemetry Quality why there is no attitude, if the switches want it rated."""
         if self._switches.estimate != "votes":
-            self.state.quality = quality.told(self.results, reason)
+            self.state.quality = quality.picture_values(self.results, reason)
 
-    def _tell_outcome(self, outcome: MatchOutcome) -> None:
+    def _report_outcome(self, outcome: MatchOutcome) -> None:
         detection = self.results.detection
-        self._tell(quality.reason_of(None if detection is None else detection.statistics, outcome))
+        self._report(
+            quality.reason_of(None if detection is None else detection.statistics, outcome)
+        )
 
     # --- detection ----------------------------------------------------------------------------
 
@@ -115,7 +115,7 @@ class Processing:
         self.discard_results()
         retained, settings = self.state.retained, self.state.settings
         if not retained.image_present:
-            self._tell(Reason.NO_PICTURE)
+            self._report(Reason.NO_PICTURE)
             return self._fail(TaskStatus.DETECTION_FAILED, "StatusError")
         self.state.task_status = TaskStatus.DETECTING
         started_us: int = yield ReadTimer()
@@ -142,7 +142,7 @@ class Processing:
         )
         found = len(vectors) > 0
         if not found:
-            self._tell_outcome(MatchOutcome.TOO_FEW_CENTROIDS)
+            self._report_outcome(MatchOutcome.TOO_FEW_CENTROIDS)
         self.state.task_status = TaskStatus.DETECTED if found else TaskStatus.DETECTION_FAILED
         return found
 
@@ -164,7 +164,7 @@ class Processing:
         if identification.outcome is not MatchOutcome.IDENTIFIED:
             searches.explain(results, identification)
             self.transitions.failed(results.mode)
-            self._tell_outcome(identification.outcome)
+            self._report_outcome(identification.outcome)
             return self._fail(
                 TaskStatus.IDENTIFICATION_FAILED, OUTCOME_FLAGS[identification.outcome]
             )
@@ -202,7 +202,7 @@ class Processing:
             found = self._solve(identification)
         except AttitudeError:
             self.transitions.failed(results.mode)
-            self._tell_outcome(MatchOutcome.TOO_FEW_MATCHED)
+            self._report_outcome(MatchOutcome.TOO_FEW_MATCHED)
             return self._fail(TaskStatus.CALCULATION_FAILED, "QuestindexError")
         page = self._switches.flash_store == "page"
         stored = dcm(found.quaternion, self.meter) if page else None
@@ -224,7 +224,7 @@ class Processing:
         return True
 
     def _solve(self, identification: Identification) -> Estimate:
-        """The attitude by the weights that the switches say. Raises AttitudeError."""
+        """The attitude with the weights that the switches select. Raises AttitudeError."""
         stars = self.catalogue.vectors
         if self._switches.estimate == "votes":
             return by_votes(self.results, identification, stars, self.meter)

@@ -1,10 +1,7 @@
-"""The attitude from identified stars: weighted with votes, or with what their errors will be.
-
-The expected error of a star is that of its centroid, which the search tells. Its inverse square is
-the weight of least variance (Shuster and Oh 1981), and with the residuals it gives the covariance
-of the attitude. Errors that all stars share leave no residual, and are not in it: aberration of
-light, by up to 1e-4 rad, is for whoever knows the velocity.
-"""
+"""The attitude from identified stars: weighted with votes, or with the stars' expected errors.
+Inverse squares of the expected errors are the weights of least variance (Shuster and Oh 1981), and
+with the residuals they give the covariance. Errors that all stars share leave no residual:
+aberration of light, up to 1e-4 rad, is left to users that know the velocity."""
 
 from dataclasses import dataclass
 
@@ -15,9 +12,9 @@ from cubestack.firmware_model.attitude.geometry import CameraParameters, scaled
 from cubestack.firmware_model.attitude.quest import quest
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.cubestar.matching.identification import Identification
-from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.star_tracker.rating import Rating
+from cubestack.firmware_model.star_tracker.quality import Rating
 
 CENTROID_ERROR_PX = 0.2  #: of a search that does not tell what errors to expect
 
@@ -32,7 +29,7 @@ EXCESS = 2.2
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """An attitude (4,), its stars in number, and what is known of its error, if anything."""
+    """An attitude (4,), its number of stars, and its rating, if any."""
 
     quaternion: NDArray[np.float32]
     stars: int

@@ -1,5 +1,6 @@
-"""The search that a mode asks for, and what its failure says: CubeStar thesis, section 5.3.4."""
+"""The search of each mode, and the flags of its failure: CubeStar thesis, section 5.3.4."""
 
+from dataclasses import dataclass, field
 from math import acos, degrees
 
 import numpy as np
@@ -9,11 +10,11 @@ from cubestack.firmware_model.attitude.geometry import direction_of
 from cubestack.firmware_model.attitude.quest import dcm
 from cubestack.firmware_model.cubestar import configuration
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.detection import Detection
 from cubestack.firmware_model.cubestar.matching import confirmed, voting
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.matching.tracking import track
 from cubestack.firmware_model.cubestar.matching.voting import CUT_RADIUS_DEG
-from cubestack.firmware_model.cubestar.processing.results import Results
 from cubestack.firmware_model.cubestar.state import Attitude, State
 from cubestack.firmware_model.interface.cubestar.codes import MatchMode
 from cubestack.firmware_model.mcu.costs import Meter
@@ -32,21 +33,38 @@ OUTCOME_FLAGS = {
 }
 
 
+@dataclass
+class Results:
+    """Results of the latest picture; each is None until its step succeeded."""
+
+    detection: Detection | None = None  #: centroids and counts
+    #: undistorted centroids (n, 2) in px
+    points: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 2), np.float32))
+    #: camera unit vectors (n, 3)
+    vectors: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), np.float32))
+    identification: Identification | None = None  #: identity of each centroid
+    mode: MatchMode = MatchMode.LOST_IN_SPACE  #: MatchMode that identified it
+    best: list[int] = field(default_factory=list)  #: indices of the selected stars, at most three
+    #: number and time of the picture, as in ``Attitude``
+    frame: int = 0
+    image_ms: int = 0
+
+
 class Searches:
-    """Lost in space, assisted and tracking, with what the switches make of them."""
+    """Lost in space, assisted and tracking, as the switches select."""
 
     def __init__(self, state: State, catalogue: StarCatalogue, meter: Meter) -> None:
         self._state, self._catalogue, self._meter = state, catalogue, meter
 
     def run(self, results: Results, cone_deg: float) -> Identification:
-        """Identify the stars of ``results`` in its mode; ``cone_deg``: how far the boresight may be
-        from the expected one."""
+        """Identify the stars of ``results`` in its mode; ``cone_deg``: largest error of the
+        expected boresight."""
         state, meter, switches = self._state, self._meter, self._state.switches.now
         mode, vectors, attitude = results.mode, results.vectors, self._state.attitude
         margin = float(state.settings.get("setIDMargin", "Margin"))
-        field = configuration.field(state.settings)
+        view = configuration.field(state.settings)
         if results.detection is not None and results.detection.blind is not None:
-            field = field.without(results.detection.blind)
+            view = view.without(results.detection.blind)
         catalogue = self._catalogue.with_pair_limit(float(switches.pair_limit))
         if mode is MatchMode.TRACKING and attitude is not None:
             return track(
@@ -55,7 +73,7 @@ class Searches:
                 self._rotation(attitude),
                 meter,
                 margin_rad=margin,
-                field=field if switches.tracking == "verified" else None,
+                field=view if switches.tracking == "verified" else None,
                 radius_deg=self._radius_deg(mode),
             )
         boresight = None if mode is MatchMode.LOST_IN_SPACE else self._expected_boresight()
@@ -67,7 +85,7 @@ class Searches:
             vectors,
             None if results.detection is None else results.detection.intensities,
             catalogue,
-            field,
+            view,
             meter,
             boresight=boresight,
             margin_rad=margin,

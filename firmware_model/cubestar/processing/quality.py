@@ -1,17 +1,16 @@
 """Values of telemetry Quality for the latest picture, and why it gave no attitude.
 
-What disturbs the picture comes first (``star_tracker.disturbance``); only an undisturbed picture is
+What disturbs the picture comes first (``star_tracker.quality``); only an undisturbed picture is
 said to have too few stars. The limits are chosen well above those of an undisturbed sky.
 """
 
 from cubestack.firmware_model.cubestar.detection.contract import PictureStatistics
 from cubestack.firmware_model.cubestar.matching.identification import Identification
-from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.cubestar.state import UNRATED
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.cubestar.codes import Reason
-from cubestack.firmware_model.star_tracker.disturbance import DisturbanceLimits
-from cubestack.firmware_model.star_tracker.rating import Rating
+from cubestack.firmware_model.star_tracker.quality import DisturbanceLimits, Rating
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 #: The brightest stars fill a few pixels each, and 1e-3 are 500; brightness and differences are more
@@ -41,7 +40,7 @@ def reason_of(picture: PictureStatistics | None, outcome: MatchOutcome) -> Reaso
     return _OTHERS[outcome] if outcome in _OTHERS else Reason[outcome.name]
 
 
-def told(results: Results, reason: Reason) -> dict[str, Value]:
+def picture_values(results: Results, reason: Reason) -> dict[str, Value]:
     """Values of a picture that gave no attitude for ``reason``."""
     values = UNRATED | {"FrameCounter": results.frame, "Reason": reason}
     picture = None if results.detection is None else results.detection.statistics
@@ -62,4 +61,6 @@ def rated(
 ) -> dict[str, Value]:
     """Values of a picture that gave an attitude; it is valid if ``reason`` says SOLVED."""
     valid, matched = reason is Reason.SOLVED, len(identification.matched)
-    return told(results, reason) | rating.values(matched, identification.expected, valid=valid)
+    return picture_values(results, reason) | rating.values(
+        matched, identification.expected, valid=valid
+    )

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from cubestack.firmware_model.attitude.geometry import CameraParameters
 from cubestack.firmware_model.cubestar.matching.identification import Identification
 from cubestack.firmware_model.cubestar.processing.estimate import by_errors
-from cubestack.firmware_model.cubestar.processing.results import Results
+from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
 from ..sky import FOCAL_PX, meter

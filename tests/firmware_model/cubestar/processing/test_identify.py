@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 
@@ -31,3 +32,10 @@ def test_stars_in_the_far_corner_count_though_the_hint_is_off(catalogue: StarCat
     assert (values["Valid"], values["Mode"]) == (True, MatchMode.ASSISTED)
     assert values["Matched"] == len(seen.stars) == 7
     assert error_deg(attitude_of(values), pose) < 0.02
+
+
+def test_before_a_picture_there_are_no_stars() -> None:
+    results = Results()
+    assert (results.points.shape, results.vectors.shape) == ((0, 2), (0, 3))
+    assert results.best == []
+    assert results.detection is results.identification is None
