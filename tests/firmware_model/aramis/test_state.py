@@ -3,6 +3,7 @@ import pytest
 from cubestack.firmware_model.aramis.settings import CONFIG_PAGE
 from cubestack.firmware_model.aramis.state import Clock, State
 from cubestack.firmware_model.interface.aramis import MS_PER_DAY, MeasurementOutcome, SensorState
+from cubestack.firmware_model.interface.codec.field import InterfaceError
 from cubestack.firmware_model.mcu.flash_store import FlashStore
 
 
@@ -32,7 +33,7 @@ def test_a_fresh_state() -> None:
 
 
 def test_unknown_flags_are_a_programming_error() -> None:
-    with pytest.raises(KeyError, match="no flag 'Nonsense'"):
+    with pytest.raises(InterfaceError, match="no error flag 'Nonsense'"):
         State(FlashStore()).raise_flag("Nonsense")
 
 
