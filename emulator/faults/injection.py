@@ -57,7 +57,7 @@ class Injection:
         """Draw whether it has an effect, with probability ``rate``."""
         return rate >= 1 or float(self.generator.random()) < rate
 
-    def drawn(self, value: int | None, limit: int, *key: int) -> int:
+    def draw(self, value: int | None, limit: int, *key: int) -> int:
         """``value``, limited below ``limit``; None draws one from ``key``."""
         if value is None:
             return int(self.generator_at(*key).integers(limit))

@@ -135,8 +135,8 @@ class MemoryFaults(Mechanism):
     def _place(
         self, injection: Injection, fault: table.MemoryFlip | table.MemoryStuck
     ) -> tuple[int, int]:
-        address = injection.drawn(fault.address, self._memory.size, 1)
-        return address, injection.drawn(fault.bit, 8, 2)
+        address = injection.draw(fault.address, self._memory.size, 1)
+        return address, injection.draw(fault.bit, 8, 2)
 
     def _advance(self) -> None:
         if self._engine is not None:
@@ -201,10 +201,10 @@ class CoreFaults(Mechanism):
     ) -> tuple[str, int]:
         registers, name = self.core.registers, fault.register
         if name is None:
-            name = list(registers)[injection.drawn(None, len(registers), 1)]
+            name = list(registers)[injection.draw(None, len(registers), 1)]
         if name not in registers:
             raise FaultError(f"{fault.kind}: no register {name!r}, only {', '.join(registers)}")
-        return name, injection.drawn(fault.bit, registers[name], 2)
+        return name, injection.draw(fault.bit, registers[name], 2)
 
     def _flip(self, injection: Injection, register: str, bit: int) -> None:
         self.core.flip(register, bit)

@@ -126,10 +126,10 @@ class FaultySource:
             key = base.start_ps
             if float(injection.generator_at(key).random()) >= fault.rate:
                 continue
-            row = injection.drawn(fault.row, base.rows, key, 1)
+            row = injection.draw(fault.row, base.rows, key, 1)
             column = 0
             if not isinstance(fault, table.LineMissing):
-                column = injection.drawn(fault.column, self.active_columns, key, 2)
+                column = injection.draw(fault.column, self.active_columns, key, 2)
             hits.setdefault(row, _Hit(row, column, injection))
         return sorted(hits.values())
 
@@ -201,12 +201,12 @@ def _apply(picture: Picture, lines: range, injection: Injection) -> str:
     fault = injection.fault
     match fault:
         case table.PixelHot() | table.PixelDead():
-            x, y = injection.drawn(fault.x, width, 1), injection.drawn(fault.y, height, 2)
+            x, y = injection.draw(fault.x, width, 1), injection.draw(fault.y, height, 2)
             if y in lines:
                 picture[y, x] = fault.level if isinstance(fault, table.PixelHot) else 0
             return f"pixel ({x}, {y})"
         case table.ColumnDefect():
-            x = injection.drawn(fault.x, width, 1)
+            x = injection.draw(fault.x, width, 1)
             picture[lines.start : lines.stop, x] = fault.level
             return f"column {x}"
         case table.Blooming():

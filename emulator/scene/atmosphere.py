@@ -70,7 +70,7 @@ class Atmosphere(DeclaredValues):
             [across * np.cos(sidereal), across * np.sin(sidereal), np.sin(latitude)], np.float64
         )
 
-    def seen(
+    def apparent(
         self,
         vectors: Vectors,
         time_s: float,

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from cubestack.emulator.scene.file import SceneError, read_scene_file
-from cubestack.emulator.scene.form import SceneForm, Sight, differing
+from cubestack.emulator.scene.form import SceneForm, SkyMap, changed_fields
 from cubestack.firmware_model.values import DeclaredValues, described, read_table
 
 
@@ -31,17 +31,17 @@ class DeclaredScene(DeclaredValues):
         kinds = {cls.kind: lambda table: cls(**read_table(table, cls.declared()))}
         return read_scene_file(path, kinds, f'"{cls.kind}"')
 
-    def sight(self, now_ps: int) -> Sight:
+    def sky_map(self, now_ps: int) -> SkyMap:
         """Where it is on a map of the sky, at a time; by default nowhere."""
-        return Sight("no map", ())
+        return SkyMap("no map", ())
 
     @classmethod
     def form(cls) -> SceneForm[Self]:
         """What tools can do with such scenes beside reading files."""
         return SceneForm(
-            {cls.kind: described(cls.declared())}, lambda board: board.scene, _table, cls.sight
+            {cls.kind: described(cls.declared())}, lambda board: board.scene, _table, cls.sky_map
         )
 
 
 def _table(scene: DeclaredScene) -> dict[str, Any]:
-    return {"kind": scene.kind} | differing(scene, type(scene)())
+    return {"kind": scene.kind} | changed_fields(scene, type(scene)())

@@ -17,7 +17,7 @@ from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import Clouds, EarthHazard
-from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
+from cubestack.emulator.scene.hazards.contract import SkyHazard, check_hazards
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.values import (
     REQUIRED,
@@ -155,7 +155,7 @@ class EarthSunScene(DeclaredValues):
         for name in ("nadir", "sun", "moon"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _unit(name, getattr(self, name)))
-        refuse_strangers(self.hazards)
+        check_hazards(self.hazards)
         radius = np.radians(angular_radius_deg(self.altitude_km))
         for hazard in self.hazards:
             if isinstance(hazard, EarthHazard):
@@ -193,7 +193,9 @@ class EarthSunScene(DeclaredValues):
         turned = propagate(_IDENTITY, self.rate_deg_s, time_ps / PS_PER_S)
         return mounting.matrix @ matrix_from_quaternion(turned)
 
-    def seen(self, direction: ArrayLike, camera: CameraTarget, time_ps: int) -> NDArray[np.float64]:
+    def in_camera_axes(
+        self, direction: ArrayLike, camera: CameraTarget, time_ps: int
+    ) -> NDArray[np.float64]:
         """``direction`` (3,) of scene axes in a camera's axes at a time."""
         return self.axes(camera, time_ps) @ np.asarray(direction, np.float64)
 
@@ -208,7 +210,7 @@ class EarthSunScene(DeclaredValues):
         ``field_deg`` is the largest angle from the boresight that its lens images.
         """
         of_sun = camera == CameraTarget.SUN
-        vector = self.seen(self.sun if of_sun else self.nadir, camera, time_ps)
+        vector = self.in_camera_axes(self.sun if of_sun else self.nadir, camera, time_ps)
         alpha, beta = angles_from_vector(vector)
         reach = field_deg if of_sun else field_deg + angular_radius_deg(self.altitude_km)
         visible = bool(np.hypot(alpha, beta) <= reach) and not (of_sun and self.hidden(self.sun))

@@ -40,7 +40,7 @@ class CameraField:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class SkyMap:
     """A scene on a map of the sky. Directions are in the scene's axes.
 
     Attributes:
@@ -70,12 +70,12 @@ class Sight:
             "bodies": [
                 {
                     "name": one.name,
-                    "direction": rounded(one.direction),
+                    "direction": round_values(one.direction),
                     "radius_deg": one.radius_deg,
                 }
                 for one in self.bodies
             ],
-            "marks": {name: rounded(mark) for name, mark in self.marks.items()},
+            "marks": {name: round_values(mark) for name, mark in self.marks.items()},
             "stars": self.stars,
             "turn": self.turn.tolist(),
         }
@@ -89,25 +89,25 @@ class SceneForm(Generic[V]):
         keys: of scene files, by kind, as ``values.described`` has them.
         view: the scene and condition that the cameras of a board have.
         table: the scene file's table that gives such a view again.
-        sight: the map of such a view, with its state at a time in ps.
+        sky_map: the map of such a view, with its state at a time in ps.
     """
 
     keys: Mapping[str, Mapping[str, Any]]
     view: Callable[[Any], V]
     table: Callable[[V], Table]
-    sight: Callable[[V, int], Sight]
+    sky_map: Callable[[V, int], SkyMap]
 
 
 def _field(one: CameraField) -> dict[str, Any]:
-    return {"name": one.name, "axes": rounded(one.axes), "outline": rounded(one.outline)}
+    return {"name": one.name, "axes": round_values(one.axes), "outline": round_values(one.outline)}
 
 
-def rounded(values: Any, digits: int = DIGITS) -> Any:
+def round_values(values: Any, digits: int = DIGITS) -> Any:
     """Numbers of any shape, rounded to ``digits`` after the point, as lists; never -0."""
     return (np.round(np.asarray(values, np.float64), digits) + 0.0).tolist()
 
 
-def differing(thing: Any, usual: Any, *without: str) -> Table:
+def changed_fields(thing: Any, usual: Any, *without: str) -> Table:
     """Fields of a dataclass that differ from ``usual`` and can be written in TOML, by name."""
     found = {}
     for one in fields(thing):
@@ -122,7 +122,7 @@ def hazard_table(hazards: tuple[Hazard, ...], seed: int) -> Table:
     """The key ``hazards`` of a file with this ``seed``, if there are any hazards."""
     found: dict[str, list[Table]] = {}
     for one in hazards:
-        own = differing(one, type(one)(), "seed")
+        own = changed_fields(one, type(one)(), "seed")
         found.setdefault(one.name, []).append(
             own | ({} if one.seed == seed else {"seed": one.seed})
         )
@@ -134,5 +134,5 @@ def bodies_of(hazards: tuple[SkyHazard, ...]) -> tuple[Body, ...]:
     found: dict[tuple[str, tuple[float, ...]], Body] = {}
     for hazard in hazards:
         for body in hazard.bodies:
-            found.setdefault((body.name, tuple(rounded(body.direction))), body)
+            found.setdefault((body.name, tuple(round_values(body.direction))), body)
     return tuple(found.values())

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.attitude import propagate, quaternion_from_pointing
 from cubestack.emulator.scene.file import SceneError
-from cubestack.emulator.scene.hazards.contract import SkyHazard, refuse_strangers
+from cubestack.emulator.scene.hazards.contract import SkyHazard, check_hazards
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
 from cubestack.emulator.scene.picture import PictureScene, check_quaternion
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -94,7 +94,7 @@ class SkyScene(DeclaredValues):
         starts = [pose.at_s for pose in self.all_poses]
         if sorted(starts) != starts:
             raise SceneError(f"poses must be in order of time from 0 s on, not at {starts}")
-        refuse_strangers(self.hazards)
+        check_hazards(self.hazards)
         brightest, faintest = self.false_star_mag
         if not brightest <= faintest:
             raise SceneError(

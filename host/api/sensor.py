@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from cubestack.emulator.scene.declared import DeclaredScene as DeclaredScene
     from cubestack.emulator.scene.file import SceneError as SceneError
     from cubestack.emulator.scene.form import CameraField as CameraField
-    from cubestack.emulator.scene.form import Sight as Sight
+    from cubestack.emulator.scene.form import SkyMap as SkyMap
     from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG as SUN_RADIUS_DEG
     from cubestack.emulator.scene.hazards.contract import Body as Body
     from cubestack.firmware_model.values import Declaration as Declaration

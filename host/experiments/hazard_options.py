@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from cubestack.emulator.camera.common.exposure import looking_along
+from cubestack.emulator.camera.common.exposure import camera_state_for
 from cubestack.emulator.camera.common.hazards import HAZARDS
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.view import SkyView
-from cubestack.emulator.camera.ov7620.light import looking_with
+from cubestack.emulator.camera.ov7620.light import fisheye_state
 from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.emulator.scene.hazards import (
     EARTH_HAZARDS,
     SKY_HAZARDS,
+    CameraState,
     EarthHazard,
-    Looking,
     SkyHazard,
 )
 from cubestack.emulator.scene.hazards.hazard import Hazard
@@ -85,13 +85,13 @@ def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
 
 
 def _placed(
-    asked: Sequence[Asked], looking: Looking, rng: np.random.Generator
+    asked: Sequence[Asked], state: CameraState, rng: np.random.Generator
 ) -> tuple[tuple[SkyHazard, ...], tuple[SensorHazard, ...]]:
     """Hazards of light, and those of sensor and lens, drawn for one frame."""
     kinds = known()
     placed = [
-        kinds[one.name].placed(
-            kinds[one.name].strength.usual if one.strength is None else one.strength, looking, rng
+        kinds[one.name].sample(
+            kinds[one.name].strength.usual if one.strength is None else one.strength, state, rng
         )
         for one in asked
     ]
@@ -107,8 +107,8 @@ def with_hazards(
     scene, condition = view.scene, view.condition
     if not asked or not isinstance(scene, SkyScene):
         return view
-    looking = looking_along(scene.quaternion, condition.optics, time_s)
-    light, sensor = _placed(asked, looking, rng)
+    state = camera_state_for(scene.quaternion, condition.optics, time_s)
+    light, sensor = _placed(asked, state, rng)
     return replace(
         view,
         scene=replace(scene, hazards=(*scene.hazards, *light)),
@@ -123,7 +123,7 @@ def around_earth(
     if not asked:
         return view
     scene, condition = view.scene, view.condition
-    light, sensor = _placed(asked, looking_with(scene, camera, 0), rng)
+    light, sensor = _placed(asked, fisheye_state(scene, camera, 0), rng)
     light = tuple(
         hazard
         for hazard in light

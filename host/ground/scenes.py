@@ -37,7 +37,7 @@ def present(emulated: AnyEmulated) -> JsonObject:
     """
     form = _form(emulated.device)
     view = form.view(emulated.board)
-    sight = form.sight(view, emulated.board.kernel.now).as_dict()
+    sight = form.sky_map(view, emulated.board.kernel.now).as_dict()
     return {"table": form.table(view), "sight": sight, "follows": emulated.follows}
 
 
@@ -52,7 +52,7 @@ def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:
             view = emulated.device.load_scene(path)
         except ValueError as error:
             raise ValueError(str(error).replace(str(path), FILE)) from None
-    return {"sight": form.sight(view, emulated.board.kernel.now).as_dict()}
+    return {"sight": form.sky_map(view, emulated.board.kernel.now).as_dict()}
 
 
 def text_of(table: Mapping[str, Any]) -> str:

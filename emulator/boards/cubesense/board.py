@@ -18,7 +18,7 @@ from cubestack.emulator.boards.cubesense.processor import Pic18f45k20
 from cubestack.emulator.boards.cubesense.wiring import cubesense_wiring
 from cubestack.emulator.bus.i2c import Forwarder
 from cubestack.emulator.camera.common.shutter import RollingShutter
-from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, drawn_lens
+from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, draw_lens
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
 from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.faults.sites import CameraSite, Sites
@@ -108,7 +108,7 @@ class CubeSenseBoard(Board):
         drawn = switches.lens == "residuals"
         self.cameras = {
             Camera[target.name]: Ov7620(
-                scene, target, lens=drawn_lens(target, self.seed) if drawn else NOMINAL
+                scene, target, lens=draw_lens(target, self.seed) if drawn else NOMINAL
             )
             for target in CameraTarget
         }

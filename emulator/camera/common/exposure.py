@@ -20,7 +20,7 @@ from cubestack.emulator.camera.common.glow import glow_electrons
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.scene.attitude import matrix_from_quaternion
-from cubestack.emulator.scene.hazards.contract import Looking, Vectors
+from cubestack.emulator.scene.hazards.contract import CameraState, Vectors
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
@@ -61,32 +61,32 @@ def star_light(scene: SkyScene, optics: Optics, shutter: RollingShutter) -> NDAr
         image += np.float32(glow * shutter.exposure_s) * optics.even_light
     if scene.hazards:
         count = min(len(phases), MOST_GLOWS)
-        instants = [looking(scene, optics, shutter, (i + 0.5) / count) for i in range(count)]
+        instants = [camera_state(scene, optics, shutter, (i + 0.5) / count) for i in range(count)]
         electrons_per_s = glow_electrons(scene.hazards, instants, optics)
         if electrons_per_s is not None:
             image += electrons_per_s * np.float32(shutter.exposure_s)
     return image
 
 
-def looking(
+def camera_state(
     scene: SkyScene, optics: Optics, shutter: RollingShutter, phase: float = 0.5
-) -> Looking:
+) -> CameraState:
     """The camera's state for hazards at the instant ``phase`` of the middle row's exposure."""
     now = _time_ps(optics, shutter, phase)
-    return looking_along(
+    return camera_state_for(
         scene.truth(now), optics, time_s=now / PS_PER_S, exposure_s=shutter.exposure_s
     )
 
 
-def looking_along(
+def camera_state_for(
     quaternion: ArrayLike, optics: Optics, time_s: float = 0.0, exposure_s: float = 0.0
-) -> Looking:
+) -> CameraState:
     """The state for hazards of a camera with attitude ``quaternion`` (4,)."""
     x, y = optics.columns - 0.5, optics.rows - 0.5
     middle_x, middle_y = (x - 0.5) / 2, (y - 0.5) / 2
     edges = np.array([[-0.5, middle_y], [x, middle_y], [middle_x, -0.5], [middle_x, y]])
     left, right, top, bottom = optics.unproject(edges)
-    return Looking(
+    return CameraState(
         axes=matrix_from_quaternion(quaternion),
         width_deg=math.degrees(math.acos(left @ right)),
         height_deg=math.degrees(math.acos(top @ bottom)),
@@ -105,7 +105,7 @@ def star_pixels(
     For tests and drawings.
     """
     sky = load_sky(scene.epoch, _limit(scene))
-    vectors, covered = _through(scene, looking(scene, optics, shutter), sky.vectors)
+    vectors, covered = _through(scene, camera_state(scene, optics, shutter), sky.vectors)
     pixels, _ = _instant(scene, optics, shutter, vectors, 0.5)
     columns, rows = optics.columns, optics.rows
     x, y = pixels.T
@@ -130,20 +130,20 @@ def _stars(
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
     vectors, rates = sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
     if scene.hazards:
-        vectors, covered = _through(scene, looking(scene, optics, shutter), vectors)
+        vectors, covered = _through(scene, camera_state(scene, optics, shutter), vectors)
         vectors, rates = vectors[~covered], rates[~covered]
     if scene.atmosphere is None:
         return vectors, rates
     # Seeded by the frame time, like the sensor's noise.
     generator = np.random.default_rng([scene.seed, 0xA12, max(0, shutter.readout_ps)])
-    vectors, share = scene.atmosphere.seen(
+    vectors, share = scene.atmosphere.apparent(
         vectors, middle / PS_PER_S, shutter.exposure_s, optics.aperture_mm, generator
     )
     return vectors, rates * share
 
 
 def _through(
-    scene: SkyScene, now: Looking, vectors: Vectors, depth: int = -1
+    scene: SkyScene, now: CameraState, vectors: Vectors, depth: int = -1
 ) -> tuple[Vectors, NDArray[np.bool_]]:
     """Apparent directions (n, 3) of light from ``vectors``, and which (n,) hazards hide.
 
@@ -155,7 +155,7 @@ def _through(
         if hidden is not None:
             covered |= hidden
     for hazard in scene.hazards:
-        vectors = hazard.seen(now, vectors)
+        vectors = hazard.apparent(now, vectors)
     return vectors, covered
 
 
@@ -166,7 +166,7 @@ def _hazard_lights(
     for hazard in scene.hazards:
         phases = _phases(scene, optics, shutter, hazard.speed_deg_s)
         for phase in phases:
-            now = looking(scene, optics, shutter, phase)
+            now = camera_state(scene, optics, shutter, phase)
             lights = hazard.lights(now)
             if lights is None:
                 break

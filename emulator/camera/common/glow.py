@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.camera.common.optics import Optics
-from cubestack.emulator.scene.hazards.contract import Looking, SkyHazard, angles_rad
+from cubestack.emulator.scene.hazards.contract import CameraState, SkyHazard, angles_rad
 
 CELL_PX = 16
 Values = NDArray[np.float32]
 
 
 def glow_electrons(
-    hazards: Sequence[SkyHazard], instants: Sequence[Looking], optics: Optics
+    hazards: Sequence[SkyHazard], instants: Sequence[CameraState], optics: Optics
 ) -> Values | None:
     """Mean electrons per second in each pixel (rows, columns) over ``instants``, or None."""
     all_maps = [_brightness_map(hazards, now, optics) for now in instants]
@@ -32,7 +32,7 @@ def glow_electrons(
 
 
 def brightness(
-    hazards: Sequence[SkyHazard], now: Looking, vectors: NDArray[np.float64]
+    hazards: Sequence[SkyHazard], now: CameraState, vectors: NDArray[np.float64]
 ) -> Values | None:
     """Surface brightness (n,) of all hazards along ``vectors`` (n, 3) in the scene's axes.
 
@@ -53,7 +53,9 @@ def brightness(
     return total
 
 
-def _brightness_map(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) -> Values | None:
+def _brightness_map(
+    hazards: Sequence[SkyHazard], now: CameraState, optics: Optics
+) -> Values | None:
     (x, y), nodes = _grid(optics)
     directions = nodes @ now.axes
     coarse = brightness(hazards, now, directions)
@@ -74,7 +76,7 @@ def _brightness_map(hazards: Sequence[SkyHazard], now: Looking, optics: Optics) 
 
 
 def _not_smooth(
-    hazards: Sequence[SkyHazard], now: Looking, nodes: NDArray[np.float64]
+    hazards: Sequence[SkyHazard], now: CameraState, nodes: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Cells (ny-1, nx-1) of the grid of ``nodes`` (ny, nx, 3) that need all their pixels."""
     cell = np.linalg.norm(nodes[1:, 1:] - nodes[:-1, :-1], axis=2)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.hazards.contract import Lens
-from cubestack.emulator.camera.common.residual import Residual, displaced, restored
+from cubestack.emulator.camera.common.residual import Residual, displace, restore
 from cubestack.emulator.scene.file import SceneError
 from cubestack.firmware_model.values import (
     REQUIRED,
@@ -133,12 +133,12 @@ class Optics(DeclaredValues):
             distorted = self._polynomial(undistorted, -1)
         else:
             distorted = self._inverse_polynomial(undistorted, +1)
-        pixels[imaged] = displaced(distorted * self._scale + (self.cx, self.cy), self.residuals)
+        pixels[imaged] = displace(distorted * self._scale + (self.cx, self.cy), self.residuals)
         return pixels
 
     def unproject(self, pixels: Pixels) -> NDArray[np.float64]:
         """Unit vectors (n, 3) in camera axes of pixel coordinates (n, 2)."""
-        points = restored(np.asarray(pixels, np.float64), self.residuals)
+        points = restore(np.asarray(pixels, np.float64), self.residuals)
         distorted = (points - (self.cx, self.cy)) / self._scale
         if self.distortion is Distortion.TOOLBOX:
             undistorted = self._inverse_polynomial(distorted, -1)

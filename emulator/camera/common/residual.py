@@ -28,7 +28,7 @@ class Residual:
         return np.stack([_horner(x, y, self.across), _horner(x, y, self.down)], axis=1)
 
 
-def displaced(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
+def displace(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
     """Image points (n, 2) of the ideal points ``pixels``, to 1e-11 px for smooth residuals.
 
     NaN stays NaN.
@@ -43,8 +43,8 @@ def displaced(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
     return pixels
 
 
-def restored(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
-    """Inverse of `displaced`, and the faster of the two: for all pixels of an image."""
+def restore(pixels: Pixels, residuals: tuple[Residual, ...]) -> Pixels:
+    """Inverse of `displace`, and the faster of the two: for all pixels of an image."""
     for residual in reversed(residuals):
         pixels = pixels - residual.at(pixels)
     return pixels

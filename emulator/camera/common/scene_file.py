@@ -135,7 +135,7 @@ def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int
     def lens(values: dict[str, Any]) -> Optics:
         drawn, optics = values.pop("drawn", None), condition.optics
         return replace(
-            drawn_optics(optics, uncertain, drawn) if drawn is not None else optics, **values
+            draw_optics(optics, uncertain, drawn) if drawn is not None else optics, **values
         )
 
     drawn = whole(None, "seed of a lens that differs from its calibration", 0)
@@ -211,7 +211,7 @@ def split_hazards(
     )
 
 
-def drawn_optics(optics: Optics, uncertain: Mapping[str, float], seed: int) -> Optics:
+def draw_optics(optics: Optics, uncertain: Mapping[str, float], seed: int) -> Optics:
     """A random lens whose calibration found ``optics``; SceneError if nothing is uncertain."""
     if not uncertain:
         raise SceneError("this lens has no uncertainties to draw from; omit drawn")

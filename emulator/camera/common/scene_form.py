@@ -17,12 +17,12 @@ from cubestack.emulator.scene.form import (
     CameraField,
     Matrix,
     SceneForm,
-    Sight,
+    SkyMap,
     Table,
     bodies_of,
-    differing,
+    changed_fields,
     hazard_table,
-    rounded,
+    round_values,
 )
 from cubestack.emulator.scene.sky import Pose, Scene, SkyScene
 from cubestack.firmware_model.values import plain
@@ -37,7 +37,7 @@ def sky_form(
     condition: SkyCondition, uncertain: Mapping[str, float] = MappingProxyType({})
 ) -> SceneForm[SkyView]:
     """Form of a device with this default condition; arguments as of `load_scene`."""
-    return SceneForm(sky_keys(condition, uncertain), _view, partial(_table, condition), _sight)
+    return SceneForm(sky_keys(condition, uncertain), _view, partial(_table, condition), _sky_map)
 
 
 def _view(board: Any) -> SkyView:
@@ -48,9 +48,9 @@ def _table(usual: SkyCondition, view: SkyView) -> Table:
     scene, condition = view.scene, view.condition
     table = _sky(scene) if isinstance(scene, SkyScene) else _picture(scene)
     seed = table.get("seed", 0)
-    table |= differing(condition, usual, "optics", "hazards", "seed")
+    table |= changed_fields(condition, usual, "optics", "hazards", "seed")
     hazards = (*getattr(scene, "hazards", ()), *condition.hazards)
-    optics = differing(condition.optics, usual.optics, "residuals")
+    optics = changed_fields(condition.optics, usual.optics, "residuals")
     return table | ({"optics": optics} if optics else {}) | hazard_table(hazards, seed)
 
 
@@ -65,7 +65,7 @@ def _sky(scene: SkyScene) -> Table:
     first, *later = scene.all_poses
     table: Table = {"kind": "sky", **_pose(first)}
     usual = SkyScene(scene.quaternion)
-    table |= differing(
+    table |= changed_fields(
         *(scene, usual), "quaternion", "rate_deg_s", "poses", "atmosphere", "hazards"
     )
     if later:
@@ -73,7 +73,7 @@ def _sky(scene: SkyScene) -> Table:
     air = scene.atmosphere
     if air is not None:
         needed = {"latitude_deg": air.latitude_deg, "sidereal_deg": air.sidereal_deg}
-        table["atmosphere"] = needed | differing(
+        table["atmosphere"] = needed | changed_fields(
             air, Atmosphere(air.latitude_deg, air.sidereal_deg)
         )
     return table
@@ -81,17 +81,17 @@ def _sky(scene: SkyScene) -> Table:
 
 def _pose(pose: Pose) -> Table:
     angles = pointing_from_matrix(matrix_from_quaternion(pose.quaternion))
-    found = dict(zip(("ra_deg", "dec_deg", "roll_deg"), rounded(angles), strict=True))
+    found = dict(zip(("ra_deg", "dec_deg", "roll_deg"), round_values(angles), strict=True))
     rate = np.asarray(pose.rate_deg_s, np.float64)
     return found | ({"rate_deg_s": rate.tolist()} if np.any(rate) else {})
 
 
-def _sight(view: SkyView, now_ps: int) -> Sight:
+def _sky_map(view: SkyView, now_ps: int) -> SkyMap:
     scene, border = view.scene, outline(view.condition.lens)
     known = [None if (q := scene.truth(ps)) is None else _camera(q, border) for ps in (0, now_ps)]
     at_first, now = known
     moved = at_first is not None and now is not None and not np.allclose(at_first.axes, now.axes)
-    return Sight(
+    return SkyMap(
         TITLE,
         () if at_first is None else (at_first,),
         (now,) if moved and now is not None else (),

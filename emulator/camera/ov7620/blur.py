@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 REACH_SIGMAS = 4.0
 
 
-def blurred(light: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
+def blur(light: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
     """``light`` (rows, columns) with spots of this standard deviation; dark beyond the edges."""
     half = math.ceil(REACH_SIGMAS * sigma_px)
     edges = (np.arange(2 * half + 2) - half - 0.5) / (sigma_px * math.sqrt(2))

@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cubestack.emulator.camera.common.residual import displaced, restored
+from cubestack.emulator.camera.common.residual import displace, restore
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget
@@ -39,7 +39,7 @@ def check_field(alpha_deg: float, beta_deg: float) -> None:
         )
 
 
-def distorted(radius_px: ArrayLike) -> NDArray[np.float64]:
+def distort(radius_px: ArrayLike) -> NDArray[np.float64]:
     """Distance from the boresight in the image for the ideal ``radius_px`` (equation 5.2.3).
 
     Monotonic up to 370 px, far beyond the field's 275.5 px.
@@ -47,13 +47,13 @@ def distorted(radius_px: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(np.polyval(DISTORTION, np.asarray(radius_px, np.float64)))
 
 
-def undistorted(radius_px: ArrayLike) -> NDArray[np.float64]:
-    """Inverse of :func:`distorted` within the field, exact; 0 below its smallest value."""
+def undistort(radius_px: ArrayLike) -> NDArray[np.float64]:
+    """Inverse of `distort` within the field, exact; 0 below its smallest value."""
     target = np.asarray(radius_px, np.float64)
-    radius = np.minimum(target, distorted(FIELD_DEG * PIXELS_PER_DEGREE))
+    radius = np.minimum(target, distort(FIELD_DEG * PIXELS_PER_DEGREE))
     slope = np.polyder(DISTORTION)
     for _ in range(_NEWTON_STEPS):
-        radius = radius - (distorted(radius) - target) / np.polyval(slope, radius)
+        radius = radius - (distort(radius) - target) / np.polyval(slope, radius)
     return np.maximum(radius, 0)
 
 
@@ -72,19 +72,19 @@ class Fisheye:
         angles = np.array(angles_from_vector(vector))
         if np.hypot(*angles) > FIELD_DEG:
             return None
-        angles = self.error.displaced(angles)
+        angles = self.error.displace(angles)
         theta = float(np.hypot(*angles))
-        stretch = self.error.scale * distorted(theta * PIXELS_PER_DEGREE) / theta if theta else 0.0
+        stretch = self.error.scale * distort(theta * PIXELS_PER_DEGREE) / theta if theta else 0.0
         pixels = np.array([[self.cx, self.cy]]) + angles * stretch
-        return np.asarray(displaced(pixels, self.error.residuals)[0])
+        return np.asarray(displace(pixels, self.error.residuals)[0])
 
     def unproject(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Unit vectors (n, 3) in camera axes of pixel coordinates (n, 2) within the field."""
-        points = restored(np.asarray(pixels, np.float64), self.error.residuals)
+        points = restore(np.asarray(pixels, np.float64), self.error.residuals)
         offset = (points - (self.cx, self.cy)) / self.error.scale
         radius = np.hypot(offset[:, 0], offset[:, 1])
-        theta = undistorted(radius) / PIXELS_PER_DEGREE
-        angles = self.error.restored(offset * (theta / np.where(radius == 0, 1, radius))[:, None])
+        theta = undistort(radius) / PIXELS_PER_DEGREE
+        angles = self.error.restore(offset * (theta / np.where(radius == 0, 1, radius))[:, None])
         return vector_from_angles(angles[:, 0], angles[:, 1])
 
     @cached_property
@@ -95,10 +95,10 @@ class Fisheye:
         """
         rows, columns = np.mgrid[:ROWS, :COLUMNS].reshape(2, -1)
         radius = np.hypot(columns - self.cx, rows - self.cy) / self.error.scale
-        rim = float(distorted(FIELD_DEG * PIXELS_PER_DEGREE))
+        rim = float(distort(FIELD_DEG * PIXELS_PER_DEGREE))
         lit = np.clip(rim - radius + 0.5, 0, 1)
         index = np.flatnonzero(lit)
-        wide = undistorted(np.minimum(radius[index], rim))
+        wide = undistort(np.minimum(radius[index], rim))
         # Across the radius a pixel spans 1 / radius of a turn; along it, the inverse of the slope.
         along = 1 / np.polyval(np.polyder(DISTORTION), wide)
         across = np.sin(np.radians(wide / PIXELS_PER_DEGREE)) / np.maximum(radius[index], 1)

@@ -82,13 +82,13 @@ class LensError(DeclaredValues):
         turn = np.radians(np.arange(0, 360, 15))[:, None]
         along = np.linspace(0.0, FIELD_DEG, 96)
         angles = np.stack([along * np.cos(turn), along * np.sin(turn)], axis=-1)
-        slope = np.diff(self.displaced(angles) - angles, axis=1) / along[1]
+        slope = np.diff(self.displace(angles) - angles, axis=1) / along[1]
         if not np.hypot(slope[..., 0], slope[..., 1]).max() <= STEEPEST:
             raise SceneError(
                 f"radial_deg and decentring_deg must change by at most {STEEPEST:g} deg a degree"
             )
 
-    def displaced(self, angles: ArrayLike) -> Angles:
+    def displace(self, angles: ArrayLike) -> Angles:
         """Angles (..., 2) that the polynomial images where this lens images ``angles``."""
         true = np.asarray(angles, np.float64)
         if not self.radial_deg and not any(self.decentring_deg):
@@ -103,12 +103,12 @@ class LensError(DeclaredValues):
         down = fading * (p1 * (square + 2 * y * y) + 2 * p2 * x * y)
         return np.asarray(true * stretch[..., None] + np.stack([across, down], axis=-1))
 
-    def restored(self, displaced: ArrayLike) -> Angles:
-        """Inverse of `displaced`, to 1e-9 deg within the field."""
+    def restore(self, displaced: ArrayLike) -> Angles:
+        """Inverse of `displace`, to 1e-9 deg within the field."""
         apparent = np.asarray(displaced, np.float64)
         true = apparent
         for _ in range(_INVERSION_STEPS):
-            missed = apparent - self.displaced(true)
+            missed = apparent - self.displace(true)
             true = true + missed
             if not np.abs(missed).max() > _INVERSION_DEG:
                 break
@@ -134,7 +134,7 @@ class LensError(DeclaredValues):
 NOMINAL = LensError()
 
 
-def drawn_lens(camera: CameraTarget, serial: int) -> LensError:
+def draw_lens(camera: CameraTarget, serial: int) -> LensError:
     """The lens of ``camera`` in the unit with that serial number."""
     rng = np.random.default_rng([serial, camera])
     centre_x, centre_y = rng.uniform(-0.5, 0.5, 2)

@@ -24,14 +24,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cubestack.emulator.camera.common.glow import brightness
-from cubestack.emulator.camera.ov7620.blur import blurred
+from cubestack.emulator.camera.ov7620.blur import blur
 from cubestack.emulator.camera.ov7620.fisheye import Fisheye, lens_of
 from cubestack.emulator.camera.ov7620.lens_error import FIELD_DEG, NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.luminance import SPOT_PX
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
-from cubestack.emulator.scene.hazards import Ghosts, Looking, Moon, SkyHazard
+from cubestack.emulator.scene.hazards import CameraState, Ghosts, Moon, SkyHazard
 from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE, Depth, Vectors
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
@@ -84,12 +84,12 @@ def scene_light(
     """
     lens = lens_of(camera, error)
     light = np.zeros((ROWS, COLUMNS), np.float32)
-    sun = scene.seen(scene.sun, camera, time_ps)
+    sun = scene.in_camera_axes(scene.sun, camera, time_ps)
     earth_level = FILTER[camera] * EARTH_LEVEL / _usual_lines(CameraTarget.NADIR)
     lit, radiance = scene.earth.radiance(
         lens.field.vectors,
         lens.field.pixel_rad,
-        scene.seen(scene.nadir, camera, time_ps),
+        scene.in_camera_axes(scene.nadir, camera, time_ps),
         sun,
         scene.axes(camera, time_ps),
     )
@@ -106,9 +106,9 @@ def scene_light(
     return light
 
 
-def looking_with(scene: EarthSunScene, camera: CameraTarget, time_ps: int) -> Looking:
+def fisheye_state(scene: EarthSunScene, camera: CameraTarget, time_ps: int) -> CameraState:
     """The state of ``camera`` for hazards, with the nominal lens."""
-    return Looking(
+    return CameraState(
         scene.axes(camera, time_ps),
         2 * FIELD_DEG,
         2 * FIELD_DEG,
@@ -154,8 +154,8 @@ class _Disc(SkyHazard):
     name: ClassVar[str] = "earth"
     depth: ClassVar[Depth] = Depth.EARTH
 
-    def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
-        del looking
+    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_]:
+        del state
         return np.asarray(vectors @ np.array(self.nadir) > math.cos(self.radius_rad))
 
 
@@ -183,24 +183,24 @@ def _add_hazards(
     if not hazards:
         return
     field, straight = lens.field, FILTER[camera]
-    looking = looking_with(scene, camera, time_ps)
+    state = fisheye_state(scene, camera, time_ps)
     radius = math.radians(angular_radius_deg(scene.altitude_km))
     earth = _Disc(nadir=tuple(np.asarray(scene.nadir).tolist()), radius_rad=radius)
     level = EARTH_LEVEL / _usual_lines(CameraTarget.NADIR) / EARTH_RADIANCE
-    vectors = field.vectors.astype(np.float64) @ looking.axes
+    vectors = field.vectors.astype(np.float64) @ state.axes
     for hazard in hazards:
-        points = hazard.lights(looking)
+        points = hazard.lights(state)
         if points is None:
             continue
-        behind = earth.hidden(looking, points.vectors) & (hazard.depth < earth.depth)
+        behind = earth.hidden(state, points.vectors) & (hazard.depth < earth.depth)
         for vector, v_mag in zip(points.vectors[~behind], points.v_mag[~behind], strict=True):
-            centre = lens.project(looking.axes @ vector)
+            centre = lens.project(state.axes @ vector)
             if centre is not None:
                 at = math.dist(centre, (lens.cx, lens.cy))
-                flux = 10 ** (-0.4 * v_mag) / looking.pixel_rad**2
+                flux = 10 ** (-0.4 * v_mag) / state.pixel_rad**2
                 peak = flux * level / (2 * math.pi * SPOT_PX**2)
                 _add_spot(light, centre, SPOT_PX, peak * float(_slant_transmission(straight, at)))
-    glow = brightness([*hazards, earth], looking, vectors)
+    glow = brightness([*hazards, earth], state, vectors)
     if glow is None:
         return
     places = np.divmod(field.index, COLUMNS)
@@ -209,7 +209,7 @@ def _add_hazards(
     if glow.max() > FAINTEST:
         added = np.zeros_like(light)
         added.ravel()[field.index] = glow
-        light += blurred(added, SPOT_PX)
+        light += blur(added, SPOT_PX)
 
 
 def _add_spot(light: Light, centre: NDArray[np.float64], sigma_px: float, peak: float) -> None:

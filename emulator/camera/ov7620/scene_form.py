@@ -16,12 +16,12 @@ from cubestack.emulator.scene.form import (
     CameraField,
     Matrix,
     SceneForm,
-    Sight,
+    SkyMap,
     Table,
     bodies_of,
-    differing,
+    changed_fields,
     hazard_table,
-    rounded,
+    round_values,
 )
 from cubestack.emulator.scene.hazards.contract import SUN_RADIUS_DEG, Body
 from cubestack.emulator.scene.hazards.moon import RADIUS_RAD as MOON_RADIUS_RAD
@@ -45,7 +45,7 @@ MARKS = {
 
 def earth_sun_form() -> SceneForm[EarthSunView]:
     """Form of a device with a sun and a nadir camera."""
-    return SceneForm(earth_sun_keys(), _view, _table, _sight)
+    return SceneForm(earth_sun_keys(), _view, _table, _sky_map)
 
 
 def _view(board: Any) -> EarthSunView:
@@ -57,14 +57,14 @@ def _table(view: EarthSunView) -> Table:
     table: Table = {"kind": "earth-sun"}
     for name in ("nadir", "sun", "moon"):
         if getattr(scene, name) is not None:
-            table[name] = rounded(getattr(scene, name), WRITTEN_DIGITS)
+            table[name] = round_values(getattr(scene, name), WRITTEN_DIGITS)
     rate = np.asarray(scene.rate_deg_s, np.float64)
     if np.any(rate):
         table["rate_deg_s"] = rate.tolist()
     usual = EarthSunScene()
-    table |= differing(scene, usual, "nadir", "sun", "moon", "rate_deg_s")
+    table |= changed_fields(scene, usual, "nadir", "sun", "moon", "rate_deg_s")
     seed = table.get("seed", 0)
-    table |= differing(condition, FisheyeCondition(), "seed")
+    table |= changed_fields(condition, FisheyeCondition(), "seed")
     for camera in CameraTarget:
         name = camera.name.lower()
         mounting: Mounting = getattr(scene, f"{name}_camera")
@@ -72,7 +72,7 @@ def _table(view: EarthSunView) -> Table:
             table[f"{name}_camera"] = {key: plain(one) for key, one in vars(mounting).items()}
         lens: LensError | None = getattr(condition, f"{name}_lens")
         if lens is not None:
-            table[f"{name}_lens"] = differing(lens, NOMINAL, "scale", "residuals")
+            table[f"{name}_lens"] = changed_fields(lens, NOMINAL, "scale", "residuals")
     if scene.reflections:
         table["reflections"] = [_reflection(one) for one in scene.reflections]
     return table | hazard_table((*scene.hazards, *condition.hazards), seed)
@@ -83,7 +83,7 @@ def _reflection(one: Reflection) -> Table:
     return {**at, "radius_px": one.radius_px, "level": one.level}
 
 
-def _sight(view: EarthSunView, now_ps: int) -> Sight:
+def _sky_map(view: EarthSunView, now_ps: int) -> SkyMap:
     scene = view.scene
     moved = bool(np.any(np.asarray(scene.rate_deg_s))) and now_ps > 0
     bodies = [
@@ -94,7 +94,7 @@ def _sight(view: EarthSunView, now_ps: int) -> Sight:
         moon_deg = float(np.degrees(MOON_RADIUS_RAD))
         bodies.append(Body("Moon", np.asarray(scene.moon), moon_deg))
     known = {one.name for one in bodies}
-    return Sight(
+    return SkyMap(
         TITLE,
         tuple(_camera(scene, camera, 0) for camera in CameraTarget),
         tuple(_camera(scene, camera, now_ps) for camera in CameraTarget) if moved else (),

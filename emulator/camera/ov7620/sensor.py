@@ -27,7 +27,7 @@ from cubestack.emulator.camera.common.image_sensor import ImageSensor
 from cubestack.emulator.camera.common.imager import Grey, Light
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.common.stream import PixelClock, StreamSegment
-from cubestack.emulator.camera.ov7620.blur import blurred
+from cubestack.emulator.camera.ov7620.blur import blur
 from cubestack.emulator.camera.ov7620.fisheye import check_field
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError
 from cubestack.emulator.camera.ov7620.light import scene_light
@@ -282,7 +282,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
             bloom_px = self.condition.bloom_px
             light = scene_light(self.scene, self.camera, bloom_px, time_ps, self.lens)
             if further:
-                light = blurred(light, further)
+                light = blur(light, further)
             self._light = *key, light
         return self._light[-1]
 

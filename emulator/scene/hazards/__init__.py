@@ -5,7 +5,7 @@ Earth below the satellite.
 """
 
 from cubestack.emulator.scene.hazards.aberration import Aberration
-from cubestack.emulator.scene.hazards.contract import Lights, Looking, SkyHazard
+from cubestack.emulator.scene.hazards.contract import CameraState, Lights, SkyHazard
 from cubestack.emulator.scene.hazards.debris import Debris
 from cubestack.emulator.scene.hazards.earth_below import (
     Clouds,
@@ -26,6 +26,7 @@ __all__ = [
     "EARTH_HAZARDS",
     "SKY_HAZARDS",
     "Aberration",
+    "CameraState",
     "Clouds",
     "Debris",
     "EarthHazard",
@@ -35,7 +36,6 @@ __all__ = [
     "Glint",
     "Hazard",
     "Lights",
-    "Looking",
     "Moon",
     "Planets",
     "SkyGlow",

@@ -11,7 +11,7 @@ import numpy as np
 
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards import ephemeris
-from cubestack.emulator.scene.hazards.contract import Looking, SkyHazard, Vectors, direction
+from cubestack.emulator.scene.hazards.contract import CameraState, SkyHazard, Vectors, direction
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number, vector
 
@@ -49,8 +49,8 @@ class Aberration(SkyHazard):
             )
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        del looking
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+        del state
         towards = generator.standard_normal(3)
         x, y, z = (strength * towards / np.linalg.norm(towards)).tolist()
         return cls(velocity_km_s=(x, y, z))
@@ -62,8 +62,8 @@ class Aberration(SkyHazard):
         orbit = self.orbit_km_s * direction("orbit_towards", self.orbit_towards)
         return ephemeris.earth_velocity_km_s(self.julian_date + time_s / ephemeris.DAY_S) + orbit
 
-    def seen(self, looking: Looking, vectors: Vectors) -> Vectors:
-        beta = self.velocity(looking.time_s) / LIGHT_KM_S
+    def apparent(self, state: CameraState, vectors: Vectors) -> Vectors:
+        beta = self.velocity(state.time_s) / LIGHT_KM_S
         root = np.sqrt(1 - beta @ beta)
         along = vectors @ beta
         moved = root * vectors + (1 + along / (1 + root))[:, None] * beta

@@ -75,7 +75,7 @@ class Ring:
 
 
 @dataclass(frozen=True, eq=False)
-class Looking:
+class CameraState:
     """The camera at one instant of an exposure, as far as hazards need it.
 
     Attributes:
@@ -99,14 +99,14 @@ class Looking:
     def boresight(self) -> Vectors:
         return np.asarray(self.axes[2])
 
-    def anywhere(self, generator: np.random.Generator) -> Vectors:
+    def random_direction(self, generator: np.random.Generator) -> Vectors:
         """A random direction (3,) within the picture, uniform in its angles."""
         while True:
             across, down = generator.uniform(-0.5, 0.5, 2) * (self.width_deg, self.height_deg)
             if math.hypot(across, down) <= self.half_field_deg:
                 return np.asarray(vector_from_angles(across, down) @ self.axes, np.float64)
 
-    def beside(self, angle_deg: float, generator: np.random.Generator) -> Vectors:
+    def random_direction_at(self, angle_deg: float, generator: np.random.Generator) -> Vectors:
         """A direction (3,) at ``angle_deg`` from the boresight, to a random side."""
         around = generator.uniform(0, 2 * math.pi)
         sides = angle_deg * np.cos(around), angle_deg * np.sin(around)
@@ -139,31 +139,31 @@ class SkyHazard(Hazard):
         """Bodies whose place at time 0 it gives."""
         return ()
 
-    def lights(self, looking: Looking) -> Lights | None:
-        del looking
+    def lights(self, state: CameraState) -> Lights | None:
+        del state
         return None
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness | None:
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness | None:
         """Its surface brightness (n,) along ``vectors`` (n, 3), V = 0 stars per steradian.
 
-        Where it changes within a pixel: the mean over a round pixel of ``looking.pixel_rad``.
+        Where it changes within a pixel: the mean over a round pixel of ``state.pixel_rad``.
         """
-        del looking, vectors
+        del state, vectors
         return None
 
-    def rings(self, looking: Looking) -> tuple[Ring, ...]:
+    def rings(self, state: CameraState) -> tuple[Ring, ...]:
         """Where its glow changes from pixel to pixel; elsewhere it is linear over 16 px."""
-        del looking
+        del state
         return ()
 
-    def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_] | None:
+    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_] | None:
         """Which directions ``vectors`` (n, 3) it covers, (n,); None for none."""
-        del looking, vectors
+        del state, vectors
         return None
 
-    def seen(self, looking: Looking, vectors: Vectors) -> Vectors:
+    def apparent(self, state: CameraState, vectors: Vectors) -> Vectors:
         """Apparent directions (n, 3) of points at ``vectors`` (n, 3)."""
-        del looking
+        del state
         return vectors
 
 
@@ -196,7 +196,9 @@ def angles_rad(vectors: Vectors, centre: Vectors) -> NDArray[np.float64]:
     return np.asarray(2 * np.arcsin(np.clip(chord / 2, 0, 1)))
 
 
-def aside(centre: Vectors, angle_deg: float, generator: np.random.Generator) -> Vectors:
+def random_direction_at(
+    centre: Vectors, angle_deg: float, generator: np.random.Generator
+) -> Vectors:
     """A unit vector (3,) at ``angle_deg`` from ``centre``, to a random side."""
     side = np.cross(centre, generator.standard_normal(3))
     side /= np.linalg.norm(side)
@@ -204,7 +206,7 @@ def aside(centre: Vectors, angle_deg: float, generator: np.random.Generator) -> 
     return np.asarray(math.cos(angle) * centre + math.sin(angle) * side)
 
 
-def refuse_strangers(hazards: Sequence[object]) -> None:
+def check_hazards(hazards: Sequence[object]) -> None:
     """Raise SceneError if one of ``hazards`` is not a hazard of light."""
     for hazard in hazards:
         if not isinstance(hazard, SkyHazard):

@@ -13,12 +13,12 @@ import numpy as np
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import (
     Body,
+    CameraState,
     Depth,
     Lights,
-    Looking,
     SkyHazard,
-    aside,
     direction,
+    random_direction_at,
 )
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
 from cubestack.firmware_model.values import number
@@ -54,16 +54,16 @@ class Debris(SkyHazard):
             raise SceneError(f"towards of the hazard {self.name} must not be along direction")
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """One of this magnitude, anywhere in the picture in the middle of the exposure."""
-        here = looking.anywhere(generator)
+        here = state.random_direction(generator)
         rate = math.exp(generator.uniform(math.log(SLOWEST_DEG_S), math.log(FASTEST_DEG_S)))
         return cls(
             direction=tuple(here.tolist()),
-            towards=tuple(aside(here, 90.0, generator).tolist()),
+            towards=tuple(random_direction_at(here, 90.0, generator).tolist()),
             rate_deg_s=rate,
             v_mag=strength,
-            at_s=looking.time_s,
+            at_s=state.time_s,
         )
 
     @property
@@ -74,10 +74,10 @@ class Debris(SkyHazard):
     def bodies(self) -> tuple[Body, ...]:
         return (Body("debris", direction("direction", self.direction)),)
 
-    def lights(self, looking: Looking) -> Lights:
+    def lights(self, state: CameraState) -> Lights:
         here, there = direction("direction", self.direction), direction("towards", self.towards)
         ahead = there - (there @ here) * here
         ahead /= np.linalg.norm(ahead)
-        angle = math.radians(self.rate_deg_s * (looking.time_s - self.at_s))
+        angle = math.radians(self.rate_deg_s * (state.time_s - self.at_s))
         place = math.cos(angle) * here + math.sin(angle) * ahead
         return Lights(place[None], np.array([self.v_mag]))

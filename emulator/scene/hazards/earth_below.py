@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
-from cubestack.emulator.scene.hazards.contract import Depth, Looking, SkyHazard, Vectors
+from cubestack.emulator.scene.hazards.contract import CameraState, Depth, SkyHazard, Vectors
 from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
 
@@ -98,8 +98,8 @@ class Terminator(EarthHazard):
     depth: ClassVar[Depth] = Depth.EARTH
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        del looking
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+        del state
         return cls(phase_deg=strength, towards_deg=float(generator.uniform(0, 360)))
 
     def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
@@ -123,8 +123,8 @@ class EarthInSunCamera(EarthHazard):
     depth: ClassVar[Depth] = Depth.EARTH
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
-        del looking
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
+        del state
         return cls(above_deg=strength, towards_deg=float(generator.uniform(0, 360)))
 
     def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:

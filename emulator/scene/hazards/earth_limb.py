@@ -25,14 +25,14 @@ from cubestack.emulator.scene.hazards.contract import (
     SUN_RADIUS_DEG,
     Body,
     Brightness,
+    CameraState,
     Depth,
-    Looking,
     Ring,
     SkyHazard,
     Vectors,
     angles_rad,
-    aside,
     direction,
+    random_direction_at,
 )
 from cubestack.emulator.scene.hazards.glare import OUTER_RAD, aureole
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
@@ -86,13 +86,13 @@ class EarthLimb(SkyHazard):
     depth: ClassVar[Depth] = Depth.EARTH
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """The limb at this angle from the boresight, to any side; a Sun that is not in view."""
         radius = angular_radius_deg(600.0)
-        nadir = looking.beside(min(radius + strength, 180), generator)
+        nadir = state.random_direction_at(min(radius + strength, 180), generator)
         lowest = math.cos(math.radians(SUN_AWAY_DEG))
         sun_deg = math.degrees(math.acos(generator.uniform(-1, lowest)))
-        sun = aside(looking.boresight, sun_deg, generator)
+        sun = random_direction_at(state.boresight, sun_deg, generator)
         seed = int(generator.integers(2**31))
         return cls(nadir=tuple(nadir.tolist()), sun=tuple(sun.tolist()), seed=seed)
 
@@ -117,12 +117,12 @@ class EarthLimb(SkyHazard):
     def _distance_km(self) -> float:
         return EARTH_RADIUS_KM + self.altitude_km
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
         total = np.zeros(len(vectors), np.float32)
         earth = Earth(
             self.altitude_km, self.unevenness, self.glow_km, self.seed, glow_heights=GLOW_HEIGHTS
         )
-        pixels = np.full(len(vectors), looking.pixel_rad, np.float32)
+        pixels = np.full(len(vectors), state.pixel_rad, np.float32)
         sight = vectors.astype(np.float32)
         met, light = earth.radiance(sight, pixels, self._nadir, self._sun, np.eye(3))
         light *= self._night(vectors[met])
@@ -180,14 +180,14 @@ class EarthLimb(SkyHazard):
         light[met] = shares * self._night(vectors[met])
         return EARTH_RADIANCE * light
 
-    def rings(self, looking: Looking) -> tuple[Ring, ...]:
+    def rings(self, state: CameraState) -> tuple[Ring, ...]:
         top_km = EARTH_RADIUS_KM + max(TOP_KM, GLOW_HEIGHTS * self.glow_km)
         top = math.asin(min(top_km / self._distance_km, 1))
-        inner = self._radius_rad - 2 * looking.pixel_rad
-        return (Ring(self._nadir, inner, max(top, self._radius_rad + 2 * looking.pixel_rad)),)
+        inner = self._radius_rad - 2 * state.pixel_rad
+        return (Ring(self._nadir, inner, max(top, self._radius_rad + 2 * state.pixel_rad)),)
 
-    def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
-        del looking
+    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_]:
+        del state
         return angles_rad(vectors, self._nadir) < self._radius_rad
 
 

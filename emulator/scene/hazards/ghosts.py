@@ -17,8 +17,8 @@ from cubestack.emulator.scene.hazards.contract import (
     SUN_V,
     Body,
     Brightness,
+    CameraState,
     Depth,
-    Looking,
     Ring,
     SkyHazard,
     Vectors,
@@ -57,9 +57,9 @@ class Ghosts(SkyHazard):
     depth: ClassVar[Depth] = Depth.LENS
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """Of a Sun anywhere in the picture; the brightest ghost has this share of its light."""
-        sun = tuple(looking.anywhere(generator).tolist())
+        sun = tuple(state.random_direction(generator).tolist())
         return cls(share=strength, sun=sun, seed=int(generator.integers(2**31)))
 
     @property
@@ -68,36 +68,36 @@ class Ghosts(SkyHazard):
             return ()
         return (Body("Sun", direction("sun", self.sun), SUN_RADIUS_DEG),)
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
         total = np.zeros(len(vectors), np.float32)
         if self.sun is None:
             return total
         sun = direction("sun", self.sun)
-        if np.degrees(angles_rad(sun[None], looking.boresight)[0]) > looking.half_field_deg:
+        if np.degrees(angles_rad(sun[None], state.boresight)[0]) > state.half_field_deg:
             return total
         light = 10 ** (-0.4 * SUN_V)
         if self.scatter:
             total += (light * aureole(angles_rad(vectors, sun), self.scatter)).astype(np.float32)
-        for count, (centre, sigma) in enumerate(self._places(looking, sun)):
+        for count, (centre, sigma) in enumerate(self._places(state, sun)):
             angles = angles_rad(vectors, centre)
             near = np.flatnonzero(angles < REACH_SIGMAS * sigma)
             peak = light * self.share / 2**count / (2 * np.pi * sigma**2)
             total[near] += peak * np.exp(-0.5 * (angles[near] / sigma) ** 2)
         return total
 
-    def rings(self, looking: Looking) -> tuple[Ring, ...]:
+    def rings(self, state: CameraState) -> tuple[Ring, ...]:
         if self.sun is None:
             return ()
-        places = self._places(looking, direction("sun", self.sun))
+        places = self._places(state, direction("sun", self.sun))
         return tuple(Ring(centre, 0.0, REACH_SIGMAS * sigma) for centre, sigma in places)
 
-    def _places(self, looking: Looking, sun: Vectors) -> list[tuple[Vectors, float]]:
+    def _places(self, state: CameraState, sun: Vectors) -> list[tuple[Vectors, float]]:
         """Centre (3,) and standard deviation in radians of each ghost."""
         generator = np.random.default_rng([self.seed, 0x6057])
-        angles = np.array(angles_from_vector(looking.axes @ sun))
+        angles = np.array(angles_from_vector(state.axes @ sun))
         places = generator.uniform(*PLACES, self.count)
-        widths = np.radians(looking.half_field_deg * generator.uniform(*WIDTHS, self.count))
+        widths = np.radians(state.half_field_deg * generator.uniform(*WIDTHS, self.count))
         return [
-            (np.asarray(vector_from_angles(*(place * angles)) @ looking.axes), float(width))
+            (np.asarray(vector_from_angles(*(place * angles)) @ state.axes), float(width))
             for place, width in zip(places, widths, strict=True)
         ]

@@ -15,8 +15,8 @@ from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.hazards.contract import (
     SUN_V,
     Brightness,
+    CameraState,
     Depth,
-    Looking,
     Ring,
     SkyHazard,
     Vectors,
@@ -47,36 +47,36 @@ class Glint(SkyHazard):
     )
     depth: ClassVar[Depth] = Depth.LENS
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
         """The patches, each with an edge one pixel wide."""
         total = np.zeros(len(vectors), np.float32)
-        for centre, along, across, length, width in self._patches(looking):
-            near = np.flatnonzero(vectors @ centre > math.cos(length + width + looking.pixel_rad))
+        for centre, along, across, length, width in self._patches(state):
+            near = np.flatnonzero(vectors @ centre > math.cos(length + width + state.pixel_rad))
             beside = [np.abs(vectors[near] @ side) for side in (along, across)]
             share = np.ones(len(near))
             for distance, half in zip(beside, (length, width), strict=True):
-                share *= np.clip((half - distance) / looking.pixel_rad + 0.5, 0, 1)
+                share *= np.clip((half - distance) / state.pixel_rad + 0.5, 0, 1)
             total[near] = np.maximum(total[near], self.surface * SUN_SURFACE * share)
         return total
 
-    def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        patches = self._patches(looking)
+    def rings(self, state: CameraState) -> tuple[Ring, ...]:
+        patches = self._patches(state)
         return tuple(Ring(centre, 0.0, length + width) for centre, _, _, length, width in patches)
 
-    def _patches(self, looking: Looking) -> list[tuple[Vectors, Vectors, Vectors, float, float]]:
+    def _patches(self, state: CameraState) -> list[tuple[Vectors, Vectors, Vectors, float, float]]:
         """Centre, two sides (3,) each, half length and half width in rad of each patch."""
         generator = np.random.default_rng([self.seed, 0x611E7])
         patches = []
         for _ in range(self.count):
             around, turn = generator.uniform(0, 2 * math.pi, 2)
-            away = looking.half_field_deg * generator.uniform(*PLACES)
+            away = state.half_field_deg * generator.uniform(*PLACES)
             camera = vector_from_angles(away * math.cos(around), away * math.sin(around))
             one = np.cross(camera, np.eye(3)[np.argmin(np.abs(camera))])
             one /= np.linalg.norm(one)
             other = np.cross(camera, one)
             along = math.cos(turn) * one + math.sin(turn) * other
-            sizes = [looking.half_field_deg * generator.uniform(*of) for of in (LENGTHS, WIDTHS)]
+            sizes = [state.half_field_deg * generator.uniform(*of) for of in (LENGTHS, WIDTHS)]
             length, width = (math.radians(size) for size in sizes)
-            one, two, three = (v @ looking.axes for v in (camera, along, np.cross(camera, along)))
+            one, two, three = (v @ state.axes for v in (camera, along, np.cross(camera, along)))
             patches.append((one, two, three, length, width))
         return patches

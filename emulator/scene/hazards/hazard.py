@@ -32,7 +32,7 @@ class Strength:
     """The scale on which experiments vary a hazard.
 
     Attributes:
-        key: what varies: a field, or a quantity that ``placed`` converts.
+        key: what varies: a field, or a quantity that ``sample`` converts.
         unit: of its values, empty for a plain number.
         values: from harmless to worst.
         default: of a hazard without a given strength; None: the last of ``values``.
@@ -76,12 +76,12 @@ class Hazard(DeclaredValues):
         return SceneError(f"{name} of the hazard {cls.name} {text}")
 
     @classmethod
-    def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: Any, generator: np.random.Generator) -> Self:
         """A hazard of this strength for one frame, drawn from ``generator``.
 
-        ``looking`` is the camera, for hazards that have a place in the sky.
+        ``state`` is the camera, for hazards that have a place in the sky.
         """
-        del looking
+        del state
         counted = cls.declared()[cls.strength.key].kind is WHOLE
         values: dict[str, Any] = {cls.strength.key: int(strength) if counted else strength}
         return cls(seed=int(generator.integers(2**31)), **values)

@@ -17,14 +17,14 @@ from cubestack.emulator.scene.hazards.contract import (
     SUN_RADIUS_DEG,
     Body,
     Brightness,
+    CameraState,
     Depth,
-    Looking,
     Ring,
     SkyHazard,
     Vectors,
     angles_rad,
-    aside,
     direction,
+    random_direction_at,
 )
 from cubestack.emulator.scene.hazards.glare import SHARE, aureole
 from cubestack.emulator.scene.hazards.hazard import Strength, heading
@@ -58,11 +58,11 @@ class Moon(SkyHazard):
     depth: ClassVar[Depth] = Depth.MOON
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """Anywhere in the picture; ``strength`` is the share of its disc that is lit, 0 to 1."""
-        centre = looking.anywhere(generator)
+        centre = state.random_direction(generator)
         phase_deg = math.degrees(math.acos(min(max(2 * strength - 1, -1), 1)))
-        sun = aside(centre, 180 - phase_deg, generator)
+        sun = random_direction_at(centre, 180 - phase_deg, generator)
         return cls(direction=tuple(centre.tolist()), sun=tuple(sun.tolist()))
 
     @property
@@ -88,12 +88,12 @@ class Moon(SkyHazard):
         """Magnitude of the whole Moon, -12.73 when full."""
         return -12.73 + 0.026 * self.phase_deg + 4e-9 * self.phase_deg**4
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
         angles = angles_rad(vectors, self._centre)
         light = 10 ** (-0.4 * self.v_mag)
         glow = light * aureole(angles, self.scatter)
-        on = np.flatnonzero(angles < RADIUS_RAD + looking.pixel_rad)
-        glow[on] += light * self._disc(vectors[on], looking.pixel_rad)
+        on = np.flatnonzero(angles < RADIUS_RAD + state.pixel_rad)
+        glow[on] += light * self._disc(vectors[on], state.pixel_rad)
         return glow.astype(np.float32)
 
     def _disc(self, vectors: Vectors, pixel_rad: float) -> NDArray[np.float64]:
@@ -120,11 +120,11 @@ class Moon(SkyHazard):
         even = 1 / (math.pi * RADIUS_RAD**2 * max(lit, LEAST_LIT))
         return np.asarray(even * shine.mean(axis=(1, 2)))
 
-    def rings(self, looking: Looking) -> tuple[Ring, ...]:
-        del looking
+    def rings(self, state: CameraState) -> tuple[Ring, ...]:
+        del state
         return (Ring(self._centre, 0.0, STEEP_RAD),)
 
-    def hidden(self, looking: Looking, vectors: Vectors) -> NDArray[np.bool_]:
+    def hidden(self, state: CameraState, vectors: Vectors) -> NDArray[np.bool_]:
         """What is behind the disc, lit or dark."""
-        del looking
+        del state
         return angles_rad(vectors, self._centre) < RADIUS_RAD

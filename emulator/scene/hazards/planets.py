@@ -13,9 +13,9 @@ import numpy as np
 from cubestack.emulator.scene.hazards import ephemeris
 from cubestack.emulator.scene.hazards.contract import (
     Body,
+    CameraState,
     Depth,
     Lights,
-    Looking,
     SkyHazard,
     Vectors,
     direction,
@@ -56,9 +56,9 @@ class Planets(SkyHazard):
     depth: ClassVar[Depth] = Depth.PLANETS
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """One planet of this magnitude anywhere in the picture."""
-        return cls(direction=tuple(looking.anywhere(generator).tolist()), v_mag=strength)
+        return cls(direction=tuple(state.random_direction(generator).tolist()), v_mag=strength)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -67,10 +67,10 @@ class Planets(SkyHazard):
         there = {one: ephemeris.geocentric(one, self.julian_date) for one in MAGNITUDES}
         return tuple(Body(one.title(), at / np.linalg.norm(at)) for one, at in there.items())
 
-    def lights(self, looking: Looking) -> Lights:
+    def lights(self, state: CameraState) -> Lights:
         if self.direction is not None:
             return Lights(direction("direction", self.direction)[None], np.array([self.v_mag]))
-        date = self.julian_date + looking.time_s / ephemeris.DAY_S
+        date = self.julian_date + state.time_s / ephemeris.DAY_S
         there = np.array([ephemeris.geocentric(planet, date) for planet in MAGNITUDES])
         earth = ephemeris.heliocentric("earth", date)
         v_mag = [

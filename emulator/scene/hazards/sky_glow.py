@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cubestack.emulator.scene.hazards import ephemeris
-from cubestack.emulator.scene.hazards.contract import Brightness, Looking, SkyHazard, Vectors
+from cubestack.emulator.scene.hazards.contract import Brightness, CameraState, SkyHazard, Vectors
 from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
 
@@ -89,9 +89,9 @@ class SkyGlow(SkyHazard):
     )
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """At a date in 2026 when the Sun's longitude is this far from the boresight's."""
-        x, y, _ = looking.boresight @ ephemeris.FROM_ECLIPTIC
+        x, y, _ = state.boresight @ ephemeris.FROM_ECLIPTIC
         wanted = math.degrees(math.atan2(y, x)) + strength * generator.choice([-1, 1])
         date = ephemeris.NEW_YEAR_2026
         date += (wanted - ephemeris.sun_longitude_deg(date)) % 360 * DAYS_PER_DEG
@@ -100,8 +100,8 @@ class SkyGlow(SkyHazard):
             date += missed * DAYS_PER_DEG
         return cls(julian_date=float(date))
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
-        del looking
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
+        del state
         s10 = self.zodiacal * self._zodiacal(vectors) + self.milky_way * milky_way(vectors)
         return np.asarray(S10 * s10, np.float32)
 

@@ -20,8 +20,8 @@ from cubestack.emulator.scene.hazards.contract import (
     SUN_V,
     Body,
     Brightness,
+    CameraState,
     Depth,
-    Looking,
     SkyHazard,
     Vectors,
     angles_rad,
@@ -59,18 +59,18 @@ class SunGlare(SkyHazard):
     depth: ClassVar[Depth] = Depth.LENS
 
     @classmethod
-    def placed(cls, strength: float, looking: Looking, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
         """The Sun at this angle from the boresight, to any side."""
-        return cls(direction=tuple(looking.beside(strength, generator).tolist()))
+        return cls(direction=tuple(state.random_direction_at(strength, generator).tolist()))
 
     @property
     def bodies(self) -> tuple[Body, ...]:
         name = "Sun" if self.v_mag == SUN_V else "stray light"
         return (Body(name, direction("direction", self.direction), SUN_RADIUS_DEG),)
 
-    def glow(self, looking: Looking, vectors: Vectors) -> Brightness:
+    def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
         source = direction("direction", self.direction)
-        aside_rad = float(angles_rad(looking.boresight[None], source)[0])
+        aside_rad = float(angles_rad(state.boresight[None], source)[0])
         decades = (math.degrees(aside_rad) - REFERENCE_DEG) / self.decade_deg
         level = min(self.transmittance * 10**-decades, MOST) * 10 ** (-0.4 * self.v_mag)
         nearer_deg = np.degrees(aside_rad - angles_rad(vectors, source))

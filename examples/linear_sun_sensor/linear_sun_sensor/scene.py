@@ -9,7 +9,7 @@ from cubestack.sensor import (
     Body,
     CameraField,
     DeclaredScene,
-    Sight,
+    SkyMap,
     flag,
     number,
     whole,
@@ -27,11 +27,11 @@ class SlitScene(DeclaredScene):
     noise: bool = flag(True, "whether pixels have any")
     seed: int = whole(0, "of the noise", 0, 2**32)
 
-    def sight(self, now_ps: int) -> Sight:
+    def sky_map(self, now_ps: int) -> SkyMap:
         """Where Sun and field are, on a map of the sky."""
         angles = np.radians([self.sun_deg, *range(-45, 46, 5)])
         sun, *field = np.transpose([np.sin(angles), 0 * angles, np.cos(angles)])
         array = CameraField("array", np.eye(3), np.array(field))
         turn = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # the boresight in the map's middle
         bodies = (Body("Sun", sun, SUN_RADIUS_DEG),)
-        return Sight("the sensor's axes", (array,), bodies=bodies, turn=turn)
+        return SkyMap("the sensor's axes", (array,), bodies=bodies, turn=turn)

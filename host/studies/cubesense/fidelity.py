@@ -129,11 +129,11 @@ def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
     """Figures that follow from the measured polynomial, the Earth's size and the pixels."""
     a, b, c, d = fisheye.DISTORTION
     field_px = lens_error.FIELD_DEG * fisheye.PIXELS_PER_DEGREE
-    rim_px = float(fisheye.distorted(field_px))
+    rim_px = float(fisheye.distort(field_px))
     earth_deg = angular_radius_deg(ALTITUDE_KM)
-    earth_px = float(fisheye.distorted(earth_deg * fisheye.PIXELS_PER_DEGREE))
+    earth_px = float(fisheye.distort(earth_deg * fisheye.PIXELS_PER_DEGREE))
     # Two points 10 cm apart on a board at 103 cm, near the boresight (section 5.1.3).
-    board_px = float(fisheye.distorted(np.degrees(np.arctan(10 / 103)) * fisheye.PIXELS_PER_DEGREE))
+    board_px = float(fisheye.distort(np.degrees(np.arctan(10 / 103)) * fisheye.PIXELS_PER_DEGREE))
     ball_mm = 10 * 30 * ALTITUDE_KM / EARTH_RADIUS_KM
     slant_mm = np.sqrt(1 + ball_mm**2 - 2 * ball_mm * np.cos(np.radians(30)))
     return {
@@ -150,7 +150,7 @@ def _lens(_opened: CubeSenseOpener, _frames: int) -> Figures:
         "earth_px": earth_px,
         "sampling": 8 * earth_px / 16,
         "edges_64": 8 * earth_px / 64,
-        "ball_px": float(fisheye.distorted(182.0)),
+        "ball_px": float(fisheye.distort(182.0)),
         "ball_cm": ball_mm / 10,
         "span_angle": 100 * earth_deg / lens_error.FIELD_DEG,
         "span_px": 100 * 182 / field_px,

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cubestack.emulator.camera.common.optics import Optics
-from cubestack.emulator.camera.common.scene_file import drawn_optics, load_scene
+from cubestack.emulator.camera.common.scene_file import draw_optics, load_scene
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS, UNCERTAIN
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
@@ -38,7 +38,7 @@ class _Experiment(StarCalibration[CubeStar]):
 
     def condition(self, options: CalibrateOptions) -> SkyCondition:
         if options.scene is None:
-            return replace(CONDITION, optics=drawn_optics(LENS, UNCERTAIN, options.seed))
+            return replace(CONDITION, optics=draw_optics(LENS, UNCERTAIN, options.seed))
         return load_scene(options.scene, CONDITION, UNCERTAIN).condition
 
     def load(self, client: CubeStar, camera: Camera, light: Path | None) -> None:

@@ -109,16 +109,16 @@ def test_a_photograph_is_written_down_too(tmp_path: Path) -> None:
 def test_the_sky_is_seen_where_the_camera_looks(tmp_path: Path) -> None:
     text = 'kind = "sky"\nra_deg = 30\ndec_deg = 20\nroll_deg = 90\nrate_deg_s = [0, 1, 0]'
     view = load(save(tmp_path, text))
-    sight = SKY.sight(view, 10 * 10**12)
-    (field,), (now,) = sight.fields, sight.now
+    sky_map = SKY.sky_map(view, 10 * 10**12)
+    (field,), (now,) = sky_map.fields, sky_map.now
     np.testing.assert_allclose(field.axes, matrix_from_pointing(30, 20, 90), atol=1e-12)
     turned = np.degrees(np.arccos(field.axes[2] @ now.axes[2]))
     assert turned == pytest.approx(10)
     # At a roll of 90 deg the picture's up is east, so its longer side stands upright.
     spread = np.ptp(field.outline, axis=0)
     assert spread[2] > 1.5 * np.ptp(field.outline @ field.axes[1])
-    assert not SKY.sight(view, 0).now
-    assert sight.stars
+    assert not SKY.sky_map(view, 0).now
+    assert sky_map.stars
 
 
 def test_an_outline_is_the_border_of_the_picture() -> None:
@@ -137,7 +137,7 @@ def test_hazards_say_where_bodies_are(tmp_path: Path) -> None:
         "[hazards.earth-limb]\nnadir = [0, -90]\nsun = [1, 0, 0]\naltitude_km = 750\n"
         "[hazards.sun-glare]\ndirection = [1, 0, 0]\n[hazards.planets]\n"
     )
-    bodies = {one.name: one for one in SKY.sight(load(save(tmp_path, text)), 0).bodies}
+    bodies = {one.name: one for one in SKY.sky_map(load(save(tmp_path, text)), 0).bodies}
     assert bodies.keys() >= {"Moon", "Earth", "Sun", "Venus"}
     np.testing.assert_allclose(bodies["Moon"].direction, [0, 1, 0], atol=1e-12)
     assert bodies["Earth"].radius_deg == pytest.approx(63.48, abs=0.01)
@@ -146,12 +146,12 @@ def test_hazards_say_where_bodies_are(tmp_path: Path) -> None:
 
 def test_earth_and_sun_stand_in_the_satellite_s_axes(tmp_path: Path) -> None:
     view = load(save(tmp_path, HARD))
-    sight = EARTH.sight(view, 10**12)
-    assert [one.name for one in sight.bodies[:3]] == ["Earth", "Sun", "Moon"]
-    nadir = next(one for one in sight.fields if one.name == "nadir camera")
+    sky_map = EARTH.sky_map(view, 10**12)
+    assert [one.name for one in sky_map.bodies[:3]] == ["Earth", "Sun", "Moon"]
+    nadir = next(one for one in sky_map.fields if one.name == "nadir camera")
     np.testing.assert_allclose(nadir.axes[2], [1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(nadir.outline @ nadir.axes[2], np.cos(np.radians(95)))
-    assert len(sight.now) == 2
-    assert sight.turn @ np.array([0, 0, 1]) == pytest.approx([1, 0, 0])
-    assert np.linalg.det(sight.turn) == pytest.approx(1)  # seen from inside, as the sky is
-    assert not sight.stars
+    assert len(sky_map.now) == 2
+    assert sky_map.turn @ np.array([0, 0, 1]) == pytest.approx([1, 0, 0])
+    assert np.linalg.det(sky_map.turn) == pytest.approx(1)  # seen from inside, as the sky is
+    assert not sky_map.stars

@@ -197,8 +197,8 @@ def test_an_injection_s_numbers_are_its_own() -> None:
     assert len({draws[0], made().generator_at(5).random(), *others}) == 4
     one = made()
     assert [one.active(time_ps) for time_ps in (9, 10, 19, 20)] == [False, True, True, False]
-    assert [one.drawn(value, 7) for value in (0, 6, 7, 99)] == [0, 6, 6, 6]
-    drawn = {one.drawn(None, 7, key) for key in range(100)}
+    assert [one.draw(value, 7) for value in (0, 6, 7, 99)] == [0, 6, 6, 6]
+    drawn = {one.draw(None, 7, key) for key in range(100)}
     assert drawn == set(range(7))
     assert one.strikes(1.0)
     assert not any(one.strikes(0.0) for _ in range(100))

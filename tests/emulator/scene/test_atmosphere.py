@@ -28,7 +28,7 @@ def stars_at(heights_deg: list[float]) -> Vectors:
 
 
 def seen(air: Atmosphere, stars: Vectors, exposure_s: float = 0.4, seed: int = 1):
-    return air.seen(stars, 0.0, exposure_s, 5.0, np.random.default_rng(seed))
+    return air.apparent(stars, 0.0, exposure_s, 5.0, np.random.default_rng(seed))
 
 
 def test_air_mass_and_refraction_are_those_of_the_tables() -> None:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from cubestack.emulator.camera.ov7620.fisheye import lens_of
-from cubestack.emulator.camera.ov7620.lens_error import LensError, drawn_lens
+from cubestack.emulator.camera.ov7620.lens_error import LensError, draw_lens
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.cli.main import main
@@ -26,7 +26,7 @@ def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[st
     which = ("--sensor", "nadir", "--seed", 2, "--emulated", 20, "--check-poses", 8)
     found = calibrate(capsys, *which, "--profile", "extended", "--set", "lens=residuals")
     assert found["error_after_deg"] < 0.06 < 0.2 < found["error_before_deg"]
-    centre = np.add((371, 236), drawn_lens(CameraTarget.NADIR, 2).centre_px)
+    centre = np.add((371, 236), draw_lens(CameraTarget.NADIR, 2).centre_px)
     np.testing.assert_allclose(found["boresight_px"], centre, atol=0.15)
 
 

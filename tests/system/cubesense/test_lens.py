@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError, drawn_lens
+from cubestack.emulator.camera.ov7620.lens_error import NOMINAL, LensError, draw_lens
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
@@ -42,7 +42,7 @@ def test_an_axis_beside_the_boresight_moves_the_earth(ready: Open) -> None:
 def test_a_unit_has_the_lenses_of_its_seed(ready: Open, profile: str) -> None:
     with ready(None, profile=profile, set="", seed=5) as opened:
         for camera, target in zip(Camera, CameraTarget, strict=True):
-            drawn = drawn_lens(target, 5)
+            drawn = draw_lens(target, 5)
             assert opened.board.cameras[camera].lens == (
                 drawn if profile == "published" else NOMINAL
             )

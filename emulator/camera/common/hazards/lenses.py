@@ -54,9 +54,9 @@ class FocalLength(SensorHazard):
     ppm_per_k: float = number(20.0, "increase per K above 20 C, millionths", -500, 500)
 
     @classmethod
-    def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: Any, generator: np.random.Generator) -> Self:
         return replace(
-            super().placed(strength, looking, generator),
+            super().sample(strength, state, generator),
             percent=strength * float(generator.choice([-1, 1])),
         )
 

@@ -44,9 +44,9 @@ class Background(SensorHazard):
     sigma: float = number(4.0, "standard deviation of the additional noise, grey values", 0, 100)
 
     @classmethod
-    def placed(cls, strength: float, looking: Any, generator: np.random.Generator) -> Self:
+    def sample(cls, strength: float, state: Any, generator: np.random.Generator) -> Self:
         """With additional noise of a fifth of the level."""
-        return replace(super().placed(strength, looking, generator), sigma=strength / 5)
+        return replace(super().sample(strength, state, generator), sigma=strength / 5)
 
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
         del generator

@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from cubestack.emulator.camera.common import exposure, imager
 from cubestack.emulator.camera.common.exposure import (
     FAINTEST_V,
-    looking_along,
+    camera_state_for,
     star_light,
     star_pixels,
 )
@@ -281,7 +281,7 @@ def test_still_stars_do_not_streak_and_are_where_they_are_in_the_middle() -> Non
 
 def test_who_looks_knows_the_angles_between_the_picture_s_edges() -> None:
     """Half a pixel beyond the outermost pixels' centres."""
-    now = looking_along([0, 0, 0, 1], LENS)
+    now = camera_state_for([0, 0, 0, 1], LENS)
     ends = {
         "width_deg": [[-0.5, 255.5], [1023.5, 255.5]],
         "height_deg": [[511.5, -0.5], [511.5, 511.5]],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from cubestack.emulator.camera.common.exposure import looking_along, star_light
+from cubestack.emulator.camera.common.exposure import camera_state_for, star_light
 from cubestack.emulator.camera.common.glow import brightness, glow_electrons
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.mlx75412.lens import LENS
@@ -20,15 +20,15 @@ GLOWING = ["moon", "earth-limb", "sun-glare", "sky-glow"]
 
 def placed(name: str, optics: Optics, seed: int) -> SkyHazard:
     kind = SKY_HAZARDS[name]
-    now = looking_along(ORION.quaternion, optics)
-    return kind.placed(kind.strength.usual, now, np.random.default_rng(seed))
+    now = camera_state_for(ORION.quaternion, optics)
+    return kind.sample(kind.strength.usual, now, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("optics", quick(LENSES, 1), ids=["cubestar", "aramis"])
 @pytest.mark.parametrize("name", GLOWING)
 def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> None:
     generator = np.random.default_rng(2)
-    now = looking_along(ORION.quaternion, optics)
+    now = camera_state_for(ORION.quaternion, optics)
     for seed in range(3):
         hazard = placed(name, optics, seed)
         picture = glow_electrons([hazard], [now], optics)
@@ -48,7 +48,7 @@ def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> No
 
 
 def test_nearer_things_hide_farther_ones() -> None:
-    now = looking_along(ORION.quaternion, LENS)
+    now = camera_state_for(ORION.quaternion, LENS)
     behind = Moon(direction=tuple(now.boresight.tolist()))
     earth = replace(placed("earth-limb", LENS, 0), nadir=behind.direction, airglow=0.0)
     glare = SunGlare(direction=tuple((-now.boresight).tolist()))
@@ -65,10 +65,10 @@ def test_nearer_things_hide_farther_ones() -> None:
 
 
 def test_even_glow_gives_what_the_sky_gives_on_the_axis() -> None:
-    glare = SunGlare(direction=tuple(looking_along(ORION.quaternion, LENS).boresight.tolist()))
+    glare = SunGlare(direction=tuple(camera_state_for(ORION.quaternion, LENS).boresight.tolist()))
     even = replace(glare, slope_deg=1e6, transmittance=1e-12, decade_deg=180.0)
     scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(even,))
-    now = looking_along(ORION.quaternion, LENS)
+    now = camera_state_for(ORION.quaternion, LENS)
     glow = even.glow(now, now.boresight[None])
     light = star_light(scene, LENS, SHUTTER)
     px = LENS.project(np.array([[0.0, 0.0, 1.0]]))[0].astype(int)
@@ -91,7 +91,7 @@ def test_glow_smears_as_the_camera_turns() -> None:
 @pytest.mark.parametrize("sigma_px", [0.9, 3.0])
 def test_lens_blurs_the_edge_as_it_does_a_star(sigma_px: float) -> None:
     optics = replace(LENS, psf_sigma_px=sigma_px)
-    now = looking_along(ORION.quaternion, optics)
+    now = camera_state_for(ORION.quaternion, optics)
     moon = Moon(direction=tuple(now.boresight.tolist()), scatter=0.0)
     light = glow_electrons([moon], [now], optics)
     sharp = glow_electrons([moon], [now], replace(optics, psf_sigma_px=1e-3))
@@ -105,6 +105,6 @@ def test_lens_blurs_the_edge_as_it_does_a_star(sigma_px: float) -> None:
 
 
 def test_without_hazards_nothing_glows() -> None:
-    now = looking_along(ORION.quaternion, LENS)
+    now = camera_state_for(ORION.quaternion, LENS)
     assert glow_electrons([], [now], LENS) is None
     assert glow_electrons([placed("aberration", LENS, 0)], [now], LENS) is None

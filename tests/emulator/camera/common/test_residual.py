@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval2d
 
-from cubestack.emulator.camera.common.residual import Residual, displaced, restored
+from cubestack.emulator.camera.common.residual import Residual, displace, restore
 
 SHAPE = (512, 1024)
 GENERATOR = np.random.default_rng(11)
@@ -35,22 +35,22 @@ def test_corners_are_the_ends_of_the_scale_and_hold_beyond() -> None:
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_both_ways_undo_each_other(count: int) -> None:
     residuals = (RESIDUAL, Residual(SHAPE, DOWN, ACROSS))[:count]
-    seen = displaced(PIXELS, residuals)
-    np.testing.assert_allclose(restored(seen, residuals), PIXELS, atol=1e-10)
-    np.testing.assert_allclose(displaced(restored(PIXELS, residuals), residuals), PIXELS, atol=1e-9)
+    seen = displace(PIXELS, residuals)
+    np.testing.assert_allclose(restore(seen, residuals), PIXELS, atol=1e-10)
+    np.testing.assert_allclose(displace(restore(PIXELS, residuals), residuals), PIXELS, atol=1e-9)
     assert bool(np.all(seen == PIXELS)) is (count == 0)
 
 
 def test_what_is_seen_is_displaced_by_what_holds_there() -> None:
-    seen = displaced(PIXELS, (RESIDUAL,))
+    seen = displace(PIXELS, (RESIDUAL,))
     np.testing.assert_allclose(seen - RESIDUAL.at(seen), PIXELS, atol=1e-10)
 
 
 def test_points_that_are_nowhere_stay_there() -> None:
     some = PIXELS.copy()
     some[3] = np.nan
-    seen = displaced(some, (RESIDUAL,))
+    seen = displace(some, (RESIDUAL,))
     assert np.isnan(seen[3]).all()
     np.testing.assert_array_equal(
-        np.delete(seen, 3, 0), np.delete(displaced(PIXELS, (RESIDUAL,)), 3, 0)
+        np.delete(seen, 3, 0), np.delete(displace(PIXELS, (RESIDUAL,)), 3, 0)
     )

@@ -17,7 +17,7 @@ from cubestack.emulator.camera.common.hazards import (
     Protons,
 )
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
-from cubestack.emulator.camera.ov7620.blur import blurred
+from cubestack.emulator.camera.ov7620.blur import blur
 from cubestack.emulator.camera.ov7620.fisheye import lens_of
 from cubestack.emulator.camera.ov7620.lens_error import NOMINAL
 from cubestack.emulator.camera.ov7620.sensor import Ov7620
@@ -62,7 +62,7 @@ def test_without_hazards_the_lens_is_the_unit_s_own() -> None:
 @pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"dose"}))
 def test_the_worst_strength_shows_and_repeats(name: str) -> None:
     hazard = HAZARDS[name]
-    worst = hazard.placed(hazard.strength.values[-1], None, np.random.default_rng(1))
+    worst = hazard.sample(hazard.strength.values[-1], None, np.random.default_rng(1))
     one = grey(worst)
     np.testing.assert_array_equal(one, grey(worst))
     assert np.mean(one != grey()) > 1e-3
@@ -70,7 +70,7 @@ def test_the_worst_strength_shows_and_repeats(name: str) -> None:
 
 def test_damage_is_too_little_for_half_a_millisecond() -> None:
     # 10 krad: 0.7 sources in each hundred pixels, of 4500 electrons a second; 433 a grey value.
-    hazard = HAZARDS["dose"].placed(10, None, np.random.default_rng(1))
+    hazard = HAZARDS["dose"].sample(10, None, np.random.default_rng(1))
     assert np.abs(grey(hazard) - grey()).max() <= 1
 
 
@@ -149,7 +149,7 @@ def test_residuals_displace_and_can_be_undone() -> None:
 def test_defocus_spreads_the_light_and_loses_none(sigma: float) -> None:
     light = np.zeros((60, 80), np.float32)
     light[30, 40], light[31, 45] = 1000, 500
-    soft = blurred(light, sigma)
+    soft = blur(light, sigma)
     assert soft.sum() == pytest.approx(1500, rel=1e-4)
     # Gaussian and pixel: 1/12 more variance.
     expected = gaussian_filter(light, np.hypot(sigma, 12**-0.5), truncate=5)

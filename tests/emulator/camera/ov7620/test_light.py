@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistorted
+from cubestack.emulator.camera.ov7620.fisheye import LENSES, undistort
 from cubestack.emulator.camera.ov7620.light import USUAL_EXPOSURE, scene_light
 from cubestack.emulator.camera.ov7620.luminance import BLACK
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene, Mounting, Reflection
@@ -96,7 +96,7 @@ def test_sun_is_where_its_direction_says() -> None:
         light = levels(EarthSunScene.facing((alpha, beta)), SUN) - 34
         centre = [np.average(axis, weights=light) for axis in (COLUMNS, ROWS)]
         offset = np.array(centre) - (369, 250)
-        theta = undistorted(np.hypot(*offset)) / 2.9
+        theta = undistort(np.hypot(*offset)) / 2.9
         np.testing.assert_allclose(offset / np.hypot(*offset) * theta, [alpha, beta], atol=0.01)
 
 

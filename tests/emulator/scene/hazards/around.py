@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from cubestack.emulator.scene.hazards.contract import Looking, SkyHazard
+from cubestack.emulator.scene.hazards.contract import CameraState, SkyHazard
 
 
-def whole_light(hazard: SkyHazard, now: Looking, centre: np.ndarray, reach_rad: float) -> float:
+def whole_light(hazard: SkyHazard, now: CameraState, centre: np.ndarray, reach_rad: float) -> float:
     """Light within ``reach_rad`` of ``centre``, in stars of V = 0: a sum over small equal areas."""
     side = np.cross(centre, [0.3, -0.5, 0.81])
     side /= np.linalg.norm(side)

@@ -14,7 +14,7 @@ VECTORS = RANDOM / np.linalg.norm(RANDOM, axis=1, keepdims=True)
 
 
 def shifts_arcsec(hazard: Aberration) -> np.ndarray:
-    return np.asarray(np.linalg.norm(hazard.seen(NOW, VECTORS) - VECTORS, axis=1) / ARCSEC)
+    return np.asarray(np.linalg.norm(hazard.apparent(NOW, VECTORS) - VECTORS, axis=1) / ARCSEC)
 
 
 def test_constant_of_aberration() -> None:
@@ -31,7 +31,7 @@ def test_orbit_adds_five_arcsec_at_most() -> None:
 def test_goes_towards_the_velocity_as_relativity_says() -> None:
     speed = 0.01
     hazard = Aberration(velocity_km_s=(0.0, 0.0, speed * 299_792.458))
-    moved = hazard.seen(NOW, VECTORS)
+    moved = hazard.apparent(NOW, VECTORS)
     before, after = VECTORS[:, 2], moved[:, 2]
     np.testing.assert_allclose(after, (before + speed) / (1 + speed * before), atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 1)

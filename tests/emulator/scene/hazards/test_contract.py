@@ -9,22 +9,22 @@ from scipy.spatial.transform import Rotation
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import (
     EARTH_RADIANCE,
+    CameraState,
     Depth,
-    Looking,
     SkyHazard,
     angles_rad,
-    aside,
+    check_hazards,
     direction,
-    refuse_strangers,
+    random_direction_at,
 )
 from cubestack.emulator.scene.hazards.moon import Moon
 
 AXES = Rotation.from_euler("zyx", [50, -20, 10], degrees=True).as_matrix()
-ROUND = Looking(AXES, 40, 20, 15, 1e-3)
+ROUND = CameraState(AXES, 40, 20, 15, 1e-3)
 
 
-def off_axis_deg(looking: Looking, vector: np.ndarray) -> float:
-    return float(np.degrees(np.arccos(np.clip(looking.boresight @ vector, -1, 1))))
+def off_axis_deg(state: CameraState, vector: np.ndarray) -> float:
+    return float(np.degrees(np.arccos(np.clip(state.boresight @ vector, -1, 1))))
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_angles_are_exact_for_small_ones_too() -> None:
 
 def test_places_are_in_the_picture_and_all_over_it() -> None:
     generator = np.random.default_rng(2)
-    vectors = np.array([ROUND.anywhere(generator) for _ in range(2000)])
+    vectors = np.array([ROUND.random_direction(generator) for _ in range(2000)])
     np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1)
     x, y, z = AXES @ vectors.T
     angle = np.degrees(np.arccos(z))
@@ -93,8 +93,8 @@ def test_places_are_in_the_picture_and_all_over_it() -> None:
 @pytest.mark.parametrize("angle_deg", [0.0, 10.0, 90.0, 170.0])
 def test_beside_and_aside_are_at_the_angle_to_any_side(angle_deg: float) -> None:
     generator = np.random.default_rng(3)
-    places = [ROUND.beside(angle_deg, generator) for _ in range(200)]
-    others = [aside(ROUND.boresight, angle_deg, generator) for _ in range(200)]
+    places = [ROUND.random_direction_at(angle_deg, generator) for _ in range(200)]
+    others = [random_direction_at(ROUND.boresight, angle_deg, generator) for _ in range(200)]
     for found in (places, others):
         for vector in found:
             assert np.linalg.norm(vector) == pytest.approx(1)
@@ -109,10 +109,10 @@ def test_a_hazard_by_itself_is_nothing() -> None:
     assert nothing.lights(ROUND) is nothing.glow(ROUND, vectors) is None
     assert nothing.hidden(ROUND, vectors) is None
     assert (nothing.rings(ROUND), nothing.speed_deg_s, nothing.seed) == ((), 0.0, 0)
-    assert nothing.seen(ROUND, vectors) is vectors
-    refuse_strangers((nothing, Moon()))
+    assert nothing.apparent(ROUND, vectors) is vectors
+    check_hazards((nothing, Moon()))
     with pytest.raises(SceneError, match="hazards must be hazards of light, not 5"):
-        refuse_strangers((nothing, 5))
+        check_hazards((nothing, 5))
 
 
 def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:

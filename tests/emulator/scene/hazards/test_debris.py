@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.exposure import looking, star_light
+from cubestack.emulator.camera.common.exposure import camera_state, star_light
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.debris import Debris
 from cubestack.emulator.scene.sky import SkyScene
 from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
 
-MIDDLE = looking(ORION, LENS, SHUTTER)
+MIDDLE = camera_state(ORION, LENS, SHUTTER)
 
 
 def streak(rate_deg_s: float) -> tuple[np.ndarray, Debris]:

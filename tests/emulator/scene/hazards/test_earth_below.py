@@ -14,7 +14,7 @@ from tests.emulator.scene.hazards.looks import NOW
 def test_every_strength_makes_a_scene(kind: type[Hazard]) -> None:
     assert kind.strength.usual in kind.strength.values
     for strength in kind.strength.values:
-        hazard = kind.placed(strength, NOW, np.random.default_rng(3))
+        hazard = kind.sample(strength, NOW, np.random.default_rng(3))
         assert getattr(hazard, kind.strength.key) == strength
         scene = EarthSunScene(hazards=(hazard,))
         assert np.linalg.norm(scene.sun) == pytest.approx(1)

@@ -129,7 +129,7 @@ def test_light_in_a_lens_is_the_sum_over_the_ground() -> None:
 
 @pytest.mark.parametrize("angle_deg", [45.0, 5.0, 0.0, -10.0])
 def test_is_placed_with_the_limb_at_an_angle(angle_deg: float) -> None:
-    hazard = EarthLimb.placed(angle_deg, NOW, np.random.default_rng(8))
+    hazard = EarthLimb.sample(angle_deg, NOW, np.random.default_rng(8))
     to_nadir = np.degrees(np.arccos(np.array(hazard.nadir) @ NOW.boresight))
     assert to_nadir - RADIUS_DEG == pytest.approx(angle_deg, abs=1e-6)
     assert hazard.sun is not None

@@ -21,8 +21,8 @@ class Fog(Hazard):
 
 
 def test_one_of_a_strength_has_a_seed_of_its_own_that_repeats() -> None:
-    first, again = (Fog.placed(3.0, None, np.random.default_rng(5)) for _ in range(2))
+    first, again = (Fog.sample(3.0, None, np.random.default_rng(5)) for _ in range(2))
     assert first == again
     assert first.banks == 3
     assert isinstance(first.banks, int)
-    assert first.seed != Fog.placed(3.0, None, np.random.default_rng(6)).seed
+    assert first.seed != Fog.sample(3.0, None, np.random.default_rng(6)).seed

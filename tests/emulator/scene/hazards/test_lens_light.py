@@ -5,12 +5,12 @@ import pytest
 
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.form import bodies_of
-from cubestack.emulator.scene.hazards import Ghosts, Glint, Looking
+from cubestack.emulator.scene.hazards import CameraState, Ghosts, Glint
 from cubestack.emulator.scene.hazards.contract import SUN_V
 from cubestack.emulator.scene.hazards.glare import aureole
 from cubestack.emulator.scene.hazards.glint import SUN_SURFACE
 
-FISHEYE = Looking(np.eye(3), 190, 190, 95, np.radians(0.345))
+FISHEYE = CameraState(np.eye(3), 190, 190, 95, np.radians(0.345))
 
 
 def grid(half_deg: float, step_deg: float) -> tuple[np.ndarray, np.ndarray]:
@@ -58,7 +58,7 @@ def test_glint_is_at_the_border_and_turns_with_the_camera(seed: int) -> None:
     assert np.hypot(*angles[glow > 0].T).min() > 0.7 * 95 - 0.17 * 95
     axes = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
     axes[2] *= np.linalg.det(axes)
-    turned = Looking(axes, 190, 190, 95, FISHEYE.pixel_rad)
+    turned = CameraState(axes, 190, 190, 95, FISHEYE.pixel_rad)
     np.testing.assert_allclose(
         Glint(seed=seed, surface=0.04).glow(turned, vectors @ axes), glow, rtol=1e-3, atol=1e9
     )
@@ -116,7 +116,7 @@ def test_glint_is_of_bars_with_sizes_by_the_half_field(seed: int) -> None:
     ticks = np.linspace(-1.2, 1.2, 301) * ring.outer_rad
     u, v = (axis.ravel() for axis in np.meshgrid(ticks, ticks))
     rays = np.outer(np.sqrt(1 - u**2 - v**2), ring.centre) + np.outer(u, one) + np.outer(v, other)
-    fine = Looking(np.eye(3), 190, 190, 95, 1e-4)
+    fine = CameraState(np.eye(3), 190, 190, 95, 1e-4)
     share = Glint(seed=seed, count=1, surface=1.0).glow(fine, rays) / SUN_SURFACE
     lit = share > 0.5
     points = np.stack([u[lit], v[lit]])
@@ -129,7 +129,7 @@ def test_glint_is_of_bars_with_sizes_by_the_half_field(seed: int) -> None:
     assert area == pytest.approx(4 * length * width, rel=0.04)
     assert share.max() == pytest.approx(1.0)
     # Its edge is a pixel wide, half of it on either side.
-    wide = Looking(np.eye(3), 190, 190, 95, float(width))
+    wide = CameraState(np.eye(3), 190, 190, 95, float(width))
     soft = Glint(seed=seed, count=1, surface=1.0).glow(wide, rays) / SUN_SURFACE
     assert soft.sum() == pytest.approx(share.sum(), rel=0.05)
     assert ((soft > 0.05) & (soft < 0.95)).sum() > ((share > 0.05) & (share < 0.95)).sum()

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.exposure import looking_along, star_light, star_pixels
+from cubestack.emulator.camera.common.exposure import camera_state_for, star_light, star_pixels
 from cubestack.emulator.camera.common.shutter import RollingShutter
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.file import SceneError
@@ -15,7 +15,7 @@ from tests.emulator.scene.hazards.around import whole_light
 
 SHUTTER = RollingShutter(10**12, 132_200_000, 2917, 2917)
 ORION = SkyScene.pointing(83.8, -1.0)
-NOW = looking_along(ORION.quaternion, LENS)
+NOW = camera_state_for(ORION.quaternion, LENS)
 CENTRE = tuple(NOW.boresight)
 
 
@@ -82,7 +82,7 @@ def test_hides_the_stars_behind() -> None:
 def test_is_placed_in_the_picture_with_its_phase() -> None:
     generator = np.random.default_rng(3)
     for share in (0.0, 0.2, 1.0):
-        moon = Moon.placed(share, NOW, generator)
+        moon = Moon.sample(share, NOW, generator)
         x, y = LENS.project((NOW.axes @ np.asarray(moon.direction))[None])[0]
         assert -30 < x < LENS.columns + 30
         assert -30 < y < LENS.rows + 30

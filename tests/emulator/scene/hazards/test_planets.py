@@ -35,7 +35,7 @@ def test_all_are_near_the_ecliptic() -> None:
 
 
 def test_one_shines_as_a_star_of_its_magnitude() -> None:
-    planet = Planets.placed(-2.0, NOW, np.random.default_rng(1))
+    planet = Planets.sample(-2.0, NOW, np.random.default_rng(1))
     dark = SkyScene(ORION.quaternion, mag_limit=-2.0)
     light = star_light(SkyScene(ORION.quaternion, mag_limit=-2.0, hazards=(planet,)), LENS, SHUTTER)
     right = float(LENS.electrons_per_second(-2.0)) * SHUTTER.exposure_s

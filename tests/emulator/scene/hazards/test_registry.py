@@ -3,7 +3,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from cubestack.emulator.camera.common.exposure import looking, star_light
+from cubestack.emulator.camera.common.exposure import camera_state, star_light
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.scene_file import hazard_tables
 from cubestack.emulator.camera.mlx75412.lens import LENS
@@ -28,9 +28,9 @@ def test_says_what_it_is(kind: type[SkyHazard]) -> None:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 @pytest.mark.parametrize("optics", quick([LENS, double_gauss()], 1), ids=["cubestar", "aramis"])
 def test_every_strength_renders(kind: type[SkyHazard], optics: Optics) -> None:
-    now = looking(ORION, optics, SHUTTER)
+    now = camera_state(ORION, optics, SHUTTER)
     for seed, strength in enumerate(kind.strength.values):
-        hazard = kind.placed(strength, now, np.random.default_rng(seed))
+        hazard = kind.sample(strength, now, np.random.default_rng(seed))
         light = star_light(replace(ORION, hazards=(hazard,)), optics, SHUTTER)
         assert np.isfinite(light).all()
         assert light.min() >= 0
@@ -38,14 +38,14 @@ def test_every_strength_renders(kind: type[SkyHazard], optics: Optics) -> None:
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_worst_disturbs_more_than_mildest(kind: type[SkyHazard]) -> None:
-    now = looking(ORION, LENS, SHUTTER)
+    now = camera_state(ORION, LENS, SHUTTER)
     clean = star_light(ORION, LENS, SHUTTER)
     mild, bad = (
         sum(
             float(
                 np.abs(star_light(replace(ORION, hazards=(hazard,)), LENS, SHUTTER) - clean).sum()
             )
-            for hazard in (kind.placed(s, now, np.random.default_rng(k)) for k in range(3))
+            for hazard in (kind.sample(s, now, np.random.default_rng(k)) for k in range(3))
         )
         for s in (kind.strength.values[0], kind.strength.values[-1])
     )
@@ -55,7 +55,7 @@ def test_worst_disturbs_more_than_mildest(kind: type[SkyHazard]) -> None:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
     first, same, other = (
-        kind.placed(kind.strength.usual, NOW, np.random.default_rng(seed)) for seed in (1, 1, 2)
+        kind.sample(kind.strength.usual, NOW, np.random.default_rng(seed)) for seed in (1, 1, 2)
     )
     assert first == same
     assert first != other
@@ -63,7 +63,7 @@ def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
-    hazard = kind.placed(kind.strength.usual, NOW, np.random.default_rng(4))
+    hazard = kind.sample(kind.strength.usual, NOW, np.random.default_rng(4))
     assert set(kind.declared()) == {entry.name for entry in fields(kind)}
     values = {entry.name: getattr(hazard, entry.name) for entry in fields(kind)}
     table = {
@@ -77,8 +77,8 @@ def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_lights_move_as_fast_as_is_said(kind: type[SkyHazard]) -> None:
     """By that the renderer knows how often to look at them."""
-    now = looking(ORION, LENS, SHUTTER)
-    hazard = kind.placed(kind.strength.usual, now, np.random.default_rng(3))
+    now = camera_state(ORION, LENS, SHUTTER)
+    hazard = kind.sample(kind.strength.usual, now, np.random.default_rng(3))
     here, soon = (hazard.lights(replace(now, time_s=now.time_s + dt)) for dt in (0.0, 1.0))
     if here is None or soon is None:
         assert hazard.speed_deg_s == 0

@@ -87,7 +87,7 @@ def test_milky_way_is_a_band() -> None:
 @pytest.mark.parametrize("away_deg", [15.0, 60.0, 180.0])
 def test_is_placed_at_a_longitude_from_the_sun(away_deg: float) -> None:
     for seed in range(4):
-        hazard = SkyGlow.placed(away_deg, NOW, np.random.default_rng(seed))
+        hazard = SkyGlow.sample(away_deg, NOW, np.random.default_rng(seed))
         x, y, _ = NOW.boresight @ ephemeris.FROM_ECLIPTIC
         from_sun = np.degrees(np.arctan2(y, x)) - ephemeris.sun_longitude_deg(hazard.julian_date)
         assert abs((from_sun + 180) % 360 - 180) == pytest.approx(away_deg, abs=0.01)

@@ -54,7 +54,7 @@ def test_each_says_what_it_and_its_keys_are(hazard: type[SensorHazard]) -> None:
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("hazard", HAZARDS.values(), ids=list(HAZARDS))
 def test_the_worst_strength_shows_and_repeats(hazard: type[SensorHazard], camera: str) -> None:
-    worst = hazard.placed(hazard.strength.values[-1], None, np.random.default_rng(1))
+    worst = hazard.sample(hazard.strength.values[-1], None, np.random.default_rng(1))
     first = picture(camera, worst)
     np.testing.assert_array_equal(first, picture(camera, worst))
     assert np.mean(first != picture(camera)) > 1e-4
@@ -64,7 +64,7 @@ def test_the_worst_strength_shows_and_repeats(hazard: type[SensorHazard], camera
 @pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"defocus", "response"}))
 def test_the_least_strength_is_none(name: str, camera: str) -> None:
     hazard = HAZARDS[name]
-    least = hazard.placed(hazard.strength.values[0], None, np.random.default_rng(1))
+    least = hazard.sample(hazard.strength.values[0], None, np.random.default_rng(1))
     np.testing.assert_array_equal(picture(camera, least), picture(camera))
 
 
@@ -105,7 +105,7 @@ def test_more_hot_pixels_than_pixels_are_refused() -> None:
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_other_frames_have_other_protons_but_the_same_damage(camera: str) -> None:
     def bright(name: str, readout_ps: int) -> set[int]:
-        hazard = HAZARDS[name].placed(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
+        hazard = HAZARDS[name].sample(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
         frame = picture(camera, hazard, scene=DARK, readout_ps=readout_ps, hot_pixels=0)
         return set(np.flatnonzero(frame > 30).tolist())
 
@@ -129,7 +129,7 @@ def test_a_photograph_has_what_happens_in_the_sensor(striped: PictureScene) -> N
 
 @pytest.mark.parametrize("name", ["protons", "hot-pixels"])
 def test_a_frame_with_it_takes_little_longer(name: str) -> None:
-    hazard = HAZARDS[name].placed(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
+    hazard = HAZARDS[name].sample(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
 
     def seconds(*hazards: SensorHazard) -> float:
         times = []

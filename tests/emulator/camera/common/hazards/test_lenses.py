@@ -6,7 +6,7 @@ import pytest
 from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.hazards.lenses import Defocus, FocalLength, LensResiduals
 from cubestack.emulator.camera.common.optics import Optics
-from cubestack.emulator.camera.common.residual import displaced
+from cubestack.emulator.camera.common.residual import displace
 from cubestack.emulator.camera.common.view import SkyCondition
 from cubestack.emulator.camera.mlx75412.lens import CONDITION, LENS
 from cubestack.emulator.camera.mt9m001.lens import CONDITION as ARAMIS
@@ -41,7 +41,7 @@ def test_focal_length_follows_the_temperature() -> None:
 
 
 def test_focal_lengths_are_placed_on_both_sides() -> None:
-    placed = {FocalLength.placed(1, None, np.random.default_rng(s)).percent for s in range(20)}
+    placed = {FocalLength.sample(1, None, np.random.default_rng(s)).percent for s in range(20)}
     assert placed == {-1, 1}
 
 
@@ -90,4 +90,4 @@ def test_hazards_that_go_too_far_together_are_refused() -> None:
 def test_what_the_lens_can_not_image_stops_no_other_star() -> None:
     residuals = lens(LensResiduals(rms_px=2.0, seed=1)).residuals
     with_nan = np.concatenate([[[np.nan, np.nan]], GRID])
-    np.testing.assert_array_equal(displaced(with_nan, residuals)[1:], displaced(GRID, residuals))
+    np.testing.assert_array_equal(displace(with_nan, residuals)[1:], displace(GRID, residuals))
