@@ -41,14 +41,19 @@ void Dma::reset() {
 
 // -- registers --
 
+// Registers that set and clear bits by channel.
+const Dma::ChannelBits Dma::CHANNEL_BITS[] = {
+    {CHUSEBURSTS, CHUSEBURSTC, &Dma::bursts}, {CHREQMASKS, CHREQMASKC, &Dma::masked},
+    {CHENS, CHENC, &Dma::enabled_channels},   {CHALTS, CHALTC, &Dma::alternates},
+    {CHPRIS, CHPRIC, &Dma::high},
+};
+
 uint32_t Dma::peek(uint32_t offset) const {
     uint32_t status = 0;
+    for (const ChannelBits &one : CHANNEL_BITS)
+        if (offset == one.set)
+            return this->*one.bits;
     switch (offset) {
-    case CHUSEBURSTS: return bursts;
-    case CHREQMASKS: return masked;
-    case CHENS: return enabled_channels;
-    case CHALTS: return alternates;
-    case CHPRIS: return high;
     case ALTCTRLBASE: return reg(CTRLBASE) + ALTERNATE;
     case CHREQSTATUS:
     case CHSREQSTATUS:
@@ -61,6 +66,13 @@ uint32_t Dma::peek(uint32_t offset) const {
 
 void Dma::write(uint32_t offset, uint32_t value) {
     const uint32_t bits = value & ALL;
+    for (const ChannelBits &one : CHANNEL_BITS)
+        if (offset == one.set || offset == one.clear) {
+            set_bits(this->*one.bits, bits, offset == one.set);
+            if (offset == CHENC)
+                software &= ~bits, continued &= ~bits;
+            return consider();
+        }
     switch (offset) {
     case CONFIG:
         reg(STATUS) = (reg(STATUS) & ~STATUS_EN) | (value & CONFIG_EN ? STATUS_EN : 0);
@@ -69,20 +81,6 @@ void Dma::write(uint32_t offset, uint32_t value) {
         reg(CTRLBASE) = value & ~(2 * ALTERNATE - 1);
         break;
     case CHSWREQ: software |= bits & enabled_channels; break;
-    case CHUSEBURSTS: bursts |= bits; break;
-    case CHUSEBURSTC: bursts &= ~bits; break;
-    case CHREQMASKS: masked |= bits; break;
-    case CHREQMASKC: masked &= ~bits; break;
-    case CHENS: enabled_channels |= bits; break;
-    case CHENC:
-        enabled_channels &= ~bits;
-        continued &= ~bits;
-        software &= ~bits;
-        break;
-    case CHALTS: alternates |= bits; break;
-    case CHALTC: alternates &= ~bits; break;
-    case CHPRIS: high |= bits; break;
-    case CHPRIC: high &= ~bits; break;
     case ERRORC:
         if (value & ERRORC_ERRORC)
             reg(ERRORC) = 0;

@@ -32,6 +32,11 @@ public:
 
 private:
     static constexpr int SOURCES = 64;
+    struct ChannelBits {
+        uint32_t set, clear;
+        uint32_t Dma::*bits;
+    };
+    static const ChannelBits CHANNEL_BITS[];
 
     uint8_t levels[SOURCES] = {}, pulses[SOURCES] = {};
     uint64_t waking = 0;

@@ -29,8 +29,7 @@ class Gpio;
 class Ebi;
 class Prs;
 class I2c;
-class Usart;
-class Leuart;
+class SerialReceiver;
 class Timer;
 
 enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFXO, LFRCO, ULFRCO };
@@ -144,8 +143,7 @@ public:
     Gpio *gpio = nullptr;
     Ebi *ebi = nullptr;
     Prs *prs = nullptr;
-    std::vector<Usart *> usarts;
-    std::vector<Leuart *> leuarts;
+    std::vector<SerialReceiver *> receivers;  // USARTs and LEUARTs, by unit number
     std::vector<I2c *> i2cs;
     std::vector<Timer *> timers;
 

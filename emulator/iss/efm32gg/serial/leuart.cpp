@@ -1,212 +1,131 @@
-#include "efm32gg/serial/leuart.h"
-
-#include "efm32gg/memory/dma.h"
-#include "efm32gg/pins/gpio.h"
+// LEUART, which works down to EM2. EFM32GG Reference Manual, chapter 19.
+#include "efm32gg/part/low_energy.h"
+#include "efm32gg/part/units.h"
+#include "efm32gg/serial/serial_port.h"
 
 namespace efm32gg {
 
+namespace {
+
 using namespace leuart;
 
-void Leuart::reset() {
-    LowEnergy::reset();
-    part.cancel(sent);
-    shifting = stalled = false;
-    transmit_buffer.clear();
-    receive_buffer.clear();
-    follow();
-}
+constexpr int FIRST_UNIT = 5;  // number of LEUART0 in messages
+constexpr SerialBits BITS = {CTRL_LOOPBK, CTRL_MPM, CTRL_MPAB, CTRL_ERRSDMA, STATUS_RXBLOCK,
+                             STATUS_TXC, STATUS_TXBL, STATUS_RXDATAV, IF_TXOF, IF_RXOF, IF_RXUF,
+                             IF_PERR, IF_FERR, IF_MPAF};
 
-int Leuart::transmit_pin() const {
-    const int location = (int)field(reg(ROUTE), ROUTE_LOCATION);
-    return reg(ROUTE) & ROUTE_TXPEN ? part.gpio->drivable(ROUTES[signals][location]) : -1;
-}
+class Leuart : public SerialPort<LowEnergy, 1> {
+public:
+    Leuart(Part &part, const Instance &instance, int source, int signals)
+        : SerialPort(part, instance, STATUS, BITS, FIRST_UNIT + instance.index, source, signals) {}
 
-int Leuart::receive_pin() const {
-    const int location = (int)field(reg(ROUTE), ROUTE_LOCATION);
-    return reg(ROUTE) & ROUTE_RXPEN ? part.gpio->readable(ROUTES[signals + 1][location]) : -1;
-}
-
-// -- registers --
-
-uint32_t Leuart::peek(uint32_t offset) const {
-    switch (offset) {
-    case RXDATA: return receive_buffer.front() & 0xFF;
-    case RXDATAX:
-    case RXDATAXP: return receive_buffer.front();
+    uint32_t peek(uint32_t offset) const override {
+        switch (offset) {
+        case RXDATA: return receive_buffer.front() & 0xFF;
+        case RXDATAX:
+        case RXDATAXP: return receive_buffer.front();
+        }
+        return Peripheral::peek(offset);
     }
-    return Peripheral::peek(offset);
-}
 
-uint32_t Leuart::read(uint32_t offset) {
-    if (offset != RXDATA && offset != RXDATAX)
+    uint32_t read(uint32_t offset) override {
+        switch (offset) {
+        case RXDATA: return take_received() & 0xFF;
+        case RXDATAX: return take_received();
+        }
         return peek(offset);
-    if (receive_buffer.empty()) {
-        raise(IF_RXUF);
-        return 0;
     }
-    const uint32_t entry = receive_buffer.pop();
-    follow();
-    return offset == RXDATA ? entry & 0xFF : entry;
-}
 
-void Leuart::write(uint32_t offset, uint32_t value) {
-    if (offset == TXDATA || offset == TXDATAX) {
-        // It enters the buffer now, and the shift register once it is synchronised.
+    void write(uint32_t offset, uint32_t value) override {
+        // A frame enters the buffer now, and the shift register once it is synchronised.
         const uint32_t eighth = reg(CTRL) & CTRL_BIT8DV ? 0x100 : 0;
-        if (transmit_buffer.full()) {
-            raise(IF_TXOF);
-        } else {
-            transmit_buffer.push(offset == TXDATA ? (value & 0xFF) | eighth : value & 0xE1FF);
-            reg(STATUS) &= ~STATUS_TXC;
+        if (offset == TXDATA)
+            enqueue((value & 0xFF) | eighth);
+        if (offset == TXDATAX)
+            enqueue(value & 0xE1FF);
+        LowEnergy::write(offset, value);
+        follow();
+    }
+
+private:
+    int data_bits() const override { return reg(CTRL) & CTRL_DATABITS ? 9 : 8; }
+    // 1 + CLKDIV / 256 (19.3.3).
+    double clocks_per_bit() const override { return (256.0 + reg(CLKDIV)) / 256.0; }
+
+    void apply(uint32_t offset, uint32_t value) override {
+        if (offset == CMD)
+            command(value);
+        else if (offset == TXDATA || offset == TXDATAX)
+            start();
+        else
+            LowEnergy::apply(offset, value);
+        follow();
+    }
+
+    // Bits that enable and disable the same thing are neighbours in CMD; the newer command wins.
+    uint32_t merge_commands(uint32_t older, uint32_t newer) const override {
+        const uint32_t pairs = newer & 0x3F;
+        return (older & ~((pairs & 0x15) << 1 | (pairs & 0x2A) >> 1)) | newer;
+    }
+
+    void command(uint32_t value) {
+        command_bit(status(), STATUS_RXENS, value, CMD_RXEN, CMD_RXDIS);
+        command_bit(status(), STATUS_TXENS, value, CMD_TXEN, CMD_TXDIS);
+        command_bit(status(), STATUS_RXBLOCK, value, CMD_RXBLOCKEN, CMD_RXBLOCKDIS);
+        clear_buffers(value & CMD_CLEARTX, value & CMD_CLEARRX);
+    }
+
+    void start(bool follows = false) override {
+        constexpr uint32_t waiting = SYNCBUSY_TXDATA | SYNCBUSY_TXDATAX;
+        const Rate rate = clock_now();
+        if (shifting || transmit_buffer.empty() || !(status() & STATUS_TXENS) || !rate.runs() ||
+            reg(SYNCBUSY) & waiting)
+            return;
+        shifted = transmit_buffer.pop();
+        const int64_t stop_bits = field(reg(CTRL), CTRL_STOPBITS) ? 2 : 1;
+        const bool parity = field(reg(CTRL), CTRL_PARITY) & 2;
+        const uint32_t data = shifted & ((1u << data_bits()) - 1);
+        send(Kind::UART, shifted & TXDATAX_TXBREAK ? 0x10000 : data, rate,
+             (1 + data_bits() + parity + stop_bits) * (256 + (int64_t)reg(CLKDIV)), 256, follows,
+             true);
+    }
+
+    void finished() override {
+        if (shifted & TXDATAX_TXDISAT)
+            status() &= ~STATUS_TXENS;
+        if (reg(CTRL) & CTRL_LOOPBK && status() & STATUS_RXENS)
+            accept(shifted & ((1u << data_bits()) - 1));
+        if (shifted & TXDATAX_RXENAT)
+            status() |= STATUS_RXENS;
+    }
+
+    void accept(uint32_t frame) override {
+        const uint32_t data = frame & 0x1FF;
+        const bool address = set_frame_flags(frame);
+        // Only frames without error are compared (19.3.5.5).
+        const bool compared = !(frame & (RXDATAX_FERR | RXDATAX_PERR));
+        if (compared && data == reg(STARTFRAME)) {
+            flags() |= IF_STARTF;
+            if (reg(CTRL) & CTRL_SFUBRX)
+                status() &= ~STATUS_RXBLOCK;
         }
+        const bool accepted = !(status() & STATUS_RXBLOCK) || address;
+        if (compared && data == reg(SIGFRAME) && accepted)
+            flags() |= IF_SIGF;
+        if (accepted)
+            store_received(frame);
     }
-    LowEnergy::write(offset, value);
-    follow();
-}
 
-void Leuart::apply(uint32_t offset, uint32_t value) {
-    if (offset == CMD)
-        command(value);
-    else if (offset == TXDATA || offset == TXDATAX)
-        start();
-    else
-        LowEnergy::apply(offset, value);
-    follow();
-}
-
-// Bits that enable and disable the same thing are neighbours in CMD; the newer command wins.
-uint32_t Leuart::merge_commands(uint32_t older, uint32_t newer) const {
-    const uint32_t pairs = newer & 0x3F;
-    return (older & ~((pairs & 0x15) << 1 | (pairs & 0x2A) >> 1)) | newer;
-}
-
-void Leuart::command(uint32_t value) {
-    uint32_t &status = reg(STATUS);
-    command_bit(status, STATUS_RXENS, value, CMD_RXEN, CMD_RXDIS);
-    command_bit(status, STATUS_TXENS, value, CMD_TXEN, CMD_TXDIS);
-    command_bit(status, STATUS_RXBLOCK, value, CMD_RXBLOCKEN, CMD_RXBLOCKDIS);
-    if (value & CMD_CLEARTX)
-        transmit_buffer.clear();
-    if (value & CMD_CLEARRX)
-        receive_buffer.clear();
-    start();
-}
-
-// -- transmitter: a bit takes 1 + CLKDIV / 256 clocks (19.3.3), so durations are in 1/256 clock --
-
-void Leuart::start(bool follows) {
-    constexpr uint32_t waiting = SYNCBUSY_TXDATA | SYNCBUSY_TXDATAX;
-    const Rate rate = clock_now();
-    if (shifting || transmit_buffer.empty() || !(reg(STATUS) & STATUS_TXENS) || !rate.runs() ||
-        reg(SYNCBUSY) & waiting)
-        return;
-    const uint32_t frame = transmit_buffer.pop();
-    const int64_t halves = field(reg(CTRL), CTRL_STOPBITS) ? 2 : 1;
-    const bool parity = field(reg(CTRL), CTRL_PARITY) & 2;
-    const int64_t units = (1 + data_bits() + parity + halves) * (256 + (int64_t)reg(CLKDIV));
-    timing.append(rate, units, 256, follows, part.now());
-    shifting = true;
-    shifted = frame;
-    const int64_t data = frame & ((1u << data_bits()) - 1);
-    if (const int to = transmit_pin(); to >= 0)
-        part.send(Kind::UART, (FIRST_UNIT + instance.index) | to << 8,
-                  frame & TXDATAX_TXBREAK ? 0x10000 : data,
-                  timing.end - timing.begin).time = timing.begin;
-    part.schedule(sent, timing.end);
-}
-
-void Leuart::on_sent(int64_t) {
-    if (!clock_now().runs()) {
-        stalled = true;
-        return;
+    void follow() override {
+        part.dma->wakes(source, reg(CTRL) & (CTRL_RXDMAWU | CTRL_TXDMAWU));
+        SerialPort::follow();
     }
-    shifting = false;
-    uint32_t &status = reg(STATUS);
-    if (shifted & TXDATAX_TXDISAT)
-        status &= ~STATUS_TXENS;
-    if (reg(CTRL) & CTRL_LOOPBK && status & STATUS_RXENS)
-        accept(shifted & ((1u << data_bits()) - 1));
-    if (shifted & TXDATAX_RXENAT)
-        status |= STATUS_RXENS;
-    if (transmit_buffer.empty()) {
-        status |= STATUS_TXC;
-        reg(IF) |= IF_TXC;
-    }
-    start(true);
-    follow();
-}
+};
 
-void Leuart::clocks_changed() {
-    LowEnergy::clocks_changed();
-    if (stalled && clock_now().runs()) {
-        stalled = false;
-        part.schedule(sent, part.now());
-    }
-    start();
-    follow();
-}
+}  // namespace
 
-// -- receiver --
-
-void Leuart::receive(uint32_t data, bool framing_error, bool parity_error, uint32_t rate) {
-    const Rate clock = clock_now();
-    if (!clock.runs() || !(reg(STATUS) & STATUS_RXENS) || reg(CTRL) & CTRL_LOOPBK ||
-        receive_pin() < 0)
-        return;
-    if (rate) {
-        const double own = clock.frequency() * 256.0 / (256.0 + reg(CLKDIV));
-        framing_error |= own < 0.96 * rate || own > 1.04 * rate;
-    }
-    data &= (1u << data_bits()) - 1;
-    accept(data | (framing_error ? RXDATAX_FERR : 0) | (parity_error ? RXDATAX_PERR : 0));
-    follow();
-}
-
-void Leuart::accept(uint32_t frame) {
-    const uint32_t control = reg(CTRL);
-    uint32_t &status = reg(STATUS), flags = 0;
-    const uint32_t data = frame & 0x1FF;
-    const bool address = control & CTRL_MPM && !!(frame & 0x100) == !!(control & CTRL_MPAB);
-    if (address)
-        flags |= IF_MPAF;
-    if (frame & RXDATAX_FERR)
-        flags |= IF_FERR;
-    if (frame & RXDATAX_PERR)
-        flags |= IF_PERR;
-    // Only frames without error are compared (19.3.5.5).
-    if (!(frame & (RXDATAX_FERR | RXDATAX_PERR))) {
-        if (data == reg(STARTFRAME)) {
-            flags |= IF_STARTF;
-            if (control & CTRL_SFUBRX)
-                status &= ~STATUS_RXBLOCK;
-        }
-        if (data == reg(SIGFRAME) && (!(status & STATUS_RXBLOCK) || address))
-            flags |= IF_SIGF;
-    }
-    if (!(status & STATUS_RXBLOCK) || address) {
-        if (receive_buffer.full()) {
-            flags |= IF_RXOF;
-            receive_buffer.replace_last(frame);
-        } else {
-            receive_buffer.push(frame);
-        }
-    }
-    reg(IF) |= flags;
-}
-
-void Leuart::follow() {
-    uint32_t &status = reg(STATUS), &flags = reg(IF);
-    set_bits(status, STATUS_TXBL, transmit_buffer.empty());
-    set_bits(flags, IF_TXBL, transmit_buffer.empty());
-    set_bits(status, STATUS_RXDATAV, !receive_buffer.empty());
-    set_bits(flags, IF_RXDATAV, !receive_buffer.empty());
-    const bool stopped = reg(CTRL) & CTRL_ERRSDMA && flags & (IF_FERR | IF_PERR);
-    Dma &dma = *part.dma;
-    dma.wakes(source, reg(CTRL) & (CTRL_RXDMAWU | CTRL_TXDMAWU));
-    dma.request(source, 0, !receive_buffer.empty() && !stopped);
-    dma.request(source, 1, transmit_buffer.empty());
-    dma.request(source, 2, transmit_buffer.empty() && !shifting);
-    update_interrupts();
+void add_leuart(Part &part, const Instance &instance, int source, int signals) {
+    part.receivers.push_back(part.add(new Leuart(part, instance, source, signals)));
 }
 
 }  // namespace efm32gg
