@@ -49,9 +49,7 @@ void System::enter() {
     listener.catch_up();
     const uint32_t returns_to = cpu.r[15];
     cpu.cycles += VECTOR_CYCLES;
-    take(exc_return);
-    dwt.count_exception(cpu.cycles - begin);
-    if (cpu.tracer && !lockup) cpu.tracer->exception_entry(cpu.ipsr, returns_to, cpu);
+    take(exc_return, begin, returns_to);
 }
 
 // PushStack(). Ends at an access that fails; its fault competes with the exception being entered.
@@ -68,14 +66,18 @@ bool System::push_frame(uint32_t &exc_return) {
         (cpu.xpsr() & ~0x200u) | (aligns ? 0x200u : 0u),
     };
     cpu.r[13] = frame;
-    for (uint32_t n = 0; n < 8; n++) {
-        const Result result = cpu.store(frame + 4 * n, 4, words[n], privileged);
-        if (result == Result::Done) continue;
-        const bool violation = result == Result::Violation;
-        cfsr |= violation ? MSTKERR : STKERR;
-        pend_synchronous(violation ? MEM_MANAGE : BUS_FAULT, true);
-        return false;
-    }
+    Result result = Result::Done;
+    for (uint32_t n = 0; n < 8 && result == Result::Done; n++)
+        result = cpu.store(frame + 4 * n, 4, words[n], privileged);
+    return !stack_failed(result, MSTKERR, STKERR, true);
+}
+
+// Whether an access to the stack failed; then sets the status bit and pends the fault.
+bool System::stack_failed(Result result, uint32_t violation, uint32_t bus_error, bool derived) {
+    if (result == Result::Done) return false;
+    const bool is_violation = result == Result::Violation;
+    cfsr |= is_violation ? violation : bus_error;
+    pend_synchronous(is_violation ? MEM_MANAGE : BUS_FAULT, derived);
     return true;
 }
 
@@ -86,8 +88,14 @@ bool System::fetch_vector(int number, uint32_t &vector) {
     return result == Result::Done || (result == Result::Violation && cpu.peek(address, 4, vector));
 }
 
-// ExceptionTaken() for the pending exception of the highest priority.
-void System::take(uint32_t exc_return) {
+// Takes the pending exception of the highest priority; its entry began at cycle `begin`.
+void System::take(uint32_t exc_return, int64_t begin, uint32_t returns_to) {
+    exception_taken(exc_return);
+    dwt.count_exception(cpu.cycles - begin);
+    if (cpu.tracer && !lockup) cpu.tracer->exception_entry(cpu.ipsr, returns_to, cpu);
+}
+
+void System::exception_taken(uint32_t exc_return) {
     int number = nvic.first_pending();
     uint32_t vector = 0;
     if (!fetch_vector(number, vector)) {
@@ -137,24 +145,16 @@ void System::chain(uint32_t exc_return) {
     const int64_t begin = cpu.cycles;
     cpu.cycles += TAIL_CHAIN_CYCLES;
     listener.catch_up();
-    const uint32_t returns_to = cpu.r[15];
-    take(exc_return);
-    dwt.count_exception(cpu.cycles - begin);
-    if (cpu.tracer && !lockup) cpu.tracer->exception_entry(cpu.ipsr, returns_to, cpu);
+    take(exc_return, begin, cpu.r[15]);
 }
 
 bool System::pop_frame(uint32_t exc_return, uint32_t (&words)[8]) {
     const uint32_t frame = exc_return & 4 ? cpu.process_sp() : cpu.main_sp();
     const bool privileged = exc_return == RETURN_TO_HANDLER || !(cpu.control & 1);
-    for (uint32_t n = 0; n < 8; n++) {
-        const Result result = cpu.load(frame + 4 * n, 4, words[n], privileged);
-        if (result == Result::Done) continue;
-        const bool violation = result == Result::Violation;
-        cfsr |= violation ? MUNSTKERR : UNSTKERR;
-        pend_synchronous(violation ? MEM_MANAGE : BUS_FAULT);
-        return false;
-    }
-    return true;
+    Result result = Result::Done;
+    for (uint32_t n = 0; n < 8 && result == Result::Done; n++)
+        result = cpu.load(frame + 4 * n, 4, words[n], privileged);
+    return !stack_failed(result, MUNSTKERR, UNSTKERR, false);
 }
 
 void System::exception_return(uint32_t exc_return) {

@@ -66,25 +66,20 @@ bool Nvic::repend(int number) {
     return true;
 }
 
-void Nvic::find_first() {
-    first = 0;
-    for (int index = 0; index < ExceptionSet::WORDS; index++) {
-        for (uint32_t left = pend.word[index] & enable.word[index]; left; left &= left - 1) {
+// The member of two sets with the highest priority, of equal ones the lowest number; 0: none.
+int Nvic::most_urgent(const ExceptionSet &a, const ExceptionSet &b) const {
+    int found = 0;
+    for (int index = 0; index < ExceptionSet::WORDS; index++)
+        for (uint32_t left = a.word[index] & b.word[index]; left; left &= left - 1) {
             const int number = 32 * index + __builtin_ctz(left);
-            if (!first || priorities[number] < priorities[first]) first = number;
+            if (!found || priorities[number] < priorities[found]) found = number;
         }
-    }
+    return found;
 }
 
 void Nvic::find_active() {
-    int most_urgent = THREAD_PRIORITY;
-    for (int index = 0; index < ExceptionSet::WORDS; index++) {
-        for (uint32_t left = act.word[index]; left; left &= left - 1) {
-            const int number = 32 * index + __builtin_ctz(left);
-            if (priorities[number] < most_urgent) most_urgent = priorities[number];
-        }
-    }
-    active_group = most_urgent == THREAD_PRIORITY ? most_urgent : group(most_urgent);
+    const int number = most_urgent(act, act);
+    active_group = number ? group(priorities[number]) : THREAD_PRIORITY;
 }
 
 int Nvic::active_count() const {

@@ -67,7 +67,8 @@ public:
     void write_priorities(int first_number, uint32_t value, uint32_t lanes);
 
 private:
-    void find_first();
+    void find_first() { first = most_urgent(pend, enable); }
+    int most_urgent(const ExceptionSet &a, const ExceptionSet &b) const;
     void find_active();
     // The bits of 32 interrupts in a set.
     uint32_t interrupts(const ExceptionSet &set, uint32_t index) const;

@@ -3,33 +3,27 @@
 HANDLE(B) { GO(PC + op->value, REFILL_DIRECT); }
 
 #define BRANCH_IF(name, holds) \
-    HANDLE(B_##name) { \
+    HANDLE(name) { \
         if (holds) GO(PC + op->value, REFILL_DIRECT); \
         NEXT(1); \
     }
-BRANCH_IF(EQ, (uint32_t)nz == 0)
-BRANCH_IF(NE, (uint32_t)nz != 0)
-BRANCH_IF(CS, carry)
-BRANCH_IF(CC, !carry)
-BRANCH_IF(MI, n())
-BRANCH_IF(PL, !n())
-BRANCH_IF(VS, overflow)
-BRANCH_IF(VC, !overflow)
-BRANCH_IF(HI, carry && (uint32_t)nz != 0)
-BRANCH_IF(LS, !carry || (uint32_t)nz == 0)
-BRANCH_IF(GE, n() == (bool)overflow)
-BRANCH_IF(LT, n() != (bool)overflow)
-BRANCH_IF(GT, n() == (bool)overflow && (uint32_t)nz != 0)
-BRANCH_IF(LE, n() != (bool)overflow || (uint32_t)nz == 0)
+BRANCH_IF(B_EQ, (uint32_t)nz == 0)
+BRANCH_IF(B_NE, (uint32_t)nz != 0)
+BRANCH_IF(B_CS, carry)
+BRANCH_IF(B_CC, !carry)
+BRANCH_IF(B_MI, n())
+BRANCH_IF(B_PL, !n())
+BRANCH_IF(B_VS, overflow)
+BRANCH_IF(B_VC, !overflow)
+BRANCH_IF(B_HI, carry && (uint32_t)nz != 0)
+BRANCH_IF(B_LS, !carry || (uint32_t)nz == 0)
+BRANCH_IF(B_GE, n() == (bool)overflow)
+BRANCH_IF(B_LT, n() != (bool)overflow)
+BRANCH_IF(B_GT, n() == (bool)overflow && (uint32_t)nz != 0)
+BRANCH_IF(B_LE, n() != (bool)overflow || (uint32_t)nz == 0)
+BRANCH_IF(CBZ, r[op->n] == 0)
+BRANCH_IF(CBNZ, r[op->n] != 0)
 
-HANDLE(CBZ) {
-    if (r[op->n] == 0) GO(PC + op->value, REFILL_DIRECT);
-    NEXT(1);
-}
-HANDLE(CBNZ) {
-    if (r[op->n] != 0) GO(PC + op->value, REFILL_DIRECT);
-    NEXT(1);
-}
 HANDLE(BL) {
     const uint32_t pc = PC;
     r[14] = (pc + 4) | 1;
@@ -72,20 +66,16 @@ leave_exception:
     system->exception_return(target);
     goto failed;
 
-HANDLE(TBB) {
-    const uint32_t pc = PC, start = op->n == 15 ? pc + 4 : r[op->n];
-    const uint32_t address = start + r[op->m];
-    READ(uint8_t, address, op->m)
-    load_end = -1;
-    GO(pc + 4 + 2 * value, REFILL_LOADED);    // 2, 1 to add, and the refill
-}
-HANDLE(TBH) {
-    const uint32_t pc = PC, start = op->n == 15 ? pc + 4 : r[op->n];
-    const uint32_t address = start + 2 * r[op->m];
-    READ(uint16_t, address, op->m)
-    load_end = -1;
-    GO(pc + 4 + 2 * value, REFILL_LOADED);
-}
+#define TABLE_BRANCH(name, type) \
+    HANDLE(name) { \
+        const uint32_t pc = PC, start = op->n == 15 ? pc + 4 : r[op->n]; \
+        const uint32_t address = start + (uint32_t)sizeof(type) * r[op->m]; \
+        READ(type, address, op->m) \
+        load_end = -1; \
+        GO(pc + 4 + 2 * value, REFILL_LOADED); \
+    }
+TABLE_BRANCH(TBB, uint8_t)
+TABLE_BRANCH(TBH, uint16_t)
 // Folded into a 16-bit instruction before it: no cycle of its own (TRM 3.3.1).
 HANDLE(IT) {
     const uint32_t pc = PC;

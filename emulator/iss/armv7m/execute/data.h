@@ -161,31 +161,22 @@ HANDLE(MLS) {
     r[op->d] = r[op->a] - r[op->n] * r[op->m];
     NEXT(2);
 }
-HANDLE(UMULL) {
-    const uint32_t a = r[op->n], b = r[op->m];
-    const uint64_t product = (uint64_t)a * b;
-    r[op->a] = (uint32_t)product, r[op->d] = (uint32_t)(product >> 32);
-    NEXT(long_multiply_cycles(a, b));
-}
-HANDLE(SMULL) {
-    const uint32_t a = r[op->n], b = r[op->m];
-    const int64_t product = (int64_t)(int32_t)a * (int32_t)b;
-    r[op->a] = (uint32_t)product, r[op->d] = (uint32_t)((uint64_t)product >> 32);
-    NEXT(long_multiply_cycles(magnitude(a), magnitude(b)));
-}
-HANDLE(UMLAL) {
-    const uint32_t a = r[op->n], b = r[op->m], high = r[op->d];
-    const uint64_t sum = (uint64_t)a * b + ((uint64_t)high << 32 | r[op->a]);
-    r[op->a] = (uint32_t)sum, r[op->d] = (uint32_t)(sum >> 32);
-    NEXT(long_accumulate_cycles(a, b, high));
-}
-HANDLE(SMLAL) {
-    const uint32_t a = r[op->n], b = r[op->m], high = r[op->d];
-    const uint64_t sum =
-        (uint64_t)((int64_t)(int32_t)a * (int32_t)b) + ((uint64_t)high << 32 | r[op->a]);
-    r[op->a] = (uint32_t)sum, r[op->d] = (uint32_t)(sum >> 32);
-    NEXT(long_accumulate_cycles(magnitude(a), magnitude(b), magnitude(high)));
-}
+// `product`: 64 bits of a and b; `size`: the operand whose size determines the cycles.
+#define LONG_MULTIPLY(name, product, size) \
+    HANDLE(name##MULL) { \
+        const uint32_t a = r[op->n], b = r[op->m]; \
+        const uint64_t result = (product); \
+        r[op->a] = (uint32_t)result, r[op->d] = (uint32_t)(result >> 32); \
+        NEXT(long_multiply_cycles(size(a), size(b))); \
+    } \
+    HANDLE(name##MLAL) { \
+        const uint32_t a = r[op->n], b = r[op->m], high = r[op->d]; \
+        const uint64_t result = (product) + ((uint64_t)high << 32 | r[op->a]); \
+        r[op->a] = (uint32_t)result, r[op->d] = (uint32_t)(result >> 32); \
+        NEXT(long_accumulate_cycles(size(a), size(b), size(high))); \
+    }
+LONG_MULTIPLY(U, (uint64_t)a * b, uint32_t)
+LONG_MULTIPLY(S, (uint64_t)((int64_t)(int32_t)a * (int32_t)b), magnitude)
 HANDLE(UDIV) {
     const uint32_t a = r[op->n], b = r[op->m];
     if (UNLIKELY(b == 0) && system->divide_trap()) FAIL(Fault::DivideByZero);

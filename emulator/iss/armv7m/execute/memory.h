@@ -159,17 +159,19 @@ HANDLE(STORE_USER) {
 
 // LDM, POP: all registers are written at the end, so that a fault changes none. (The processor
 // restarts an LDM that is interrupted; here the interrupt waits for its end.)
-HANDLE(LDM) {
-    uint32_t contents[16], list = op->list;
-    const uint32_t registers = (uint32_t)__builtin_popcount(list);
-    uint32_t address = op->a ? r[op->n] - 4 * registers : r[op->n];
-    const uint32_t end = op->a ? address : address + 4 * registers;
-    const Page &page = map[address >> 20];
-    const uint32_t offset = address & 0xFFFFF;
-    if (UNLIKELY(address & 3)) {
-        fault_address = address;
-        FAIL(Fault::Unaligned);
+#define MULTIPLE() \
+    uint32_t contents[16], list = op->list; \
+    const uint32_t registers = (uint32_t)__builtin_popcount(list); \
+    const uint32_t address = op->a ? r[op->n] - 4 * registers : r[op->n]; \
+    const uint32_t end = op->a ? address : address + 4 * registers; \
+    const Page &page = map[address >> 20]; \
+    const uint32_t offset = address & 0xFFFFF; \
+    if (UNLIKELY(address & 3)) { \
+        fault_address = address; \
+        FAIL(Fault::Unaligned); \
     }
+HANDLE(LDM) {
+    MULTIPLE()
     WAIT_FOR_BUS();
     if (LIKELY((uint64_t)offset + 4 * registers <= page.read_limit)) {
         std::memcpy(contents, page.host + offset, 4 * registers);
@@ -193,16 +195,8 @@ HANDLE(LDM) {
     NEXT(0);
 }
 HANDLE(STM) {
-    uint32_t contents[16], list = op->list, *next = contents;
-    const uint32_t registers = (uint32_t)__builtin_popcount(list);
-    const uint32_t address = op->a ? r[op->n] - 4 * registers : r[op->n];
-    const uint32_t end = op->a ? address : address + 4 * registers;
-    const Page &page = map[address >> 20];
-    const uint32_t offset = address & 0xFFFFF;
-    if (UNLIKELY(address & 3)) {
-        fault_address = address;
-        FAIL(Fault::Unaligned);
-    }
+    MULTIPLE()
+    uint32_t *next = contents;
     for (; list; list &= list - 1) *next++ = r[__builtin_ctz(list)];
     WAIT_FOR_BUS();
     if (LIKELY((uint64_t)offset + 4 * registers <= page.write_limit)) {

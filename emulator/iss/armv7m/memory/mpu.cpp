@@ -10,18 +10,12 @@ constexpr uint8_t right(Access access, bool privileged) {
 
 // Table B3-15: what AP allows, as bits of right(); reserved encodings allow nothing.
 uint8_t rights_of(uint32_t attributes) {
-    constexpr uint8_t user_reads = right(Access::Read, false), user_writes = right(Access::Write, false);
     constexpr uint8_t reads = right(Access::Read, true), writes = right(Access::Write, true);
-    constexpr uint8_t BY_AP[8] = {
-        0,
-        reads | writes,
-        reads | writes | user_reads,
-        reads | writes | user_reads | user_writes,
-        0,
-        reads,
-        reads | user_reads,
-        reads | user_reads,
-    };
+    constexpr uint8_t user_reads = right(Access::Read, false);
+    constexpr uint8_t all = reads | writes | user_reads | right(Access::Write, false);
+    constexpr uint8_t read_only = reads | user_reads;
+    constexpr uint8_t BY_AP[8] = {0, reads | writes, reads | writes | user_reads, all,
+                                  0, reads,          read_only,                   read_only};
     uint8_t rights = BY_AP[attributes >> 24 & 7];
     if (!(attributes >> 28 & 1)) {    // executing needs reading
         if (rights & reads) rights |= right(Access::Fetch, true);
@@ -40,7 +34,7 @@ void Mpu::reset() {
 }
 
 void Mpu::forget() {
-    for (uint32_t n = 0; n < LINES; n++) lines[n] = {n + 1, 0};    // a tag that no address there has
+    for (uint32_t n = 0; n < LINES; n++) lines[n] = {n + 1, 0};    // no address there has it
 }
 
 bool Mpu::set_negative_priority(bool now) {
@@ -60,8 +54,9 @@ bool Mpu::allows(uint32_t address, Access access, bool privileged) const {
 
 uint8_t Mpu::rights(uint32_t address) const {
     uint8_t found = 0;
-    bool hit = false;
-    for (int n = regions - 1; n >= 0 && !hit; n--) {
+    if (control & PRIVDEFENA)
+        found = right(Access::Read, true) | right(Access::Write, true) | right(Access::Fetch, true);
+    for (int n = regions - 1; n >= 0; n--) {
         const uint32_t attributes = region[n].attributes;
         const uint32_t log2 = (attributes >> 1 & 31) + 1;
         if (!(attributes & 1) || log2 < 5) continue;
@@ -69,12 +64,10 @@ uint8_t Mpu::rights(uint32_t address) const {
         if ((address ^ region[n].base) & mask) continue;
         if (log2 >= 8 && attributes >> (8 + (address >> (log2 - 3) & 7)) & 1) continue;
         found = rights_of(attributes);
-        hit = true;
+        break;
     }
-    if (!hit && (control & PRIVDEFENA))
-        found = right(Access::Read, true) | right(Access::Write, true) | right(Access::Fetch, true);
-    if (execute_never(address)) found &= ~(right(Access::Fetch, true) | right(Access::Fetch, false));
-    return found;
+    const uint8_t fetches = right(Access::Fetch, true) | right(Access::Fetch, false);
+    return execute_never(address) ? found & ~fetches : found;
 }
 
 uint32_t Mpu::read(uint32_t offset) const {

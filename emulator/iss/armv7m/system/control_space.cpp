@@ -34,13 +34,11 @@ constexpr uint32_t FEATURES[] = {
     0x00000000, 0x01101110, 0x02111000, 0x21112231, 0x01111110, 0x01310132,
 };
 
-// Bits of SHCSR by exception, B3.2.13.
-struct HandlerBit { int exception, bit; };
-constexpr HandlerBit ACTIVE_BITS[] = {{MEM_MANAGE, 0}, {BUS_FAULT, 1}, {USAGE_FAULT, 3},
-                                      {SVCALL, 7}, {DEBUG_MONITOR, 8}, {PEND_SV, 10}, {SYSTICK, 11}};
-constexpr HandlerBit PENDING_BITS[] = {{USAGE_FAULT, 12}, {MEM_MANAGE, 13}, {BUS_FAULT, 14},
-                                       {SVCALL, 15}};
-constexpr HandlerBit ENABLE_BITS[] = {{MEM_MANAGE, 16}, {BUS_FAULT, 17}, {USAGE_FAULT, 18}};
+// Bits of SHCSR by exception, B3.2.13; -1: none.
+constexpr struct { int exception, active, pending, enable; } HANDLERS[] = {
+    {MEM_MANAGE, 0, 13, 16}, {BUS_FAULT, 1, 14, 17}, {USAGE_FAULT, 3, 12, 18},
+    {SVCALL, 7, 15, -1},     {DEBUG_MONITOR, 8, -1, -1}, {PEND_SV, 10, -1, -1}, {SYSTICK, 11, -1, -1},
+};
 
 constexpr bool within(uint32_t offset, uint32_t begin, uint32_t end) {
     return offset >= begin && offset < end;
@@ -276,16 +274,20 @@ void System::write_icsr(uint32_t value) {
 
 uint32_t System::shcsr() const {
     uint32_t value = 0;
-    for (const HandlerBit &each : ACTIVE_BITS) value |= (uint32_t)nvic.active(each.exception) << each.bit;
-    for (const HandlerBit &each : PENDING_BITS) value |= (uint32_t)nvic.pending(each.exception) << each.bit;
-    for (const HandlerBit &each : ENABLE_BITS) value |= (uint32_t)nvic.enabled(each.exception) << each.bit;
+    for (const auto &one : HANDLERS) {
+        value |= (uint32_t)nvic.active(one.exception) << one.active;
+        if (one.pending >= 0) value |= (uint32_t)nvic.pending(one.exception) << one.pending;
+        if (one.enable >= 0) value |= (uint32_t)nvic.enabled(one.exception) << one.enable;
+    }
     return value;
 }
 
 void System::write_shcsr(uint32_t value) {
-    for (const HandlerBit &each : ACTIVE_BITS) nvic.set_active(each.exception, value >> each.bit & 1);
-    for (const HandlerBit &each : ENABLE_BITS) nvic.set_enabled(each.exception, value >> each.bit & 1);
-    for (const HandlerBit &each : PENDING_BITS) nvic.set_pending(each.exception, value >> each.bit & 1);
+    for (const auto &one : HANDLERS) {
+        nvic.set_active(one.exception, value >> one.active & 1);
+        if (one.enable >= 0) nvic.set_enabled(one.exception, value >> one.enable & 1);
+        if (one.pending >= 0) nvic.set_pending(one.exception, value >> one.pending & 1);
+    }
     priority_changed();
 }
 

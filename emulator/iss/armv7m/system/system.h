@@ -26,6 +26,7 @@
 namespace armv7m {
 
 class Cpu;
+enum class Result : uint8_t;    // cpu.h
 
 struct SystemParameters {
     uint32_t cpuid = 0x412FC231;         // Cortex-M3 r2p1
@@ -175,7 +176,9 @@ private:
     // exceptions/entry_and_return.cpp
     void enter();
     bool push_frame(uint32_t &exc_return);
-    void take(uint32_t exc_return);
+    bool stack_failed(Result result, uint32_t violation, uint32_t bus_error, bool derived);
+    void take(uint32_t exc_return, int64_t begin, uint32_t returns_to);
+    void exception_taken(uint32_t exc_return);
     void chain(uint32_t exc_return);
     void deactivate(int number);
     bool pop_frame(uint32_t exc_return, uint32_t (&words)[8]);
