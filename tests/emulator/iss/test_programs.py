@@ -1,7 +1,5 @@
 """Programs as a vendor's customer writes them, with start-up and device header of their own."""
 
-import shutil
-import subprocess
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -12,14 +10,14 @@ from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.iss.outcome import OutgoingKind, Stop, StopReason
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US
+from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 from tests.tiers import quick
 
 PROGRAMS = Path(__file__).parent / "programs"
-COMPILER = shutil.which("arm-none-eabi-gcc")
 UART0 = 3
 BYTE_PS = 10 * 10**12 // 115200
 
-pytestmark = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-none-eabi")
+pytestmark = needs_compiler
 
 
 class Bench:
@@ -58,13 +56,11 @@ Start = Callable[[str], Bench]
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with all programs, each compiled for size and for speed."""
     folder = tmp_path_factory.mktemp("programs")
-    sources = [source for source in PROGRAMS.glob("*.c") if source.stem != "startup"]
-    for source in sources:
+    for source in {*PROGRAMS.glob("*.c")} - {PROGRAMS / "startup.c"}:
         for option in ("-O0", "-Os", "-O2"):
-            flags = ["-mcpu=cortex-m3", "-mthumb", option, "-ffreestanding", "-nostdlib"]
-            inputs = [PROGRAMS / "startup.c", source, "-T", PROGRAMS / "device.ld", "-lgcc"]
+            sources = PROGRAMS / "startup.c", source, "-T", PROGRAMS / "device.ld", "-lgcc"
             target = folder / f"{source.stem}{option}.elf"
-            subprocess.run([COMPILER or "", *flags, *inputs, "-o", target], check=True)
+            compile_for_m3(option, "-ffreestanding", "-nostdlib", *sources, "-o", target)
     return folder
 
 

@@ -1,12 +1,9 @@
-"""Programs of arm-none-eabi-gcc and newlib, run whole on the simulator and on unicorn.
+"""Compiled programs end with the same output, registers and RAM on the simulator and on unicorn.
 
-Output, registers and all of RAM are equal at their end. Each source runs at one optimization with
-the suite, at all of them when CUBESTACK_LOCKSTEP is set: 50 programs.
+Each source is compiled at one optimization level; at all five if CUBESTACK_LOCKSTEP is set.
 """
 
 import os
-import shutil
-import subprocess
 from itertools import product
 from pathlib import Path
 
@@ -16,6 +13,7 @@ from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.machine import RAM_BYTES, Machine
 from cubestack.emulator.iss.outcome import StopReason
 from cubestack.emulator.native.compiler import find_compiler
+from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 
 unicorn = pytest.importorskip("unicorn", reason="unicorn is not installed")
 elffile = pytest.importorskip("elftools.elf.elffile")
@@ -23,9 +21,8 @@ elffile = pytest.importorskip("elftools.elf.elffile")
 SOURCES = Path(__file__).parent / "compiled"
 PROGRAMS = sorted(path.stem for path in SOURCES.glob("*.c") if path.stem != "support")
 OPTIMIZATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
-COMPILER = shutil.which("arm-none-eabi-gcc")
 RAM = 0x2000_0000
-_LONG = 100_000_000_000_000  # ps at 1 MHz: more cycles than any of them takes
+_LONG = 100_000_000_000_000  # ps at 1 MHz: longer than any of the programs
 
 if os.environ.get("CUBESTACK_LOCKSTEP"):
     CASES = list(product(PROGRAMS, OPTIMIZATIONS))
@@ -33,7 +30,7 @@ else:
     CASES = [(name, OPTIMIZATIONS[i % 5]) for i, name in enumerate(PROGRAMS)]
 
 pytestmark = [
-    pytest.mark.skipif(COMPILER is None, reason="needs arm-none-eabi-gcc"),
+    needs_compiler,
     pytest.mark.skipif(find_compiler() is None, reason="needs a C++ compiler"),
 ]
 
@@ -46,16 +43,13 @@ def support(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _compile(*arguments: str | Path) -> None:
-    assert COMPILER is not None
-    subprocess.run(
-        [COMPILER, "-mcpu=cortex-m3", "-mthumb", "-std=gnu11", "-fno-builtin-printf", *arguments],
-        check=True,
-        capture_output=True,
-    )
+    compile_for_m3("-std=gnu11", "-fno-builtin-printf", *arguments)
 
 
 @pytest.mark.parametrize(("name", "optimization"), CASES)
-def test_program(name: str, optimization: str, support: Path, tmp_path: Path) -> None:
+def test_program_ends_as_on_unicorn(
+    name: str, optimization: str, support: Path, tmp_path: Path
+) -> None:
     elf = tmp_path / f"{name}.elf"
     _compile(optimization, SOURCES / f"{name}.c", support, f"-T{SOURCES / 'link.ld'}",
              "-nostartfiles", "-Wl,--no-warn-rwx-segments", "-lm", "-o", elf)  # fmt: skip

@@ -1,18 +1,16 @@
 """A machine whose registers are read and written by name, over its bus."""
 
-import shutil
 import struct
-import subprocess
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.iss.outcome import Outgoing, OutgoingKind
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 from cubestack.firmware_model.interface.efm32gg.c_header import c_header
+from tests.emulator.iss.cross_compiler import binary_of, compile_for_m3
 
 NS, US, MS, S = 10**3, 10**6, 10**9, 10**12
 START_UP = 163 * US
@@ -167,11 +165,6 @@ def asleep(mode: int = 1, interrupts: bool = True) -> Bench:
     return bench
 
 
-COMPILER = shutil.which("arm-none-eabi-gcc")
-needs_compiler = pytest.mark.skipif(
-    COMPILER is None, reason="arm-none-eabi-gcc is not installed (Debian: gcc-arm-none-eabi)"
-)
-
 _START = """
 #include "efm32gg.h"
 #define IN_RAM __attribute__((section(".code_in_ram"), noinline, long_call))
@@ -195,10 +188,7 @@ PROVIDE(IRQ = spin);
 SECTIONS {
     .text 0 : {
         LONG(0x20008000) LONG(start | 1)
-        LONG(spin | 1) LONG(spin | 1) LONG(spin | 1) LONG(spin | 1) LONG(spin | 1)
-        LONG(spin | 1) LONG(spin | 1) LONG(spin | 1) LONG(spin | 1) LONG(spin | 1)
-        LONG(spin | 1) LONG(spin | 1) LONG(spin | 1) LONG(spin | 1)
-        @IRQS@
+        @VECTORS@
         *(.text*) *(.rodata*) . = ALIGN(4); data_from = .;
     }
     .data 0x20000000 : AT(data_from) {
@@ -211,14 +201,10 @@ SECTIONS {
 
 def compiled(source: str, folder: Path) -> bytes:
     """Image of a program with ``main``, and optionally ``IRQ`` for all interrupts."""
-    assert COMPILER is not None
+    elf, program, script = folder / "program.elf", folder / "program.c", folder / "program.ld"
     (folder / "efm32gg.h").write_text(c_header(LAYOUTS))
-    (folder / "program.c").write_text(_START + source)
-    (folder / "program.ld").write_text(_SCRIPT.replace("@IRQS@", "LONG(IRQ | 1) " * 39))
-    elf, image = folder / "program.elf", folder / "program.bin"
-    options = ["-mcpu=cortex-m3", "-mthumb", "-O2", "-ffreestanding", "-nostdlib", "-I", folder]
-    sources = ["-T", folder / "program.ld", folder / "program.c", "-o", elf]
-    subprocess.run([COMPILER, *options, *sources], check=True)
-    objcopy = COMPILER.replace("gcc", "objcopy")
-    subprocess.run([objcopy, "-O", "binary", elf, image], check=True)
-    return image.read_bytes()
+    program.write_text(_START + source)
+    script.write_text(_SCRIPT.replace("@VECTORS@", "LONG(spin | 1) " * 14 + "LONG(IRQ | 1) " * 39))
+    flags = "-O2", "-ffreestanding", "-nostdlib", "-I", folder
+    compile_for_m3(*flags, "-T", script, program, "-o", elf)
+    return binary_of(elf)

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from cubestack.emulator.iss.outcome import OutgoingKind
+from cubestack.emulator.iss.outcome import Kind
+from tests.emulator.iss.cross_compiler import needs_compiler
 
-from .bench import MS, US, Bench, compiled, needs_compiler
+from .bench import MS, US, Bench, compiled
 
 RESULT = 0x2001_0000
 
@@ -99,16 +100,16 @@ def run_i2c(bench: Bench, known: int) -> list[str]:
         items, bench.items = bench.items, []
         for item in items:
             match item.kind:
-                case OutgoingKind.I2C_START:
+                case Kind.I2C_START:
                     passed.append(f"S{item.value:02X}")
                     machine.i2c_answer(0, item.value >> 1 == known)
-                case OutgoingKind.I2C_WRITE:
+                case Kind.I2C_WRITE:
                     passed.append(f"W{item.value:02X}")
                     machine.i2c_answer(0, True)
-                case OutgoingKind.I2C_READ:
+                case Kind.I2C_READ:
                     passed.append(f"R{item.extra}")
                     machine.i2c_answer(0, True, next(following))
-                case OutgoingKind.I2C_STOP:
+                case Kind.I2C_STOP:
                     passed.append("P")
     return passed[passed.index("SD0") :]
 

@@ -1,6 +1,5 @@
 """All registers against their tables: reset values, reserved bits; the C header's offsets."""
 
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from cubestack.firmware_model.interface.efm32gg.table import (
     RegisterTableError,
     peripheral,
 )
+from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 
 from .bench import Bench
 
@@ -129,14 +129,12 @@ def test_c_header_has_the_offsets_of_the_table(tmp_path: Path) -> None:
     subprocess.run(call, check=True)
 
 
+@needs_compiler
 def test_c_header_compiles_as_c(tmp_path: Path) -> None:
-    compiler = shutil.which("arm-none-eabi-gcc")
-    if compiler is None:
-        pytest.skip("arm-none-eabi-gcc is not installed")
     source = tmp_path / "check.c"
     source.write_text(c_header(LAYOUTS) + "int read(void) { return (int)CMU->STATUS; }\n")
-    options = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]
-    subprocess.run([compiler, *options, str(source)], check=True)
+    options = "-std=c99 -Wall -Wextra -Wpedantic -Werror -fsyntax-only"
+    compile_for_m3(*options.split(), source)
 
 
 def test_instances_do_not_overlap_and_names_are_unique() -> None:

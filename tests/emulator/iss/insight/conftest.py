@@ -1,5 +1,3 @@
-import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +6,7 @@ import pytest
 from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
+from tests.emulator.iss.cross_compiler import COMPILER, compile_for_m3
 
 HERE = Path(__file__).parent
 
@@ -15,15 +14,11 @@ HERE = Path(__file__).parent
 @pytest.fixture(scope="session")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The compiled program."""
-    compiler = shutil.which("arm-none-eabi-gcc")
-    if compiler is None:
+    if COMPILER is None:
         pytest.skip("arm-none-eabi-gcc is not installed")
     path = tmp_path_factory.mktemp("program") / "program.elf"
-    options = "-mcpu=cortex-m3 -mthumb -g -O1 -ffunction-sections -nostdlib -Wl,--gc-sections"
-    start = "-Wl,-e,Reset_Handler"
-    script = HERE / "program.ld"
-    command = [compiler, *options.split(), start, "-T", script, HERE / "program.c", "-o", path]
-    subprocess.run(command, check=True)
+    options = "-g -O1 -ffunction-sections -nostdlib -Wl,--gc-sections -Wl,-e,Reset_Handler -T"
+    compile_for_m3(*options.split(), HERE / "program.ld", HERE / "program.c", "-o", path)
     return path
 
 

@@ -15,6 +15,7 @@ from cubestack.emulator.iss.insight.lcov import write_lcov
 from cubestack.emulator.iss.insight.observer import Edge, Observer
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import RAM_BASE, Machine
+from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 
 PS_PER_MS = 10**9
 MOST_RUNS = 10_000
@@ -190,15 +191,12 @@ def test_a_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
     assert taken.count("square") == pytest.approx(5 * taken.count("work") / 6, rel=0.01)
 
 
-def test_calls_of_tasks_are_told_apart(tmp_path: Path) -> None:
+@needs_compiler
+def test_calls_of_each_task_are_counted_on_its_own_stack(tmp_path: Path) -> None:
     """Three tasks with stacks of their own are switched in the middle of their calls."""
-    compiler = shutil.which("arm-none-eabi-gcc")
-    if compiler is None:
-        pytest.skip("arm-none-eabi-gcc is not installed")
     folder, path = Path(__file__).parents[1] / "programs", tmp_path / "rtos.elf"
-    options = ["-mcpu=cortex-m3", "-mthumb", "-g", "-O0", "-ffreestanding", "-nostdlib", "-T"]
-    files = (folder / "device.ld", folder / "startup.c", folder / "rtos.c", "-lgcc", "-o", path)
-    subprocess.run([compiler, *options, *files], check=True)
+    sources = folder / "device.ld", folder / "startup.c", folder / "rtos.c", "-lgcc"
+    compile_for_m3("-g", "-O0", "-ffreestanding", "-nostdlib", "-T", *sources, "-o", path)
     image = load_image(path)
     machine = Machine()
     machine.load(image)
