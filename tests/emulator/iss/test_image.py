@@ -1,4 +1,4 @@
-"""Programs out of files, and one line for each that is none."""
+"""Images loaded from ELF, Intel HEX and binary files, and the errors of bad files."""
 
 import struct
 from contextlib import suppress
@@ -14,13 +14,9 @@ VECTORS = struct.pack("<II", 0x2000_8000, 0x0000_0009) + b"\xfe\xe7"
 
 def elf(
     segments: list[tuple[int, bytes]],
-    *,
-    machine: int = 40,
-    kind: int = 2,
-    bits: int = 1,
-    order: int = 1,
-) -> bytes:
-    """A linked file with these segments, written by hand."""
+    *, machine: int = 40, kind: int = 2, bits: int = 1, order: int = 1,
+) -> bytes:  # fmt: skip
+    """An ELF file with these segments."""
     ends = "<" if order == 1 else ">"
     ident = bytes([0x7F, *b"ELF", bits, order, 1]) + bytes(9)
     if bits == 2:
@@ -46,7 +42,7 @@ def write(folder: Path, name: str, content: bytes | str) -> Path:
     return path
 
 
-def test_the_same_program_in_three_formats(tmp_path):
+def test_elf_hex_and_binary_file_give_the_same_image(tmp_path):
     records = hex_record(4, 0, b"\0\0") + hex_record(0, 0, VECTORS[:6])
     records += hex_record(0, 6, VECTORS[6:]) + hex_record(3, 0, bytes(4)) + hex_record(1, 0, b"")
     paths = [
@@ -60,16 +56,16 @@ def test_the_same_program_in_three_formats(tmp_path):
     assert [image.elf is not None for image in images] == [True, False, False]
 
 
-def test_plain_bytes_go_to_a_base(tmp_path):
+def test_binary_file_is_loaded_at_its_base(tmp_path):
     path = write(tmp_path, "boot.bin", VECTORS)
     memory = Memory(flash_base=0x1000)
     assert load_image(f"{path}@0x1000", memory).segments == ((0x1000, VECTORS),)
     assert load_image(f"{path}@4096", memory).segments == ((0x1000, VECTORS),)
-    odd = write(tmp_path, "odd@16", VECTORS)  # a name, as there is such a file
+    odd = write(tmp_path, "odd@16", VECTORS)  # a file name, not a base
     assert load_image(odd).segments == ((0, VECTORS),)
 
 
-def test_upper_addresses_of_hex_files(tmp_path):
+def test_hex_records_set_the_upper_address(tmp_path):
     text = hex_record(0, 0, VECTORS) + hex_record(2, 0, b"\x10\x00") + hex_record(0, 4, b"ab")
     text += hex_record(4, 0, b"\x00\x02") + hex_record(0, 0x10, b"cd")
     found = load_image(write(tmp_path, "a.hex", text)).segments
@@ -96,17 +92,14 @@ BAD = {
     "long.bin": (VECTORS + bytes(1 << 20), "beyond the flash"),
     "text.hex": (b"hello", "is not an Intel HEX file"),
     "sum.hex": (b":0100000001FF\n", "line 1: wrong checksum"),
-    "short.hex": (
-        hex_record(0, 0, VECTORS).encode() + b":0400\n",
-        "line 2: not an Intel HEX record",
-    ),
-    "kind.hex": (hex_record(7, 0, b"").encode(), "line 1: unknown record type 07"),
-    "none.hex": (hex_record(1, 0, b"").encode(), "has no data records"),
+    "short.hex": (f"{hex_record(0, 0, VECTORS)}:0400\n", "line 2: not an Intel HEX record"),
+    "kind.hex": (hex_record(7, 0, b""), "line 1: unknown record type 07"),
+    "none.hex": (hex_record(1, 0, b""), "has no data records"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_file_is_one_line_that_names_it(tmp_path, name):
+def test_error_of_a_bad_file_is_one_line_with_its_path(tmp_path, name):
     content, wanted = BAD[name]
     path = write(tmp_path, name, content)
     with pytest.raises(ImageError) as caught:
@@ -117,7 +110,7 @@ def test_bad_file_is_one_line_that_names_it(tmp_path, name):
     assert "\n" not in text
 
 
-def test_file_that_is_not_there(tmp_path):
+def test_missing_file_and_folder_are_errors(tmp_path):
     with pytest.raises(ImageError, match=r"none\.elf: No such file or directory$"):
         load_image(tmp_path / "none.elf")
     with pytest.raises(ImageError, match="Is a directory"):
@@ -132,5 +125,5 @@ def test_damaged_files_are_refused_or_read(tmp_path):
         for place in random.integers(len(damaged), size=random.integers(1, 6)):
             damaged[place] = random.integers(256)
         path = write(tmp_path, f"{number}.elf", bytes(damaged[: random.integers(1, len(good))]))
-        with suppress(ImageError):  # nothing else comes out
+        with suppress(ImageError):  # no other exception
             assert isinstance(load_image(path), Image)

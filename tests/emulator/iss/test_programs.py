@@ -1,4 +1,4 @@
-"""Programs as a vendor's customer writes them, with start-up and device header of their own."""
+"""Programs with a start-up and a device header that were written without the emulator."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -8,7 +8,7 @@ import pytest
 
 from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.machine import Machine
-from cubestack.emulator.iss.outcome import OutgoingKind, Stop, StopReason
+from cubestack.emulator.iss.outcome import Kind, Stop, StopReason
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 from tests.tiers import quick
@@ -21,7 +21,7 @@ pytestmark = needs_compiler
 
 
 class Bench:
-    """A machine with a program, and somebody at its UART."""
+    """A machine with a program, and the text from its UART."""
 
     def __init__(self, elf: Path) -> None:
         self.machine = Machine()
@@ -31,19 +31,19 @@ class Bench:
         self.times_ps: list[int] = []
 
     def run(self, until_ps: int) -> Stop:
-        """Run on, through all stops but a lock-up."""
+        """Run, continuing after all stops except a lock-up."""
         while True:
             stop = self.machine.run(until_ps)
             for out in self.machine.outbox():
-                if out.kind is OutgoingKind.UART and out.unit & 0xFF == UART0:
+                if out.kind is Kind.UART and out.unit & 0xFF == UART0:
                     self.text += chr(out.value & 0xFF)
                     self.times_ps.append(out.time_ps)
-                assert out.kind is not OutgoingKind.LOG, out.text  # nothing to complain of
+                assert out.kind is not Kind.LOG, out.text  # the program makes no mistake
             if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP:
                 return stop
 
     def send(self, data: bytes) -> None:
-        """Send characters one after the other."""
+        """Send characters at 115200 baud."""
         for byte in data:
             self.run(self.machine.now_ps + BYTE_PS)
             self.machine.uart_receive(UART0, byte)
@@ -66,7 +66,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(params=quick(["-O0", "-Os", "-O2"], 2))
 def start(request: pytest.FixtureRequest, built: Path) -> Start:
-    """Starts a program by its name."""
+    """Starts a program by name."""
     return lambda name: Bench(built / f"{name}{request.param}.elf")
 
 
@@ -91,7 +91,7 @@ def test_low_energy_timers_wake_from_deep_sleep(start: Start) -> None:
     assert bench.times_ps[0] / PS_PER_MS == pytest.approx(2400, abs=20)
 
 
-def test_a_boot_counter_is_kept_in_flash_by_code_in_ram(start: Start) -> None:
+def test_code_in_ram_keeps_a_boot_counter_in_flash(start: Start) -> None:
     bench = start("flash_log")
     bench.run(200 * PS_PER_MS)
     assert bench.text == "boot 00000001\nboot 00000002\nboot 00000003\n"
@@ -101,7 +101,7 @@ def test_a_boot_counter_is_kept_in_flash_by_code_in_ram(start: Start) -> None:
     assert min(b - a for a, b in pairwise(again)) > 20 * PS_PER_MS  # an erase
 
 
-def test_each_fault_is_told_and_stepped_over(start: Start) -> None:
+def test_fault_handlers_report_each_fault_and_continue(start: Start) -> None:
     bench = start("faults")
     bench.run(50 * PS_PER_MS)
     assert bench.text.splitlines() == [
@@ -121,7 +121,7 @@ def test_tasks_are_switched_by_systick_and_pendsv(start: Start) -> None:
     assert bench.text == f"sum {total:08x}\n"
 
 
-def test_the_watchdog_bites_again_and_again(start: Start) -> None:
+def test_watchdog_resets_repeatedly(start: Start) -> None:
     bench = start("watchdog")
     bench.run(450 * PS_PER_MS)
     lines = bench.text.splitlines()
@@ -130,7 +130,7 @@ def test_the_watchdog_bites_again_and_again(start: Start) -> None:
     assert set(lines[1:]) == {"cause 00000010"}
 
 
-def test_registers_behind_an_i2c_slave(start: Start) -> None:
+def test_i2c_slave_reads_and_writes_its_registers(start: Start) -> None:
     bench = start("i2c_slave")
     bench.run(5 * PS_PER_MS)
     machine = bench.machine
@@ -141,7 +141,7 @@ def test_registers_behind_an_i2c_slave(start: Start) -> None:
                 return answer
             bench.run(machine.now_ps + 5 * PS_PER_US)
             answer = machine.i2c_slave_poll(0)
-        raise AssertionError("the clock is stretched for ever")
+        raise AssertionError("the clock stays stretched")
 
     def transfer(*data: int, read: int = 0) -> list[int]:
         acknowledged = [wait(machine.i2c_slave_start(0, 0x84))]
@@ -165,4 +165,4 @@ def test_registers_behind_an_i2c_slave(start: Start) -> None:
     transfer(5, 0x12, 0x34)
     assert transfer(5, read=2) == [0x12, 0x34]
     assert transfer(0, read=1) == [0xC0]
-    assert not wait(machine.i2c_slave_start(0, 0x86))  # another's address
+    assert not wait(machine.i2c_slave_start(0, 0x86))  # not its address

@@ -1,4 +1,4 @@
-"""Bad firmware: whatever an image does, a run ends, and the machine can tell what happened."""
+"""Faulty programs: every run ends, and the cause of a crash is known."""
 
 import os
 import random
@@ -9,13 +9,13 @@ import pytest
 
 from cubestack.emulator.iss.insight.fault_report import last_fault
 from cubestack.emulator.iss.machine import EXTERNAL_BASE, RAM_BASE, Machine
-from cubestack.emulator.iss.outcome import OutgoingKind, StopReason
+from cubestack.emulator.iss.outcome import Kind, StopReason
 
 from .wild_images import KINDS, START, make
 
 MILLISECOND = 1_000_000_000
 RUNS_AT_MOST = 3000
-"""Of a millisecond: programs that reset the part all the time stop often."""
+"""Runs per millisecond; a program that keeps resetting the part stops often."""
 
 SEEDS = int(os.environ.get("CUBESTACK_WILD_IMAGES", "600"))
 """How many images; 10 000 have been run, with and without -fsanitize=address,undefined."""
@@ -30,7 +30,7 @@ def machine() -> Iterator[Machine]:
 
 
 def start(machine: Machine, image: bytes) -> int:
-    """Load it and reset; the time then."""
+    """Load an image and reset; returns the time."""
     machine.flash[:] = 0xFF
     machine.flash[: len(image)] = memoryview(image)
     machine.ram[:] = 0
@@ -42,7 +42,7 @@ def start(machine: Machine, image: bytes) -> int:
 
 
 def disturb(machine: Machine, chance: random.Random) -> None:
-    """Something from outside."""
+    """Apply one random input."""
     what = chance.randrange(7)
     if what == 0:
         machine.pin(chance.randrange(6), chance.randrange(16), chance.randrange(2))
@@ -72,15 +72,15 @@ def test_random_images_run_to_their_time(machine, kind):
             step = chance.choice((1, 1000, 100_000, MILLISECOND))
             until = min(begin + MILLISECOND, machine.now_ps + step)
             stop = machine.run(until)
-            told = list(machine.outbox()) or stop.reason is not StopReason.TIME
-            assert stop.now_ps >= until or told
+            stopped = list(machine.outbox()) or stop.reason is not StopReason.TIME
+            assert stop.now_ps >= until or stopped
             if machine.now_ps >= begin + MILLISECOND:
                 break
         assert len(machine.registers()) == 23
 
 
 def program(*halves: int, vectors: dict[int, int] | None = None, stack: int = 0x2000_8000) -> bytes:
-    """Half-words at START; handlers without an address wait for ever."""
+    """Half-words at START; other handlers loop at their end."""
     table = [stack, START | 1, *[START + 2 * len(halves) | 1] * 62]
     for number, value in (vectors or {}).items():
         table[number] = value
@@ -88,10 +88,10 @@ def program(*halves: int, vectors: dict[int, int] | None = None, stack: int = 0x
     return struct.pack("<64I", *table).ljust(START, b"\xff") + code
 
 
-def outcome(machine: Machine, image: bytes) -> set[OutgoingKind]:
-    """What is in the outbox after two milliseconds."""
+def outcome(machine: Machine, image: bytes) -> set[Kind]:
+    """Kinds of messages in two milliseconds."""
     begin = start(machine, image)
-    kinds: set[OutgoingKind] = set()
+    kinds: set[Kind] = set()
     for _ in range(RUNS_AT_MOST):
         machine.run(begin + 2 * MILLISECOND)
         kinds |= {one.kind for one in machine.outbox()}
@@ -100,46 +100,46 @@ def outcome(machine: Machine, image: bytes) -> set[OutgoingKind]:
     return kinds
 
 
-def test_an_empty_vector_table_locks_up_and_the_part_resets(machine):
-    assert OutgoingKind.RESET in outcome(machine, b"")
+def test_empty_vector_table_locks_up_and_the_part_resets(machine):
+    assert Kind.RESET in outcome(machine, b"")
 
 
-def test_jump_into_nowhere_leads_to_the_hard_fault_handler(machine):
+def test_jump_to_an_unused_address_is_a_hard_fault(machine):
     outcome(machine, program(0xF04F, 0x5040, 0x3001, 0x4700))  # MOV.W r0, #0x30000000; ADDS; BX
     assert machine.register("xpsr") & 0x1FF == 3
 
 
-def test_stack_overflow_leads_there_too(machine):
+def test_stack_overflow_is_a_hard_fault(machine):
     # PUSH {r0-r7, lr}; B there
     outcome(machine, program(0xB5FF, 0xE7FD, stack=RAM_BASE + 64))
     assert machine.register("xpsr") & 0x1FF == 3
 
 
-def test_an_endless_loop_with_interrupts_off_takes_its_time_and_no_more(machine):
+def test_endless_loop_with_interrupts_off_ends_at_its_time(machine):
     begin = start(machine, program(0xB672, 0xE7FE))
     assert machine.run(begin + MILLISECOND).reason == StopReason.TIME
     assert machine.now_ps - begin >= MILLISECOND
 
 
 @pytest.mark.parametrize("on", [False, True])
-def test_semihosting_is_a_switch(machine, on):
+def test_semihosting_can_be_switched_on(machine, on):
     machine.semihosting(on)
     # ADR r1, text; MOVS r0, #4 (SYS_WRITE0); BKPT 0xAB; B here; the text
     begin = start(machine, program(0xA101, 0x2004, 0xBEAB, 0xE7FE, 0x6968, 0x0021))
     machine.run(begin + MILLISECOND)
-    text = [one.text for one in machine.outbox() if one.kind is OutgoingKind.SEMIHOSTING]
+    text = [one.text for one in machine.outbox() if one.kind is Kind.SEMIHOSTING]
     assert text == (["hi!"] if on else [])
     assert machine.register("xpsr") & 0x1FF == (0 if on else 3)
     machine.semihosting(False)
 
 
-def test_a_lock_up_is_seen_before_the_part_resets(machine):
+def test_lock_up_stops_the_run_before_the_part_resets(machine):
     image = program(0xDE00, vectors={3: 0x3000_0001})
     begin = start(machine, image)
     assert machine.run(begin + MILLISECOND).reason == StopReason.LOCKED_UP
     assert machine.register("pc") == 0x3000_0000
-    assert OutgoingKind.RESET in outcome(machine, image)
-    assert last_fault(machine).exception == 0  # it is still known
+    assert Kind.RESET in outcome(machine, image)
+    assert last_fault(machine).exception == 0  # still known after the reset
     assert last_fault(machine).pc == 0x3000_0000
 
 

@@ -1,4 +1,4 @@
-"""Images that no compiler made: bytes at random, instructions at random, accesses at random."""
+"""Images of random bytes, random instructions and random accesses."""
 
 import random
 import struct
@@ -31,7 +31,7 @@ def _vectors(chance: random.Random, start: int = START) -> bytes:
 
 
 def address(chance: random.Random) -> int:
-    """Somewhere it might matter."""
+    """A random address, most often of a register."""
     kind = chance.random()
     if kind < 0.6:
         return chance.choice(REGISTERS)
@@ -57,17 +57,17 @@ def _constant(register: int, value: int) -> bytes:
 
 
 def noise(chance: random.Random) -> bytes:
-    """Bytes, the vector table too."""
+    """Random bytes, also as vector table."""
     return chance.randbytes(0x4000)
 
 
 def noise_that_starts(chance: random.Random) -> bytes:
-    """Bytes behind a vector table that leads to them."""
+    """Random bytes after a valid vector table."""
     return _vectors(chance) + chance.randbytes(0x8000)
 
 
 def short_instructions(chance: random.Random) -> bytes:
-    """16-bit instructions, few branches: it runs for a while."""
+    """16-bit instructions with few branches, so that many are executed."""
     halves = []
     for _ in range(0x2000):
         half = chance.getrandbits(16)
@@ -81,11 +81,11 @@ STORES = 0x6001, 0x8001, 0x7001  # STR, STRH, STRB r1, [r0]
 LOADS = 0x6802, 0x8802, 0x7802
 OTHERS = 0xBF30, 0xBF20, 0xBF40, 0xDF00, 0xB662, 0xBE00  # WFI, WFE, SEV, SVC, CPSIE, BKPT
 SKIP = bytes.fromhex("0698023006907047")
-"""A handler that returns two bytes behind where it came from."""
+"""A handler that returns to two bytes after the faulting instruction."""
 
 
 def _program(chance: random.Random, code: bytes) -> bytes:
-    """The code, then a branch to itself; most often with handlers that go on behind a fault."""
+    """The code, then a branch to itself; most often with handlers that continue after a fault."""
     image = bytearray(_vectors(chance) + code + struct.pack("<H", 0xE7FE))
     if chance.random() < 0.8:
         handler = len(image) + 2 & ~3
@@ -112,23 +112,23 @@ CLOCKS_ON = b"".join(
     _constant(0, 0x400C_8000 + offset) + _constant(1, value) + struct.pack("<H", 0x6001)
     for offset, value in ((0x40, 7), (0x44, 0xFFFF_FFFF), (0x58, 0xFFFF_FFFF), (0x60, 0xFFFF_FFFF))
 )
-"""HFPERCLKEN0 and others; HFCORECLKEN0 without what ends programs."""
+"""All clocks, except those of the core's bus that would stop a program."""
 
 
 def accesses(chance: random.Random) -> bytes:
-    """Loads and stores of all sizes, of registers that exist and of such that do not."""
+    """Loads and stores of all sizes, of registers and of unused addresses."""
     return _program(chance, b"".join(_access(chance, address(chance)) for _ in range(200)))
 
 
 def accesses_with_clocks(chance: random.Random) -> bytes:
-    """The same behind clocks that are on, as a start-up leaves them, and interrupts enabled."""
+    """The same with clocks and interrupts enabled."""
     code = CLOCKS_ON + _constant(0, 0xE000_E100) + _constant(1, 0xFFFF_FFFF)
     code += struct.pack("<H", 0x6001)
     return _program(chance, code + b"".join(_access(chance, address(chance)) for _ in range(200)))
 
 
 def one_peripheral(chance: random.Random) -> bytes:
-    """Much ado with the registers of one or two of them, clocks on, time passing between."""
+    """Many accesses of one or two peripherals with clocks enabled and delays between."""
     layouts = [layout for layout in LAYOUTS if layout.modelled]
     chosen = [
         instance.base + register.offset

@@ -1,10 +1,15 @@
-"""Every encoding of the Cortex-M3's instructions, as templates that random programs are made of.
+"""Encodings of the Cortex-M3's instructions, as templates for random programs.
 
 Source: ARMv7-M Architecture Reference Manual (ARM DDI 0403), chapter A7.7; a template's name is the
-mnemonic and the number of the encoding there. Tokens of a template are fixed bits or names:
-``d`` a result, ``n``, ``m``, ``a`` operands (4 bits; with ``l`` behind it 3 bits, low registers),
-``dH`` and ``dL`` its high and low part, ``p`` a register with an address of RAM, ``x`` one with a
-small index, and ``name:bits`` any value.
+mnemonic and the number of the encoding there. A template has fixed bits and these fields:
+
+- ``d``, ``e``: results;
+- ``n``, ``m``, ``a``: operands;
+- ``p``: a register with an address of RAM, ``q``: with one of a word, ``x``: with a small index;
+- ``name:bits``: any value.
+
+Registers have 4 bits; with ``l`` behind them 3, as low registers; ``dH`` and ``dL`` are the high
+bit and the low bits of one.
 """
 
 from collections.abc import Callable
@@ -20,9 +25,9 @@ class Encoding:
     Attributes:
         name: mnemonic and number.
         template: its bits.
-        valid: what its fields must keep to.
-        moves: the register ``p`` moves by up to so many bytes (write back).
-        results: fields beside ``d`` that are written.
+        valid: tells whether the instruction with these fields is predictable.
+        moves: the most bytes by which write-back changes register ``p``.
+        results: written fields besides ``d``.
         in_it: allowed in an IT block.
     """
 
@@ -91,7 +96,7 @@ def _high_compare(fields: Fields) -> bool:
 
 
 def _modified_constants() -> list[Encoding]:
-    """With ThumbExpandImm constants; those of 16 bits twice may not be 0 (A5.3.2)."""
+    """With ThumbExpandImm constants; a byte that is repeated may not be 0 (A5.3.2)."""
 
     def valid(fields: Fields) -> bool:
         kind = fields["i"] << 3 | fields["imm3"]
@@ -215,7 +220,7 @@ def _several_accesses() -> list[Encoding]:
     def stored(fields: Fields) -> bool:
         return fields["p"] not in (fields["m"], fields["n"])
 
-    found = [
+    return [
         Encoding("LDRD (offset)", "1110100 1 U:1 1 0 1 q d e i:8", distinct, results=("e",)),
         Encoding("LDRD (before)", "1110100 1 U:1 1 1 1 q d e i:8", distinct, 1020, ("e",)),
         Encoding("LDRD (after)", "1110100 0 U:1 1 1 1 q d e i:8", distinct, 1020, ("e",)),
@@ -225,13 +230,11 @@ def _several_accesses() -> list[Encoding]:
         Encoding("STRD (before)", "1110100 1 U:1 1 1 0 q m n i:8", stored, 1020),
         Encoding("STRD (after)", "1110100 0 U:1 1 1 0 q m n i:8", stored, 1020),
     ]  # fmt: skip
-    return found
 
 
 def _system() -> list[Encoding]:
-    flags = "11110011100 0 n 1000 10 00 00000000"
-    found = [Encoding("MSR APSR", flags)]
-    # BASEPRI has as many bits as the part implements priorities: a test of its own.
+    found = [Encoding("MSR APSR", "11110011100 0 n 1000 10 00 00000000")]
+    # Without BASEPRI, whose bits depend on the part: test_core.py.
     for number in (0, 1, 2, 3, 5, 6, 7, 8, 9, 16, 19, 20):
         found.append(Encoding(f"MRS {number}", f"11110011111 01111 1000 d {number:08b}"))
     found += [
@@ -241,7 +244,7 @@ def _system() -> list[Encoding]:
         Encoding("CLREX", "1111001110111111 1000111100101111"),
         Encoding("DSB", "1111001110111111 100011110100 o:4"),
         Encoding("DMB", "1111001110111111 100011110101 o:4"),
-        # unicorn forgets the rest of an IT block behind an ISB (it runs unconditionally).
+        # After an ISB unicorn runs the rest of an IT block unconditionally.
         Encoding("ISB", "1111001110111111 100011110110 o:4", in_it=False),
         Encoding("NOP T2", "1111001110101111 1000000000000000"),
         Encoding("SEV T2", "1111001110101111 1000000000000100"),
@@ -259,5 +262,5 @@ ENCODINGS: tuple[Encoding, ...] = (
     *_several_accesses(),
     *_system(),
 )
-"""All that stand for themselves; programs.py makes branches, IT blocks, stack and multiple
-accesses, exclusives and changes of SP."""
+"""Instructions without conditions on others. programs.py adds branches, IT blocks, multiple
+transfers, exclusive accesses and changes of SP."""

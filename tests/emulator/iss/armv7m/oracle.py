@@ -1,4 +1,4 @@
-"""A bare machine and unicorn's Cortex-M3, run side by side."""
+"""A machine without peripherals and unicorn's Cortex-M3, which run the same slices."""
 
 import unicorn
 from unicorn import arm_const
@@ -19,14 +19,13 @@ _FOREVER = 1 << 60
 
 
 class UnequalError(AssertionError):
-    """The two differ."""
+    """The results differ."""
 
 
 class Pair:
-    """The two processors with the same memories."""
+    """Both processors, with equal memories."""
 
     def __init__(self, flash: bytes, ram: bytes) -> None:
-        """Begin with these contents."""
         self.machine = Machine(bare_hz=1_000_000, flash_bytes=_CODE_BYTES, ram_bytes=RAM_BYTES)
         self.machine.flash[:] = 0xFF
         self.machine.flash[: len(flash)] = list(flash)
@@ -43,7 +42,7 @@ class Pair:
         self.machine.breakpoints.add(END)
 
     def prepare(self, slice_: Slice) -> None:
-        """Put a slice and its registers into both."""
+        """Write a slice and its registers to both."""
         code = b"".join(half.to_bytes(2, "little") for half in slice_.code)
         assert self.machine.poke(slice_.start, code) == len(code)
         self.oracle.mem_write(slice_.start, code)
@@ -63,7 +62,7 @@ class Pair:
                                 (_U.UC_ARM_REG_XPSR, flags | 1 << 24)])  # fmt: skip
 
     def run(self, slice_: Slice) -> int:
-        """Run a slice on both; the number of instructions. UnequalError if anything differs."""
+        """Run a slice on both; returns the number of instructions, or raises UnequalError."""
         self.prepare(slice_)
         before = self.machine.instructions
         stop = self.machine.run(_FOREVER)
@@ -78,12 +77,6 @@ class Pair:
         self.compare()
         return self.machine.instructions - before
 
-    def step(self) -> None:
-        """One instruction on both (two of IT's block may be one step of unicorn)."""
-        self.machine.step()
-        pc = self.oracle.reg_read(_U.UC_ARM_REG_PC)
-        self.oracle.emu_start(pc | 1, END, count=1)
-
     def registers(self) -> tuple[dict[str, int], dict[str, int]]:
         """Registers of both by name."""
         theirs = dict(zip(_NAMES, self.oracle.reg_read_batch(_IDS), strict=True))
@@ -93,7 +86,7 @@ class Pair:
         return ours, theirs
 
     def compare(self) -> None:
-        """UnequalError if a register, flag or byte of RAM differs."""
+        """Raise UnequalError if a register, a flag or a byte of RAM differs."""
         ours, theirs = self.registers()
         if ours != theirs:
             raise UnequalError(", ".join(f"{name}: {ours[name]:#x} here, {theirs[name]:#x} there"

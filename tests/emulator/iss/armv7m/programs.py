@@ -1,4 +1,4 @@
-"""Random programs: slices of straight code with forward branches, ready for two processors."""
+"""Random programs: slices of code with forward branches only."""
 
 from dataclasses import dataclass, field
 from random import Random
@@ -6,11 +6,11 @@ from random import Random
 from .encodings import ENCODINGS, Encoding, Fields
 
 END = 0x2000
-"""Address behind every slice, in flash; slices lie before it, literals on both sides."""
+"""End of every slice, in flash. Literals are loaded from addresses on both sides of it."""
 
 RAM = 0x2000_0000
 RAM_BYTES = 0x4000
-_LOW, _HIGH = 0x1400, 0x2700  # where pointers begin: all offsets stay in RAM
+_LOW, _HIGH = 0x1400, 0x2700  # range of pointers, such that all accesses are in RAM
 
 INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x7FFFFFFF,
                0x80000000, 0x80000001, 0xFFFF8000, 0xFFFFFF80, 0xFFFFFFFE, 0xFFFFFFFF)  # fmt: skip
@@ -19,7 +19,7 @@ _NAMES = {"d", "n", "m", "a", "e", "p", "q", "x"}
 
 
 def _parse(template: str) -> tuple[int, tuple[tuple[str, int], ...]]:
-    """Width of an encoding, and its tokens: fixed bits as ("", bits)-pairs are kept as strings."""
+    """Width of an encoding, and its tokens with their widths, which are negative for fixed bits."""
     tokens: list[tuple[str, int]] = []
     for token in template.split():
         if set(token) <= {"0", "1"}:
@@ -60,7 +60,7 @@ class Slice:
 
 @dataclass
 class _Item:
-    """Some half-words that are entered at the first one only; ``target``: index of an item."""
+    """Half-words that are executed from the first on; ``target`` of a branch: index of an item."""
 
     halves: list[int]
     kind: str = ""
@@ -82,14 +82,13 @@ def movw(register: int, value: int) -> list[int]:
 
 
 class Generator:
-    """Makes slices from a seed."""
+    """Makes slices."""
 
     def __init__(self, seed: int) -> None:
-        """Begin with that seed."""
         self.random = Random(seed)
 
     def slice(self, length: int) -> Slice:
-        """Make a slice of about so many instructions."""
+        """Make a slice of about ``length`` instructions."""
         random = self.random
         self.pointers = random.sample(range(8), 2) + random.sample(range(8, 13), 1)
         self.aligned = self.word_pointer = self.pointers[random.randrange(3)]
@@ -141,7 +140,7 @@ class Generator:
                 return found
 
     def one(self, encoding: Encoding) -> list[int] | None:
-        """An instruction of a class, None if none fits now."""
+        """An instruction of a class, or None if the registers do not allow one."""
         width, tokens = _PARSED[encoding.name]
         if " SP T2" in encoding.name and not self.stack_valid:
             return None
@@ -177,7 +176,7 @@ class Generator:
         if kind not in _NAMES or (len(name) > 1 and name[1] not in "lHL"):
             fields[name] = random.getrandbits(bits)
             return fields[name]
-        if kind in fields:  # again, or its low part
+        if kind in fields:  # the same register again, or its low part
             register = fields[kind]
         elif kind in "de":
             register = random.choice(self.free_low if name[1:] == "l" else self.free)
@@ -209,7 +208,7 @@ class Generator:
         mask = (mask << 1 | 1) << (4 - length)
         self.classes.append("IT")
         halves = [0xBF00 | condition << 4 | mask]
-        # Nothing in it may move a pointer: whether it does depends on the flags.
+        # Without write-back, which would depend on the flags.
         before = dict(self.offset)
         for _ in range(length):
             while True:
@@ -286,7 +285,7 @@ class Generator:
                 return []
             base = 0xE9000000 if kind.endswith("DB") else 0xE8800000
             return wide(base | load << 20 | random.getrandbits(1) << 21 | pointer << 16 | registers)
-        if kind.startswith("LDREX"):  # with STREX behind it, where QEMU's monitor agrees
+        if kind.startswith("LDREX"):  # with the STREX for which QEMU's monitor agrees
             if pointer < 0:
                 return []
             d, e, t = random.sample(self.free, 3)
@@ -298,12 +297,11 @@ class Generator:
                     *wide(0xE8C00F40 | half << 4 | pointer << 16 | t << 12 | e)]  # fmt: skip
         if not self.stack_valid:
             return []
-        if kind == "CONTROL":  # to the process stack and back, or stay there
+        if kind == "CONTROL":  # to either stack
             d = random.choice(self.free_low)
             return [0x2000 | d << 8 | random.choice([0, 2]), *wide(0xF3808814 | d << 16),
                     *wide(0xF3BF8F6F)]  # fmt: skip
-        # QEMU keeps the two low bits of what is written to SP; B1.4.1 says that they are 0, which
-        # test_directed.py looks at. Here whole words are written.
+        # QEMU keeps the two low bits that are written to SP; by B1.4.1 they are 0 (test_core.py).
         self.stack_valid = False
         word, pointer = self.free[0], self.pointers[0]
         masked = wide(0xF0200003 | random.choice(self.sources) << 16 | word << 8)  # BIC word, s, 3
@@ -383,17 +381,17 @@ class Generator:
             case "TBB" | "TBH":
                 chosen = self.random.getrandbits(1)
                 entry = (target - (at + 6)) >> 1
-                least = size - 3  # half-words of the table: the shortest way over it
+                least = size - 3  # half-words of the table
                 entries = [least, least]
                 entries[chosen] = max(entry, least)
                 head = [0x2000 | r << 8 | chosen, *wide(0xE8DFF000 | r)]
                 if item.kind == "TBB":
                     return [*head, entries[0] | entries[1] << 8, 0xBF00]
                 return [*wide_index(head), *entries, 0xBF00]
-            case _:  # IT B: the last of a block
+            case _:  # IT B: a branch as last instruction of a block
                 return [0xBF08 | item.condition << 4, 0xE000 | (distance - 2) >> 1 & 0x7FF]
 
 
 def wide_index(head: list[int]) -> list[int]:
-    """TBB's half-words as TBH's."""
+    """TBH of a TBB."""
     return [head[0], head[1], head[2] | 0x10]

@@ -1,16 +1,16 @@
-"""Random programs, equal on the simulator and on unicorn's Cortex-M3.
+"""Random programs have the same results on the simulator and on unicorn's Cortex-M3.
 
-A short share runs with the suite; all of it: CUBESTACK_LOCKSTEP=5000000 pytest -s -k lockstep.
+CUBESTACK_LOCKSTEP is the number of instructions: CUBESTACK_LOCKSTEP=5000000 pytest -s -k lockstep.
 
-What is kept out because unicorn is not a Cortex-M3 there (sections of the ARMv7-M ARM):
+Left out because unicorn differs from a Cortex-M3 (sections of the ARMv7-M ARM):
 
-- writes to SP of addresses that are not of words: bits 1:0 are 0 (B1.4.1), QEMU keeps them;
+- SP with bits 1:0 set: they are 0 (B1.4.1), QEMU keeps them;
 - BASEPRI: it has the part's priority bits (B1.4.3), QEMU's all eight;
-- YIELD is a NOP here (A7.7.263), and ends unicorn's run; WFI and WFE would wait for ever in both;
-- ISB in an IT block: unicorn runs the rest of the block unconditionally (A7.3 says otherwise);
-- STREX whose address is not that of LDREX, or with other stores between: the part's monitor tags
-  no address (A3.4.1 leaves it open), QEMU's compares address and content;
-- what the manual calls UNPREDICTABLE, and accesses that fault: test_core.py and test_faults.py.
+- YIELD, a NOP (A7.7.263), ends unicorn's run; WFI and WFE would wait for ever in both;
+- ISB in an IT block: unicorn runs the rest of the block unconditionally, against A7.3;
+- STREX to another address than LDREX, or after another store: the part's monitor has no address
+  (A3.4.1 allows both), QEMU's compares address and content;
+- UNPREDICTABLE instructions, and accesses that fault: test_core.py and test_faults.py.
 """
 
 import os
@@ -33,7 +33,7 @@ SLICE = 24
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C++ compiler")
 
 
-def test_random_programs() -> None:
+def test_random_programs_have_the_results_of_unicorn() -> None:
     random = Random(1)
     pair = Pair(random.randbytes(0x4000), random.randbytes(RAM_BYTES))
     generator = Generator(2)

@@ -109,7 +109,7 @@ def test_memory_is_not_accessed_without_pins() -> None:
     assert "without its pins" in bench.log()
 
 
-def test_the_alternative_map_has_banks_of_256_mb() -> None:
+def test_alternative_map_has_banks_of_256_mb() -> None:
     bench = ebi(control=0x8000_1000 | 0x200)
     bench["EBI.ROUTE"] |= 4
     bench.machine.write(0x8400_0000, 0x77, 1)  # still bank 0

@@ -110,7 +110,7 @@ def test_lock_bits_protect_their_page() -> None:
     assert bench.is_set("MSC.STATUS.BUSY")
 
 
-def test_the_user_data_page_can_be_written_and_erased() -> None:
+def test_user_data_page_can_be_written_and_erased() -> None:
     bench = Bench()
     write_word(bench, 0x0FE0_0010, 0x5555_AAAA)
     bench.run_for(21 * US)
@@ -217,7 +217,7 @@ def test_loop_larger_than_512_bytes_misses_the_cache() -> None:
     assert cycles_of_a_loop(mode=4, nops=200) < 1.1
 
 
-def test_the_performance_counters_count_hits_and_misses() -> None:
+def test_performance_counters_count_hits_and_misses() -> None:
     bench = Bench(*[NOP] * 40, 0xE000 | (-42 & 0x7FF))
     bench["MSC.READCTRL"] = 1
     bench.command("MSC.CMD.INVCACHE")
@@ -232,7 +232,7 @@ def test_the_performance_counters_count_hits_and_misses() -> None:
     assert bench["MSC.CACHEHITS"] == hits
 
 
-def test_a_data_access_to_the_flash_has_its_wait_states() -> None:
+def test_data_access_to_the_flash_has_its_wait_states() -> None:
     bench = Bench()
 
     def cost(mode: int) -> int:

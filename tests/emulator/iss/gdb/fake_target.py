@@ -1,4 +1,4 @@
-"""A target without a processor, and a client that speaks the protocol by hand."""
+"""A debug target without a processor, and a session on it."""
 
 from cubestack.emulator.iss.gdb.description import REGISTERS
 from cubestack.emulator.iss.gdb.packets import framed
@@ -9,7 +9,7 @@ RAM = 0x2000_0000
 
 
 class FakeTarget:
-    """Registers, a kilobyte of RAM behind one of flash, and a note of each call."""
+    """Registers, 1 kB each of flash and RAM, and a list of the calls."""
 
     registers = REGISTERS
     regions = (MemoryRegion("flash", 0, 1024, 64), MemoryRegion("ram", RAM, 1024))
@@ -76,14 +76,14 @@ class FakeTarget:
 
 
 class Talk:
-    """A session on a fake target, in packets' data."""
+    """A session on a fake target."""
 
     def __init__(self) -> None:
         self.target = FakeTarget()
         self.session = Session(self.target)
 
     def ask(self, data: bytes | str) -> bytes | None:
-        """What a packet is answered with, without its frame; None for no answer."""
+        """Send a packet; returns the data of the answer, or None without answer."""
         self.send(framed(data.encode() if isinstance(data, str) else data))
         return self.answer()
 

@@ -1,4 +1,4 @@
-"""Packets as the manual of the protocol has them, on a target without processor."""
+"""Packets of the remote protocol (GDB manual, appendix E), on a target without processor."""
 
 from xml.etree import ElementTree
 
@@ -16,7 +16,7 @@ def talk() -> Talk:
     return Talk()
 
 
-def test_a_client_halts_the_target(talk: Talk) -> None:
+def test_connecting_halts_the_target(talk: Talk) -> None:
     assert (talk.ask("?") or b"").startswith(b"T02thread:1;")
 
 
@@ -25,19 +25,19 @@ def test_features_are_announced(talk: Talk) -> None:
     assert {b"QStartNoAckMode+", b"qXfer:features:read+", b"qXfer:memory-map:read+"} <= {*features}
 
 
-def test_acknowledgements_end_when_the_client_wants(talk: Talk) -> None:
+def test_client_can_switch_acknowledgements_off(talk: Talk) -> None:
     assert talk.ask("QStartNoAckMode") == b"OK"
     talk.session.receive(framed(b"?"))
     assert talk.session.output.startswith(b"$")
 
 
-def test_an_answer_is_repeated(talk: Talk) -> None:
+def test_answer_is_repeated_on_request(talk: Talk) -> None:
     talk.ask("p0")
     talk.send(b"-")
     assert talk.answer() == b"00000000"
 
 
-def test_the_description_comes_in_parts(talk: Talk) -> None:
+def test_target_description_is_sent_in_parts(talk: Talk) -> None:
     text, more = b"", True
     while more:
         part = talk.ask(f"qXfer:features:read:target.xml:{len(text):x},40") or b""
@@ -46,7 +46,7 @@ def test_the_description_comes_in_parts(talk: Talk) -> None:
     assert {int(r.attrib["regnum"]): r.attrib["name"] for r in registers} == REGISTERS
 
 
-def test_the_memory_map_has_flash_blocks(talk: Talk) -> None:
+def test_memory_map_has_flash_blocks(talk: Talk) -> None:
     text = (talk.ask("qXfer:memory-map:read::0,1000") or b"")[1:]
     assert b'<memory type="flash" start="0x0" length="0x400">' in text
     assert b'<property name="blocksize">0x40</property>' in text
@@ -74,7 +74,7 @@ def test_memory_is_read_and_written(talk: Talk) -> None:
     assert talk.ask(f"M{RAM:x},2:00") == b"E01"
 
 
-def test_flash_is_loaded(talk: Talk) -> None:
+def test_flash_changes_when_the_client_is_done(talk: Talk) -> None:
     talk.target.write(0, bytes(128))
     assert talk.ask("vFlashErase:40,40") == b"OK"
     assert talk.ask(b"vFlashWrite:50:" + escape(b"a:}c")) == b"OK"
@@ -84,7 +84,7 @@ def test_flash_is_loaded(talk: Talk) -> None:
     assert talk.target.read(0x50, 5) == b"a:}c\xff"
 
 
-def test_continue_answers_when_the_target_stops(talk: Talk) -> None:
+def test_continue_is_answered_when_the_target_stops(talk: Talk) -> None:
     assert talk.ask("vCont;c") is None
     assert talk.target.halted is None
     talk.target.halted = Stop(breakpoint=True)
@@ -92,7 +92,7 @@ def test_continue_answers_when_the_target_stops(talk: Talk) -> None:
     assert (talk.answer() or b"").startswith(b"T05thread:1;hwbreak:;0d:0d000000;")
 
 
-def test_an_interrupt_halts(talk: Talk) -> None:
+def test_interrupt_halts_the_target(talk: Talk) -> None:
     talk.ask("c")
     talk.send(b"\x03")
     assert (talk.answer() or b"").startswith(b"T02")
@@ -102,26 +102,23 @@ def test_an_interrupt_halts(talk: Talk) -> None:
     ("packet", "low", "high"),
     [("s", 0, 0), ("vCont;s:1;c", 0, 0), ("vCont;r100,110:1", 0x100, 0x110), ("S05", 0, 0)],
 )
-def test_steps(talk: Talk, packet: str, low: int, high: int) -> None:
+def test_step_passes_its_range(talk: Talk, packet: str, low: int, high: int) -> None:
     assert (talk.ask(packet) or b"").startswith(b"T05")
     assert talk.target.calls == [("step", low, high)]
 
 
-def test_a_stop_tells_of_its_watchpoint(talk: Talk) -> None:
+@pytest.mark.parametrize(
+    ("stop", "text"),
+    [(Stop(watch=("access", RAM + 4)), b"awatch:20000004;"), (Stop(SIGSEGV), b"T0b")],
+)
+def test_stop_reply_has_watchpoint_and_signal(talk: Talk, stop: Stop, text: bytes) -> None:
     talk.ask("c")
-    talk.target.halted = Stop(watch=("access", RAM + 4))
+    talk.target.halted = stop
     talk.session.look()
-    assert b"awatch:20000004;" in (talk.answer() or b"")
+    assert text in (talk.answer() or b"")
 
 
-def test_a_stop_tells_of_a_fault(talk: Talk) -> None:
-    talk.ask("c")
-    talk.target.halted = Stop(SIGSEGV)
-    talk.session.look()
-    assert (talk.answer() or b"").startswith(b"T0b")
-
-
-def test_points_are_set_and_removed(talk: Talk) -> None:
+def test_breakpoints_and_watchpoints_are_set_and_removed(talk: Talk) -> None:
     packets = ("Z0,101,2", "z0,100,2", "Z1,200,2", "Z2,20000000,4", "Z3,20000000,4", "z4,1,0")
     assert [talk.ask(packet) for packet in packets] == [b"OK"] * 6
     assert talk.target.calls == [
@@ -135,23 +132,21 @@ def test_points_are_set_and_removed(talk: Talk) -> None:
     assert talk.ask("Z7,0,0") == b""
 
 
-def test_monitor_answers_in_hex(talk: Talk) -> None:
-    assert (
-        bytes.fromhex((talk.ask(b"qRcmd," + b"time".hex().encode()) or b"").decode()) == b"0.5 s\n"
-    )
-    refused = talk.ask(b"qRcmd," + b"x".hex().encode()) or b""
-    assert bytes.fromhex(refused.decode()) == b"no command 'x'\n"
+@pytest.mark.parametrize(("command", "text"), [(b"time", b"0.5 s"), (b"x", b"no command 'x'")])
+def test_monitor_answers_in_hex(talk: Talk, command: bytes, text: bytes) -> None:
+    answer = talk.ask(b"qRcmd," + command.hex().encode()) or b""
+    assert bytes.fromhex(answer.decode()) == text + b"\n"
 
 
 @pytest.mark.parametrize("packet", ["D", "vKill;1"])
-def test_after_a_good_bye_the_target_runs_free(talk: Talk, packet: str) -> None:
+def test_target_runs_after_detach_and_kill(talk: Talk, packet: str) -> None:
     assert talk.ask(packet) == b"OK"
     assert talk.session.ended
     assert talk.target.calls == [("detach",)]
     assert talk.target.halted is None
 
 
-def test_restarts(talk: Talk) -> None:
+def test_target_is_restarted(talk: Talk) -> None:
     assert talk.ask("!") == b"OK"
     assert talk.ask("R00") is None
     assert (talk.ask("vRun;") or b"").startswith(b"T05")
@@ -159,10 +154,10 @@ def test_restarts(talk: Talk) -> None:
 
 
 @pytest.mark.parametrize("packet", ["qFoo", "vFoo", "Y", "QFoo", ""])
-def test_what_is_not_known_is_answered_empty(talk: Talk, packet: str) -> None:
+def test_unknown_packet_has_an_empty_answer(talk: Talk, packet: str) -> None:
     assert talk.ask(packet) == b""
 
 
 @pytest.mark.parametrize("packet", ["p99", "mzz,1", "P0", "Z0", "Mx:", "vCont;r1", "qRcmd,x"])
-def test_what_makes_no_sense_is_an_error(talk: Talk, packet: str) -> None:
+def test_invalid_packet_is_answered_with_an_error(talk: Talk, packet: str) -> None:
     assert talk.ask(packet) == b"E01"

@@ -7,40 +7,40 @@ from cubestack.emulator.iss.outcome import StopReason
 
 PS_PER_MS = 10**9
 MOST_RUNS = 10_000
-SCREEN = 32
-"""Lines."""
+SCREEN_LINES = 32
 
 
 def run(machine: Machine, until_ps: int) -> None:
-    """Up to a time, or to a handler without an end."""
+    """Run to a time, or to a fault handler that does not return."""
     for _ in range(MOST_RUNS):
         stop = machine.run(until_ps)
         list(machine.outbox())
-        locked_up = stop.reason is StopReason.LOCKED_UP
-        if stop.now_ps >= until_ps or locked_up or unhandled(machine):
+        if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP or unhandled(machine):
             return
-    pytest.fail(f"stands at {machine.now_ps} ps")
+    pytest.fail(f"time stays at {machine.now_ps} ps")
 
 
 def crash(machine: Machine, symbols: Symbols, how: int) -> str:
-    """Let the program fail; the report."""
+    """Let the program fail; returns the report."""
     run(machine, PS_PER_MS)
     machine.poke(symbols.variables["command"].address, how.to_bytes(4, "little"))
     run(machine, 300 * PS_PER_MS)
     report = fault_report(machine, symbols, machine.now_ps)
-    assert len(report.splitlines()) <= SCREEN
+    assert len(report.splitlines()) <= SCREEN_LINES
     assert all(len(line) <= 100 for line in report.splitlines())
     return report
 
 
-def test_no_fault_so_far(machine: Machine, symbols: Symbols) -> None:
+def test_report_before_any_fault_says_so(machine: Machine, symbols: Symbols) -> None:
     run(machine, PS_PER_MS)
     assert not unhandled(machine)
     assert last_fault(machine).count == 0
     assert "no fault so far" in fault_report(machine, symbols, machine.now_ps)
 
 
-def test_a_division_by_zero(machine: Machine, symbols: Symbols) -> None:
+def test_report_of_a_division_by_zero_has_cause_and_calls(
+    machine: Machine, symbols: Symbols
+) -> None:
     report = crash(machine, symbols, 1)
     assert unhandled(machine)
     assert "UsageFault DIVBYZERO: divided by zero" in report
@@ -50,32 +50,29 @@ def test_a_division_by_zero(machine: Machine, symbols: Symbols) -> None:
     assert "(program.c:" in report
 
 
-def test_a_jump_into_nowhere(machine: Machine, symbols: Symbols) -> None:
-    report = crash(machine, symbols, 2)
-    assert "IBUSERR" in report or "IACCVIOL" in report
-    assert "faulting instruction 60000000" in report
+@pytest.mark.parametrize(
+    ("how", "texts"),
+    [
+        pytest.param(2, ["BUSERR", "faulting instruction 60000000"], id="jump to unused address"),
+        pytest.param(4, ["PRECISERR", "crash"], id="write to unused address"),
+        pytest.param(3, ["has the stack run over?", "overflow"], id="stack overflow"),
+    ],
+)
+def test_report_has_the_cause(
+    machine: Machine, symbols: Symbols, how: int, texts: list[str]
+) -> None:
+    report = crash(machine, symbols, how)
+    assert all(text in report for text in texts)
 
 
-def test_a_write_into_nowhere(machine: Machine, symbols: Symbols) -> None:
-    report = crash(machine, symbols, 4)
-    assert "PRECISERR" in report
-    assert "crash" in report
-
-
-def test_a_stack_that_runs_over_still_gives_a_report(machine: Machine, symbols: Symbols) -> None:
-    report = crash(machine, symbols, 3)
-    assert "has the stack run over?" in report
-    assert "overflow" in report
-
-
-def test_a_program_without_names_gives_a_report(machine: Machine, symbols: Symbols) -> None:
+def test_report_without_symbols(machine: Machine, symbols: Symbols) -> None:
     crash(machine, symbols, 1)
     report = fault_report(machine, Symbols(None), machine.now_ps)
     assert "DIVBYZERO" in report
     assert "[by stack scan]" not in report
 
 
-def test_every_status_bit_has_its_words() -> None:
+def test_status_bits_are_described() -> None:
     assert reasons(1 << 25 | 1 << 9, 1 << 30) == [
         "BusFault PRECISERR: data access where there is nothing",
         "UsageFault DIVBYZERO: divided by zero",

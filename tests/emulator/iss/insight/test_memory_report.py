@@ -1,4 +1,4 @@
-"""What a program used of flash and RAM, against its ELF file and what is written by hand."""
+"""Flash and RAM in use, compared with the ELF file and with bytes that the test changes."""
 
 import io
 from pathlib import Path
@@ -29,7 +29,7 @@ def write(observer: Observer, address: int) -> None:
     observer.machine.ram[address - RAM_BASE] ^= 0x55
 
 
-def test_a_program_s_bytes(observer: Observer, program: Path) -> None:
+def test_flash_and_static_data_are_those_of_the_elf_file(observer: Observer, program: Path) -> None:
     elf = ELFFile(io.BytesIO(program.read_bytes()))
     sections = [part for part in elf.iter_sections() if part["sh_flags"] & 2]  # SHF_ALLOC
     in_ram = [part for part in sections if part["sh_addr"] >= RAM_BASE]
@@ -46,7 +46,7 @@ def test_a_program_s_bytes(observer: Observer, program: Path) -> None:
     assert 0 < use.stack < 256
 
 
-def test_the_heap_ends_behind_the_last_byte_that_changed(observer: Observer) -> None:
+def test_heap_ends_after_the_last_changed_byte(observer: Observer) -> None:
     before = memory_use(observer)
     assert before.static is not None
     assert before.free is not None
@@ -60,8 +60,9 @@ def test_the_heap_ends_behind_the_last_byte_that_changed(observer: Observer) -> 
     assert memory_use(observer).free == 0
 
 
-def test_names_that_end_static_data(observer: Observer) -> None:
+def test_static_data_end_at_the_first_known_symbol(observer: Observer) -> None:
     labels = observer.symbols.labels
+    before = labels.copy()
     end = labels.pop("end")
     try:
         use = memory_use(observer)
@@ -72,9 +73,8 @@ def test_names_that_end_static_data(observer: Observer) -> None:
             assert memory_use(observer).static == (at - RAM_BASE if inside else None)
         labels["_ebss"] = RAM_BASE + RAM_BYTES + 1
         assert memory_use(observer).static is None
-        labels["_end"] = end  # surer than the other one
+        labels["_end"] = end  # preferred
         assert memory_use(observer).static == end - RAM_BASE
     finally:
-        for name in ("_ebss", "_end"):
-            labels.pop(name, None)
-        labels["end"] = end
+        labels.clear()
+        labels |= before

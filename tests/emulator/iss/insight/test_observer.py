@@ -1,4 +1,4 @@
-"""What the counters say is what the program is known to do."""
+"""Counters, profile, coverage and history of a program whose behaviour is known."""
 
 import io
 import re
@@ -19,8 +19,7 @@ from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 
 PS_PER_MS = 10**9
 MOST_RUNS = 10_000
-RUN_PS = 20 * PS_PER_MS
-"""Two hundred ticks."""
+RUN_PS = 20 * PS_PER_MS  # 200 ticks
 
 
 def run(machine: Machine, until_ps: int) -> None:
@@ -29,7 +28,7 @@ def run(machine: Machine, until_ps: int) -> None:
         list(machine.outbox())
         if machine.now_ps >= until_ps:
             return
-    pytest.fail(f"stands at {machine.now_ps} ps")
+    pytest.fail(f"time stays at {machine.now_ps} ps")
 
 
 @pytest.fixture
@@ -62,7 +61,7 @@ def self_cycles(observer: Observer, name: str) -> int:
     return sum(code.cycles_of(function.address, function.end) for code in observer.codes)
 
 
-def test_every_cycle_is_somewhere(observer: Observer) -> None:
+def test_cycles_of_instructions_and_idle_cycles_are_all_cycles(observer: Observer) -> None:
     counted = sum(int(code.cycles.sum()) for code in observer.codes)
     idle = observer.figures().idle_cycles
     assert idle > 0.9 * observer.machine.cycles
@@ -89,7 +88,9 @@ def test_instructions_at_the_start_of_the_ram_are_counted(
     assert counts == [0, 3, 2, 0]
 
 
-def test_an_exception_is_not_part_of_what_it_interrupts(observer: Observer) -> None:
+def test_cycles_of_an_exception_are_not_those_of_the_interrupted_function(
+    observer: Observer,
+) -> None:
     handler = calls(observer, "SysTick_Handler")
     assert handler.exception
     assert handler.site == 15
@@ -98,7 +99,7 @@ def test_an_exception_is_not_part_of_what_it_interrupts(observer: Observer) -> N
     assert start.cycles == self_cycles(observer, "main") + calls(observer, "work").cycles
 
 
-def test_the_lowest_stack_pointer_is_kept(observer: Observer) -> None:
+def test_lowest_stack_pointer_is_recorded(observer: Observer) -> None:
     figures = observer.figures()
     top = observer.symbols.labels["stack_top"]
     assert figures.process_sp is None
@@ -106,7 +107,7 @@ def test_the_lowest_stack_pointer_is_kept(observer: Observer) -> None:
     assert 32 <= top - figures.main_sp < 128
 
 
-def test_an_observed_machine_does_the_same(machine: Machine, observer: Observer) -> None:
+def test_observed_machine_behaves_as_one_that_is_not(machine: Machine, observer: Observer) -> None:
     other = Machine()
     assert machine.image is not None
     other.load(machine.image)
@@ -118,7 +119,7 @@ def test_an_observed_machine_does_the_same(machine: Machine, observer: Observer)
     other.close()
 
 
-def test_the_profile_has_all_cycles_by_function_and_line(observer: Observer, program: Path) -> None:
+def test_profile_has_all_cycles_by_function_and_line(observer: Observer, program: Path) -> None:
     stream = io.StringIO()
     write_callgrind(observer, stream)
     text = stream.getvalue()
@@ -136,10 +137,10 @@ def test_callgrind_reads_the_profile(observer: Observer, tmp_path: Path) -> None
     with path.open("w") as stream:
         write_callgrind(observer, stream)
     command = ["callgrind_annotate", "--inclusive=yes", "--auto=no", str(path)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     found = {
         name: int(cost.replace(",", ""))
-        for cost, name in re.findall(r"^\s*([\d,]+) \(.*?program\.c:(\w+)", said, re.M)
+        for cost, name in re.findall(r"^\s*([\d,]+) \(.*?program\.c:(\w+)", output, re.M)
     }
     assert found["work"] == calls(observer, "work").cycles
     assert found["main"] == calls(observer, "main").cycles
@@ -161,7 +162,9 @@ def test_coverage_has_lines_and_functions(observer: Observer, symbols: Symbols) 
     assert f"DA:{number},0\n" in text
 
 
-def test_a_history_tells_function_and_exception(machine: Machine, symbols: Symbols) -> None:
+def test_history_has_functions_and_exceptions_with_their_times(
+    machine: Machine, symbols: Symbols
+) -> None:
     observer = Observer(machine, symbols)
     history = History(observer, {})
     run(machine, PS_PER_MS)
@@ -175,7 +178,7 @@ def test_a_history_tells_function_and_exception(machine: Machine, symbols: Symbo
     assert list(history.take()) == []
 
 
-def test_a_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
+def test_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
     observer = Observer(machine, symbols)
     history = History(observer, {})
     for _ in range(MOST_RUNS):
@@ -183,17 +186,17 @@ def test_a_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
         list(machine.outbox())
         if machine.now_ps >= RUN_PS * 3:
             break
-    standing = machine.now_ps
+    full_ps = machine.now_ps
     for _ in range(10):  # the buffer is nearly full: each run is short
         machine.run(RUN_PS * 10)
-    assert machine.now_ps < standing + RUN_PS
+    assert machine.now_ps < full_ps + RUN_PS
     taken = [name for _, variable, name in history.take() if variable == "function"]
     assert taken.count("square") == pytest.approx(5 * taken.count("work") / 6, rel=0.01)
 
 
 @needs_compiler
 def test_calls_of_each_task_are_counted_on_its_own_stack(tmp_path: Path) -> None:
-    """Three tasks with stacks of their own are switched in the middle of their calls."""
+    """SysTick and PendSV switch three tasks in the middle of their calls."""
     folder, path = Path(__file__).parents[1] / "programs", tmp_path / "rtos.elf"
     sources = folder / "device.ld", folder / "startup.c", folder / "rtos.c", "-lgcc"
     compile_for_m3("-g", "-O0", "-ffreestanding", "-nostdlib", "-T", *sources, "-o", path)

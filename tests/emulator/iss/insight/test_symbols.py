@@ -9,12 +9,12 @@ def test_functions_are_found_by_address(symbols: Symbols) -> None:
     assert symbols.function_at(0x2000_0000) is None
 
 
-def test_what_the_linker_left_out_has_no_lines(symbols: Symbols) -> None:
+def test_function_that_the_linker_removed_has_no_lines(symbols: Symbols) -> None:
     assert symbols.function("never") is None
     assert all(symbols.function_at(line.address) for line in symbols.lines)
 
 
-def test_an_address_is_described_by_function_and_line(symbols: Symbols) -> None:
+def test_address_is_described_by_function_and_line(symbols: Symbols) -> None:
     square = symbols.function("square")
     assert square is not None
     text = symbols.describe(square.address)
@@ -26,7 +26,7 @@ def test_variables_have_addresses(symbols: Symbols) -> None:
     assert symbols.labels["stack_top"] == 0x2002_0000
 
 
-def test_a_program_without_names_has_none() -> None:
+def test_program_without_elf_file_has_no_symbols() -> None:
     symbols = Symbols(None)
     assert not symbols.functions
     assert not symbols.lines
