@@ -67,24 +67,8 @@ def _shift_add_16() -> list[Encoding]:
         "NOP T1": "1011111100000000",
         "SEV T1": "1011111101000000",
     }
-    names = [
-        "AND",
-        "EOR",
-        "LSL",
-        "LSR",
-        "ASR",
-        "ADC",
-        "SBC",
-        "ROR",
-        "TST",
-        "RSB",
-        "CMP",
-        "CMN",
-        "ORR",
-        "MUL",
-        "BIC",
-        "MVN",
-    ]
+    names = ("AND", "EOR", "LSL", "LSR", "ASR", "ADC", "SBC", "ROR", "TST", "RSB", "CMP", "CMN",
+             "ORR", "MUL", "BIC", "MVN")  # fmt: skip
     for number, name in enumerate(names):
         first = "nl" if name in ("TST", "CMP", "CMN") else "dl"
         rows[f"{name} reg T1"] = f"010000 {number:04b} ml {first}"
