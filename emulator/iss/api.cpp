@@ -100,24 +100,16 @@ static StopReason reason_of(IssMachine &machine, uint32_t exits) {
     const bool asleep = machine.system.sleep() != armv7m::Sleep::Awake;
     const bool changed = asleep != machine.was_asleep;
     machine.was_asleep = asleep;
-    if (exits & armv7m::ExitBreakpoint)
-        return STOP_BREAKPOINT;
-    if (exits & armv7m::ExitWatchpoint)
-        return STOP_WATCHPOINT;
-    if (exits & armv7m::ExitStep)
-        return STOP_STEPPED;
+    if (exits & armv7m::ExitBreakpoint) return STOP_BREAKPOINT;
+    if (exits & armv7m::ExitWatchpoint) return STOP_WATCHPOINT;
+    if (exits & armv7m::ExitStep) return STOP_STEPPED;
     const auto stopped_by = machine.system.stopped_by();
     machine.system.clear_debug_stop();
-    if (stopped_by == System::DebugStop::Breakpoint)
-        return STOP_HALTED;
-    if (stopped_by == System::DebugStop::VectorCatch)
-        return STOP_FAULT;
-    if (exits & armv7m::ExitLockup)
-        return STOP_LOCKED_UP;
-    if (machine.part && machine.part->outbox.count)
-        return STOP_OUTBOX;
-    if (changed)
-        return asleep ? STOP_ASLEEP : STOP_AWAKE;
+    if (stopped_by == System::DebugStop::Breakpoint) return STOP_HALTED;
+    if (stopped_by == System::DebugStop::VectorCatch) return STOP_FAULT;
+    if (exits & armv7m::ExitLockup) return STOP_LOCKED_UP;
+    if (machine.part && machine.part->outbox.count) return STOP_OUTBOX;
+    if (changed) return asleep ? STOP_ASLEEP : STOP_AWAKE;
     return STOP_TIME;
 }
 
@@ -175,8 +167,7 @@ int64_t iss_next_event(const IssMachine *machine) {
 
 // 0: awake, else 1 + energy mode.
 int32_t iss_asleep(const IssMachine *machine) {
-    if (machine->system.sleep() == armv7m::Sleep::Awake)
-        return 0;
+    if (machine->system.sleep() == armv7m::Sleep::Awake) return 0;
     return machine->part ? 1 + machine->part->mode : 1;
 }
 
@@ -187,8 +178,7 @@ int64_t iss_hz(const IssMachine *machine) {
 
 // Moves up to `count` messages to `out`; returns their number.
 int64_t iss_take(IssMachine *machine, efm32gg::Outgoing *out, int64_t count) {
-    if (!machine->part)
-        return 0;
+    if (!machine->part) return 0;
     efm32gg::Outbox &box = machine->part->outbox;
     const int32_t taken = (int32_t)std::min<int64_t>(count, box.count);
     std::copy(box.items, box.items + taken, out);
@@ -236,8 +226,7 @@ int64_t iss_peek(IssMachine *machine, uint32_t address, uint8_t *out, int64_t co
         // Registers of peripherals can only be read as words.
         const uint32_t at = address + (uint32_t)n;
         uint32_t value;
-        if (!machine->cpu.peek(at & ~3u, 4, value))
-            return n;
+        if (!machine->cpu.peek(at & ~3u, 4, value)) return n;
         out[n] = (uint8_t)(value >> 8 * (at & 3));
     }
     return count;
@@ -251,8 +240,7 @@ int64_t iss_poke(IssMachine *machine, uint32_t address, const uint8_t *data, int
         const int size = at % 4 == 0 && count - n >= 4 ? 4 : 1;
         uint32_t value = 0;
         std::memcpy(&value, data + n, (size_t)size);
-        if (!machine->cpu.poke(at, (uint32_t)size, value))
-            break;
+        if (!machine->cpu.poke(at, (uint32_t)size, value)) break;
         n += size;
     }
     return n;
@@ -294,8 +282,7 @@ static I2c *i2c_of(IssMachine *machine, int32_t unit) {
 // Returns what I2c's slave functions return; without a unit nothing is acknowledged.
 int32_t iss_i2c_slave(IssMachine *machine, int32_t unit, int32_t what, int32_t byte) {
     I2c *slave = i2c_of(machine, unit);
-    if (!slave)
-        return what == 2 ? 0xFF : 0;
+    if (!slave) return what == 2 ? 0xFF : 0;
     switch (what) {
     case 0: return slave->slave_start((uint32_t)byte);
     case 1: return slave->slave_write((uint32_t)byte);
@@ -363,8 +350,7 @@ void iss_stop(IssMachine *machine) { machine->cpu.stop(); }
 
 void iss_fpga(IssMachine *machine, const FpgaDriver *driver, const FpgaWire *wires,
               int32_t count) {
-    if (!machine->part)
-        return;
+    if (!machine->part) return;
     machine->link = std::make_unique<FpgaLink>(*machine->part, *driver, wires, count);
     machine->part->attached = machine->link.get();
 }

@@ -44,8 +44,7 @@ void FpgaLink::outputs_changed(int port, uint32_t changed, uint32_t levels, int6
 }
 
 bool FpgaLink::bus_access(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) {
-    if (!fpga.slow_external)
-        return false;
+    if (!fpga.slow_external) return false;
     const int32_t answer = fpga.slow_external(bank, address, write ? value : -1, now);
     if (answer >= 0 && !write)
         value = (uint8_t)answer;
@@ -64,8 +63,7 @@ uint32_t FpgaLink::level(const FpgaWire &wire, int64_t now) {
 
 // Makes the clocks of running cameras. Engines that are not compiled do so themselves.
 void FpgaLink::advance(int64_t now) {
-    if (!running || !compiled())
-        return;
+    if (!running || !compiled()) return;
     int64_t reached = now;
     int32_t camera = 0;
     const int32_t outcome = fpga.burst(fpga.driver, now, running, &reached, &camera);
@@ -78,8 +76,7 @@ void FpgaLink::advance(int64_t now) {
 void FpgaLink::report(int64_t now) {
     for (std::size_t n = 0; n < wires.size(); n++) {
         const FpgaWire &wire = wires[n];
-        if (!wire.alert)
-            continue;
+        if (!wire.alert) continue;
         const uint32_t value = level(wire, now) & mask_of(wire);
         const uint32_t changed = value ^ reported[n];
         reported[n] = value;

@@ -8,7 +8,7 @@ from collections import defaultdict
 from typing import IO
 
 from cubestack.emulator.iss.insight.observer import Edge, Observer
-from cubestack.emulator.iss.insight.symbols import Function
+from cubestack.emulator.iss.insight.symbols import Symbol
 
 EXCEPTIONS = "(exceptions)"
 NOWHERE = "(unknown)"
@@ -32,7 +32,7 @@ def write_callgrind(observer: Observer, stream: IO[str]) -> None:
     costs: dict[tuple[str, str], dict[tuple[str, int], int]] = defaultdict(lambda: defaultdict(int))
     places: dict[str, tuple[str, str]] = {}
 
-    def place(function: Function | None, address: int) -> tuple[str, str]:
+    def place(function: Symbol | None, address: int) -> tuple[str, str]:
         """File and name of a function."""
         name = function.name if function else NOWHERE
         if name not in places:

@@ -15,45 +15,36 @@ from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
 
 EXCEPTIONS = {
-    0: "",
-    1: "Reset",
-    2: "NMI",
-    3: "HardFault",
-    4: "MemManage",
-    5: "BusFault",
-    6: "UsageFault",
-    11: "SVCall",
-    12: "DebugMonitor",
-    14: "PendSV",
-    15: "SysTick",
-}
+    0: "", 1: "Reset", 2: "NMI", 3: "HardFault", 4: "MemManage", 5: "BusFault", 6: "UsageFault",
+    11: "SVCall", 12: "DebugMonitor", 14: "PendSV", 15: "SysTick",
+}  # fmt: skip
 FIRST_INTERRUPT = 16
 FAULTS = (3, 4, 5, 6)
 
 CFSR = {
-    0: ("MemManage", "IACCVIOL", "code was fetched where none may run"),
-    1: ("MemManage", "DACCVIOL", "data access that the MPU does not allow"),
-    3: ("MemManage", "MUNSTKERR", "not allowed to unstack after an exception"),
-    4: ("MemManage", "MSTKERR", "not allowed to stack for an exception: has the stack run over?"),
+    0: ("MemManage", "IACCVIOL", "instruction fetch from where execution is forbidden"),
+    1: ("MemManage", "DACCVIOL", "data access that the MPU forbids"),
+    3: ("MemManage", "MUNSTKERR", "unstacking after an exception is forbidden"),
+    4: ("MemManage", "MSTKERR", "stacking for an exception is forbidden: stack overflow?"),
     7: ("MemManage", "MMARVALID", ""),
-    8: ("BusFault", "IBUSERR", "code was fetched where there is no memory"),
-    9: ("BusFault", "PRECISERR", "data access where there is nothing"),
-    10: ("BusFault", "IMPRECISERR", "earlier write to where there is nothing; pc is behind it"),
-    11: ("BusFault", "UNSTKERR", "could not unstack after an exception"),
-    12: ("BusFault", "STKERR", "could not stack for an exception: has the stack run over?"),
+    8: ("BusFault", "IBUSERR", "instruction fetch from an unused address"),
+    9: ("BusFault", "PRECISERR", "data access to an unused address"),
+    10: ("BusFault", "IMPRECISERR", "earlier write to an unused address; pc is after it"),
+    11: ("BusFault", "UNSTKERR", "unstacking after an exception failed"),
+    12: ("BusFault", "STKERR", "stacking for an exception failed: stack overflow?"),
     15: ("BusFault", "BFARVALID", ""),
-    16: ("UsageFault", "UNDEFINSTR", "no such instruction"),
+    16: ("UsageFault", "UNDEFINSTR", "undefined instruction"),
     17: ("UsageFault", "INVSTATE", "not in Thumb state: a jump to an even address?"),
-    18: ("UsageFault", "INVPC", "return from an exception that makes no sense"),
-    19: ("UsageFault", "NOCP", "there is no such coprocessor"),
+    18: ("UsageFault", "INVPC", "invalid return from an exception"),
+    19: ("UsageFault", "NOCP", "no such coprocessor"),
     24: ("UsageFault", "UNALIGNED", "unaligned access"),
-    25: ("UsageFault", "DIVBYZERO", "divided by zero"),
+    25: ("UsageFault", "DIVBYZERO", "division by zero"),
 }
 """Fault, name and meaning by the bit of the configurable fault status register."""
 
 HFSR = {
-    1: ("HardFault", "VECTTBL", "could not read the vector table"),
-    30: ("HardFault", "FORCED", "a fault whose own handler is off or can not run now"),
+    1: ("HardFault", "VECTTBL", "the vector table cannot be read"),
+    30: ("HardFault", "FORCED", "a fault whose own handler is disabled or cannot run now"),
     31: ("HardFault", "DEBUGEVT", "BKPT without a debugger"),
 }
 MMARVALID, BFARVALID = 1 << 7, 1 << 15

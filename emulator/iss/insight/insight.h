@@ -121,16 +121,14 @@ private:
     // one count, sleep does not.
     int64_t wait_or_sleep(int64_t cycles) {
         const int64_t gap = cycles - last;
-        if (gap <= LONGEST_WAIT)
-            return last;
+        if (gap <= LONGEST_WAIT) return last;
         idle += gap;
         stolen += gap;
         return cycles;
     }
 
     static void charge(const CodeRange *range, uint32_t pc, int64_t cycles, uint64_t count) {
-        if (!range || !range->cycles)
-            return;
+        if (!range || !range->cycles) return;
         const uint32_t index = (pc - range->base) >> 1;
         range->cycles[index] += (uint64_t)cycles;
         range->counts[index] += count;
@@ -140,8 +138,7 @@ private:
         returning = false;
         while (depth && !frames[depth - 1].exception)
             close(cycles);
-        if (!depth)
-            return;
+        if (!depth) return;
         const Frame &marker = frames[depth - 1];
         const int64_t own = cycles - marker.start - (stolen - marker.stolen);
         const uint32_t stack = marker.sp;
@@ -156,8 +153,7 @@ private:
 
     const CodeRange *range_of(uint32_t pc) const {
         for (const CodeRange &range : ranges)
-            if (pc - range.base < range.size)
-                return &range;
+            if (pc - range.base < range.size) return &range;
         return nullptr;
     }
 
@@ -182,8 +178,7 @@ private:
             close(cpu.cycles);
             returned = true;
         }
-        if (returned || !depth || frames[depth - 1].exception)
-            return;
+        if (returned || !depth || frames[depth - 1].exception) return;
         const uint16_t from = function_at(pc), to = function_at(next);
         if (from != to && from && to)
             open(frames[depth - 1].returns_to, frames[depth - 1].sp, pc, next, cpu.cycles);
@@ -191,13 +186,11 @@ private:
 
     // Length in bytes of the call at `pc`; 0: no call. ARMv7-M, A7.7.18 and A7.7.19.
     static uint32_t call_length(const CodeRange *range, uint32_t pc) {
-        if (!range || pc - range->base + 4 > range->size)
-            return 0;
+        if (!range || pc - range->base + 4 > range->size) return 0;
         const uint8_t *code = range->host + (pc - range->base);
         const uint32_t first = code[0] | (uint32_t)code[1] << 8;
         const uint32_t second = code[2] | (uint32_t)code[3] << 8;
-        if ((first & 0xFF87) == 0x4780)
-            return 2;
+        if ((first & 0xFF87) == 0x4780) return 2;
         return (first & 0xF800) == 0xF000 && (second & 0xD000) == 0xD000 ? 4 : 0;
     }
 
@@ -260,8 +253,7 @@ private:
 
     void record(uint32_t pc, armv7m::Cpu &cpu) {
         const uint16_t function = function_at(pc);
-        if (function == recorded && cpu.ipsr == recorded_exception)
-            return;
+        if (function == recorded && cpu.ipsr == recorded_exception) return;
         recorded = function, recorded_exception = cpu.ipsr;
         changes[change_count++] = {now(owner), function, cpu.ipsr, pc};
         if (change_count + 2 >= CHANGES)

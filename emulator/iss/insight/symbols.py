@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from io import BytesIO
-from typing import Any
+from typing import Any, TypeVar
 
 from cubestack.emulator.iss.image import Image
 
 
 @dataclass(frozen=True)
-class Function:
-    """A function or other named code."""
+class Symbol:
+    """A function, or an object in memory."""
 
     name: str
     address: int
@@ -28,15 +28,6 @@ class Function:
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A named object in memory."""
-
-    name: str
-    address: int
-    size: int
-
-
-@dataclass(frozen=True)
 class Line:
     """A line of a source file and its code, ``address`` to ``end`` - 1."""
 
@@ -45,6 +36,9 @@ class Line:
     file: str
     number: int
     statement: bool
+
+
+_Range = TypeVar("_Range", Symbol, Line)
 
 
 class Symbols:
@@ -59,8 +53,8 @@ class Symbols:
     def __init__(self, elf: bytes | None) -> None:
         """Read the contents of an ELF file; None: no symbols."""
         self._elf = elf
-        self.functions: list[Function] = []
-        self.variables: dict[str, Variable] = {}
+        self.functions: list[Symbol] = []
+        self.variables: dict[str, Symbol] = {}
         self.labels: dict[str, int] = {}
         if elf is not None:
             self._read_symbols()
@@ -72,21 +66,15 @@ class Symbols:
         """Symbols of a program, cached."""
         return Symbols(None if image is None else image.elf)
 
-    def function_at(self, address: int) -> Function | None:
+    def function_at(self, address: int) -> Symbol | None:
         """The function with code at ``address``."""
-        index = bisect_right(self._starts, address) - 1
-        if index < 0 or address >= self.functions[index].end:
-            return None
-        return self.functions[index]
+        return _containing(self.functions, self._starts, address)
 
     def line_at(self, address: int) -> Line | None:
         """The source line of the code at ``address``."""
-        index = bisect_right(self._line_starts, address) - 1
-        if index < 0 or address >= self.lines[index].end:
-            return None
-        return self.lines[index]
+        return _containing(self.lines, self._line_starts, address)
 
-    def function(self, name: str) -> Function | None:
+    def function(self, name: str) -> Symbol | None:
         return next((found for found in self.functions if found.name == name), None)
 
     def describe(self, address: int, place: int | None = None) -> str:
@@ -143,7 +131,7 @@ class Symbols:
 
         assert self._elf is not None
         file = ELFFile(BytesIO(self._elf))
-        found: dict[int, Function] = {}
+        found: dict[int, Symbol] = {}
         for section in file.iter_sections():
             if not isinstance(section, SymbolTableSection):
                 continue
@@ -156,9 +144,9 @@ class Symbols:
                     address = value & ~1
                     known = found.get(address)
                     if known is None or known.size < size:
-                        found[address] = Function(name, address, size)
+                        found[address] = Symbol(name, address, size)
                 elif kind == "STT_OBJECT":
-                    self.variables[name] = Variable(name, value, size)
+                    self.variables[name] = Symbol(name, value, size)
                 self.labels[name] = value
         self.functions = list(_apart(sorted(found.values(), key=lambda one: one.address)))
 
@@ -187,24 +175,25 @@ class Symbols:
                 if before is None:  # code that the linker discarded begins at address 0
                     linked = self.function_at(state.address) is not None
                 elif linked:
-                    yield Line(
-                        before.address,
-                        state.address,
-                        names.get(before.file, "?"),
-                        before.line,
-                        bool(before.is_stmt),
-                    )
+                    file_name, statement = names.get(before.file, "?"), bool(before.is_stmt)
+                    yield Line(before.address, state.address, file_name, before.line, statement)
                 before = None if state.end_sequence else state
 
 
-def _apart(functions: list[Function]) -> Iterator[Function]:
+def _containing(items: list[_Range], starts: list[int], address: int) -> _Range | None:
+    """The item that contains the address, of items sorted by their starts."""
+    index = bisect_right(starts, address) - 1
+    return items[index] if index >= 0 and address < items[index].end else None
+
+
+def _apart(functions: list[Symbol]) -> Iterator[Symbol]:
     """Functions by address, each cut at the next one; one without a size ends there."""
     for index, function in enumerate(functions):
         follower = functions[index + 1].address if index + 1 < len(functions) else None
         size = function.size or 2
         if follower is not None and (not function.size or function.end > follower):
             size = min(size if function.size else 1 << 12, follower - function.address)
-        yield Function(function.name, function.address, size)
+        yield Symbol(function.name, function.address, size)
 
 
 def _file_names(program: Any, folder: str) -> dict[int, str]:

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from cubestack.emulator.boards.processor_registers import RegisterValue, peek, peripherals
-from cubestack.emulator.iss.insight.symbols import Symbols, Variable
+from cubestack.emulator.iss.insight.symbols import Symbol, Symbols
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS
 
 RAM = 0x2000_0000
@@ -19,7 +19,7 @@ class Memory:
         return b"" if address >= 0x6000_0000 else address.to_bytes(4, "little")[:count]
 
 
-def look(what: str, **variables: Variable) -> list[RegisterValue]:
+def look(what: str, **variables: Symbol) -> list[RegisterValue]:
     symbols, memory = Symbols(None), Memory()
     symbols.variables |= variables
     machine: Any = memory
@@ -34,7 +34,7 @@ def test_an_address_is_that_of_its_word(offset: int) -> None:
 
 def test_a_variable_s_words_are_all_that_it_touches() -> None:
     for address, size, words in ((RAM, 4, 1), (RAM + 3, 1, 1), (RAM + 3, 2, 2), (RAM, 9, 3)):
-        found = look("it", it=Variable("it", address, size))
+        found = look("it", it=Symbol("it", address, size))
         assert [one.value for one in found] == [RAM + 4 * n for n in range(words)]
         assert found[0].name == "it 20000000"
 

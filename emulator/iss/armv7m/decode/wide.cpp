@@ -149,8 +149,7 @@ Operation plain_constant(uint32_t first, uint32_t second) {
         op.a = n == 15;
         return bad(d) || n == 13 ? undefined_32() : op;
     }
-    default:
-        return undefined_32();
+    default: return undefined_32();
     }
     return bad(d) || bad(n) ? undefined_32() : op;
 }
@@ -197,8 +196,7 @@ Operation branch_or_control(uint32_t first, uint32_t second) {
         const Operation op = wide(C_MRS, second >> 8 & 15, 0, 0, second & 0xFF);
         return bad(op.d) ? undefined_32() : op;
     }
-    default:
-        return undefined_32();
+    default: return undefined_32();
     }
 }
 

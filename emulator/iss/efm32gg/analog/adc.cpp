@@ -65,8 +65,7 @@ public:
         Peripheral::write(offset, value);
         if (offset == CTRL && field(value, CTRL_WARMUPMODE) != KEEP_WARM)
             warm = false;
-        if (offset != CMD)
-            return;
+        if (offset != CMD) return;
         if (value & CMD_SINGLESTOP)
             single_wanted = false;
         else if (value & CMD_SINGLESTART)
@@ -89,14 +88,12 @@ public:
     }
 
     void prs_changed(int channel, bool level) override {
-        if (!level)
-            return;
+        if (!level) return;
         const auto triggered = [channel](uint32_t control) {
             return control & SINGLECTRL_PRSEN && (int)field(control, SINGLECTRL_PRSSEL) == channel;
         };
         const bool single = triggered(reg(SINGLECTRL)), scan = triggered(reg(SCANCTRL));
-        if (!single && !scan)
-            return;
+        if (!single && !scan) return;
         single_wanted |= single;
         if (scan && !scanning)
             start_scan();
@@ -132,8 +129,7 @@ private:
     double input_volts(uint32_t selected, bool difference, double reference) const {
         if (difference)
             return selected < 4 ? volts((int)(2 * selected)) - volts((int)(2 * selected + 1)) : 0;
-        if (selected < TEMPERATURE)
-            return volts(analog::ADC0_CH0 + (int)selected);
+        if (selected < TEMPERATURE) return volts(analog::ADC0_CH0 + (int)selected);
         switch (selected) {
         case TEMPERATURE: {
             uint32_t degrees = 0, reading = 0;
@@ -169,8 +165,7 @@ private:
     int64_t warm_up(uint32_t control) {
         const uint32_t chosen = field(control, SINGLECTRL_REF);
         const uint32_t mode = field(reg(CTRL), CTRL_WARMUPMODE);
-        if (mode == KEEP_WARM && warm && warm_reference == chosen)
-            return 0;
+        if (mode == KEEP_WARM && warm && warm_reference == chosen) return 0;
         const bool bandgap = chosen == V1_25 || chosen == V2_5 || chosen == V5_DIFF;
         const int64_t units = 1 + (bandgap && mode != FAST_BANDGAP ? 4 : 0);
         return units * (1 + (int64_t)field(reg(CTRL), CTRL_TIMEBASE));
@@ -189,8 +184,7 @@ private:
     // Starts the next conversion; single conversions have priority.
     void begin() {
         const Rate rate = clock_now();
-        if (converting || !rate.runs() || !(single_wanted || scanning))
-            return;
+        if (converting || !rate.runs() || !(single_wanted || scanning)) return;
         single_running = single_wanted;
         if (!single_running)
             scan_channel = __builtin_ctz(to_scan);

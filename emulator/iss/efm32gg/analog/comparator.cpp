@@ -99,8 +99,7 @@ private:
         const bool before = reg(STATUS) & OUTPUT;
         set_bits(reg(STATUS), OUTPUT, output);
         drive_output(output);
-        if (before == output)
-            return;
+        if (before == output) return;
         part.prs->set(reflex(), 0, output);
         if (interrupts && reg(CTRL) & (output ? acmp::CTRL_IRISE : acmp::CTRL_IFALL))
             raise(acmp::IF_EDGE);

@@ -55,12 +55,9 @@ uint32_t Cmu::hertz(const Cmu &cmu, int oscillator) {
     case AUXHFRCO:
         return tuned(AUX_BANDS[field(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_BAND)],
                      field(cmu.reg(AUXHFRCOCTRL), AUXHFRCOCTRL_TUNING), 0x80);
-    case LFRCO:
-        return tuned(LF_HERTZ, cmu.reg(LFRCOCTRL), 0x40);
-    case HFXO:
-        return HFXO_HERTZ;
-    default:
-        return LF_HERTZ;
+    case LFRCO: return tuned(LF_HERTZ, cmu.reg(LFRCOCTRL), 0x40);
+    case HFXO: return HFXO_HERTZ;
+    default: return LF_HERTZ;
     }
 }
 
@@ -69,16 +66,8 @@ Rate Cmu::clock_of(int oscillator, int64_t now) const {
 }
 
 Rate Cmu::low_frequency(uint32_t select, bool ultra_low, int64_t now) const {
-    switch (select) {
-    case 0:
-        return ultra_low ? Rate(ULFRCO_HERTZ, 1, now) : Rate();
-    case 1:
-        return clock_of(LFRCO, now);
-    case 2:
-        return clock_of(LFXO, now);
-    default:
-        return Rate();
-    }
+    if (select == 1 || select == 2) return clock_of(select == 1 ? LFRCO : LFXO, now);
+    return select == 0 && ultra_low ? Rate(ULFRCO_HERTZ, 1, now) : Rate();
 }
 
 void Cmu::rates(Rates &rates, int64_t now) const {
@@ -111,8 +100,7 @@ void Cmu::rates(Rates &rates, int64_t now) const {
 const Cmu::Enable &Cmu::enable_of(const Instance &instance) const {
     static const Enable always = {nullptr, 0, 0, false, -1, 0, 0};
     for (const Enable &unit : UNITS)
-        if (unit.instance->base == instance.base)
-            return unit;
+        if (unit.instance->base == instance.base) return unit;
     return always;
 }
 
@@ -134,15 +122,12 @@ Rate Cmu::unit_rate(const Instance &instance) const {
     const Enable &enable = enable_of(instance);
     if (enable.synced >= 0) {
         const Rate &clock = part.rate(enable.synced ? Clock::LFB : Clock::LFA);
-        if (!(effective[enable.synced] & enable.enable) || !clock.runs())
-            return Rate();
+        if (!(effective[enable.synced] & enable.enable) || !clock.runs()) return Rate();
         const uint32_t exponent = field(effective[enable.synced + 1], enable.prescaler);
         return clock.divided((int64_t)1 << exponent, clock.origin);
     }
-    if (enable.low_energy)
-        return part.rate(Clock::LFA);
-    if (!enabled(instance))
-        return Rate();
+    if (enable.low_energy) return part.rate(Clock::LFA);
+    if (!enabled(instance)) return Rate();
     return part.rate(enable.offset == HFPERCLKEN0 ? Clock::HFPER : Clock::HFCORE);
 }
 

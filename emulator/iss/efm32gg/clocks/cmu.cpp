@@ -61,16 +61,14 @@ uint32_t Cmu::status() const {
 
 uint32_t Cmu::peek(uint32_t offset) const {
     switch (offset) {
-    case STATUS:
-        return status();
+    case STATUS: return status();
     case SYNCBUSY: {
         uint32_t busy = 0;
         for (int n = 0; n < SYNCED; n++)
             busy |= unsynchronised >> n & 1 ? described(SYNC_OFFSETS[n])->busy : 0;
         return busy;
     }
-    default:
-        return Peripheral::peek(offset);
+    default: return Peripheral::peek(offset);
     }
 }
 
@@ -80,25 +78,15 @@ bool Cmu::locked_register(uint32_t offset) const {
 }
 
 void Cmu::write(uint32_t offset, uint32_t value) {
-    if (locked_register(offset))
-        return report_locked();
+    if (locked_register(offset)) return report_locked();
     switch (offset) {
-    case CTRL:
-    case HFCORECLKDIV:
-    case HFPERCLKDIV:
-    case HFRCOCTRL:
-    case LFRCOCTRL:
-    case AUXHFRCOCTRL:
-    case LFCLKSEL:
-    case HFCORECLKEN0:
-    case HFPERCLKEN0:
+    case CTRL: case HFCORECLKDIV: case HFPERCLKDIV: case HFRCOCTRL: case LFRCOCTRL:
+    case AUXHFRCOCTRL: case LFCLKSEL: case HFCORECLKEN0: case HFPERCLKEN0:
         if (reg(offset) != value)
             part.change_clocks([&] { store(offset, value); });
         check_limits();
         break;
-    case OSCENCMD:
-        command_oscillators(value);
-        break;
+    case OSCENCMD: command_oscillators(value); break;
     case CMD:
         if (field(value, CMD_HFCLKSEL)) {
             static constexpr int ORDER[] = {-1, HFRCO, HFXO, LFRCO, LFXO, -1, -1, -1};
@@ -109,10 +97,7 @@ void Cmu::write(uint32_t offset, uint32_t value) {
         if (value & CMD_CALSTOP)
             part.cancel(calibrated);
         break;
-    case LFACLKEN0:
-    case LFAPRESC0:
-    case LFBCLKEN0:
-    case LFBPRESC0:
+    case LFACLKEN0: case LFAPRESC0: case LFBCLKEN0: case LFBPRESC0:
         store(offset, value);
         for (int n = 0; n < SYNCED; n++)
             if (SYNC_OFFSETS[n] == offset)
@@ -123,9 +108,7 @@ void Cmu::write(uint32_t offset, uint32_t value) {
         store(offset, value);
         synchronise();
         break;
-    case LOCK:
-        lock(LOCK, value, UNLOCK);
-        break;
+    case LOCK: lock(LOCK, value, UNLOCK); break;
     default:
         Peripheral::write(offset, value);
     }
@@ -176,8 +159,7 @@ void Cmu::on_started(int number) {
 }
 
 void Cmu::select(int number) {
-    if (number < 0)
-        return;
+    if (number < 0) return;
     const Oscillator &one = oscillators[number];
     if (!one.enabled) {
         part.log_once("CMU: HFCLKSEL selects an oscillator that is off: ignored");
@@ -209,8 +191,7 @@ void Cmu::wake() {
 // -- synchronisation, calibration --
 
 void Cmu::synchronise() {
-    if (reg(FREEZE) & FREEZE_REGFREEZE)
-        return;
+    if (reg(FREEZE) & FREEZE_REGFREEZE) return;
     for (int domain = 0; domain < 2; domain++) {
         const Rate &clock = part.rate(domain ? Clock::LFB : Clock::LFA);
         if (!(unsynchronised >> 2 * domain & 3) || !clock.runs()) {
@@ -246,8 +227,7 @@ void Cmu::start_calibration() {
                                      Clock::LFRCO, Clock::AUXHFRCO};
     const uint32_t up = field(reg(CALCTRL), CALCTRL_UPSEL);
     const uint32_t down = field(reg(CALCTRL), CALCTRL_DOWNSEL);
-    if (up > 4 || down > 5)
-        return;
+    if (up > 4 || down > 5) return;
     calibration_top = reg(CALCNT);
     calibration_began = part.now();
     calibration_up = part.rate(UP[up]);

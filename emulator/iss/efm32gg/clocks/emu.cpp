@@ -21,8 +21,7 @@ void Emu::reset() {
 }
 
 int Emu::sleeping_mode(bool deep) const {
-    if (!deep || reg(CTRL) & CTRL_EM2BLOCK)
-        return 1;
+    if (!deep || reg(CTRL) & CTRL_EM2BLOCK) return 1;
     return part.cmu->low_frequency_on() ? 2 : 3;
 }
 
@@ -31,10 +30,8 @@ void Emu::write(uint32_t offset, uint32_t value) {
         lock(LOCK, value, EMU_UNLOCK);
         return;
     }
-    if (reg(LOCK) && offset < STATUS)
-        return report_locked();
-    if (offset == EM4CONF && reg(EM4CONF) & EM4CONF_LOCKCONF)
-        return;
+    if (reg(LOCK) && offset < STATUS) return report_locked();
+    if (offset == EM4CONF && reg(EM4CONF) & EM4CONF_LOCKCONF) return;
     Peripheral::write(offset, value);
     if (offset == CTRL)
         em4_written(field(value, CTRL_EM4CTRL));

@@ -51,12 +51,10 @@ const Dma::ChannelBits Dma::CHANNEL_BITS[] = {
 uint32_t Dma::peek(uint32_t offset) const {
     uint32_t status = 0;
     for (const ChannelBits &one : CHANNEL_BITS)
-        if (offset == one.set)
-            return this->*one.bits;
+        if (offset == one.set) return this->*one.bits;
     switch (offset) {
     case ALTCTRLBASE: return reg(CTRLBASE) + ALTERNATE;
-    case CHREQSTATUS:
-    case CHSREQSTATUS:
+    case CHREQSTATUS: case CHSREQSTATUS:
         for (int n = 0; n < CHANNELS; n++)
             status |= (uint32_t)requested(n) << n;
         return status;
@@ -77,9 +75,7 @@ void Dma::write(uint32_t offset, uint32_t value) {
     case CONFIG:
         reg(STATUS) = (reg(STATUS) & ~STATUS_EN) | (value & CONFIG_EN ? STATUS_EN : 0);
         break;
-    case CTRLBASE:
-        reg(CTRLBASE) = value & ~(2 * ALTERNATE - 1);
-        break;
+    case CTRLBASE: reg(CTRLBASE) = value & ~(2 * ALTERNATE - 1); break;
     case CHSWREQ: software |= bits & enabled_channels; break;
     case ERRORC:
         if (value & ERRORC_ERRORC)
@@ -120,8 +116,7 @@ void Dma::request(int from, int signal, bool on) {
 }
 
 void Dma::pulse(int from, int signal) {
-    if (!listens(from, signal))
-        return;
+    if (!listens(from, signal)) return;
     pulses[from] = (uint8_t)(pulses[from] | 1 << signal);
     consider();
 }
@@ -132,10 +127,8 @@ void Dma::wakes(int from, bool on) {
 }
 
 bool Dma::wants(int channel) const {
-    if (!(enabled_channels >> channel & 1) || !(reg(STATUS) & STATUS_EN))
-        return false;
-    if (part.mode > 1 && !(waking >> source(channel) & 1))
-        return false;
+    if (!(enabled_channels >> channel & 1) || !(reg(STATUS) & STATUS_EN)) return false;
+    if (part.mode > 1 && !(waking >> source(channel) & 1)) return false;
     return (software | continued) >> channel & 1 ||
            (!(masked >> channel & 1) && requested(channel));
 }
@@ -144,8 +137,7 @@ bool Dma::wants(int channel) const {
 int Dma::next() const {
     for (const bool urgent : {true, false})
         for (int n = 0; n < CHANNELS; n++)
-            if ((high >> n & 1) == urgent && wants(n))
-                return n;
+            if ((high >> n & 1) == urgent && wants(n)) return n;
     return -1;
 }
 
@@ -155,8 +147,7 @@ int64_t Dma::delay(int64_t cycles) const {
 }
 
 void Dma::consider() {
-    if (serve.pending() || !part.enabled(instance) || next() < 0)
-        return;
+    if (serve.pending() || !part.enabled(instance) || next() < 0) return;
     part.schedule(serve, part.now() + delay(ROUND));
 }
 
@@ -168,8 +159,7 @@ void Dma::on_serve(int64_t time) {
         update_interrupts();
     }
     const int channel = next();
-    if (channel < 0)
-        return;
+    if (channel < 0) return;
     const int64_t cycles = round(channel);
     if (failed) {
         failed = false;

@@ -113,8 +113,7 @@ uint32_t Ebi::memory_access(const Bank &bank, uint32_t offset, int size, uint32_
     const uint32_t limit = part.memories.external_size, at = offset & bank.reach;
     uint8_t *memory = part.memories.external;
     if (at + (uint32_t)size <= limit && at + (uint32_t)size - 1 <= bank.reach) {
-        if (size == 1)
-            return move<uint8_t>(memory + at, value, write);
+        if (size == 1) return move<uint8_t>(memory + at, value, write);
         return size == 2 ? move<uint16_t>(memory + at, value, write)
                          : move<uint32_t>(memory + at, value, write);
     }
@@ -131,8 +130,7 @@ uint32_t Ebi::memory_access(const Bank &bank, uint32_t offset, int size, uint32_
 bool Ebi::access(uint32_t address, int size, uint32_t &value, bool write, int64_t &wait) {
     uint32_t offset;
     const int number = bank_of(address, offset);
-    if (number > 3 || !banks[number].enabled)
-        return report(number);
+    if (number > 3 || !banks[number].enabled) return report(number);
     const Bank &bank = banks[number];
     const int64_t each = write ? bank.write_cycles : bank.read_cycles;
     const int64_t transactions = bank.bytes == 1 ? size : (size + 1) / 2;

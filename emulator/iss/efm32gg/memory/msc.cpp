@@ -47,8 +47,7 @@ void Msc::set_up_reads() {
     lines.tags = counting() ? missing : cache;
     lines.mask = reg(READCTRL) & READCTRL_IFCDIS ? 0 : CACHE_WORDS - 1;
     for (armv7m::Region &region : part.cpu.regions) {
-        if (region.host != part.memories.flash)
-            continue;
+        if (region.host != part.memories.flash) continue;
         region.lines = wait_states || counting() ? &lines : nullptr;
         region.read_wait = (uint8_t)wait_states;
     }
@@ -109,12 +108,8 @@ void Msc::write(uint32_t offset, uint32_t value) {
                       offset == TIMEBASE))
         return report_locked();
     switch (offset) {
-    case LOCK:
-        lock(LOCK, value, MSC_UNLOCK);
-        break;
-    case MASSLOCK:
-        lock(MASSLOCK, value, MASS_UNLOCK);
-        break;
+    case LOCK: lock(LOCK, value, MSC_UNLOCK); break;
+    case MASSLOCK: lock(MASSLOCK, value, MASS_UNLOCK); break;
     case READCTRL:
         store(offset, value);
         set_up_reads();
@@ -133,9 +128,7 @@ void Msc::write(uint32_t offset, uint32_t value) {
             program();
         }
         break;
-    case WRITECMD:
-        command(value);
-        break;
+    case WRITECMD: command(value); break;
     case CMD:
         if (value & CMD_INVCACHE)
             invalidate_cache();
@@ -199,8 +192,7 @@ void Msc::command(uint32_t value) {
 
 uint8_t *Msc::page(uint32_t at) {
     uint32_t left;
-    if (at >= Part::INFORMATION)
-        return nullptr;
+    if (at >= Part::INFORMATION) return nullptr;
     return part.memory_at(at, left);
 }
 
@@ -224,13 +216,11 @@ void Msc::load_address() {
 }
 
 void Msc::program() {
-    if (done.pending() || !triggered || !data_loaded)
-        return;
+    if (done.pending() || !triggered || !data_loaded) return;
     uint8_t *cell = page(address);
     triggered = data_loaded = false;
     reg(STATUS) |= STATUS_WDATAREADY;
-    if (!cell || reg(STATUS) & (STATUS_INVADDR | STATUS_LOCKED))
-        return;
+    if (!cell || reg(STATUS) & (STATUS_INVADDR | STATUS_LOCKED)) return;
     uint32_t old;
     std::memcpy(&old, cell, 4);
     const uint32_t now = old & reg(WDATA);

@@ -32,8 +32,7 @@ Peripheral *Part::peripheral_at(uint32_t address) const {
 }
 
 bool Part::access_allowed(const Peripheral &unit) {
-    if (enabled(unit.instance))
-        return true;
+    if (enabled(unit.instance)) return true;
     log_once("%s is accessed without its clock", unit.instance.name);
     return false;
 }
@@ -61,11 +60,9 @@ static bool writable_memory(uint32_t address) { return address >= Part::RAM_CODE
 bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
     uint32_t left;
     value = 0;
-    if (ebi->covers(address))
-        return ebi->access(address, size, value, false, wait);
+    if (ebi->covers(address)) return ebi->access(address, size, value, false, wait);
     if (const uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
-        if (left < (uint32_t)size)
-            return false;
+        if (left < (uint32_t)size) return false;
         if (!writable_memory(address))
             wait += msc->read_wait(address);
         std::memcpy(&value, memory, (size_t)size);
@@ -85,13 +82,10 @@ bool Part::load(uint32_t address, int size, uint32_t &value, int64_t &wait) {
 
 bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
     uint32_t left;
-    if (ebi->covers(address))
-        return ebi->access(address, size, value, true, wait);
+    if (ebi->covers(address)) return ebi->access(address, size, value, true, wait);
     if (uint8_t *memory = address < PERIPHERALS ? memory_at(address, left) : nullptr) {
-        if (!writable_memory(address))
-            return msc->ignores_bus_writes();
-        if (left < (uint32_t)size)
-            return false;
+        if (!writable_memory(address)) return msc->ignores_bus_writes();
+        if (left < (uint32_t)size) return false;
         std::memcpy(memory, &value, (size_t)size);
         cpu.invalidate(address, (uint32_t)size);
         return true;
@@ -99,8 +93,7 @@ bool Part::store(uint32_t address, int size, uint32_t value, int64_t &wait) {
     if (Peripheral *unit = peripheral_at(address)) {
         wait += bus_wait(*unit, true);
         const uint32_t offset = (address - unit->instance.base) & ~3u;
-        if (!access_allowed(*unit) || offset >= unit->layout.size)
-            return true;
+        if (!access_allowed(*unit) || offset >= unit->layout.size) return true;
         if (size < 4) {
             const uint32_t shift = 8 * (address & 3), mask = ((1u << 8 * size) - 1) << shift;
             value = (unit->peek(offset) & ~mask) | (value << shift & mask);
@@ -145,8 +138,7 @@ bool Part::peek(uint32_t address, uint32_t size, uint32_t &value) {
     uint32_t left;
     value = 0;
     if (const uint8_t *memory = memory_at(address, left)) {
-        if (left < size)
-            return false;
+        if (left < size) return false;
         std::memcpy(&value, memory, size);
         return true;
     }

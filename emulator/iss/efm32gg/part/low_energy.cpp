@@ -25,8 +25,7 @@ void LowEnergy::write(uint32_t offset, uint32_t value) {
     Write *place = waiting;
     while (place < waiting + count && place->offset != offset)
         place++;
-    if (place == waiting + MOST)
-        return;
+    if (place == waiting + MOST) return;
     if (place == waiting + count) {
         *place = {offset, 0, false};
         count++;
@@ -69,16 +68,14 @@ int64_t LowEnergyCounter::ticks() const {
 
 void LowEnergyCounter::fold() {
     const int64_t passed = ticks();
-    if (passed <= 0)
-        return;
+    if (passed <= 0) return;
     counted += passed;
     pass(passed);
 }
 
 void LowEnergyCounter::plan() {
     part.cancel(due);
-    if (!counts() || !rate.runs())
-        return;
+    if (!counts() || !rate.runs()) return;
     const int64_t next = next_effect();
     if (next != FAR)
         part.schedule(due, rate.time(counted + next));

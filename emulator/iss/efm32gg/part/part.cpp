@@ -41,8 +41,7 @@ Part::Part(armv7m::Cpu &cpu, const Memories &memories)
 Part::~Part() = default;
 
 void Part::place(Peripheral &unit) {
-    if (unit.instance.base < PERIPHERALS)
-        return;
+    if (unit.instance.base < PERIPHERALS) return;
     const uint32_t first = (unit.instance.base - PERIPHERALS) / SLOT;
     for (uint32_t n = 0; n < (unit.layout.size + SLOT - 1) / SLOT && first + n < SLOTS; n++)
         slots[first + n] = &unit;

@@ -39,16 +39,14 @@ Rate Peripheral::clock_now() const { return part.unit_rate(instance); }
 
 void Peripheral::store(uint32_t offset, uint32_t value) {
     const Register *found = described(offset);
-    if (!found)
-        return;
+    if (!found) return;
     if (!found->modelled && (value & found->writable) != found->reset)
         part.log_once("%s.%s is kept, but does nothing", instance.name, found->name);
     reg(offset) = (reg(offset) & ~found->writable) | (value & found->writable);
 }
 
 uint32_t Peripheral::pending() const {
-    if (layout.if_ < 0 || layout.ien < 0)
-        return 0;
+    if (layout.if_ < 0 || layout.ien < 0) return 0;
     return reg((uint32_t)layout.if_) & reg((uint32_t)layout.ien);
 }
 

@@ -12,8 +12,7 @@ public:
     // `hertz` / `divider` edges per second, edge 0 at `origin`; 0 hertz: stopped.
     Rate(int64_t hertz, int64_t divider, int64_t origin)
         : origin(origin), hertz(hertz), divider(divider) {
-        if (!hertz)
-            return;
+        if (!hertz) return;
         numerator = (__int128)SECOND * divider;
         const int64_t common = (int64_t)gcd(numerator, hertz);
         numerator /= common;
@@ -27,8 +26,7 @@ public:
 
     // Time of edge k; NEVER if the clock is stopped.
     int64_t time(int64_t k) const {
-        if (!hertz)
-            return NEVER;
+        if (!hertz) return NEVER;
         if (k >= 0 && k < short_reach)
             return origin + k * (int64_t)numerator / denominator;
         return origin + (int64_t)((__int128)numerator * k / denominator);
@@ -36,15 +34,13 @@ public:
 
     // Number of edges after the origin, up to and including `time`.
     int64_t edges(int64_t time) const {
-        if (!hertz || time < origin)
-            return 0;
+        if (!hertz || time < origin) return 0;
         return (int64_t)((((__int128)(time - origin) + 1) * denominator - 1) / numerator);
     }
 
     // The first edge at or after `time`.
     int64_t edge_at_or_after(int64_t time) const {
-        if (!hertz || time <= origin)
-            return 0;
+        if (!hertz || time <= origin) return 0;
         return edges(time - 1) + 1;
     }
 

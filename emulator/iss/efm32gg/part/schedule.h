@@ -38,8 +38,7 @@ public:
     // Schedules `event` at `time`, or moves it there.
     void add(Event &event, int64_t time) {
         remove(event);
-        if (time == NEVER || count == CAPACITY)
-            return;
+        if (time == NEVER || count == CAPACITY) return;
         event.time = time;
         event.order = orders++;
         place(count++, event);
@@ -47,13 +46,11 @@ public:
     }
 
     void remove(Event &event) {
-        if (!event.pending())
-            return;
+        if (!event.pending()) return;
         const int32_t hole = event.place;
         event.place = -1;
         event.time = NEVER;
-        if (hole == --count)
-            return;
+        if (hole == --count) return;
         Event &last = *heap[count];
         place(hole, last);
         rise(hole);
@@ -97,12 +94,10 @@ private:
     void sink(int32_t at) {
         for (;;) {
             int32_t child = 2 * at + 1;
-            if (child >= count)
-                return;
+            if (child >= count) return;
             if (child + 1 < count && before(child + 1, child))
                 child++;
-            if (!before(child, at))
-                return;
+            if (!before(child, at)) return;
             swap(at, child);
             at = child;
         }

@@ -89,12 +89,10 @@ int64_t Part::run(int64_t until) {
         }
         const int64_t next = std::min(until, events.next_time());
         if (hung) {
-            if (next == NEVER)
-                break;
+            if (next == NEVER) break;
             advance(next);
         } else if (asleep) {
-            if (wait_for_wake(next))
-                break;
+            if (wait_for_wake(next)) break;
         } else if (standing) {
             advance(std::min(next, standing_until));
         } else if (stalled_until > now()) {
@@ -113,10 +111,8 @@ int64_t Part::run(int64_t until) {
                 exits |= ExitAsleep;
             }
             // Report a lock-up before the reset that it causes.
-            if (exits && (!wanted_reset || exits & armv7m::ExitLockup))
-                break;
-            if (cpu.system->stopped_by() != armv7m::System::DebugStop::None)
-                break;
+            if (exits && (!wanted_reset || exits & armv7m::ExitLockup)) break;
+            if (cpu.system->stopped_by() != armv7m::System::DebugStop::None) break;
         }
     }
     return now();
@@ -163,8 +159,7 @@ bool Part::wait_for_wake(int64_t until) {
     const int64_t tick = cpu.system->next_cycle();
     if (!standing && tick != INT64_MAX)
         next = std::min(next, cycle_time.time(tick - base_cycle));
-    if (next == NEVER)
-        return true;
+    if (next == NEVER) return true;
     advance(next);
     return false;
 }

@@ -65,8 +65,7 @@ uint32_t Gpio::read(uint32_t offset) {
 }
 
 bool Gpio::locked(uint32_t offset) const {
-    if (!reg(LOCK))
-        return false;
+    if (!reg(LOCK)) return false;
     if (offset < PORTS * PORT_SIZE) {
         const uint32_t in_port = offset % PORT_SIZE;
         return in_port <= PA_MODEH || in_port == PA_PINLOCKN;
@@ -126,15 +125,13 @@ void Gpio::write_port(int port, uint32_t offset, uint32_t value) {
 }
 
 void Gpio::function(int pin, const Peripheral *owner, bool driven, bool level) {
-    if (pin < 0)
-        return;
+    if (pin < 0) return;
     Port &one = ports[pin / PINS];
     const uint32_t mask = 1u << pin % PINS;
     if (driven && owners[pin] && owners[pin] != owner)
         part.log_once("pin P%c%d is driven by %s and by %s", 'A' + pin / PINS, pin % PINS,
                       owners[pin]->instance.name, owner->instance.name);
-    if (!driven && owners[pin] != owner)
-        return;
+    if (!driven && owners[pin] != owner) return;
     owners[pin] = driven ? owner : nullptr;
     set_bits(one.functions, mask, driven);
     set_bits(one.function_levels, mask, level);
@@ -147,8 +144,7 @@ void Gpio::release(int signal, const Peripheral *owner) {
 }
 
 void Gpio::drive_from_outside(int port, int bit, int level) {
-    if (port < 0 || port >= PORTS || bit < 0 || bit >= PINS)
-        return;
+    if (port < 0 || port >= PORTS || bit < 0 || bit >= PINS) return;
     Port &one = ports[port];
     const uint32_t mask = 1u << bit;
     set_bits(one.outside, mask, level >= 0);
@@ -212,8 +208,7 @@ void Gpio::set_levels(int port, uint32_t now_levels) {
 
 void Gpio::edge(int port, int bit, bool level) {
     check_em4(port, bit, level);
-    if (mode(port, bit) == DISABLED)
-        return;
+    if (mode(port, bit) == DISABLED) return;
     const uint32_t select = reg(bit < 8 ? EXTIPSELL : EXTIPSELH) >> 4 * (bit % 8) & 7;
     if ((int)select == port) {
         if (reg(INSENSE) & INSENSE_INT && reg(level ? EXTIRISE : EXTIFALL) >> bit & 1)
@@ -232,8 +227,7 @@ void Gpio::update_interrupts() {
 }
 
 void Gpio::check_em4(int port, int bit, bool level) {
-    if (part.mode != 4)
-        return;
+    if (part.mode != 4) return;
     for (uint32_t n = 0; n < 6; n++) {
         if (EM4_PINS[n] == port * PINS + bit && reg(EM4WUEN) >> n & 1 &&
             (reg(EM4WUPOL) >> n & 1) == (uint32_t)level) {

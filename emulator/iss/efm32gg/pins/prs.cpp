@@ -22,8 +22,7 @@ bool Prs::selects(int channel, int source, int signal) const {
 
 bool Prs::listens(int source, int signal) const {
     for (int channel = 0; channel < CHANNELS; channel++)
-        if (selects(channel, source, signal))
-            return true;
+        if (selects(channel, source, signal)) return true;
     return false;
 }
 
@@ -37,11 +36,9 @@ bool Prs::input(int channel) const {
 
 void Prs::set(int source, int signal, bool level) {
     const bool was = signals[source] >> signal & 1;
-    if (was == level)
-        return;
+    if (was == level) return;
     for (int channel = 0; channel < CHANNELS; channel++) {
-        if (!selects(channel, source, signal))
-            continue;
+        if (!selects(channel, source, signal)) continue;
         const bool before = input(channel);
         signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
         update(channel, before);
@@ -73,8 +70,7 @@ void Prs::write(uint32_t offset, uint32_t value) {
 
 void Prs::update(int channel, bool was) {
     const bool is = input(channel);
-    if (is == was)
-        return;
+    if (is == was) return;
     const uint32_t detect = field(reg(CH0_CTRL + 4 * (uint32_t)channel), CH0_CTRL_EDSEL);
     if (detect == 0)
         output(channel, is);

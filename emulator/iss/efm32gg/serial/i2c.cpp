@@ -12,6 +12,12 @@ namespace {
 // Values of STATE_STATE (16.5.3).
 enum : uint32_t { IDLE = 0, WAIT, START_SENT, ADDR, ADDRACK, DATA, DATAACK };
 
+// By Master: the phase of an address, and of a byte after it.
+constexpr uint32_t MASTER_PHASES[][2] = {
+    {IDLE, IDLE}, {START_SENT, START_SENT}, {START_SENT, START_SENT}, {ADDR, DATA}, {ADDR, DATA},
+    {ADDRACK, DATAACK}, {ADDRACK, DATAACK}, {DATA, DATA}, {DATA, DATA}, {DATA, DATA},
+    {DATAACK, DATAACK}, {DATAACK, DATAACK}, {DATAACK, DATAACK}};
+
 constexpr int HIGH_AND_LOW[] = {4 + 4, 6 + 3, 11 + 6, 4 + 4};  // CTRL_CLHR
 constexpr int IDLE_CYCLES[] = {0, 40, 80, 160};                // CTRL_BITO
 constexpr int LOW_CYCLES[] = {0, 40, 80, 160, 320, 1024, 1024, 1024};  // CTRL_CLTO
@@ -61,14 +67,12 @@ int64_t I2c::bit(int64_t count) const {
 // -- registers --
 
 uint32_t I2c::peek(uint32_t offset) const {
-    if (offset == RXDATA || offset == RXDATAP)
-        return received;
+    if (offset == RXDATA || offset == RXDATAP) return received;
     return Peripheral::peek(offset);
 }
 
 uint32_t I2c::read(uint32_t offset) {
-    if (offset != RXDATA)
-        return peek(offset);
+    if (offset != RXDATA) return peek(offset);
     if (!receive_full) {
         raise(IF_RXUF);
         return received;
@@ -81,11 +85,9 @@ uint32_t I2c::read(uint32_t offset) {
 }
 
 void I2c::write(uint32_t offset, uint32_t value) {
-    if (offset == CMD)
-        return command(value);
+    if (offset == CMD) return command(value);
     if (offset == TXDATA) {
-        if (transmit_full)
-            return raise(IF_TXOF);
+        if (transmit_full) return raise(IF_TXOF);
         transmit = (uint8_t)value;
         transmit_full = true;
         reg(STATUS) &= ~STATUS_TXC;
@@ -177,56 +179,15 @@ void I2c::on_idle_timeout(int64_t) {
 
 // Updates STATE, flags, requests and interrupts.
 void I2c::follow() {
-    uint32_t phase = IDLE;
-    bool transmitter = false, nacked = false;
-    switch (master) {
-    case Master::IDLE:
-        break;
-    case Master::START:
-    case Master::ADDRESS:
-        phase = START_SENT;
-        transmitter = true;
-        break;
-    case Master::BITS:
-    case Master::ASKED:
-        phase = addressing ? ADDR : DATA;
-        transmitter = true;
-        break;
-    case Master::ACKED:
-    case Master::NACKED:
-        phase = addressing ? ADDRACK : DATAACK;
-        transmitter = !to_read;
-        nacked = refused;
-        break;
-    case Master::READING:
-    case Master::RECEIVING:
-    case Master::RECEIVED:
-        phase = DATA;
-        break;
-    case Master::ACKNOWLEDGING:
-    case Master::REFUSED:
-    case Master::STOP:
-        phase = DATAACK;
-        nacked = refused;
-        break;
-    }
-    switch (slave) {
-    case Slave::IDLE:
-        break;
-    case Slave::ADDRESS:
-        phase = ADDR;
-        transmitter = shift & 1;
-        break;
-    case Slave::WRITE:
-    case Slave::WRITTEN:
-        phase = DATA;
-        break;
-    case Slave::READ:
-    case Slave::LOAD:
-        phase = first_read ? ADDRACK : DATAACK;
-        transmitter = true;
-        break;
-    }
+    uint32_t phase = MASTER_PHASES[(int)master][!addressing];
+    const bool acknowledging = phase == ADDRACK || phase == DATAACK;
+    const bool nacked = acknowledging && refused;
+    bool transmitter = master == Master::ACKED || master == Master::NACKED
+        ? !to_read : master >= Master::START && master <= Master::ASKED;
+    if (slave == Slave::ADDRESS) phase = ADDR, transmitter = shift & 1;
+    if (slave == Slave::WRITE || slave == Slave::WRITTEN) phase = DATA;
+    if (slave == Slave::READ || slave == Slave::LOAD)
+        phase = first_read ? ADDRACK : DATAACK, transmitter = true;
     if (master == Master::IDLE && slave == Slave::IDLE && reg(STATUS) & STATUS_PSTART)
         phase = WAIT;
     reg(STATE) = (busy ? STATE_BUSY : 0) | (master != Master::IDLE ? STATE_MASTER : 0) |

@@ -13,10 +13,8 @@ void I2c::after(int64_t bit_count, Master next) {
 
 // Continues from a held bus as far as commands and data allow (16.3.5).
 void I2c::proceed() {
-    if (!usable() || !clock_now().runs())
-        return;
-    if (master != Master::IDLE && bits.pending())
-        return;
+    if (!usable() || !clock_now().runs()) return;
+    if (master != Master::IDLE && bits.pending()) return;
     switch (master) {
     case Master::IDLE:
         if (!busy && slave == Slave::IDLE && take_pending(STATUS_PSTART))
@@ -32,10 +30,8 @@ void I2c::proceed() {
         else
             hold(true);
         return;
-    case Master::ACKED:
-    case Master::REFUSED:
-        if (master == Master::ACKED && to_read)
-            return request_byte(false);
+    case Master::ACKED: case Master::REFUSED:
+        if (master == Master::ACKED && to_read) return request_byte(false);
         if (take_pending(STATUS_PSTART))
             begin();
         else if (transmit_full && master == Master::ACKED)
@@ -60,16 +56,14 @@ void I2c::proceed() {
         return;
     case Master::RECEIVED:
         deliver();
-        if (shift_full)
-            return hold(true);
+        if (shift_full) return hold(true);
         refused = take_pending(STATUS_PNACK);
         if (refused || take_pending(STATUS_PACK) || reg(CTRL) & CTRL_AUTOACK)
             after(1, Master::ACKNOWLEDGING);
         else
             hold(true);
         return;
-    default:
-        return;
+    default: return;
     }
 }
 
@@ -125,16 +119,14 @@ void I2c::on_bits(int64_t) {
         reg(IF) |= IF_MSTOP;
         part.send(Kind::I2C_STOP, unit(), 0);
         break;
-    case Master::ACKED:
-    case Master::NACKED:
+    case Master::ACKED: case Master::NACKED:
         reg(IF) |= refused ? IF_NACK : IF_ACK;
         if (!transmit_full) {
             reg(STATUS) |= STATUS_TXC;
             reg(IF) |= IF_TXC;
         }
         break;
-    default:
-        break;
+    default: break;
     }
     proceed();
     follow();
@@ -143,8 +135,7 @@ void I2c::on_bits(int64_t) {
 void I2c::answer(int acknowledged, uint32_t data) {
     part.cancel(low_timeout);
     if (acknowledged == ARBITRATION_LOST || acknowledged == BUS_ERROR) {
-        if (master == Master::IDLE)
-            return;
+        if (master == Master::IDLE) return;
         part.cancel(bits);
         master = Master::IDLE;
         hold(false);

@@ -35,8 +35,7 @@ int I2c::slave_start(uint32_t address) {
 }
 
 int I2c::slave_write(uint32_t byte) {
-    if (slave != Slave::WRITE)
-        return slave_answer = 0;
+    if (slave != Slave::WRITE) return slave_answer = 0;
     shift = (uint8_t)byte;
     shift_full = true;
     slave = Slave::WRITTEN;
@@ -47,8 +46,7 @@ int I2c::slave_write(uint32_t byte) {
 }
 
 int I2c::slave_read(bool acknowledged) {
-    if (slave != Slave::READ)
-        return slave_answer = 0xFF;
+    if (slave != Slave::READ) return slave_answer = 0xFF;
     if (!first_read)
         reg(IF) |= acknowledged ? IF_ACK : IF_NACK;
     if (!first_read && !acknowledged) {
@@ -78,8 +76,7 @@ void I2c::slave_stop() {
 
 // Moves the received byte into the buffer if there is room.
 void I2c::deliver() {
-    if (!shift_full || receive_full)
-        return;
+    if (!shift_full || receive_full) return;
     received = shift;
     receive_full = true;
     shift_full = false;
@@ -121,8 +118,7 @@ int I2c::load() {
 }
 
 void I2c::proceed_slave() {
-    if (slave_answer != WAITING)
-        return;
+    if (slave_answer != WAITING) return;
     int answer = 0;
     if (slave == Slave::ADDRESS || slave == Slave::WRITTEN) {
         deliver();

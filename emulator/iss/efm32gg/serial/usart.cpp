@@ -33,10 +33,8 @@ public:
 
     uint32_t read(uint32_t offset) override {
         switch (offset) {
-        case RXDATA:
-            return take_received() & 0xFF;
-        case RXDATAX:
-            return take_received();
+        case RXDATA: return take_received() & 0xFF;
+        case RXDATAX: return take_received();
         case RXDOUBLE: {
             const uint32_t first = take_received() & 0xFF;
             return first | (take_received() & 0xFF) << 8;
@@ -52,16 +50,10 @@ public:
     uint32_t peek(uint32_t offset) const override {
         const uint32_t first = receive_buffer.front(0), second = receive_buffer.front(1);
         switch (offset) {
-        case RXDATA:
-            return first & 0xFF;
-        case RXDATAX:
-        case RXDATAXP:
-            return first;
-        case RXDOUBLE:
-            return (first & 0xFF) | (second & 0xFF) << 8;
-        case RXDOUBLEX:
-        case RXDOUBLEXP:
-            return first | second << 16;
+        case RXDATA: return first & 0xFF;
+        case RXDATAX: case RXDATAXP: return first;
+        case RXDOUBLE: return (first & 0xFF) | (second & 0xFF) << 8;
+        case RXDOUBLEX: case RXDOUBLEXP: return first | second << 16;
         }
         return Peripheral::peek(offset);
     }
@@ -69,12 +61,9 @@ public:
     void write(uint32_t offset, uint32_t value) override {
         const uint32_t eighth = reg(CTRL) & CTRL_BIT8DV ? 0x100 : 0;
         switch (offset) {
-        case CMD:
-            return command(value);
-        case TXDATA:
-            return put((value & 0xFF) | eighth);
-        case TXDATAX:
-            return put(value & 0xF9FF);
+        case CMD: return command(value);
+        case TXDATA: return put((value & 0xFF) | eighth);
+        case TXDATAX: return put(value & 0xF9FF);
         case TXDOUBLE:
             put((value & 0xFF) | eighth);
             return put((value >> 8 & 0xFF) | eighth);
@@ -111,8 +100,7 @@ private:
     }
 
     int64_t frame_units() const {
-        if (synchronous())
-            return 2 * data_bits() * bit_units();
+        if (synchronous()) return 2 * data_bits() * bit_units();
         const bool parity = field(reg(FRAME), FRAME_PARITY) & 2;
         const int64_t stop_halves = 1 + field(reg(FRAME), FRAME_STOPBITS);
         return (2 * (1 + data_bits() + parity) + stop_halves) * bit_units();
@@ -129,23 +117,18 @@ private:
     }
 
     void put(uint32_t frame) {
-        if (!enqueue(frame))
-            return;
+        if (!enqueue(frame)) return;
         start();
         follow();
     }
 
     void start(bool follows = false) override {
-        if (shifting || transmit_buffer.empty() || !(status() & STATUS_TXENS))
-            return;
-        if (synchronous() && !(status() & STATUS_MASTER))
-            return;
+        if (shifting || transmit_buffer.empty() || !(status() & STATUS_TXENS)) return;
+        if (synchronous() && !(status() & STATUS_MASTER)) return;
         const int bits = data_bits();
-        if (bits > 9 && transmit_buffer.size() < 2)
-            return;
+        if (bits > 9 && transmit_buffer.size() < 2) return;
         const Rate rate = clock_now();
-        if (!rate.runs())
-            return;
+        if (!rate.runs()) return;
         const uint32_t frame = transmit_buffer.pop();
         uint32_t data = frame & TXDATAX_TXDATAX;
         if (bits > 9)

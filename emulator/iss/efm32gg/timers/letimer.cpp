@@ -80,8 +80,7 @@ void LeTimer::underflow() {
                 outputs[n] = false;
         }
     switch (repeat_mode()) {
-    case FREE:
-        break;
+    case FREE: break;
     case ONE_SHOT:
         count_down(0);
         running = reg(REP0) != 0;
@@ -117,21 +116,18 @@ void LeTimer::count_down(int which) {
 }
 
 int64_t LeTimer::until(uint32_t wanted) const {
-    if (wanted < value)
-        return (int64_t)value - wanted;
+    if (wanted < value) return (int64_t)value - wanted;
     return wanted <= top() ? (int64_t)value + 1 + top() - wanted : FAR;
 }
 
 bool LeTimer::outputs_matter() const {
     for (int n = 0; n < 2; n++)
-        if (action(n) && (pin(n) >= 0 || part.prs->listens(REFLEX, n)))
-            return true;
+        if (action(n) && (pin(n) >= 0 || part.prs->listens(REFLEX, n))) return true;
     return false;
 }
 
 int64_t LeTimer::next_effect() const {
-    if (pulsing[0] || pulsing[1])
-        return 1;
+    if (pulsing[0] || pulsing[1]) return 1;
     const uint32_t awaited = reg(IEN) & ~reg(IF);
     int64_t next = FAR;
     if (repeat_mode() != FREE || awaited & (IF_UF | IF_REP0 | IF_REP1) || outputs_matter())
@@ -144,8 +140,7 @@ int64_t LeTimer::next_effect() const {
 }
 
 void LeTimer::start() {
-    if (running)
-        return;
+    if (running) return;
     running = true;
     reg(STATUS) |= STATUS_RUNNING;
     restart_clock();
@@ -157,8 +152,7 @@ void LeTimer::stop() {
 }
 
 void LeTimer::compare_matched(int compare) {
-    if (!awaits(compare))
-        return;
+    if (!awaits(compare)) return;
     fold();
     start();
     plan();
@@ -169,8 +163,7 @@ bool LeTimer::awaits(int compare) const {
 }
 
 uint32_t LeTimer::after(int64_t ticks) const {
-    if (ticks <= value)
-        return (uint32_t)(value - ticks);
+    if (ticks <= value) return (uint32_t)(value - ticks);
     return top() - (uint32_t)((ticks - value - 1) % ((int64_t)top() + 1));
 }
 

@@ -70,8 +70,7 @@ private:
             raise(IF_DIRCNG);
         }
         const uint32_t counted = field(control, CTRL_CNTEV);  // both, up, down, none
-        if (counted == 3 || (counted == 1 && down) || (counted == 2 && !down))
-            return;
+        if (counted == 3 || (counted == 1 && down) || (counted == 2 && !down)) return;
         uint32_t &count = reg(CNT);
         if (down) {
             if (!count)

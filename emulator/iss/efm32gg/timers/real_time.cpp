@@ -48,8 +48,7 @@ protected:
 
     uint32_t after(int64_t ticks) const override {
         const int64_t zero = until_zero();
-        if (ticks < zero)
-            return (uint32_t)(value + ticks);
+        if (ticks < zero) return (uint32_t)(value + ticks);
         return (uint32_t)((ticks - zero) % ((int64_t)top() + 1));
     }
 
@@ -168,10 +167,8 @@ public:
     void write(uint32_t offset, uint32_t value) override {
         if (part.rmu->reg(rmu::CTRL) & rmu::CTRL_BURSTEN)
             return part.log_once("BURTC is held in reset by RMU_CTRL.BURSTEN: a write is lost");
-        if (offset == LOCK)
-            return lock(LOCK, value, 0xAEE8);
-        if (reg(LOCK) && offset < LOCK)
-            return report_locked();
+        if (offset == LOCK) return lock(LOCK, value, 0xAEE8);
+        if (reg(LOCK) && offset < LOCK) return report_locked();
         if (offset == CTRL) {
             fold();
             const uint32_t chosen = reg(CTRL) & CTRL_CLKSEL;
@@ -183,8 +180,7 @@ public:
             clocks_changed();
             return;
         }
-        if (offset >= RET0_REG && reg(POWERDOWN) & POWERDOWN_RAM)
-            return;
+        if (offset >= RET0_REG && reg(POWERDOWN) & POWERDOWN_RAM) return;
         CompareCounter::write(offset, value);
         if (offset == POWERDOWN && reg(POWERDOWN) & POWERDOWN_RAM)
             for (uint32_t at = RET0_REG; at <= RET127_REG; at += 4)
@@ -204,8 +200,7 @@ private:
     int64_t oscillator_origin = 0;
 
     Rate clock() const override {
-        if (!oscillator_hertz || !counts())
-            return Rate();
+        if (!oscillator_hertz || !counts()) return Rate();
         return {oscillator_hertz, (int64_t)1 << field(reg(CTRL), CTRL_PRESC), oscillator_origin};
     }
 

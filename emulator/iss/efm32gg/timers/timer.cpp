@@ -28,8 +28,7 @@ void Timer::reset() {
 // and at 0: the tick after it is the overflow or underflow.
 int64_t Timer::until_wrap(const Count &from) const {
     const int64_t top = reg(TOP), value = from.value;
-    if (counts_down(from))
-        return value + 1;
+    if (counts_down(from)) return value + 1;
     return (value > top ? LAST : top) - value + 1;
 }
 
@@ -47,18 +46,15 @@ Timer::Count Timer::after(Count from, int64_t steps) const {
         return {(uint32_t)(down ? from.value - steps : from.value + steps), down};
     const uint32_t top = reg(TOP);
     switch (mode()) {
-    case DOWN:
-        return {top, true};
+    case DOWN: return {top, true};
     case UP_DOWN:
         return down ? Count{std::min(1u, top), false} : Count{top ? top - 1 : 0, true};
-    default:
-        return {0, false};
+    default: return {0, false};
     }
 }
 
 int64_t Timer::pending_ticks() const {
-    if (!running || !ticks.runs() || field(reg(CTRL), CTRL_CLKSEL) != PRESCALED)
-        return 0;
+    if (!running || !ticks.runs() || field(reg(CTRL), CTRL_CLKSEL) != PRESCALED) return 0;
     return ticks.edges(part.now()) - counted;
 }
 
@@ -161,11 +157,9 @@ bool Timer::watched_wrap() const {
     if (cascade || buffered_top || reg(CTRL) & CTRL_OSMEN || part.dma->listens(source, 0) ||
         part.prs->listens(reflex, 0) || part.prs->listens(reflex, 1))
         return true;
-    if (reg(IEN) & (IEN_OF | IEN_UF) & ~reg(IF))
-        return true;
+    if (reg(IEN) & (IEN_OF | IEN_UF) & ~reg(IF)) return true;
     for (int n = 0; n < CHANNELS; n++)
-        if (compares(n) && (buffered[n] || pin(n) >= 0))
-            return true;
+        if (compares(n) && (buffered[n] || pin(n) >= 0)) return true;
     return false;
 }
 
@@ -177,8 +171,7 @@ bool Timer::watched(int n) const {
 
 void Timer::plan() {
     part.cancel(due);
-    if (!running || !ticks.runs() || field(reg(CTRL), CTRL_CLKSEL) != PRESCALED)
-        return;
+    if (!running || !ticks.runs() || field(reg(CTRL), CTRL_CLKSEL) != PRESCALED) return;
     const int64_t wrap = until_wrap(count);
     int64_t next = watched_wrap() ? wrap : FAR;
     for (int n = 0; n < CHANNELS; n++)
@@ -221,8 +214,7 @@ void Timer::clocks_changed() {
 }
 
 void Timer::start() {
-    if (running)
-        return;
+    if (running) return;
     running = true;
     restart_clock();
     count.down = mode() == DOWN || (mode() == UP_DOWN && count.down);

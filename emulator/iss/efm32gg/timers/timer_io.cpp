@@ -20,14 +20,9 @@ uint32_t Timer::status() const {
 
 uint32_t Timer::peek(uint32_t offset) const {
     switch (offset) {
-    case CNT:
-        return current().value;
-    case STATUS:
-        return status();
-    case CC0_CCVP:
-    case CC1_CCVP:
-    case CC2_CCVP:
-        return reg(offset - 4);
+    case CNT: return current().value;
+    case STATUS: return status();
+    case CC0_CCVP: case CC1_CCVP: case CC2_CCVP: return reg(offset - 4);
     }
     return Peripheral::peek(offset);
 }
@@ -62,9 +57,7 @@ void Timer::write(uint32_t offset, uint32_t value) {
                     }
         }
         break;
-    case CNT:
-        count.value = value & LAST;
-        break;
+    case CNT: count.value = value & LAST; break;
     case CTRL: {
         const uint32_t before = reg(CTRL);
         store(offset, value);
@@ -84,9 +77,7 @@ void Timer::write(uint32_t offset, uint32_t value) {
         store(offset, value);
         buffered_top = false;
         break;
-    case DTLOCK:
-        lock(DTLOCK, value, UNLOCK);
-        break;
+    case DTLOCK: lock(DTLOCK, value, UNLOCK); break;
     default:
         Peripheral::write(offset, value);
         for (int n = 0; n < CHANNELS; n++) {
@@ -132,8 +123,7 @@ void Timer::act(int n, uint32_t action) {
 
 void Timer::show_outputs() {
     for (int n = 0; n < CHANNELS; n++) {
-        if (!compares(n))
-            continue;
+        if (!compares(n)) continue;
         if (cc_mode(n) == PWM)
             outputs[n] = running && count.value < reg(cc(n, CC0_CCV));
         const int to = pin(n);
@@ -164,8 +154,7 @@ void Timer::prs_changed(int channel, bool level) {
 
 void Timer::edge(int n, bool rising) {
     inputs[n] = rising;
-    if (!clock_now().runs() || within_edge)
-        return;
+    if (!clock_now().runs() || within_edge) return;
     within_edge = true;
     fold();
     const uint32_t control = reg(cc(n, CC0_CTRL)), which = field(control, CC0_CTRL_ICEDGE);
@@ -200,8 +189,7 @@ void Timer::capture(int n) {
     skipped[n] = !skipped[n];
     const bool signals_event = events == 0 || (events == 1 && !skipped[n]) ||
                                (events == 2 && inputs[n]) || (events == 3 && !inputs[n]);
-    if (!signals_event)
-        return;
+    if (!signals_event) return;
     reg(IF) |= IF_CC0 << n;
     part.prs->pulse(reflex, 2 + n);
     part.dma->pulse(source, 1 + n);

@@ -27,8 +27,7 @@ public:
 
     void write(uint32_t offset, uint32_t value) override {
         if (offset == CTRL) {
-            if (reg(CTRL) & CTRL_LOCK)
-                return;
+            if (reg(CTRL) & CTRL_LOCK) return;
             store(offset, value);
             reg(SYNCBUSY) |= SYNCBUSY_CTRL;
         } else if (offset == CMD && value & CMD_CLEAR) {
@@ -42,8 +41,7 @@ public:
 
     // Whole periods of the clock are kept over clock changes and sleep.
     void clocks_changing() override {
-        if (!clock.runs())
-            return;
+        if (!clock.runs()) return;
         const int64_t now = part.now();
         counted += clock.edges(now) - clock.edges(since);
         since = now;

@@ -61,10 +61,10 @@ def reserved_registers(code: Program) -> None:
 
 
 CASES = {
-    jump_into_nowhere: ("HardFault", "code was fetched where there is no memory", "30000000"),
-    stack_overflow: ("HardFault", "has the stack run over?"),
-    divide_by_zero: ("HardFault", "divided by zero"),
-    lock_up: ("lock-up", "no such instruction"),
+    jump_into_nowhere: ("HardFault", "instruction fetch from an unused address", "30000000"),
+    stack_overflow: ("HardFault", "stack overflow?"),
+    divide_by_zero: ("HardFault", "division by zero"),
+    lock_up: ("lock-up", "undefined instruction"),
     watchdog: ("watchdog reset",),
     interrupts_off: (),
     reserved_registers: (),

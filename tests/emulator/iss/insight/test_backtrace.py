@@ -16,7 +16,7 @@ from cubestack.emulator.iss.insight.backtrace import (
     Frame,
     backtrace,
 )
-from cubestack.emulator.iss.insight.symbols import Function, Symbols
+from cubestack.emulator.iss.insight.symbols import Symbol, Symbols
 
 STACK, OTHER_STACK = 0x2000_1000, 0x2000_3000
 BL, BLX_R3, NOP_PAIR = 0xF800_F000, 0x4798_BF00, 0xBF00_BF00
@@ -29,7 +29,7 @@ class Scene:
     def __init__(self) -> None:
         self.words: dict[int, int] = {}
         symbols = Symbols(None)
-        symbols.functions = [Function(f"f{n}", 0x100 * n, 0x100) for n in (1, 2, 3, 4)]
+        symbols.functions = [Symbol(f"f{n}", 0x100 * n, 0x100) for n in (1, 2, 3, 4)]
         symbols._starts = [one.address for one in symbols.functions]
         symbols.frames = []
         self.symbols = symbols
