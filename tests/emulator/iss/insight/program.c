@@ -1,4 +1,4 @@
-/* A program with known calls: it works at each tick, sleeps between them, and fails on request. */
+/* A program with known calls at each tick, which sleeps between ticks and fails on request. */
 #include <stdint.h>
 
 #define REGISTER(address) (*(volatile uint32_t *)(address))
@@ -7,7 +7,7 @@ enum { SYST_CSR = 0xE000E010, SYST_RVR = 0xE000E014, CCR = 0xE000ED14, SHCSR = 0
 volatile uint32_t ticks, total, command, received;
 
 __attribute__((noinline)) uint32_t square(uint32_t x) {
-    __asm volatile(""); /* not to be called less often than it is written */
+    __asm volatile(""); /* prevents that calls are merged */
     return x * x;
 }
 

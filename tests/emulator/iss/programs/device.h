@@ -1,7 +1,7 @@
-// The EFM32GG as a vendor's device header shows it: struct types laid over the peripherals.
+// The EFM32GG as a vendor's device header shows it: struct types for the peripherals.
 //
-// Written from the reference manual alone and used by no other part of the project, so that a
-// register that the emulator has at a wrong place is found by programs that include this.
+// Written from the reference manual and not from the emulator's tables, so that programs that
+// include it find registers at wrong addresses.
 #ifndef DEVICE_H
 #define DEVICE_H
 
@@ -171,23 +171,11 @@ typedef struct {
 #define SysTick ((SysTick_Type *)0xE000E010UL)
 #define SCB ((SCB_Type *)0xE000ED00UL)
 #define NVIC_ISER ((__IO uint32_t *)0xE000E100UL)
-#define NVIC_ICPR ((__IO uint32_t *)0xE000E280UL)
-#define NVIC_IPR ((__IO uint8_t *)0xE000E400UL)
-
-enum {
-    DMA_IRQn = 0,
-    I2C0_IRQn = 9,
-    UART0_RX_IRQn = 20,
-    UART0_TX_IRQn = 21,
-    LETIMER0_IRQn = 26,
-    RTC_IRQn = 30,
-};
+enum { DMA_IRQn = 0, I2C0_IRQn = 9, UART0_RX_IRQn = 20, LETIMER0_IRQn = 26, RTC_IRQn = 30 };
 
 static inline void NVIC_EnableIRQ(int irq) { NVIC_ISER[irq >> 5] = 1UL << (irq & 31); }
-static inline void NVIC_ClearPendingIRQ(int irq) { NVIC_ICPR[irq >> 5] = 1UL << (irq & 31); }
 static inline void __WFI(void) { __asm volatile("wfi" ::: "memory"); }
 static inline void __disable_irq(void) { __asm volatile("cpsid i" ::: "memory"); }
-static inline void __enable_irq(void) { __asm volatile("cpsie i" ::: "memory"); }
 
 #define CMU_CTRL_HFLE (1UL << 30)
 #define CMU_HFCORECLKDIV_LEDIV4 (1UL << 8)
@@ -211,10 +199,8 @@ static inline void __enable_irq(void) { __asm volatile("cpsie i" ::: "memory"); 
 #define USART_CMD_TXEN (1UL << 2)
 #define USART_STATUS_TXC (1UL << 5)
 #define USART_STATUS_TXBL (1UL << 6)
-#define USART_STATUS_RXDATAV (1UL << 7)
-#define USART_IF_RXDATAV (1UL << 2)
 
-// What every program here does first: 48 MHz from the crystal, UART0 at 115200 on PE0 and PE1.
+// Of startup.c: 48 MHz from the crystal, UART0 at 115200 baud on PE0 and PE1.
 void SystemInit(void);
 void console_init(void);
 void console_put(char c);

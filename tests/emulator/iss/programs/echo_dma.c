@@ -1,4 +1,4 @@
-// Receives on UART0 by DMA in ping-pong mode and sends every full half back, upper case.
+// Receives on UART0 by DMA in ping-pong mode; sends every full half back in upper case.
 #include "device.h"
 
 #define HALF 8
@@ -8,13 +8,13 @@ typedef struct {
     volatile uint32_t control, user;
 } Descriptor;
 
-// Primary and alternate structures of 12 channels each; the base has to be aligned to their size.
+// Primary and alternate descriptors, 16 each; the base is aligned to their size.
 static Descriptor descriptors[32] __attribute__((aligned(512)));
 static uint8_t halves[2][HALF];
 static volatile uint8_t full[2];
 
 static uint32_t ping_pong(void) {
-    // Destination byte by byte, source stays, one byte a request, HALF of them, cycle 3 = ping-pong.
+    // HALF bytes, one per request, from a fixed source to increasing addresses; cycle 3: ping-pong.
     return 0UL << 30 | 3UL << 26 | (HALF - 1) << 4 | 3;
 }
 

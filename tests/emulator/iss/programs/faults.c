@@ -1,4 +1,4 @@
-// Provokes one fault after the other; each handler says which, and steps over the instruction.
+// Causes several faults; each handler prints its name and status, and skips the instruction.
 #include "device.h"
 
 typedef struct {

@@ -12,17 +12,14 @@ __attribute__((section(".ramfunc"), noinline, long_call)) static int write_page(
     if (MSC->STATUS & (2 | 4))
         return -1;
     MSC->WRITECMD = 2;
-    while (MSC->STATUS & 1) {
-    }
+    while (MSC->STATUS & 1) ;
     for (int i = 0; i < WORDS; i++) {
         MSC->ADDRB = PAGE + 4UL * (uint32_t)i;
         MSC->WRITECMD = 1;
-        while (!(MSC->STATUS & 8)) {
-        }
+        while (!(MSC->STATUS & 8)) ;
         MSC->WDATA = words[i];
         MSC->WRITECMD = 8;
-        while (MSC->STATUS & 1) {
-        }
+        while (MSC->STATUS & 1) ;
     }
     MSC->WRITECTRL &= ~1UL;
     MSC->LOCK = 0;
@@ -43,8 +40,7 @@ int main(void) {
     console_write(failed ? "locked" : same ? "boot " : "differs ");
     console_hex(page[0]);
     console_write("\n");
-    while (!(UART0->STATUS & USART_STATUS_TXC)) {
-    }
+    while (!(UART0->STATUS & USART_STATUS_TXC)) ;
     if (boots < 3)
         SCB->AIRCR = 0x05FA0004;
     for (;;)

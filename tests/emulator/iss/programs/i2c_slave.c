@@ -1,4 +1,4 @@
-// An I2C slave at 0x42 by interrupt: 16 registers behind a pointer that steps on.
+// An I2C slave at 0x42, served by interrupts: 16 registers and a pointer that increments.
 #include "device.h"
 
 static volatile uint8_t registers[16] = {0xC0, 0xFF, 0xEE};
@@ -45,7 +45,7 @@ int main(void) {
     I2C0->SADDRMASK = 0x7F << 1;
     I2C0->ROUTE = 3 | 1 << 8;  // location 1
     I2C0->CTRL = 1 | 2 | 1 << 4;
-    I2C0->CMD = 0x20;  // nothing is known of the bus
+    I2C0->CMD = 0x20;  // ABORT: the bus counts as idle
     I2C0->IFC = 0x1FFFF;
     I2C0->IEN = 1UL << 2 | 1UL << 5 | 1UL << 6 | 1UL << 7 | 1UL << 16;
     NVIC_EnableIRQ(I2C0_IRQn);

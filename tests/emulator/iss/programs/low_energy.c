@@ -1,4 +1,4 @@
-// Sleeps in EM2 between RTC compares; LETIMER counts beside it and wakes too.
+// Sleeps in EM2 until RTC or LETIMER wakes it.
 #include "device.h"
 
 static volatile uint32_t rtc_wakes, letimer_wakes;
@@ -17,15 +17,12 @@ int main(void) {
     console_init();
     CMU->HFCORECLKEN0 |= CMU_HFCORECLKEN0_LE;
     CMU->OSCENCMD = CMU_OSCENCMD_LFXOEN;
-    while (!(CMU->STATUS & CMU_STATUS_LFXORDY)) {
-    }
+    while (!(CMU->STATUS & CMU_STATUS_LFXORDY)) ;
     CMU->LFCLKSEL = (CMU->LFCLKSEL & ~3UL) | 2;  // LFXO to the A branch
     CMU->LFACLKEN0 |= CMU_LFACLKEN0_RTC | CMU_LFACLKEN0_LETIMER0;
-    while (CMU->SYNCBUSY) {
-    }
+    while (CMU->SYNCBUSY) ;
     RTC->COMP0 = 32768 / 10 - 1;
-    while (RTC->SYNCBUSY) {
-    }
+    while (RTC->SYNCBUSY) ;
     RTC->IFC = 7;
     RTC->IEN = 2;
     NVIC_EnableIRQ(RTC_IRQn);
@@ -33,18 +30,16 @@ int main(void) {
     LETIMER0->IFC = 0x1F;
     LETIMER0->IEN = 4;                  // underflow
     LETIMER0->CTRL = 1UL << 9;          // COMP0 is the top
-    while (LETIMER0->SYNCBUSY) {
-    }
+    while (LETIMER0->SYNCBUSY) ;
     NVIC_EnableIRQ(LETIMER0_IRQn);
-    RTC->CTRL = 1 | 1 << 2;             // COMP0 is the top here too
+    RTC->CTRL = 1 | 1 << 2;             // COMP0 is the top
     LETIMER0->CMD = 1;
     SCB->SCR = 1UL << 2;                // deep sleep
     while (rtc_wakes < 10) {
         __WFI();
-        // Deep sleep stops the crystal: back to it as a driver does.
+        // Deep sleep has stopped the crystal.
         CMU->OSCENCMD = CMU_OSCENCMD_HFXOEN;
-        while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) {
-        }
+        while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) ;
         CMU->CMD = CMU_CMD_HFCLKSEL_HFXO;
     }
     console_write("rtc ");
@@ -52,8 +47,7 @@ int main(void) {
     console_write(" letimer ");
     console_hex(letimer_wakes);
     console_write("\n");
-    while (!(UART0->STATUS & USART_STATUS_TXC)) {
-    }
+    while (!(UART0->STATUS & USART_STATUS_TXC)) ;
     __disable_irq();
     SCB->SCR = 0;
     for (;;)

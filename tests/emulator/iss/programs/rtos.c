@@ -1,4 +1,4 @@
-// Three tasks, switched by SysTick and PendSV, each on a stack of its own, with a queue between.
+// Three tasks with own stacks, switched by SysTick and PendSV; two of them share a queue.
 #include "device.h"
 
 #define TASKS 3
@@ -49,8 +49,7 @@ __attribute__((naked)) void SVC_Handler(void) {
 
 static void producer(void) {
     for (uint32_t value = 1;; value++) {
-        while (head - tail == 4) {
-        }
+        while (head - tail == 4) ;
         queue[head % 4] = value * value;
         head++;
         counts[0]++;
@@ -59,8 +58,7 @@ static void producer(void) {
 
 static void consumer(void) {
     for (uint32_t sum = 0, n = 0;;) {
-        while (head == tail) {
-        }
+        while (head == tail) ;
         sum += queue[tail % 4];
         tail++;
         counts[1]++;
@@ -94,6 +92,5 @@ int main(void) {
     SysTick->VAL = 0;
     SysTick->CTRL = 7;
     __asm volatile("svc 0");
-    for (;;) {
-    }
+    for (;;) ;
 }

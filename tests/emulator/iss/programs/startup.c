@@ -1,13 +1,10 @@
-// Start-up as vendors write it: weak handlers, a vector table, copy .data, clear .bss.
+// Start-up as vendors write it: weak handlers, vector table, .data and .bss.
 #include "device.h"
 
 extern uint32_t __etext, __data_start__, __data_end__, __bss_start__, __bss_end__, __StackTop;
 int main(void);
 
-void Default_Handler(void) {
-    for (;;) {
-    }
-}
+void Default_Handler(void) { for (;;) ; }
 
 void Reset_Handler(void) {
     const uint32_t *source = &__etext;
@@ -17,56 +14,31 @@ void Reset_Handler(void) {
         *target++ = 0;
     SystemInit();
     main();
-    for (;;) {
-    }
+    Default_Handler();
 }
 
-#define WEAK __attribute__((weak, alias("Default_Handler")))
-void NMI_Handler(void) WEAK;
-void HardFault_Handler(void) WEAK;
-void MemManage_Handler(void) WEAK;
-void BusFault_Handler(void) WEAK;
-void UsageFault_Handler(void) WEAK;
-void SVC_Handler(void) WEAK;
-void PendSV_Handler(void) WEAK;
-void SysTick_Handler(void) WEAK;
-void DMA_IRQHandler(void) WEAK;
-void I2C0_IRQHandler(void) WEAK;
-void UART0_RX_IRQHandler(void) WEAK;
-void UART0_TX_IRQHandler(void) WEAK;
-void LETIMER0_IRQHandler(void) WEAK;
-void RTC_IRQHandler(void) WEAK;
+#define WEAK(handler) __attribute__((weak, alias("Default_Handler"))) void handler(void);
+WEAK(NMI_Handler) WEAK(HardFault_Handler) WEAK(MemManage_Handler) WEAK(BusFault_Handler)
+WEAK(UsageFault_Handler) WEAK(SVC_Handler) WEAK(PendSV_Handler) WEAK(SysTick_Handler)
+WEAK(DMA_IRQHandler) WEAK(I2C0_IRQHandler) WEAK(UART0_RX_IRQHandler) WEAK(LETIMER0_IRQHandler)
+WEAK(RTC_IRQHandler)
 
+#define IRQ(unit) [16 + unit##_IRQn] = unit##_IRQHandler
 __attribute__((section(".isr_vector"), used)) void (*const vectors[16 + 39])(void) = {
-    (void (*)(void))&__StackTop,
-    Reset_Handler,
-    NMI_Handler,
-    HardFault_Handler,
-    MemManage_Handler,
-    BusFault_Handler,
-    UsageFault_Handler,
-    [11] = SVC_Handler,
-    [14] = PendSV_Handler,
-    [15] = SysTick_Handler,
-    [16 + DMA_IRQn] = DMA_IRQHandler,
-    [16 + I2C0_IRQn] = I2C0_IRQHandler,
-    [16 + UART0_RX_IRQn] = UART0_RX_IRQHandler,
-    [16 + UART0_TX_IRQn] = UART0_TX_IRQHandler,
-    [16 + LETIMER0_IRQn] = LETIMER0_IRQHandler,
-    [16 + RTC_IRQn] = RTC_IRQHandler,
+    (void (*)(void))&__StackTop, Reset_Handler, NMI_Handler, HardFault_Handler, MemManage_Handler,
+    BusFault_Handler, UsageFault_Handler, [11] = SVC_Handler, [14] = PendSV_Handler,
+    [15] = SysTick_Handler, IRQ(DMA), IRQ(I2C0), IRQ(UART0_RX), IRQ(LETIMER0), IRQ(RTC),
 };
 
 void SystemInit(void) {
     MSC->READCTRL = (MSC->READCTRL & ~7UL) | MSC_READCTRL_MODE_WS2;
-    // The low energy bus is to be slower than 32 MHz.
+    // The low-energy bus must be slower than 32 MHz.
     CMU->CTRL |= CMU_CTRL_HFLE;
     CMU->HFCORECLKDIV |= CMU_HFCORECLKDIV_LEDIV4;
     CMU->OSCENCMD = CMU_OSCENCMD_HFXOEN;
-    while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) {
-    }
+    while (!(CMU->STATUS & CMU_STATUS_HFXORDY)) ;
     CMU->CMD = CMU_CMD_HFCLKSEL_HFXO;
-    while (!(CMU->STATUS & CMU_STATUS_HFXOSEL)) {
-    }
+    while (!(CMU->STATUS & CMU_STATUS_HFXOSEL)) ;
     CMU->OSCENCMD = CMU_OSCENCMD_HFRCODIS;
 }
 
@@ -81,8 +53,7 @@ void console_init(void) {
 }
 
 void console_put(char c) {
-    while (!(UART0->STATUS & USART_STATUS_TXBL)) {
-    }
+    while (!(UART0->STATUS & USART_STATUS_TXBL)) ;
     UART0->TXDATA = (uint8_t)c;
 }
 
