@@ -8,7 +8,7 @@ import pytest
 
 from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.machine import Machine
-from cubestack.emulator.iss.outcome import Kind, Stop, StopReason
+from cubestack.emulator.iss.outcome import OutgoingKind, Stop, StopReason
 from cubestack.emulator.sim.virtual_time import PS_PER_MS, PS_PER_US
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 from tests.tiers import quick
@@ -35,10 +35,10 @@ class Bench:
         while True:
             stop = self.machine.run(until_ps)
             for out in self.machine.outbox():
-                if out.kind is Kind.UART and out.unit & 0xFF == UART0:
+                if out.kind is OutgoingKind.UART and out.unit & 0xFF == UART0:
                     self.text += chr(out.value & 0xFF)
                     self.times_ps.append(out.time_ps)
-                assert out.kind is not Kind.LOG, out.text  # the program makes no mistake
+                assert out.kind is not OutgoingKind.LOG, out.text  # the program makes no mistake
             if stop.now_ps >= until_ps or stop.reason is StopReason.LOCKED_UP:
                 return stop
 

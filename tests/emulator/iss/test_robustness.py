@@ -9,7 +9,7 @@ import pytest
 
 from cubestack.emulator.iss.insight.fault_report import last_fault
 from cubestack.emulator.iss.machine import EXTERNAL_BASE, RAM_BASE, Machine
-from cubestack.emulator.iss.outcome import Kind, StopReason
+from cubestack.emulator.iss.outcome import OutgoingKind, StopReason
 
 from .wild_images import KINDS, START, make
 
@@ -88,10 +88,10 @@ def program(*halves: int, vectors: dict[int, int] | None = None, stack: int = 0x
     return struct.pack("<64I", *table).ljust(START, b"\xff") + code
 
 
-def outcome(machine: Machine, image: bytes) -> set[Kind]:
+def outcome(machine: Machine, image: bytes) -> set[OutgoingKind]:
     """Kinds of messages in two milliseconds."""
     begin = start(machine, image)
-    kinds: set[Kind] = set()
+    kinds: set[OutgoingKind] = set()
     for _ in range(RUNS_AT_MOST):
         machine.run(begin + 2 * MILLISECOND)
         kinds |= {one.kind for one in machine.outbox()}
@@ -101,7 +101,7 @@ def outcome(machine: Machine, image: bytes) -> set[Kind]:
 
 
 def test_empty_vector_table_locks_up_and_the_part_resets(machine):
-    assert Kind.RESET in outcome(machine, b"")
+    assert OutgoingKind.RESET in outcome(machine, b"")
 
 
 def test_jump_to_an_unused_address_is_a_hard_fault(machine):
@@ -127,7 +127,7 @@ def test_semihosting_can_be_switched_on(machine, on):
     # ADR r1, text; MOVS r0, #4 (SYS_WRITE0); BKPT 0xAB; B here; the text
     begin = start(machine, program(0xA101, 0x2004, 0xBEAB, 0xE7FE, 0x6968, 0x0021))
     machine.run(begin + MILLISECOND)
-    text = [one.text for one in machine.outbox() if one.kind is Kind.SEMIHOSTING]
+    text = [one.text for one in machine.outbox() if one.kind is OutgoingKind.SEMIHOSTING]
     assert text == (["hi!"] if on else [])
     assert machine.register("xpsr") & 0x1FF == (0 if on else 3)
     machine.semihosting(False)
@@ -138,7 +138,7 @@ def test_lock_up_stops_the_run_before_the_part_resets(machine):
     begin = start(machine, image)
     assert machine.run(begin + MILLISECOND).reason == StopReason.LOCKED_UP
     assert machine.register("pc") == 0x3000_0000
-    assert Kind.RESET in outcome(machine, image)
+    assert OutgoingKind.RESET in outcome(machine, image)
     assert last_fault(machine).exception == 0  # still known after the reset
     assert last_fault(machine).pc == 0x3000_0000
 

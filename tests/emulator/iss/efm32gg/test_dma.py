@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 
 from .bench import US, Bench, S, asleep, mask_of
 
@@ -139,7 +139,7 @@ def test_uart_sends_text_by_dma() -> None:
     describe(bench, 1, DATA + len(text) - 1, TXDATA, control(BASIC, len(text), BYTES, target=3))
     bench.load("DMA", CH1_CTRL=UART0_TX, CHENS=2)
     bench.run_for(len(text) * 10 * 17 * S // HZ)
-    assert bytes(item.value for item in bench.out(Kind.UART)) == text
+    assert bytes(item.value for item in bench.out(OutgoingKind.UART)) == text
     assert bench["DMA.IF"] == 2
 
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 from tests.emulator.iss.cross_compiler import needs_compiler
 
 from .bench import MS, US, Bench, compiled
@@ -100,16 +100,16 @@ def run_i2c(bench: Bench, known: int) -> list[str]:
         items, bench.items = bench.items, []
         for item in items:
             match item.kind:
-                case Kind.I2C_START:
+                case OutgoingKind.I2C_START:
                     passed.append(f"S{item.value:02X}")
                     machine.i2c_answer(0, item.value >> 1 == known)
-                case Kind.I2C_WRITE:
+                case OutgoingKind.I2C_WRITE:
                     passed.append(f"W{item.value:02X}")
                     machine.i2c_answer(0, True)
-                case Kind.I2C_READ:
+                case OutgoingKind.I2C_READ:
                     passed.append(f"R{item.extra}")
                     machine.i2c_answer(0, True, next(following))
-                case Kind.I2C_STOP:
+                case OutgoingKind.I2C_STOP:
                     passed.append("P")
     return passed[passed.index("SD0") :]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cubestack.emulator.iss.outcome import Kind
+from cubestack.emulator.iss.outcome import OutgoingKind
 from tests.emulator.iss.cross_compiler import needs_compiler
 
 from .bench import MS, US, Bench, compiled
@@ -43,7 +43,9 @@ def test_page_erase_takes_20_ms_and_counts_wear() -> None:
     assert set(bench.machine.flash[PAGE + 4096 : PAGE + 8192]) == {0}
     erased(bench)
     bench.run_for(21 * MS)
-    erasures = [(item.value, item.extra) for item in bench.out(Kind.FLASH) if item.unit == 1]
+    erasures = [
+        (item.value, item.extra) for item in bench.out(OutgoingKind.FLASH) if item.unit == 1
+    ]
     assert erasures == [(PAGE, 1), (PAGE, 2)]
 
 
@@ -179,7 +181,7 @@ def test_program_in_ram_runs_while_it_writes_the_flash(tmp_path: Path) -> None:
     ticks = bench.machine.read(0x2001_0000)
     assert ticks is not None
     assert 100 < ticks < 8 * 20 * 14 // 5  # it polled during all writes
-    times = [item.time_ps for item in bench.out(Kind.FLASH)]
+    times = [item.time_ps for item in bench.out(OutgoingKind.FLASH)]
     assert len(times) == 8
     assert 8 * 20 * US < times[-1] + 20 * US - began < 8 * 28 * US
 
