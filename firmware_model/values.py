@@ -218,14 +218,25 @@ class ListDeclaration(Declaration):
         return "a list" if self.count is None else f"a list of {self.count} {what}"
 
     def read(self, given: Any) -> Any:
-        parts = given.tolist() if hasattr(given, "tolist") else given  # an array
+        array = hasattr(given, "tolist")
+        return self._made(given, given.tolist() if array else given, self.part.read)
+
+    def parse(self, given: str) -> Any:
+        """The values of a text with commas between them."""
+        return self._made(given, given.split(","), self.part.parse)
+
+    def take(self, given: Any) -> Any:
+        return (
+            self.parse(given)
+            if isinstance(given, str)
+            else self._made(given, given, self.part.take)
+        )
+
+    def _made(self, given: Any, parts: Any, read: Callable[[Any], Any]) -> Any:
         if not isinstance(parts, list | tuple) or self.count not in (None, len(parts)):
             raise self.error(given)
-        values = tuple(self.part.read(one) for one in parts)
+        values = tuple(read(one) for one in parts)
         return values if self.make is None else self.make(values)
-
-    def take(self, given: Any) -> tuple[Any, ...]:
-        return tuple(self.part.take(one) for one in given)
 
     def described(self) -> dict[str, Any]:
         """As JSON has it, with ``count`` and what each is ``of``."""

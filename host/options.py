@@ -9,12 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cubestack.firmware_model.values import FLAG, WHOLE, DeclaredValues, ValueKind, declare
-
-
-def _corner(given: Any) -> tuple[int, int]:
-    left, top = (WHOLE.parse(one) if isinstance(one, str) else WHOLE.read(one) for one in given)
-    return left, top
+from cubestack.firmware_model.values import FLAG, DeclaredValues, ValueKind, declare, vector, whole
 
 
 def _file(given: Any) -> Any:
@@ -25,13 +20,12 @@ PATH = ValueKind("path", "a path", Path, Path)
 FILE = ValueKind("file", "a file", _file, Path)
 """The path of a file, or what a program made instead of it: a scene, a plan of faults."""
 
-CORNER = ValueKind("corner", "X,Y, as in 0,256", _corner, lambda text: _corner(text.split(",")))
 SWITCH = replace(FLAG, read={False: False, True: True}.__getitem__)  # 0 and 1 too
 
 # Each takes (default, meaning), then keywords of `Declaration`.
 path_option: Callable[..., Any] = partial(declare, PATH, metavar="FILE")
 file_option: Callable[..., Any] = partial(declare, FILE, metavar="FILE")
-corner: Callable[..., Any] = partial(declare, CORNER, metavar="X,Y")
+corner: Callable[..., Any] = partial(vector, 2, kind=whole, metavar="X,Y")
 switch: Callable[..., Any] = partial(declare, SWITCH, False)
 
 

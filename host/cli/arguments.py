@@ -51,14 +51,15 @@ def add_failed(commands: "argparse._SubParsersAction[Any]", name: str, error: st
 
 def add_value(parser: argparse._ActionsContainer, name: str, one: Any, **how: Any) -> None:
     """Declare a value as an option; ``how`` is given to the parser besides."""
-    part = one.part if isinstance(one, ListDeclaration) else one
+    repeated = isinstance(one, ListDeclaration) and one.count is None
+    part = one.part if repeated else one
     how = {"dest": name, "default": one.default, "help": one.meaning, **how}
     if part.kind.name == FLAG.name:
         how |= {"action": "store_const", "const": True}
     else:
         metavar = one.metavar or "|".join(part.choices) or part.unit.upper().replace("/", "_")
         how |= {"type": _read(part), "choices": part.choices or None, "metavar": metavar or None}
-        if part is not one:
+        if repeated:
             how |= {"action": "append", "default": []}
     parser.add_argument(option_string(name), **how)
 

@@ -22,7 +22,7 @@ from cubestack.emulator.scene.hazards import (
 )
 from cubestack.emulator.scene.hazards.hazard import Hazard
 from cubestack.emulator.scene.sky import SkyScene
-from cubestack.firmware_model.values import REQUIRED, ValueKind, declare, many
+from cubestack.firmware_model.values import REQUIRED, ValueKind, declare, many, number
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,10 @@ def check(asked: Sequence[Asked], *, earth: bool = False) -> None:
         if one.name not in kinds:
             raise ValueError(f"hazard: there is no {one.name!r}; known: {', '.join(sorted(kinds))}")
         scale = kinds[one.name].strength
-        low, high = min(scale.values), max(scale.values)
-        if one.strength is not None and not low <= one.strength <= high:
-            raise ValueError(
-                f"hazard: {one.name} goes from {low:g} to {high:g} {scale.unit}".rstrip()
-                + f", not {one.strength:g}"
-            )
+        try:
+            number(None, "", min(scale.values), max(scale.values), scale.unit).check(one.strength)
+        except ValueError as error:
+            raise ValueError(f"hazard: {one.name} {error}") from None
 
 
 def _placed(

@@ -109,8 +109,6 @@ class Emulator:
         check_options(self._device, {**options, **dict.fromkeys(files, "")})
         for option in self._device.all_options:
             value = options.get(option.name, option.default)
-            if not isinstance(value, type(option.default)):
-                raise TargetError(f"{option.name} can not be {value!r}")
             kept = ("", *option.known, self.options.get(option.name))
             if option.is_file and value not in kept:
                 raise TargetError(f"{option.name}: send the file itself, not its name")

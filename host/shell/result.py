@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from cubestack.firmware_model.values import REQUIRED, number
+
 GREATEST = 1e9
 """Of a number on a line."""
 
@@ -44,9 +46,7 @@ def check_count(usage: str, words: Sequence[str], least: int, most: int) -> None
 def to_number(command: str, text: str, least: float) -> float:
     """A number of at least ``least``; raises ShellError otherwise."""
     try:
-        value = float(text)
-    except ValueError:
-        value = least - 1
-    if not least <= value < GREATEST:
-        raise ShellError(f"{command}: {text!r} is not a number of at least {least:g}")
+        value: float = number(REQUIRED, "", least, GREATEST).parse(text)
+    except ValueError as error:
+        raise ShellError(f"{command}: {error}") from None
     return value

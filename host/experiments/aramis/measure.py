@@ -35,16 +35,7 @@ from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import PictureScene, SkyScene
 from cubestack.firmware_model.interface.aramis import OnOff
 from cubestack.firmware_model.interface.cameras import mt9m001
-from cubestack.firmware_model.values import (
-    NUMBER,
-    REQUIRED,
-    ValueKind,
-    choice,
-    declare,
-    many,
-    number,
-    positive,
-)
+from cubestack.firmware_model.values import REQUIRED, choice, many, number, positive, vector
 from cubestack.host.clients.aramis.client import Aramis, Star
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.experiments import attitude as attitudes
@@ -65,19 +56,10 @@ PHASE_S = 0.2
 """Measurements start at a random time within this many s of each other."""
 
 
-def _magnitudes(given: Any) -> tuple[float, float]:
-    brightest, faintest = (NUMBER.read(float(one)) for one in given)
-    if not brightest <= faintest:
-        raise ValueError
-    return brightest, faintest
-
-
-MAGNITUDES = ValueKind(
-    "magnitudes",
-    "V,V, the brightest first, as in 4.5,6",
-    _magnitudes,
-    lambda text: _magnitudes(text.split(",")),
-)
+def _rising(pair: tuple[float, float]) -> tuple[float, float]:
+    if not pair[0] <= pair[1]:
+        raise ValueError(f"must have the brightest first, not {pair}")
+    return pair
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,10 +80,11 @@ class AramisOptions(attitudes.SkyOptions):
     gain: float | None = number(None, "gain, 1 to 15 (default 15)", 1, 15, metavar="X")
     rate: float = number(0.0, "body rate across the boresight", 0, 180, "deg/s")
     roll_rate: float = number(0.0, "body rate about it", 0, 180, "deg/s")
-    false_mags: tuple[float, float] = declare(
-        MAGNITUDES,
+    false_mags: tuple[float, float] = vector(
+        2,
         (4.5, 6.0),
         "brightest and faintest magnitude of the false stars (default 4.5,6)",
+        make=_rising,
         metavar="V,V",
     )
     without: tuple[str, ...] = many(

@@ -28,7 +28,7 @@ def test_a_hazard_is_a_name_and_perhaps_a_strength() -> None:
     [
         ("mooon", "hazard: there is no 'mooon'; known: .*moon"),
         ("gradient=steep", "hazard must be NAME or NAME=STRENGTH"),
-        ("gradient=-1", "hazard: gradient goes from 0 to .*, not -1"),
+        ("gradient=-1", "hazard: gradient must be 0 to .*, not -1"),
     ],
 )
 @pytest.mark.parametrize("options", [CubeStarOptions, CubeSenseOptions])

@@ -79,7 +79,7 @@ def test_results_come_one_by_one_with_progress() -> None:
         ({"frame": 3}, "no option 'frame' for cubestar; known: frames, corner, tilt"),
         ({"layout": "2"}, "no option 'layout'"),  # the experiment's own decision
         ({"frames": "0"}, "frames must be 1 to 9, not 0"),
-        ({"corner": (1, 2, 3)}, r"corner must be X,Y, as in 0,256, not \(1, 2, 3\)"),
+        ({"corner": (1, 2, 3)}, r"corner must be a list of 2 numbers, not \(1, 2, 3\)"),
         ({"skip": ("a", "c")}, "skip must be one of a, b, not 'c'"),
         ({"left": 0, "right": 1}, "--left and --right exclude each other"),
         ({"quick": True, "tilt": 1}, "--tilt takes its time"),

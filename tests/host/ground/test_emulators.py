@@ -97,7 +97,7 @@ def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> N
         ({"options": {"profile": "best"}}, 400, "profile of cubestar must be one of"),
         ({"options": {"profile": 3}}, 400, "profile of cubestar must be one of"),
         ({"options": {"set": "no=1"}}, 400, "no"),
-        ({"options": {"set": 3}}, 400, "set can not be 3"),
+        ({"options": {"set": 3}}, 400, "set of cubestar must be text, not 3"),
         ({"options": {"uart": "node"}}, 400, "uart is an option of cubesense, not of cubestar"),
         ({"options": {"scene": "/etc/passwd"}}, 400, "scene is no option of cubestar"),
         ({"options": {"firmware": "/etc/passwd"}}, 400, "firmware: send the file itself"),

@@ -85,7 +85,7 @@ def test_time_passes_and_is_told(known: Known) -> None:
     assert (found.rows, found.data) == ([("time", "1.500000 s")], {"time_s": 1.5})
     assert known.shell.execute("time") == found
     known.controls.advance.assert_called_once_with(0.25)
-    with pytest.raises(ShellError, match="time: '-1' is not a number of at least 0"):
+    with pytest.raises(ShellError, match="time: must be 0 to 1000000000, not -1"):
         known.shell.execute("time -1")
 
 
@@ -179,7 +179,8 @@ def test_counts_are_from_least_to_most(count: int, good: bool) -> None:
         ("2", True),
         ("1.99", False),
         ("999999999", True),
-        ("1e9", False),
+        ("1e9", True),
+        ("1.1e9", False),
         ("x", False),
         ("nan", False),
     ],
@@ -188,5 +189,5 @@ def test_numbers_are_at_least_and_not_without_end(text: str, good: bool) -> None
     if good:
         assert to_number("do", text, 2) == float(text)
         return
-    with pytest.raises(ShellError, match=f"do: '{text}' is not a number of at least 2"):
+    with pytest.raises(ShellError, match="do: must be "):
         to_number("do", text, 2)

@@ -127,7 +127,7 @@ def test_magnitudes_are_typed_or_given(given: object) -> None:
 
 @pytest.mark.parametrize("given", ["6,4.5", "4.5", "a,b", (6, 4.5)])
 def test_magnitudes_that_are_none(given: object) -> None:
-    with pytest.raises(ValueError, match="the brightest first"):
+    with pytest.raises(ValueError, match=r"must (be|have) "):
         FALSE_MAGS.take(given)
     assert FALSE_MAGS.take("5,5") == (5.0, 5.0)
 
