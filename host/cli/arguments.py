@@ -37,9 +37,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def _documents() -> str:
-    """Where the documents are, as the distribution says it."""
-    links: list[str] = metadata("cubestack").get_all("Project-URL") or []
-    return next(one.removeprefix("Documentation, ") for one in links if one.startswith("Doc"))
+    """Where the documents are, by the distribution's repository."""
+    return metadata("cubestack")["Project-URL"].rpartition(" ")[2] + "/tree/main/docs"
 
 
 def add_failed(commands: "argparse._SubParsersAction[Any]", name: str, error: str) -> None:

@@ -79,7 +79,7 @@ def test_help(run: Run, command: str | None) -> None:
         (("emulate", "cubestarr"), ("cubestarr", "cubestar")),
         (("measure", "cubestar", "--frames", "0"), ("0", "at least 1")),
         (("measure", "cubestar", "--frames", "many"), ("many", "a whole number")),
-        (("measure", "cubestar", "--crop", "0;256"), ("0;256", "0,256")),
+        (("measure", "cubestar", "--crop", "0;256"), ("0;256", "a list of 2 numbers")),
         (("measure", "cubestar", "--crop", "0,256"), ("--crop", "--image")),
         (("measure", "cubestar", "--camera", "c.json"), ("--camera", "--image")),
         (("measure", "cubestar", "--image", "a.png", "--scene", "b.toml"), ("--scene", "--image")),
