@@ -29,26 +29,20 @@ EXPOSURE_SETTLE_US = _SETTLE_CLOCKS * 1_000_000 // ov7620.PIXEL_CLOCK_HZ + 100
 
 def register_values(settings: CameraSettings) -> dict[str, int]:
     """Values of the camera's registers: the whole image, one byte of grey per pixel."""
-    automatic = settings.auto_adjust
+    automatic, registers = settings.auto_adjust, ov7620.REGISTERS
     numbers = ("EXPOSURE", "GAIN", "BLUE_GAIN", "RED_GAIN")
     return {
-        "COMMON_A": _bits("COMMON_A", AUTO_WHITE_BALANCE=automatic, AUTO_GAIN=automatic),
-        "COMMON_B": _bits("COMMON_B", AUTO_ADJUST=automatic),
-        "COMMON_C": ov7620.REGISTERS["COMMON_C"].reset,
-        "COMMON_H": _bits("COMMON_H", PROGRESSIVE=1, BLACK_AND_WHITE=1),
-        "COMMON_I": _bits("COMMON_I", MANUAL_EXPOSURE=1 - automatic),
+        "COMMON_A": registers["COMMON_A"].value(AUTO_WHITE_BALANCE=automatic, AUTO_GAIN=automatic),
+        "COMMON_B": registers["COMMON_B"].value(AUTO_ADJUST=automatic),
+        "COMMON_C": registers["COMMON_C"].reset,
+        "COMMON_H": registers["COMMON_H"].value(PROGRESSIVE=1, BLACK_AND_WHITE=1),
+        "COMMON_I": registers["COMMON_I"].value(MANUAL_EXPOSURE=1 - automatic),
         "HSTART": ov7620.window_column(0),
         "HSTOP": ov7620.window_column(COLUMNS),
         "VSTART": ov7620.window_row(0),
         "VSTOP": ov7620.window_row(ROWS),
-        **{n: min(getattr(settings, n.lower()), ov7620.REGISTERS[n].bits) for n in numbers},
+        **{n: min(getattr(settings, n.lower()), registers[n].bits) for n in numbers},
     }
-
-
-def _bits(register: str, **fields: int) -> int:
-    """Value of ``register`` with the named bit fields set and all others 0."""
-    field = ov7620.REGISTERS[register].field
-    return sum(value << field(name).lsb for name, value in fields.items())
 
 
 class CameraControl:

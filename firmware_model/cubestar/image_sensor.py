@@ -14,22 +14,12 @@ from cubestack.firmware_model.mcu.requests import CameraTransfer, ReadTimer, Rou
 
 SETTLE_US = 2_000  #: from power-up to the first register access; assumed
 
-
-def _bits(register: str, **fields: int) -> int:
-    """Value of ``register`` with the named bit fields set and all others 0."""
-    return sum(value << REGISTERS[register].field(name).lsb for name, value in fields.items())
-
-
-_REST = _bits("MODE_SELECT", OUTPUT_DEPTH=1)
-_GATHER = _REST | _bits("MODE_SELECT", ENABLE=1)
-_ALL_BUT_SHARPENING = _bits(
-    "HARDWARE_FEATURES",
-    DEFECT_CORRECTION=1,
-    FPN_CORRECTION=1,
-    DARK_SUBTRACTION=1,
-    HISTOGRAM_REMAP=1,
+_REST = REGISTERS["MODE_SELECT"].value(OUTPUT_DEPTH=1)
+_GATHER = _REST | REGISTERS["MODE_SELECT"].value(ENABLE=1)
+_ALL_BUT_SHARPENING = REGISTERS["HARDWARE_FEATURES"].value(
+    DEFECT_CORRECTION=1, FPN_CORRECTION=1, DARK_SUBTRACTION=1, HISTOGRAM_REMAP=1
 )
-_AUTOVIEW_ONLY = _bits("FIRMWARE_FEATURES", AUTOVIEW=1)
+_AUTOVIEW_ONLY = REGISTERS["FIRMWARE_FEATURES"].value(AUTOVIEW=1)
 
 
 @dataclass(eq=False)

@@ -24,7 +24,7 @@ from cubestack.firmware_model.interface.codec.field import (
     u32,
 )
 from cubestack.firmware_model.interface.codec.message import Message
-from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION, TCMD_PROCESSED
 
 #: Steps of a measurement, in the order of telemetry PhaseTimes, with their meanings.
 PHASES = {
@@ -60,14 +60,7 @@ def _time(what: str) -> tuple[Field, ...]:
 
 
 _NODE = (
-    Message(128, "Identification", "type, versions and uptime").of(
-        u8("NodeType", "6: AraMiS star tracker"),
-        u8("InterfaceVersion", "of these tables"),
-        u8("FirmwareVersionMajor", "of the program"),
-        u8("FirmwareVersionMinor", "of the program"),
-        u16("RuntimeMilliseconds", "fraction of RuntimeSeconds", "ms"),
-        u16("RuntimeSeconds", "since power-up, wraps", "s"),
-    ),
+    IDENTIFICATION,
     Message(129, "ExtendedIdentification", "the unit and its traffic").of(
         u16("SerialNumber", "of the unit"),
         enum8("ResetCause", "why the program started", choices=codes.ResetCause),
@@ -75,12 +68,7 @@ _NODE = (
         u16("TlmCount", "answered telemetry, wraps"),
     ),
     Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(*flag_fields()),
-    Message(131, "TcmdProcessed", "pending telecommands, and the latest acknowledge").of(
-        u8("Processed", "1: all are done"),
-        u8("Waiting", "waiting telecommands"),
-        u8("Latest", "ID of the latest telecommand, accepted or not"),
-        enum8("Error", "its error code", choices=AckError),
-    ),
+    TCMD_PROCESSED,
     Message(132, "SensorStatus", "state of the star tracker").of(
         enum8("State", "state", choices=codes.SensorState),
         enum8("Catalogue", "its catalogue", choices=codes.CatalogueState),

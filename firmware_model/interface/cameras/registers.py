@@ -78,6 +78,10 @@ class CameraRegister:
             return (1 << (self.unit_bits * self.width)) - 1
         return sum(field.mask for field in self.fields)
 
+    def value(self, **fields: int) -> int:
+        """Value with the named bit fields set and all others 0."""
+        return sum(value << self.field(name).lsb for name, value in fields.items())
+
     def units(self, value: int) -> list[int]:
         """``value`` split by addresses, most significant part first."""
         part = (1 << self.unit_bits) - 1

@@ -19,6 +19,24 @@ NODE_FLAGS = {
     "TcmdRefused": "telecommand with an unknown ID, a wrong length or a parameter out of range",
 }
 
+IDENTIFICATION = Message(128, "Identification", "type, versions and uptime").of(
+    u8("NodeType", "type of node"),
+    u8("InterfaceVersion", "version of this interface"),
+    u8("FirmwareVersionMajor", "firmware version, major"),
+    u8("FirmwareVersionMinor", "firmware version, minor"),
+    u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
+    u16("RuntimeSeconds", "uptime, whole seconds, modulo 65536", "s"),
+)
+
+TCMD_PROCESSED = Message(
+    131, "TcmdProcessed", "pending telecommands and latest acknowledge"
+).of(
+    u8("Processed", "1: all are done"),
+    u8("Waiting", "waiting telecommands"),
+    u8("Latest", "ID of the latest telecommand, accepted or not"),
+    enum8("Error", "its error code", choices=AckError),
+)
+
 NODE_TELECOMMANDS = (
     Message(1, "Reset", "restart the program"),
     Message(2, "ClearErrorFlags", "lower all error flags"),
@@ -29,23 +47,13 @@ def node_telemetry(node_type: int, own_flags: Mapping[str, str]) -> tuple[Messag
     """Telemetry 128 to 131 of a node; its ``own_flags`` follow those of the link."""
     flags = {**NODE_FLAGS, **own_flags}
     return (
-        Message(128, "Identification", "type, versions and uptime").of(
-            u8("NodeType", f"always {node_type}", reset=node_type),
-            u8("InterfaceVersion", "of these tables"),
-            u8("FirmwareVersionMajor", "of the program"),
-            u8("FirmwareVersionMinor", "of the program"),
-            u16("RuntimeMilliseconds", "fraction of RuntimeSeconds", "ms"),
-            u16("RuntimeSeconds", "since power-up, wraps", "s"),
+        IDENTIFICATION.of(
+            u8("NodeType", f"always {node_type}", reset=node_type), *IDENTIFICATION.fields[1:]
         ),
         Message(130, "ErrorFlags", "errors since ClearErrorFlags").of(
             *flags_at((bit, name, flags[name], name) for bit, name in enumerate(flags))
         ),
-        Message(131, "TcmdProcessed", "whether all accepted telecommands are done").of(
-            u8("Processed", "1: all are done"),
-            u8("Waiting", "waiting telecommands"),
-            u8("Latest", "ID of the latest telecommand, accepted or not"),
-            enum8("Error", "its error code", choices=AckError),
-        ),
+        TCMD_PROCESSED,
     )
 
 

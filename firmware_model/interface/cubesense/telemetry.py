@@ -11,6 +11,7 @@ from functools import partial
 from cubestack.firmware_model.interface.codec.field import Field, byte_array, i16, u8, u16
 from cubestack.firmware_model.interface.codec.message import Confidence, Message
 from cubestack.firmware_model.interface.codec.node_codes import AckError
+from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.extensions import EXTENSIONS
 
@@ -75,13 +76,8 @@ def _mask(camera: codes.Camera) -> Message:
 
 
 _NODE = (
-    _high(128, "Identification", "type, versions and uptime").of(
-        u8("NodeType", "type of node"),
-        u8("InterfaceVersion", "version of this interface"),
-        u8("FirmwareVersionMajor", "firmware version, major"),
-        u8("FirmwareVersionMinor", "firmware version, minor"),
-        u16("RuntimeSeconds", "uptime, whole seconds", "s"),
-        u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
+    _high(128, "Identification", IDENTIFICATION.meaning).of(
+        *IDENTIFICATION.fields[:4], *reversed(IDENTIFICATION.fields[4:])
     ),
     _low(129, "SerialNumber", "serial number").of(
         byte_array(6, "SerialNumber", "ASCII; padded with zeros")

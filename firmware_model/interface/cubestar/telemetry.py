@@ -25,6 +25,7 @@ from cubestack.firmware_model.interface.codec.field import (
     u32,
 )
 from cubestack.firmware_model.interface.codec.message import Message
+from cubestack.firmware_model.interface.codec.node_messages import IDENTIFICATION
 from cubestack.firmware_model.interface.cubestar import codes
 from cubestack.firmware_model.interface.cubestar.flags import flag_fields
 
@@ -76,14 +77,7 @@ _QUATERNION = (
 )
 
 _NODE = (
-    Message(128, "Identification", "type, versions and uptime").of(
-        u8("NodeType", "type of node"),
-        u8("InterfaceVersion", "version of this interface"),
-        u8("FirmwareVersionMajor", "firmware version, major"),
-        u8("FirmwareVersionMinor", "firmware version, minor"),
-        u16("RuntimeMilliseconds", "uptime, part below one second", "ms"),
-        u16("RuntimeSeconds", "uptime, whole seconds, modulo 65536", "s"),
-    ),
+    IDENTIFICATION,
     Message(129, "ExtendedIdentification", "serial number and counters").of(
         u16("SerialNumber", "serial number"),
         _temperature("Temperature"),
