@@ -28,9 +28,7 @@ IDENTIFICATION = Message(128, "Identification", "type, versions and uptime").of(
     u16("RuntimeSeconds", "uptime, whole seconds, modulo 65536", "s"),
 )
 
-TCMD_PROCESSED = Message(
-    131, "TcmdProcessed", "pending telecommands and latest acknowledge"
-).of(
+TCMD_PROCESSED = Message(131, "TcmdProcessed", "pending telecommands and latest acknowledge").of(
     u8("Processed", "1: all are done"),
     u8("Waiting", "waiting telecommands"),
     u8("Latest", "ID of the latest telecommand, accepted or not"),
