@@ -57,11 +57,7 @@ _USE_CASES = (
         u32("Millisecond", "since that noon", "ms", high=MS_PER_DAY - 1),
     ),
     Message(4, "GetAttitude", "measure the attitude, lost in space; result: Attitude"),
-    Message(
-        5,
-        "GetAttitudeNearVector",
-        "measure the attitude near a direction; a length beyond 1 +- 0.1 is rejected",
-    ).of(
+    Message(5, "GetAttitudeNearVector", "measure the attitude near a vector of length 1 +- 0.1").of(
         *(
             f32(axis, f"{axis} of the boresight's inertial unit vector").within(
                 -1.1, 1.1, "DirectionError"
@@ -115,13 +111,7 @@ _EXTENSIONS = (
         u8("Gain", "factor", scale=8, reset=mt9m001.HIGHEST_GAIN).within(1, mt9m001.HIGHEST_GAIN)
     ),
     Message(104, "SetDetection", "search for stars").of(
-        u8(
-            "Sigmas",
-            "a bright pixel exceeds the mean by this many standard deviations",
-            scale=10,
-            high=20,
-            reset=2,
-        ),
+        u8("Sigmas", "threshold above the mean in standard deviations", scale=10, high=20, reset=2),
         enum8("Spikes", "how spikes are removed", choices=SpikeMethod, reset=SpikeMethod.CENTRE),
         u8("Needed", "bright pixels required in a window of 25", reset=13).within(1, 25),
         u16("MinPixels", "smallest star", "px", low=1, reset=1),
@@ -131,24 +121,10 @@ _EXTENSIONS = (
         ordered=(("MinPixels", "MaxPixels"),),
     ),
     Message(105, "SetIdentification", "identification of the stars").of(
-        u16("Noise", "noise of a centroid, per axis", "px", scale=1000, reset=0.151).within(
-            0.01, 10
-        ),
+        u16("Noise", "centroid's noise, per axis", "px", scale=1000, reset=0.151).within(0.01, 10),
         u8("Pivots", "largest number of pivot triangles", high=3, reset=3),
-        enum8(
-            "Verify",
-            "further stars must confirm the attitude; published: off",
-            choices=OnOff,
-            reset=OnOff.ON,
-        ),
-        u16(
-            "HintTolerance",
-            "a boresight farther from the rough direction is rejected",
-            "deg",
-            scale=100,
-            high=180,
-            reset=6,
-        ),
+        enum8("Verify", "further stars confirm; published: off", choices=OnOff, reset=OnOff.ON),
+        u16("HintTolerance", "largest error of the hint", "deg", scale=100, high=180, reset=6),
     ),
     Message(106, "SetField", "the lens").of(
         f32("FieldOfView", "across the image's height", "deg", reset=21.534639).within(5, 40),

@@ -37,13 +37,7 @@ _synced = partial(CameraRegister, needs_sync=True)
 _stored = partial(_synced, modelled=False)
 
 _REGISTERS = (
-    CameraRegister(
-        0x8100,
-        "MODE_SELECT",
-        0x00,
-        "enable and output depth; takes effect at once",
-        assumed="reset value",
-    ).of(
+    CameraRegister(0x8100, "MODE_SELECT", 0x00, "enable, output depth", assumed="reset value").of(
         BitField("ENABLE", 0, 1, "1 captures images, 0 is idle"),
         BitField(
             "OUTPUT_DEPTH",
@@ -107,28 +101,9 @@ _REGISTERS = (
         BitField("BARRIER_UPDATE", 6, 1, "with AUTO_DYNAMIC_RANGE"),
         BitField("AUTOVIEW", 7, 1, "updates the histogram remap"),
     ),
-    _synced(
-        0x8518,
-        "CLOCKS_PER_SECOND",
-        27_000_000,
-        "input clock in Hz on which FRAMES_PER_SECOND is based",
-        width=4,
-    ),
-    _synced(
-        0x851C,
-        "FRAMES_PER_SECOND",
-        30,
-        "frame rate in 1/s at an input clock of CLOCKS_PER_SECOND",
-        width=2,
-    ),
-    _synced(
-        0x8526,
-        "EXPOSURE",
-        512,
-        "exposure in line times of 1322 clocks",
-        width=2,
-        assumed="reset value",
-    ),
+    _synced(0x8518, "CLOCKS_PER_SECOND", 27_000_000, "clock of FRAMES_PER_SECOND in Hz", width=4),
+    _synced(0x851C, "FRAMES_PER_SECOND", 30, "at an input clock of CLOCKS_PER_SECOND", width=2),
+    _synced(0x8526, "EXPOSURE", 512, "lines of 1322 clocks", width=2, assumed="reset value"),
 )
 
 # Address 0101_100: image sensor zero.

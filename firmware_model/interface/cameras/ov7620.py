@@ -75,18 +75,12 @@ _REGISTERS = (
     CameraRegister(0x13, "COMMON_B", 0x01, "enable of the automatic functions").of(
         BitField("AUTO_ADJUST", 0, 1, "1 enables the automatic functions")
     ),
-    _stored(
-        0x14, "COMMON_C", 0x04, "size of the image", assumed="the model always sends full size"
-    ).of(BitField("QVGA", 5, 1, "1 sends 320 x 240 pixels")),
+    _stored(0x14, "COMMON_C", 0x04, "size of the image", assumed="the model sends full size").of(
+        BitField("QVGA", 5, 1, "1 sends 320 x 240 pixels")
+    ),
     CameraRegister(0x17, "HSTART", window_column(0), "first column of the window"),
     CameraRegister(0x18, "HSTOP", window_column(640), "column after the window"),
-    CameraRegister(
-        0x19,
-        "VSTART",
-        window_row(0),
-        "first row of the window",
-        assumed="reset value: the whole image",
-    ),
+    CameraRegister(0x19, "VSTART", window_row(0), "first row of the window", assumed="reset value"),
     CameraRegister(0x1A, "VSTOP", window_row(480), "row after the window"),
     CameraRegister(
         0x28,

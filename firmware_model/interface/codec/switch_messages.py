@@ -53,9 +53,7 @@ def switch_messages(
     value = u8("Value", "one of that switch's values", choices=any_value, reset=min(values[first]))
     effect = f"of the firmware from the next image on; {kept}"
     return (
-        Message(telecommand, SET_PROFILE, f"set every switch {effect}", extension=True).of(
-            settable
-        ),
+        Message(telecommand, SET_PROFILE, f"set a profile {effect}", extension=True).of(settable),
         Message(telecommand + 1, SET_SWITCH, f"set a switch {effect}", extension=True).of(
             switch, replace(value, choices_by=("Switch", of_switch))
         ),

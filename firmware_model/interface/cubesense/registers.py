@@ -68,9 +68,7 @@ _COMMON = (
         ),
     ),
     PointerRegister(0x14, _RW, u8("NADIR_SEARCH", "search method", choices=codes.NadirSearch)),
-    PointerRegister(
-        0x30, _RO, u8("OVER_CURRENT", "over-current: bit 0 SRAM1, bit 1 SRAM2", high=3)
-    ),
+    PointerRegister(0x30, _RO, u8("OVER_CURRENT", "bit 0: SRAM1 cut off, bit 1: SRAM2", high=3)),
     PointerRegister(0x60, _RO, byte_array(codes.IMAGE_BYTES, "IMAGE", "640 x 480 px by row")),
 )
 

@@ -52,9 +52,7 @@ def _of_camera(camera: codes.Camera) -> tuple[Message, ...]:
             f"AutoAdjust{number}",
             f"automatic exposure and gain of camera {number}, {name}",
         ).of(u8("Enabled", "1: the camera adjusts itself", high=1)),
-        _high(
-            43 + 2 * camera, f"CameraSettings{number}", f"settings of camera {number}, {name}"
-        ).of(
+        _high(43 + 2 * camera, f"CameraSettings{number}", f"set-up of camera {number}, {name}").of(
             u16("Exposure", "in two lines, 127 us; at most 255 are used", reset=_EXPOSURES[camera]),
             u8("Gain", "amplification; the camera gets at most 63"),
             u8("BlueGain", "gain of the blue channel", reset=0x80),

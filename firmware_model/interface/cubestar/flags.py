@@ -36,12 +36,7 @@ _FLAGS = (
     ErrorFlag(19, "I2C_TCMD_TooManyparm", "telecommand with too many parameter bytes"),
     ErrorFlag(24, "SPICommsError", "error on an SPI bus", never="there is no SPI bus"),
     ErrorFlag(25, "StatusError", "a step was requested before its input existed"),
-    ErrorFlag(
-        26,
-        "ISSetupError",
-        "the image sensor did not acknowledge its set-up or a register access",
-        "ISsetupError",
-    ),
+    ErrorFlag(26, "ISSetupError", "the image sensor did not acknowledge an access", "ISsetupError"),
     ErrorFlag(27, "TestPatternConfigError", "unknown test pattern", "TestpatternConfigError"),
     ErrorFlag(28, "ImageCaptureError", "no whole image arrived in time"),
     ErrorFlag(29, "ISDisableError", "the image sensor did not acknowledge being disabled"),

@@ -44,24 +44,14 @@ _SYSTEM = (
 
 _OPTICS = (
     Message(7, "Exposure", "exposure of the image sensor").of(
-        u16(
-            "exposure", "line times (132.2 us at 10 MHz); 0: the longest at the frame rate", "lines"
-        )
+        u16("exposure", "line times (132.2 us at 10 MHz); 0: longest at the frame rate", "lines")
     ),
-    Message(
-        8,
-        "setFocalLength",
-        "focal length that converts undistorted pixels to unit vectors (pixel pitch 5.6 um)",
-    ).of(
+    Message(8, "setFocalLength", "focal length for unit vectors, at a pixel pitch of 5.6 um").of(
         f32("FocalLength", "focal length", "mm", reset=6.28).within(
             5.0, 7.0, "FocalLengthRangeError"
         )
     ),
-    Message(
-        9,
-        "setFocalLengthComponents",
-        "focal lengths that normalise distorted pixels in the distortion model",
-    ).of(
+    Message(9, "setFocalLengthComponents", "focal lengths of the distortion model, x and y").of(
         _focal_length("Fx", "along the rows", 1147.5),
         _focal_length("Fy", "along the columns", 1147.4),
     ),
@@ -96,15 +86,9 @@ _OPTICS = (
 )
 
 _IMAGE = (
-    Message(
-        13,
-        "WriteTo_IS_Register",
-        "write an image sensor register on the page that SetCameraRegisterPage selects",
-    ).of(
+    Message(13, "WriteTo_IS_Register", "write an image sensor register on the selected page").of(
         u8("Reg", "low byte of the register's address"),
-        u8("DataH", "must be 0: the sensor's registers have 8 bits").within(
-            None, 0, "ISSetupError"
-        ),
+        u8("DataH", "must be 0: registers have 8 bits").within(None, 0, "ISSetupError"),
         u8("DataL", "value to write"),
     ),
     Message(
@@ -145,21 +129,13 @@ _IMAGE = (
             reset=codes.ImageBlockSize.BYTES_128,
         ),
     ),
-    Message(
-        19,
-        "StreamDownImage",
-        "send the whole image as telemetry ImageBlock frames, 128 bytes each, without requests",
-    ),
+    Message(19, "StreamDownImage", "send the whole image as ImageBlock frames, unrequested"),
 )
 
 _LATER = "; published: {} of a 1280 x 1024 sensor, not mapped; more is rejected"
 
 _DETECTION = (
-    Message(
-        20,
-        "setDetectionRegion",
-        "part of this sensor's 1024 x 512 pixels that is searched, both ends included",
-    ).of(
+    Message(20, "setDetectionRegion", "searched part of the 1024 x 512 pixels, ends included").of(
         u8(
             "StepSize", "sample every n-th pixel of every n-th row; 0 acts as 1", "px", reset=3
         ).within(None, 10, "ValidImageRangeSetError"),
@@ -175,9 +151,7 @@ _DETECTION = (
     ),
     Message(22, "setStarPixels", "number of pixels of a star").of(
         u8("MinPixels", "fewer are noise", "px", reset=6).within(1, 100, "StarPixSetError"),
-        u8("MaxPixels", "more are an invalid star", "px", reset=60).within(
-            1, 100, "StarPixSetError"
-        ),
+        u8("MaxPixels", "more are invalid", "px", reset=60).within(1, 100, "StarPixSetError"),
         ordered=(("MinPixels", "MaxPixels"),),
     ),
     Message(23, "setDetectionVariables", "centroiding window, and limits that end the search").of(

@@ -307,9 +307,7 @@ _ATTITUDE = (
 )
 
 _LOG = (
-    Message(173, "DelayTime", "from Trigger to first capture").of(
-        u8("Timeout", "delay", "x 10 ms")
-    ),
+    Message(173, "DelayTime", "Trigger to first capture").of(u8("Timeout", "delay", "x 10 ms")),
     Message(174, "LogStatus", "state and errors in one frame").of(
         _temperature("Temp"),
         u32("Runtime", "uptime", "s"),
