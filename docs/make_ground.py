@@ -45,7 +45,7 @@ def draw(page: Page) -> None:
     """Capture an image, and take both screenshots."""
     page.set_default_timeout(WAIT_MS)
     page.click("nav >> text=CubeStar")
-    page.wait_for_selector("#scene-told >> text=/camera/")
+    page.wait_for_selector("#scene-status >> text=/camera/")
     page.fill("#line", "write CaptureAndProcess")
     page.press("#line", "Enter")
     page.wait_for_selector("#loop >> text=/CALCULATED/")

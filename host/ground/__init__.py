@@ -1,4 +1,4 @@
-"""Pages and programs that look at a sensor and steer it, by HTTP."""
+"""The page in the browser, and the control port."""
 
 from importlib.util import find_spec
 

@@ -1,6 +1,6 @@
-"""The control port's language: JSON over HTTP, and a WebSocket that tells how the emulation is.
+"""The control port: JSON over HTTP, and a WebSocket with the state of the emulation.
 
-Every call is declared once in `CALLS`; GET / lists them with what they take.
+`CALLS` declares all calls with their arguments; ``GET /`` lists them.
 """
 
 import asyncio
@@ -31,22 +31,20 @@ from cubestack.host.pictures.images import png
 T = TypeVar("T")
 
 EVERY_S, SHORTEST_S, LONGEST_S = 0.2, 0.05, 60.0
-"""Between two messages of `events`, unless the client wants another time; and its limits."""
+"""Default, lowest and highest interval between two messages of ``/events``."""
 
 REQUIRED = object()
 
 
 @dataclass(frozen=True)
 class Call:
-    """Something that can be asked for.
+    """A call of the control port.
 
     Attributes:
         method, path: of the request.
         meaning: one phrase.
-        act: (emulation, values of path and body) -> the answer, in the emulation's thread; a
-            future is waited for.
-        takes: types of the body's members by name, or of the numbers behind a GET's path; each
-            with its default, or `REQUIRED`.
+        act: (emulation, arguments) -> the answer, or a future; runs in the emulation's thread.
+        takes: type and default, or `REQUIRED`, of each member of the body or number in the query.
     """
 
     method: str
@@ -61,30 +59,39 @@ class Call:
         )
 
     def values(self, body: object) -> JsonObject:
-        """Members of a request's body; ValueError for what is missing, unknown or another type."""
+        """Arguments from a request's body; raises ValueError for an invalid one."""
         if not isinstance(body, dict):
-            raise ValueError(f"the body is a JSON object with {', '.join(self.takes) or 'nothing'}")
+            raise ValueError(
+                f"the body must be a JSON object with {', '.join(self.takes) or 'nothing'}"
+            )
         for name in body:
             if name not in self.takes:
-                known = ", ".join(self.takes) or "nothing"
-                raise ValueError(f"{name!r} means nothing to {self.path}; it takes {known}")
-        found = {}
+                known = ", ".join(self.takes) or "none"
+                raise ValueError(f"{self.path} has no member {name!r}; known: {known}")
+        values = {}
         for name, (types, default) in self.takes.items():
             if name not in body and default is REQUIRED:
                 raise ValueError(f"{self.path} needs {name!r}")
             value = body.get(name, default)
             if not isinstance(value, types) or (isinstance(value, bool) and types is not bool):
-                raise ValueError(f"{name!r} of {self.path} can not be {value!r}")
-            found[name] = value
-        return found
+                raise ValueError(f"{name!r} of {self.path} must be {KINDS[types]}, not {value!r}")
+            values[name] = value
+        return values
 
 
 NUMBER = (int, float)
 
+TIME_OR_NAME = (int, float, str)
+
+KINDS: Mapping[type | tuple[type, ...], str] = {
+    **{int: "an integer", NUMBER: "a number", TIME_OR_NAME: "a number or a text"},
+    **{str: "a text", list: "a list", dict: "an object"},
+}
+
 
 def _words(value: list[Any]) -> list[str]:
     if not all(isinstance(word, str) for word in value):
-        raise ValueError("'words' are texts")
+        raise ValueError("'words' must be texts")
     return value
 
 
@@ -93,78 +100,82 @@ def _act(emulation: Emulation, device: str, words: list[Any], text: str) -> Json
     return emulation.state()
 
 
-def _done(act: Callable[[Emulation], None]) -> Callable[[Emulation], JsonObject]:
-    def acts(emulation: Emulation) -> JsonObject:
+def _then_state(act: Callable[[Emulation], None]) -> Callable[[Emulation], JsonObject]:
+    def call(emulation: Emulation) -> JsonObject:
         act(emulation)
         return emulation.state()
 
-    return acts
+    return call
 
 
 def _pace(emulation: Emulation, pace: str, speed: float) -> JsonObject:
     if pace not in ("real", "fast"):
-        raise ValueError(f"a pace is real or fast, not {pace!r}")
+        raise ValueError(f"pace must be real or fast, not {pace!r}")
     emulation.set_pace(pace, speed)  # type: ignore[arg-type]
     return emulation.state()
 
 
 CALLS = (
-    Call("GET", "/state", "time, pace, and how each device is", Emulation.state),
-    Call("POST", "/pause", "hold virtual time", _done(Emulation.pause)),
-    Call("POST", "/resume", "let it go on", _done(Emulation.resume)),
+    Call("GET", "/state", "time, pace, and state of each device", Emulation.state),
+    Call("POST", "/pause", "hold virtual time", _then_state(Emulation.pause)),
+    Call("POST", "/resume", "resume virtual time", _then_state(Emulation.resume)),
     Call(
-        *("POST", "/step", "let so many events happen, then hold"),
+        *("POST", "/step", "run a number of events, then hold"),
         lambda emulation, events: {"events": emulation.step(events)},
         {"events": (int, 1)},
     ),
     Call(
-        *("POST", "/run", "go on to a virtual time as fast as it gets, then hold"),
+        *("POST", "/run", "run to a virtual time as fast as possible, then hold"),
         lambda emulation, to_s: emulation.run_to(to_s),
         {"to_s": (NUMBER, REQUIRED)},
     ),
     Call(
-        *("POST", "/snapshot", "remember now by a name, to go back to"),
-        lambda emulation, name: _done(lambda one: one.snapshot(name))(emulation),
+        *("POST", "/snapshot", "save the current time under a name"),
+        lambda emulation, name: _then_state(lambda one: one.snapshot(name))(emulation),
         {"name": (str, REQUIRED)},
     ),
     Call(
-        *("POST", "/back", "go back to a time or a snapshot, and hold there"),
+        *("POST", "/back", "go back to a time or a snapshot, then hold"),
         lambda emulation, to: emulation.back(to),
-        {"to": ((int, float, str), REQUIRED)},
+        {"to": (TIME_OR_NAME, REQUIRED)},
     ),
     Call(
-        *("POST", "/pace", "real: speed virtual seconds a second; fast: ahead while there is work"),
+        *(
+            "POST",
+            "/pace",
+            "real: speed virtual seconds per second; fast: ahead while devices work",
+        ),
         _pace,
         {"pace": (str, "real"), "speed": (NUMBER, 1.0)},
     ),
-    Call("GET", "/devices/{device}", "ports, faults and channels that it has", Emulation.about),
+    Call("GET", "/devices/{device}", "its ports, faults and supply channels", Emulation.about),
     Call(
-        *("GET", "/devices/{device}/log", "what faults have done, from line `since` on"),
+        *("GET", "/devices/{device}/log", "log of faults, from line `since` on"),
         lambda emulation, device, since: emulation.log(device, int(since)),
         {"since": (NUMBER, 0)},
     ),
-    Call("GET", "/devices/{device}/pictures", "those in its memories", Emulation.pictures),
-    Call("GET", "/devices/{device}/pictures/{name}", "one, as PNG", Emulation.picture),
-    Call("GET", "/devices/{device}/recording", "what passed its ports", Emulation.recording),
+    Call("GET", "/devices/{device}/pictures", "images in its memories", Emulation.pictures),
+    Call("GET", "/devices/{device}/pictures/{name}", "an image, as PNG", Emulation.picture),
+    Call("GET", "/devices/{device}/recording", "recording of its ports", Emulation.recording),
     Call(
-        *("GET", "/devices/{device}/trace", "a VCD file of a span, done again beside"),
+        *("GET", "/devices/{device}/trace", "VCD file of a past time span"),
         lambda emulation, device, from_s, to_s: emulation.trace(device, from_s, to_s),
         {"from_s": (NUMBER, REQUIRED), "to_s": (NUMBER, REQUIRED)},
     ),
-    Call("GET", "/devices/{device}/scene", "what its cameras see, as a file's", Emulation.scene),
+    Call("GET", "/devices/{device}/scene", "current scene, as a table", Emulation.scene),
     Call("GET", "/devices/{device}/scene/keys", "keys of scene files", Emulation.scene_keys),
     Call(
-        *("POST", "/devices/{device}/scene/look", "where on the sky another scene would be"),
+        *("POST", "/devices/{device}/scene/look", "position of another scene on the sky"),
         lambda emulation, device, table: emulation.look(device, table),
         {"table": (dict, REQUIRED)},
     ),
     Call(
-        *("GET", "/stars", "stars of the catalogue, the brightest first"),
+        *("GET", "/stars", "stars of the catalogue, brightest first"),
         lambda _emulation, mag_limit, epoch: stars(mag_limit, epoch),
         {"mag_limit": (NUMBER, 4.0), "epoch": (NUMBER, 2026.0)},
     ),
     Call(
-        *("POST", "/devices/{device}/act", "what the shell's fault, scene and power do"),
+        *("POST", "/devices/{device}/act", "the shell's commands fault, scene and power"),
         _act,
         {"words": (list, REQUIRED), "text": (str, "")},
     ),
@@ -177,16 +188,16 @@ def control_app(emulation: Emulation) -> Starlette:
     ]
 
     async def about(_request: Request) -> Response:
-        told = {"cubestack": version("cubestack"), "calls": [call.about() for call in CALLS]}
-        told["devices"] = [one.device.name for one in emulation.emulated]
-        return JSONResponse(told)
+        content = {"cubestack": version("cubestack"), "calls": [call.about() for call in CALLS]}
+        content["devices"] = [one.device.name for one in emulation.emulated]
+        return JSONResponse(content)
 
     async def events(socket: WebSocket) -> None:
         await _events(emulation, socket)
 
     return Starlette(
         routes=[Route("/", about), *routes, WebSocketRoute("/events", events)],
-        exception_handlers={HTTPException: _not_there, Exception: _broken},
+        exception_handlers={HTTPException: _http_error, Exception: _internal_error},
     )
 
 
@@ -195,21 +206,21 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
         body = await request.body()
         given = json.loads(body) if body else _query(request, call)
         values = call.values(given) | request.path_params
-        found = await _asked(emulation, partial(call.act, emulation, **values))
-        if isinstance(found, Future):
-            await asyncio.wrap_future(found)
-            found = await _asked(emulation, emulation.state)
-        if isinstance(found, np.ndarray):
-            return Response(await asyncio.to_thread(png, found), media_type="image/png")
-        if isinstance(found, Trace):
-            return Response(await asyncio.to_thread(found.make), media_type="text/plain")
-        if isinstance(found, tuple):
-            return Response(await asyncio.to_thread(_start_of, *found), media_type="text/plain")
-        return JSONResponse(found)
+        answer = await _in_emulation(emulation, partial(call.act, emulation, **values))
+        if isinstance(answer, Future):
+            await asyncio.wrap_future(answer)
+            answer = await _in_emulation(emulation, emulation.state)
+        if isinstance(answer, np.ndarray):
+            return Response(await asyncio.to_thread(png, answer), media_type="image/png")
+        if isinstance(answer, Trace):
+            return Response(await asyncio.to_thread(answer.render), media_type="text/plain")
+        if isinstance(answer, tuple):
+            return Response(await asyncio.to_thread(_start_of, *answer), media_type="text/plain")
+        return JSONResponse(answer)
     except TooLargeError as error:
         return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        return refused(f"the body is no JSON: {error}", HTTPStatus.BAD_REQUEST)
+        return refused(f"the body is not valid JSON: {error}", HTTPStatus.BAD_REQUEST)
     except ValueError as error:
         return refused(str(error), HTTPStatus.BAD_REQUEST)
     except RuntimeError as error:
@@ -217,59 +228,59 @@ async def _answer(emulation: Emulation, call: Call, request: Request) -> Respons
 
 
 def _query(request: Request, call: Call) -> JsonObject:
-    """What a GET has behind its path: numbers; ValueError for what is none."""
+    """Numbers in the query of a GET; raises ValueError for other values."""
     given = request.query_params if call.method == "GET" else {}
     return {name: float(value) for name, value in given.items() if name in call.takes}
 
 
 def _start_of(path: Path, count: int) -> bytes:
-    """The first ``count`` bytes of a file that gets longer."""
+    """The first ``count`` bytes of a growing file."""
     with path.open("rb") as stream:
         return stream.read(count)
 
 
-async def _asked(emulation: Emulation, act: Callable[[], T]) -> T:
+async def _in_emulation(emulation: Emulation, act: Callable[[], T]) -> T:
     return await asyncio.wrap_future(emulation.port.call(act))
 
 
 async def _events(emulation: Emulation, socket: WebSocket) -> None:
-    """Tell how it is, again and again, and what faults have done since."""
+    """Send the state and new lines of the fault logs until the client disconnects."""
     try:
         every_s = float(socket.query_params.get("every_s", EVERY_S))
     except ValueError:
         every_s = EVERY_S
     every_s = min(max(every_s, SHORTEST_S), LONGEST_S) if every_s == every_s else EVERY_S
     await socket.accept()
-    gone = asyncio.create_task(_until_gone(socket))
-    told = dict.fromkeys((one.device.name for one in emulation.emulated), 0)
+    closed = asyncio.create_task(_until_closed(socket))
+    sent = dict.fromkeys((one.device.name for one in emulation.emulated), 0)
 
     def look() -> JsonObject:
-        logs = {name: emulation.log(name, since) for name, since in told.items()}
-        told.update({name: log["count"] for name, log in logs.items()})
+        logs = {name: emulation.log(name, since) for name, since in sent.items()}
+        sent.update({name: log["count"] for name, log in logs.items()})
         lines = {name: log["log"] for name, log in logs.items() if log["log"]}
         return {"state": emulation.state(), **({"log": lines} if lines else {})}
 
     try:
-        while not gone.done():
-            await socket.send_json(await _asked(emulation, look))
-            await asyncio.wait([gone], timeout=every_s)
-    except (WebSocketDisconnect, RuntimeError):  # the client has gone, or the emulation
+        while not closed.done():
+            await socket.send_json(await _in_emulation(emulation, look))
+            await asyncio.wait([closed], timeout=every_s)
+    except (WebSocketDisconnect, RuntimeError):  # the client disconnected, or the emulation ended
         pass
     finally:
-        gone.cancel()
+        closed.cancel()
 
 
-async def _until_gone(socket: WebSocket) -> None:
+async def _until_closed(socket: WebSocket) -> None:
     while (await socket.receive())["type"] != "websocket.disconnect":
         pass
 
 
-async def _broken(_request: Request, error: Exception) -> Response:
-    told = f"{type(error).__name__}: {error}"
-    return refused(f"this is a mistake of ours: {told}", HTTPStatus.INTERNAL_SERVER_ERROR)
+async def _internal_error(_request: Request, error: Exception) -> Response:
+    text = f"internal error: {type(error).__name__}: {error}"
+    return refused(text, HTTPStatus.INTERNAL_SERVER_ERROR)
 
 
-async def _not_there(_request: Request, error: Exception) -> Response:
+async def _http_error(_request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     known = ", ".join(sorted({call.path for call in CALLS}))
-    return refused(f"{error.detail}: there is {known}", HTTPStatus(error.status_code))
+    return refused(f"{error.detail}; known: {known}", HTTPStatus(error.status_code))

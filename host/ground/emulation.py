@@ -1,4 +1,4 @@
-"""What a program can see and do of a running emulation, as JSON has it."""
+"""State and actions of a running emulation, as JSON for the control port."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,14 +30,14 @@ JsonObject = dict[str, Any]
 
 @dataclass
 class Emulation:
-    """Devices that share one virtual time. Everything but ``port`` is for the emulation's thread.
+    """Devices that share one virtual time. Only ``port`` may be used in other threads.
 
     Attributes:
-        port: by which its thread is reached.
+        port: runs calls in the emulation's thread.
         emulated: the devices.
-        ports: of each device, where its serial lines are served.
-        past: what was done to them, by which one can go back; or why there is none.
-        bench: where waveforms of that are made.
+        ports: addresses of each device's serial lines.
+        past: their history, to go back in time; or why there is none.
+        bench: renders waveforms of the history.
     """
 
     port: "ControlPort"
@@ -48,19 +48,16 @@ class Emulation:
 
     def __post_init__(self) -> None:
         self._snapshots: dict[str, int] = {}
-        self._look_anew()
+        self._reset_views()
 
-    def _look_anew(self) -> None:
-        self._known: dict[tuple[str, str], int] = {}
-        self._changes: dict[tuple[str, str], float] = {}
+    def _reset_views(self) -> None:
+        self._checksums: dict[tuple[str, str], int] = {}
+        self._changed_s: dict[tuple[str, str], float] = {}
 
-        made = (
-            map(EmulatedControls, self.emulated)
-            if isinstance(self.past, str)
-            else self.past.controls()
-        )
-        names = (one.device.name for one in self.emulated)
-        self._controls = dict(zip(names, made, strict=True))
+        past, emulated = self.past, self.emulated
+        controls = map(EmulatedControls, emulated) if isinstance(past, str) else past.controls()
+        names = (one.device.name for one in emulated)
+        self._controls = dict(zip(names, controls, strict=True))
 
     def state(self) -> JsonObject:
         scheduler = self.port.scheduler
@@ -86,7 +83,7 @@ class Emulation:
         }
 
     def about(self, device: str) -> JsonObject:
-        """What there is of one device; TargetError for one that there is not."""
+        """Options, ports and faults of a device; raises TargetError for an unknown one."""
         one, controls = self._of(device), self._controls[device]
         return {
             "title": one.device.title,
@@ -105,28 +102,28 @@ class Emulation:
         }
 
     def log(self, device: str, since: int = 0) -> JsonObject:
-        """What faults have done, from line ``since`` on; and how many lines there are."""
+        """Fault log from line ``since`` on, and its number of lines."""
         self._of(device)
         lines = self._controls[device].fault_log()
         return {"log": lines[max(0, since) :], "count": len(lines)}
 
     def pictures(self, device: str) -> JsonObject:
-        """Pictures in its memories, and when each was found to be another one than before."""
+        """Images in its memories, and when a change of each was first detected."""
         found = {}
         for name, picture in self._of(device).board.pictures().items():
             key, known = (device, name), crc32(picture.tobytes())
-            if self._known.get(key) != known:
-                self._known[key] = known
-                self._changes[key] = self.port.kernel.now / PS_PER_S
+            if self._checksums.get(key) != known:
+                self._checksums[key] = known
+                self._changed_s[key] = self.port.kernel.now / PS_PER_S
             rows, columns = picture.shape
-            found[name] = {"rows": rows, "columns": columns, "changed_s": self._changes[key]}
+            found[name] = {"rows": rows, "columns": columns, "changed_s": self._changed_s[key]}
         return {"pictures": found}
 
     def picture(self, device: str, name: str) -> NDArray[np.uint8]:
-        """A copy of one of them; TargetError for one that there is not."""
+        """A copy of the image; raises TargetError for an unknown one."""
         pictures = self._of(device).board.pictures()
         if name not in pictures:
-            raise TargetError(f"no picture {name!r}; there is {', '.join(pictures) or 'none'}")
+            raise TargetError(f"no image {name!r}; known: {', '.join(pictures) or 'none'}")
         return pictures[name].copy()
 
     def scene_keys(self, device: str) -> JsonObject:
@@ -139,13 +136,13 @@ class Emulation:
         return scenes.look(self._of(device), table)
 
     def act(self, device: str, words: Sequence[str], text: str = "") -> None:
-        """Do what the shell does with such words; ``text`` of a file that they name.
+        """Execute a shell command; ``text`` is the content of the file that it names.
 
-        Raises ValueError for what makes no sense.
+        Raises ValueError for an invalid command, RuntimeError while going back in time.
         """
         self._of(device)
         if not isinstance(self.past, str) and self.past.again:
-            raise RuntimeError("it goes back: wait until it is there")
+            raise RuntimeError("the emulation is going back in time; wait until it arrives")
         self._controls[device].act(Control(self.port.kernel.now, tuple(words), text))
 
     def pause(self) -> None:
@@ -155,64 +152,65 @@ class Emulation:
         self.port.resume()
 
     def step(self, events: int) -> int:
-        """Let so many events happen; returns how many did."""
+        """Run ``events`` events; returns the number that ran."""
         return self.port.step(events)
 
     def run_to(self, to_s: float) -> "Future[int]":
-        """Go on to a time, as fast as it gets, and hold there; when it is there."""
+        """Run to a time as fast as possible and hold; done on arrival."""
         if not 0 <= to_s <= LATEST_S:
-            raise ValueError(f"a time is 0 to {LATEST_S:g} s, not {to_s:g}")
+            raise ValueError(f"to_s must be 0 to {LATEST_S:g} s, not {to_s:g}")
         return self.port.run_to(round(to_s * PS_PER_S))
 
     def snapshot(self, name: str) -> None:
-        """Remember now as ``name``, to go back to."""
+        """Save the current time as ``name``."""
         self._recorded()
         if len(self._snapshots) >= MOST_SNAPSHOTS and name not in self._snapshots:
-            raise ValueError(f"{MOST_SNAPSHOTS} snapshots are kept at most")
+            raise ValueError(f"at most {MOST_SNAPSHOTS} snapshots are possible")
         self._snapshots[name] = self.port.kernel.now
 
     def back(self, to: float | str) -> "Future[int]":
-        """Go back to a time in s, or to a snapshot, and hold there; when it is there.
+        """Go back to a time in s or a snapshot, and hold; done on arrival.
 
-        All that was done by then is done again, as fast as it gets; ValueError for a time that was
-        not yet.
+        It replays the history as fast as possible. Raises ValueError for a future time.
         """
         past = self._recorded()
         if isinstance(to, str):
             if to not in self._snapshots:
                 known = ", ".join(self._snapshots) or "none"
-                raise ValueError(f"no snapshot {to!r}; there are {known}")
+                raise ValueError(f"no snapshot {to!r}; known: {known}")
             to_ps = self._snapshots[to]
         else:
             to_ps = round(to * PS_PER_S) if 0 <= to <= LATEST_S else -1
         now_ps = self.port.kernel.now
         if not 0 <= to_ps <= now_ps:
-            raise ValueError(f"back is 0 to {now_ps / PS_PER_S:.6f} s, which it is now, not {to}")
+            raise ValueError(
+                f"to must be 0 to {now_ps / PS_PER_S:.6f} s, the current time, not {to}"
+            )
         self.port.pause()
         past.begin_again(to_ps)
-        self._look_anew()
+        self._reset_views()
         self._snapshots = {name: ps for name, ps in self._snapshots.items() if ps <= to_ps}
         arrived = self.port.run_to(to_ps)
         arrived.add_done_callback(lambda _arrived: past.arrive())
         return arrived
 
     def recording(self, device: str) -> tuple[Path, int]:
-        """The file with all that passed a device's ports, and how long it is by now."""
+        """The recording of a device's ports, and its current size in bytes."""
         one, past = self._of(device), self._recorded()
         path = past.file(self.emulated.index(one))
         return path, path.stat().st_size
 
     def trace(self, device: str, from_s: float, to_s: float) -> Trace:
-        """A waveform of a span of time up to now; ValueError for another span."""
+        """A waveform of a past time span; raises ValueError for an invalid span."""
         now_s = self.port.kernel.now / PS_PER_S
         if not 0 <= from_s < to_s <= now_s or to_s - from_s > TRACE_S:
-            span = f"at most {TRACE_S:g} s of the time up to now, {now_s:.6f} s"
-            raise ValueError(f"a waveform has {span}, not {from_s:g} to {to_s:g} s")
+            span = f"at most {TRACE_S:g} s long and before the current time, {now_s:.6f} s"
+            raise ValueError(f"a waveform must be {span}, not {from_s:g} to {to_s:g} s")
         return Trace(self.bench, *self.recording(device), from_s, to_s)
 
     def _recorded(self) -> "History":
         if isinstance(self.past, str):
-            raise TargetError(f"there is no way back: {self.past}")
+            raise TargetError(f"no way back: {self.past}")
         return self.past
 
     def set_pace(self, pace: Literal["real", "fast"], speed: float) -> None:
@@ -223,11 +221,11 @@ class Emulation:
             if one.device.name == name:
                 return one
         known = ", ".join(one.device.name for one in self.emulated)
-        raise TargetError(f"no device {name!r} is emulated here; there is {known}")
+        raise TargetError(f"no device {name!r} is emulated here; known: {known}")
 
 
 def _columns(truths: Mapping[str, NDArray[np.float64]]) -> dict[str, float | None]:
-    """What is true, by the columns in which a log has what was measured."""
+    """Truth values by the column names of the results."""
     found: dict[str, float | None] = {}
     for name, truth in truths.items():
         if truth.size == ATTITUDE:
@@ -239,9 +237,9 @@ def _columns(truths: Mapping[str, NDArray[np.float64]]) -> dict[str, float | Non
 
 
 ATTITUDE, ANGLES = 4, ("alpha", "beta")
-"""Numbers of an attitude; what the two of a direction are called."""
+"""Size of an attitude's truth; names of the angles of a direction."""
 
 MOST_SNAPSHOTS = 100
 
 LATEST_S = 1e8
-"""Virtual time that can be run to: three years."""
+"""Latest virtual time: three years."""

@@ -1,4 +1,4 @@
-"""Emulations that a page starts for itself: each a process of `cubestack emulate`."""
+"""Emulations that the page starts, each a process of `cubestack emulate`."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -22,16 +22,16 @@ from cubestack.host.targets import Target, open_target
 _CONTROL = re.compile(r"control on (\S+), token ")
 _SERVES = re.compile(r" serves on (tcp://\S+) ")
 _ADDRESS = re.compile(r"(@0x[0-9a-fA-F]{1,8})?")
-_STRANGE = re.compile(r"[^\w.-]+")
+_UNSAFE = re.compile(r"[^\w.-]+")
 
 JsonObject = dict[str, Any]
 
 
 class Emulator:
-    """Emulations of one device, one after the other.
+    """Starts a device's emulation, and replaces it on request.
 
     Attributes:
-        options: those of `cubestack emulate` that the one was started with which runs; by name.
+        options: of `cubestack emulate` for the running emulation, by name.
     """
 
     def __init__(self, device: str, options: Mapping[str, Any]) -> None:
@@ -40,52 +40,50 @@ class Emulator:
         self._first_scene: JsonObject | None = None
 
     def start(self) -> Target:
-        """Start the first one; PortOpenError with what it said when it does not start."""
+        """Start the first emulation; raises PortOpenError with its output if it does not start."""
         target = self._running.enter_context(emulated(self._device.name, words(self.options)))
         self._first_scene = _scene(target)
         return target
 
     def restart(
-        self, target: Target, options: Mapping[str, Any], files: Mapping[str, "SentFile"]
+        self, target: Target, options: Mapping[str, Any], files: Mapping[str, "UploadedFile"]
     ) -> tuple[Target, Callable[[], None]]:
-        """Start another one in place of the one behind ``target``, which runs on until then.
-
-        Scene and seed are those of the one before: the scene that its cameras see by now.
+        """Start a new emulation with the seed and the current scene of the running one.
 
         Args:
-            target: of the one that runs.
-            options: of the device's board, by name; those that are left out are as usual.
-            files: contents of files that options name.
+            target: of the running emulation.
+            options: of the device's board, by name; others have their default.
+            files: uploaded files by option.
 
         Returns:
-            The new target, and what ends the one before.
+            The new target, and a function that ends the previous emulation.
 
         Raises:
-            ValueError: for options that make no sense.
-            PortOpenError: with what it said when it does not start.
+            ValueError: for invalid options.
+            PortOpenError: with its output if it does not start.
         """
         chosen = self._checked(options, files)
-        # To the end, as an emulation that goes back reads its files again.
+        # Kept until ``close``: an emulation reads its files again to go back in time.
         folder = Path(self._folders.enter_context(TemporaryDirectory(prefix="cubestack-")))
-        for name, sent in files.items():
-            chosen[name] = sent.written(folder)
+        for name, file in files.items():
+            chosen[name] = file.save(folder)
         scene = _scene(target)
         if scene is not None and scene != self._first_scene:
             chosen["scene"] = str(folder / "scene.toml")
             Path(chosen["scene"]).write_text(text_of(scene), "utf-8")
         with ExitStack() as stack:
-            made = stack.enter_context(emulated(self._device.name, words(chosen)))
+            started = stack.enter_context(emulated(self._device.name, words(chosen)))
             before, self._running = self._running, stack.pop_all()
-        self.options, self._first_scene = chosen, _scene(made)
-        return made, before.close
+        self.options, self._first_scene = chosen, _scene(started)
+        return started, before.close
 
     def close(self) -> None:
-        """End the one that runs, and forget all files."""
+        """End the emulation and delete uploaded files."""
         self._running.close()
         self._folders.close()
 
     def rows(self, chosen: Mapping[str, str]) -> list[JsonObject]:
-        """Its options for a form; ``chosen`` is what the running one says that it has."""
+        """Its options for a form; ``chosen`` are those that the running emulation reports."""
         return [self._row(one, chosen) for one in self._device.all_options]
 
     def _row(self, option: BoardOption, chosen: Mapping[str, str]) -> JsonObject:
@@ -103,15 +101,15 @@ class Emulator:
         }
 
     def _checked(
-        self, options: Mapping[str, Any], files: Mapping[str, "SentFile"]
+        self, options: Mapping[str, Any], files: Mapping[str, "UploadedFile"]
     ) -> dict[str, Any]:
-        """What is to be started; scene and seed are kept."""
+        """Validated options of the new emulation, with the previous scene and seed."""
         check_options(self._device, {**options, **dict.fromkeys(files, "")})
         for option in self._device.all_options:
             value = options.get(option.name, option.default)
             kept = ("", *option.known, self.options.get(option.name))
             if option.is_file and value not in kept:
-                raise TargetError(f"{option.name}: send the file itself, not its name")
+                raise TargetError(f"{option.name}: upload the file itself, not its name")
         if self._device.switches.declared():
             profile = options.get("profile", DEFAULT_PROFILE)
             self._device.switches.of(profile, options.get("set", ""))
@@ -119,38 +117,37 @@ class Emulator:
         return kept_from | dict(options)
 
 
-class SentFile:
-    """A file that a browser sent."""
+class UploadedFile:
+    """A file from the browser, for an option of the emulation."""
 
     def __init__(self, name: str, content: bytes, suffix: str = "") -> None:
-        """``suffix`` is the address of plain bytes, as ``@0x0``, or empty; else ValueError."""
+        """``suffix`` is empty or the address of a raw binary, like ``@0x0``; else ValueError."""
         if not _ADDRESS.fullmatch(suffix):
-            raise ValueError(f"an address of plain bytes is like @0x0, not {suffix!r}")
-        self._name = _STRANGE.sub("_", Path(name).name).strip(".") or "file"
+            raise ValueError(f"the address of a raw binary must be like @0x0, not {suffix!r}")
+        self._name = _UNSAFE.sub("_", Path(name).name).strip(".") or "file"
         self._content, self._suffix = content, suffix
 
-    def written(self, folder: Path) -> str:
-        """What an option calls it, written into ``folder``."""
+    def save(self, folder: Path) -> str:
+        """Write it into ``folder``; returns the value of the option."""
         path = folder / self._name
         path.write_bytes(self._content)
         return f"{path}{self._suffix}"
 
 
 def _scene(target: Target) -> JsonObject | None:
-    """The table of what its cameras see; None where that is not told."""
+    """The table of the current scene; None if the device can not report it."""
     controls = target.controls
     assert isinstance(controls, RemoteControls)
     if target.device is None or target.device.scene_form is None:
         return None
     try:
-        found = controls.client.ask("GET", f"/devices/{controls.device}/scene")
+        return dict(controls.client.ask("GET", f"/devices/{controls.device}/scene")["table"])
     except (HostError, ValueError):
         return None
-    return dict(found["table"])
 
 
 def words(options: Mapping[str, Any]) -> list[str]:
-    """Options as the command line has them; those that are None, False or empty are left out."""
+    """Options as words of the command line, without those that are None, False or empty."""
     found: list[str] = []
     for name, value in options.items():
         if value is True:
@@ -162,28 +159,25 @@ def words(options: Mapping[str, Any]) -> list[str]:
 
 @contextmanager
 def emulated(device: str, options: Sequence[str] = ()) -> Iterator[Target]:
-    """The device ``device``, emulated in a process of its own as long as the block lasts.
+    """Emulate ``device`` in its own process for the duration of the block.
 
-    Args:
-        device: its name.
-        options: of `cubestack emulate`.
-
-    Raises PortOpenError with what it said when it does not start.
+    ``options`` are words of `cubestack emulate`. Raises PortOpenError with its output if it does
+    not start.
     """
     token = new_token()
     call = [device, *options, "--tcp", "0", "--control", "0"]
-    with emulating(call, {TOKEN: token}) as said:
-        control, port = _addresses(said)
+    with emulating(call, {TOKEN: token}) as output:
+        control, port = _addresses(output)
         target = open_target(port, device)
         target.name = f"emulated:{device}"
         target.controls = RemoteControls(ControlClient(control, token), device)
         yield target
 
 
-def _addresses(said: Iterator[str]) -> tuple[str, str]:
-    """Of its control port and its first serial line."""
+def _addresses(output: Iterator[str]) -> tuple[str, str]:
+    """Addresses of its control port and its first serial line."""
     control, lines = None, list[str]()
-    for line in said:
+    for line in output:
         lines.append(line)
         if found := _CONTROL.search(line):
             control = found[1]

@@ -1,7 +1,7 @@
-"""Who may ask: only who knows the token, by the name of this machine, from a page of ours.
+"""Access control: a request needs the token, this machine's name as host, and our own origin.
 
-Without these any page in the user's browser could reach a port on loopback: by a name that leads
-there (DNS rebinding), or by a request that it need not read the answer of.
+Otherwise any page in the user's browser could reach a port on loopback: by DNS rebinding, or by a
+request whose answer it need not read.
 """
 
 import secrets
@@ -18,10 +18,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from cubestack.host.ground.serving import loopback_name
 
 COOKIE = "cubestack"
-"""Begins its name; the port follows, as browsers give a cookie to all ports of a host."""
+"""Prefix of its name; the port follows, as browsers send a cookie to all ports of a host."""
 
 LARGEST_BODY = 8 << 20
-"""Bytes: a picture of any of the sensors, as PNG or raw."""
+"""Bytes; enough for an image of any sensor, as PNG or raw."""
 
 POLICY = "; ".join(
     (
@@ -29,7 +29,7 @@ POLICY = "; ".join(
         *("frame-ancestors 'none'", "base-uri 'none'", "form-action 'none'", "object-src 'none'"),
     )
 )
-"""What a page of ours may load: nothing from elsewhere, and no script but its files."""
+"""The page loads nothing from elsewhere and runs no inline script."""
 
 HEADERS = {
     "Content-Security-Policy": POLICY,
@@ -39,7 +39,7 @@ HEADERS = {
 }
 
 UNAUTHORISED_CLOSE = 4401
-"""Of a WebSocket: the number that programs take for HTTP's 401."""
+"""Close code of a WebSocket that corresponds to HTTP status 401."""
 
 
 def new_token() -> str:
@@ -48,13 +48,13 @@ def new_token() -> str:
 
 @dataclass(frozen=True)
 class Guard:
-    """An ASGI application that passes on what ``app`` may see.
+    """An ASGI application that passes authorised requests on to ``app``.
 
     Attributes:
-        app: what is guarded.
-        token: that requests have in ``Authorization: Bearer``, or in the cookie which a page gets
-            when it is opened with ``?token=``.
-        any_host: whether it is asked by other names than this machine's own.
+        app: the guarded application.
+        token: required in ``Authorization: Bearer``, or in the cookie that the server sets when
+            the page is opened with ``?token=``.
+        any_host: accept any host name in requests.
     """
 
     app: ASGIApp
@@ -73,48 +73,46 @@ class Guard:
             await refusal(scope, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope, headers: Headers) -> Response | None:
-        host, cookie = _asked_by(headers.get("host", ""))
+        host, cookie = _host_and_cookie(headers.get("host", ""))
         if not self.any_host and not loopback_name(host):
-            return refused(f"this is not {host}", HTTPStatus.MISDIRECTED_REQUEST)
+            return refused(f"this server is not {host}", HTTPStatus.MISDIRECTED_REQUEST)
         origin = headers.get("origin")
         if origin is not None and urlsplit(origin).netloc != headers.get("host"):
-            return refused(f"not from {origin}", HTTPStatus.FORBIDDEN)
+            return refused(f"requests from {origin} are rejected", HTTPStatus.FORBIDDEN)
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
-        if scope["type"] == "http" and scope["method"] == "GET" and self._knows(given):
-            # The page's address is seen and kept by browsers: the token goes out of it.
+        if scope["type"] == "http" and scope["method"] == "GET" and self._is_token(given):
+            # Browsers show and store addresses, so the token is removed from this one.
             answer = RedirectResponse(scope["path"], HTTPStatus.SEE_OTHER)
             answer.set_cookie(cookie, self.token, httponly=True, samesite="strict")
             return answer
         bearer = headers.get("authorization", "").partition(" ")
         cookies = cookie_parser(headers.get("cookie", ""))
-        if self._knows(
+        if self._is_token(
             [bearer[2] if bearer[0].lower() == "bearer" else "", cookies.get(cookie, "")]
         ):
             return None
-        return refused(
-            "a token is needed: open the address that was printed", HTTPStatus.UNAUTHORIZED
-        )
+        return refused("a token is needed; open the printed address", HTTPStatus.UNAUTHORIZED)
 
-    def _knows(self, given: Iterable[str]) -> bool:
+    def _is_token(self, given: Iterable[str]) -> bool:
         own = self.token.encode()
         return any(secrets.compare_digest(one.encode("utf-8", "replace"), own) for one in given)
 
 
-def _asked_by(host: str) -> tuple[str, str]:
-    """Name of the host that a request names, and of the cookie that is for it."""
+def _host_and_cookie(host: str) -> tuple[str, str]:
+    """The host name in a request, and the name of its cookie."""
     parts = urlsplit(f"//{host}")
     try:
         return parts.hostname or "", f"{COOKIE}-{parts.port}"
-    except ValueError:  # no port has such a number
+    except ValueError:  # the port is out of range
         return parts.hostname or "", COOKIE
 
 
 class TooLargeError(ValueError):
-    """A body that nobody should send."""
+    """A body above `LARGEST_BODY`."""
 
 
 class _Limited:
-    """The body of a request, up to `LARGEST_BODY`."""
+    """Raises TooLargeError for a body above `LARGEST_BODY`."""
 
     def __init__(self, receive: Receive) -> None:
         self._receive, self._count = receive, 0
@@ -123,20 +121,20 @@ class _Limited:
         message = await self._receive()
         self._count += len(message.get("body", b""))
         if self._count > LARGEST_BODY:
-            raise TooLargeError(f"more than {LARGEST_BODY} bytes")
+            raise TooLargeError(f"the body must be at most {LARGEST_BODY} bytes")
         return message
 
 
 def _with_headers(send: Send) -> Send:
-    async def sends(message: Message) -> None:
+    async def send_with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
             own = [(name.lower().encode(), value.encode()) for name, value in HEADERS.items()]
             message = {**message, "headers": [*message.get("headers", []), *own]}
         await send(message)
 
-    return sends
+    return send_with_headers
 
 
 def refused(why: str, status: HTTPStatus) -> Response:
-    """An answer that tells what is wrong."""
+    """An answer with the member ``error``."""
     return JSONResponse({"error": why}, status)

@@ -1,4 +1,4 @@
-"""What a page saves: all that was said, as a recording and as tables, and its log of results."""
+"""Files that a page saves: the recording, its transcript as a table, the log of results."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,9 +12,9 @@ from cubestack.host.recording.transcript import transcript
 
 
 def recording(session: TargetSession) -> bytes:
-    """All that was said by now, in whole lines; ValueError where nothing is recorded.
+    """The recording up to now, in whole lines.
 
-    Raises the errors of its control port.
+    Raises ValueError if nothing is recorded, and the errors of its control port.
     """
     if session.controls is not None:
         return session.controls.client.fetch("GET", f"/devices/{session.controls.device}/recording")
@@ -24,23 +24,23 @@ def recording(session: TargetSession) -> bytes:
     return content[: content.rfind(b"\n") + 1]
 
 
-def said_table(session: TargetSession, kind: str) -> bytes:
-    """The table that `cubestack decode` makes of the recording: "csv" or "parquet".
+def transcript_table(session: TargetSession, kind: str) -> bytes:
+    """The table of `cubestack decode` as "csv" or "parquet".
 
-    Raises as ``recording``; ValueError for another kind, and without pyarrow.
+    Raises as ``recording`` does, and ValueError for another kind or without pyarrow.
     """
     make: Callable[..., bytes] | None = TABLES.get(kind)
     if make is None:
-        raise ValueError(f"no table {kind!r}; there are {', '.join(TABLES)}")
+        raise ValueError(f"no table {kind!r}; known: {', '.join(TABLES)}")
     content = recording(session)
     with TemporaryDirectory(prefix="cubestack-") as folder:
-        path = Path(folder) / "said.rec"
+        path = Path(folder) / "session.rec"
         path.write_bytes(content)
         return make(transcript(load_recording(path), session.target.interface))
 
 
 def results_table(session: TargetSession, kind: str) -> bytes:
-    """Its log of results, "csv" or "parquet"; raises as ``said_table``."""
+    """The log of results as "csv" or "parquet"; raises as ``transcript_table`` does."""
     if kind not in FORMS:
-        raise ValueError(f"no table {kind!r}; there are {', '.join(FORMS)}")
+        raise ValueError(f"no table {kind!r}; known: {', '.join(FORMS)}")
     return FORMS[kind](session.log)

@@ -1,4 +1,4 @@
-"""How bright stars are, for those who look at a picture of them."""
+"""Magnitudes of stars that the page marks."""
 
 from functools import lru_cache
 
@@ -7,7 +7,7 @@ from cubestack.emulator.scene.hipparcos import load_sky
 
 @lru_cache(maxsize=4096)
 def magnitude(hipparcos: int) -> float | None:
-    """V of a star by its Hipparcos number; None for one that the catalogue does not have."""
+    """V of a star by its Hipparcos number; None if the catalogue does not have it."""
     sky = load_sky()
     at = int(sky.hip.searchsorted(hipparcos))
     known = at < len(sky) and sky.hip[at] == hipparcos

@@ -1,4 +1,4 @@
-"""The page's application: targets, what is asked of them, and what they tell, live."""
+"""The page's application: requests of the page to targets, and live updates on WebSockets."""
 
 import asyncio
 import base64
@@ -21,28 +21,31 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from cubestack.host.errors import HostError
 from cubestack.host.ground import relays
 from cubestack.host.ground.emulation import JsonObject
-from cubestack.host.ground.emulators import SentFile
+from cubestack.host.ground.emulators import UploadedFile
 from cubestack.host.ground.guard import TooLargeError, refused
-from cubestack.host.ground.logs import recording, results_table, said_table
+from cubestack.host.ground.logs import recording, results_table, transcript_table
+from cubestack.host.ground.relays import forward
 from cubestack.host.ground.session import TargetSession
 
 PAGE = Path(__file__).parent / "page"
 
+TARGET = "/targets/{number:int}"
+
 EVERY_S, SHORTEST_S, LONGEST_S = 1.0, 0.2, 60.0
-"""Between two readings of what a tab shows, unless it wants another time; and its limits."""
+"""Default, lowest and highest interval between two updates of a tab."""
 
 MOST_SHOWN = 32
-"""Telemetry frames that one tab may have read again and again."""
+"""Most telemetry frames per update of a tab."""
 
-NONSENSE = 1003
-"""Closes a WebSocket whose other end sends what can not be taken."""
+INVALID_MESSAGE = 1003
+"""Close code of a WebSocket after an invalid message."""
 
 SHARED = ("time_s", "held", "pace", "speed", "snapshots", "goes_back")
-"""Of the state of an emulation, what all its devices have in common."""
+"""Members of the state of an emulation that its devices share."""
 
 
 def page_app(sessions: "Sequence[Future[TargetSession]]") -> Starlette:
-    """The application, without a guard; its targets may still be about to open."""
+    """The application, without ``Guard``; ``sessions`` may still be opening."""
 
     async def page(_request: Request) -> Response:
         return FileResponse(PAGE / "index.html")
@@ -51,13 +54,13 @@ def page_app(sessions: "Sequence[Future[TargetSession]]") -> Starlette:
         return JSONResponse([(await _opened(session)).about for session in sessions])
 
     def of(handler: Any) -> Any:
-        async def answer(request: Request) -> Response:
+        async def handle(request: Request) -> Response:
             number = request.path_params["number"]
             if number >= len(sessions):
-                return refused(f"there is no target {number}", HTTPStatus.NOT_FOUND)
-            return await _told(handler, await _opened(sessions[number]), request)
+                return refused(f"no target {number}", HTTPStatus.NOT_FOUND)
+            return await _answer(handler, await _opened(sessions[number]), request)
 
-        return answer
+        return handle
 
     async def live(socket: WebSocket) -> None:
         number = socket.path_params["number"]
@@ -66,34 +69,40 @@ def page_app(sessions: "Sequence[Future[TargetSession]]") -> Starlette:
             return
         await _live(await _opened(sessions[number]), socket)
 
+    def post(path: str, handler: Any) -> Route:
+        return Route(f"{TARGET}/{path}", of(handler), methods=["POST"])
+
+    def get(path: str, handler: Any) -> Route:
+        return Route(f"{TARGET}/{path}", of(handler))
+
     return Starlette(
         routes=[
             Route("/", page),
             Route("/targets", targets),
-            Route("/targets/{number:int}/pictures/{name}", of(relays.picture)),
-            Route("/targets/{number:int}/recording", of(_recording)),
-            Route("/targets/{number:int}/said/{kind}", of(_said)),
-            Route("/targets/{number:int}/results/{kind}", of(_results)),
-            Route("/targets/{number:int}/trace", of(relays.trace)),
-            Route("/targets/{number:int}/found/{name}", of(_found)),
-            Route("/targets/{number:int}/sensor-registers/{name}", of(_sensor_register)),
-            Route("/targets/{number:int}/carried", of(_carried)),
-            Route("/targets/{number:int}/download", of(_download), methods=["POST"]),
-            Route("/targets/{number:int}/upload", of(_upload), methods=["POST"]),
-            Route("/targets/{number:int}/transfer/{act}", of(_transfer), methods=["POST"]),
-            Route("/targets/{number:int}/play", of(_play), methods=["POST"]),
-            Route("/targets/{number:int}/do", of(_do), methods=["POST"]),
-            Route("/targets/{number:int}/scene", of(relays.scene)),
-            Route("/targets/{number:int}/scene", of(relays.show_scene), methods=["POST"]),
-            Route("/targets/{number:int}/scene/keys", of(relays.scene_keys)),
-            Route("/targets/{number:int}/scene/look", of(relays.look), methods=["POST"]),
-            Route("/targets/{number:int}/stars", of(relays.stars)),
-            Route("/targets/{number:int}/restart", of(_restart), methods=["POST"]),
-            Route("/targets/{number:int}/{call:str}", of(relays.steer), methods=["POST"]),
-            WebSocketRoute("/targets/{number:int}/live", live),
+            get("pictures/{name}", relays.picture),
+            get("recording", _recording),
+            get("transcript/{kind}", _transcript),
+            get("results/{kind}", _results),
+            get("trace", relays.trace),
+            get("detections/{name}", _detections),
+            get("sensor-registers/{name}", _sensor_register),
+            get("transfer/image", _image),
+            post("download", _download),
+            post("upload", _upload),
+            post("transfer/{act}", _transfer),
+            post("play", _play),
+            post("shell", _shell),
+            get("scene", forward("GET", "{device}/scene")),
+            post("scene", relays.apply_scene),
+            get("scene/keys", forward("GET", "{device}/scene/keys")),
+            post("scene/look", forward("POST", "{device}/scene/look")),
+            get("stars", forward("GET", "/stars")),
+            post("restart", _restart),
+            post("{call:str}", relays.control_time),
+            WebSocketRoute(f"{TARGET}/live", live),
             Mount("/page", StaticFiles(directory=PAGE)),
         ],
-        exception_handlers={HTTPException: _not_there},
+        exception_handlers={HTTPException: _http_error},
     )
 
 
@@ -101,61 +110,60 @@ async def _opened(session: "Future[TargetSession]") -> TargetSession:
     return await asyncio.shield(asyncio.wrap_future(session))
 
 
-async def _told(handler: Any, session: TargetSession, request: Request) -> Response:
-    """The answer of a handler, or what is wrong in words."""
+async def _answer(handler: Any, session: TargetSession, request: Request) -> Response:
     try:
         body = json.loads(await request.body() or b"{}") or dict(request.query_params)
         if not isinstance(body, dict):
-            raise ValueError("the body is a JSON object")
-        found = await handler(session, body, request.path_params)
-        return found if isinstance(found, Response) else JSONResponse(found)
+            raise ValueError("the body must be a JSON object")
+        answer = await handler(session, body, request.path_params)
+        return answer if isinstance(answer, Response) else JSONResponse(answer)
     except TooLargeError as error:
         return refused(str(error), HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        return refused(f"the body is no JSON: {error}", HTTPStatus.BAD_REQUEST)
+        return refused(f"the body is not valid JSON: {error}", HTTPStatus.BAD_REQUEST)
     except HostError as error:
         return refused(str(error), HTTPStatus.BAD_GATEWAY)
     except ValueError as error:
         return refused(str(error), HTTPStatus.BAD_REQUEST)
 
 
-async def _do(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
+async def _shell(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
     line = body.get("line")
     if not isinstance(line, str):
-        raise ValueError("'line' is a line of the shell")
-    return await asyncio.wrap_future(session.do(line))
+        raise ValueError("'line' must be a line of the shell")
+    return await asyncio.wrap_future(session.execute(line))
 
 
 async def _restart(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
     options, files = body.get("options", {}), body.get("files", {})
     if not isinstance(options, dict) or not isinstance(files, dict):
-        raise ValueError("'options' and 'files' are objects by the options' names")
-    sent = {name: _sent(one) for name, one in files.items()}
-    return await asyncio.wrap_future(session.restart(options, sent))
+        raise ValueError("'options' and 'files' must be objects by option name")
+    uploaded = {name: _uploaded(one) for name, one in files.items()}
+    return await asyncio.wrap_future(session.restart(options, uploaded))
 
 
-def _sent(one: object) -> SentFile:
+def _uploaded(one: object) -> UploadedFile:
     parts = (
         [one.get(key, "") for key in ("name", "content", "suffix")] if isinstance(one, dict) else []
     )
     if not parts or not all(isinstance(part, str) for part in parts):
-        raise ValueError("a file has 'name', 'content' in base 64, and 'suffix'")
+        raise ValueError("a file must have 'name', 'content' in base 64, and 'suffix'")
     name, content, suffix = parts
-    return SentFile(name, base64.b64decode(content, validate=True), suffix)
+    return UploadedFile(name, base64.b64decode(content, validate=True), suffix)
 
 
 async def _play(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
     to_s, runs = body.get("to_s"), body.get("runs")
-    if session.played is None:
-        raise ValueError(f"{session.target.name} is no recording")
+    if session.playback is None:
+        raise ValueError(f"{session.target.name} is not a recording")
     if not isinstance(to_s, int | float | None) or not isinstance(runs, bool):
-        raise ValueError("'to_s' is a time in s, 'runs' true or false")
-    session.played.play(to_s, runs)
-    return session.played.state
+        raise ValueError("'to_s' must be a time in s, 'runs' true or false")
+    session.playback.play(to_s, runs)
+    return session.playback.state
 
 
-async def _found(session: TargetSession, _body: JsonObject, path: JsonObject) -> JsonObject:
-    return await asyncio.wrap_future(session.found(path["name"]))
+async def _detections(session: TargetSession, _body: JsonObject, path: JsonObject) -> JsonObject:
+    return await asyncio.wrap_future(session.detections(path["name"]))
 
 
 async def _sensor_register(
@@ -169,8 +177,8 @@ async def _recording(session: TargetSession, _body: JsonObject, _path: JsonObjec
     return Response(content, media_type="text/plain", headers=_file(session, "rec"))
 
 
-async def _said(session: TargetSession, _body: JsonObject, path: JsonObject) -> Response:
-    return await _table(session, said_table, path["kind"])
+async def _transcript(session: TargetSession, _body: JsonObject, path: JsonObject) -> Response:
+    return await _table(session, transcript_table, path["kind"])
 
 
 async def _results(session: TargetSession, _body: JsonObject, path: JsonObject) -> Response:
@@ -186,35 +194,35 @@ async def _table(
 
 
 async def _download(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
-    return session.transfer("download", body.get("source")).state
+    return session.start_transfer("download", body.get("source")).state
 
 
 async def _upload(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:
     text = body.get("picture")
     if not isinstance(text, str):
-        raise ValueError("'picture' is a picture file in base 64")
+        raise ValueError("'picture' must be an image file in base 64")
     content = base64.b64decode(text, validate=True)
-    return (await asyncio.to_thread(session.transfer, "upload", None, content)).state
+    return (await asyncio.to_thread(session.start_transfer, "upload", None, content)).state
 
 
 async def _transfer(session: TargetSession, _body: JsonObject, path: JsonObject) -> JsonObject:
-    if session.carried is None:
-        raise ValueError("no picture is on its way")
+    if session.transfer is None:
+        raise ValueError("no image transfer was started")
     acts = {
-        "hold": session.carried.hold,
-        "go-on": session.carried.go_on,
-        "give-up": session.carried.give_up,
+        "pause": session.transfer.pause,
+        "resume": session.transfer.resume,
+        "cancel": session.transfer.cancel,
     }
     if path["act"] not in acts:
-        raise ValueError(f"no act {path['act']!r}; there are {', '.join(acts)}")
+        raise ValueError(f"no act {path['act']!r}; known: {', '.join(acts)}")
     acts[path["act"]]()
-    return session.carried.state
+    return session.transfer.state
 
 
-async def _carried(session: TargetSession, _body: JsonObject, _path: JsonObject) -> Response:
-    if session.carried is None or session.carried.picture is None:
-        raise ValueError("no picture has come over the wire")
-    return Response(session.carried.picture, media_type="image/png", headers=_file(session, "png"))
+async def _image(session: TargetSession, _body: JsonObject, _path: JsonObject) -> Response:
+    if session.transfer is None or session.transfer.picture is None:
+        raise ValueError("no image was downloaded")
+    return Response(session.transfer.picture, media_type="image/png", headers=_file(session, "png"))
 
 
 def _file(session: TargetSession, kind: str) -> dict[str, str]:
@@ -223,47 +231,47 @@ def _file(session: TargetSession, kind: str) -> dict[str, str]:
 
 
 async def _live(session: TargetSession, socket: WebSocket) -> None:
-    """Tell a tab again and again what it shows, until it is gone."""
+    """Send updates to a tab until it disconnects."""
     await socket.accept()
-    wanted, logged, begun = Wanted(), 0, session.begun
-    hears = asyncio.create_task(socket.receive_json())
+    subscription, logged, restarts = Subscription(), 0, session.restarts
+    receiving = asyncio.create_task(socket.receive_json())
     clock = asyncio.get_running_loop().time
     try:
         while True:
             begin_s = clock()
-            if hears.done():
-                wanted = _wanted(hears.result(), session)
-                hears = asyncio.create_task(socket.receive_json())
-            if session.begun != begun:
-                logged, begun = 0, session.begun
-            told: JsonObject = {"link": session.health, "begun": begun}
-            carried = session.carried
-            told["carried"] = carried.state if carried else None
-            told["played"] = session.played.state if session.played else None
+            if receiving.done():
+                subscription = _subscription(receiving.result(), session)
+                receiving = asyncio.create_task(socket.receive_json())
+            if session.restarts != restarts:
+                logged, restarts = 0, session.restarts
+            update: JsonObject = {"link": session.health, "restarts": restarts}
+            transfer = session.transfer
+            update["transfer"] = transfer.state if transfer else None
+            update["playback"] = session.playback.state if session.playback else None
             if session.controls is not None:
-                told |= await asyncio.to_thread(_emulation, session, logged)
-                logged = told.get("logged", logged)
-            held = told.get("emulation", {}).get("held", False)  # nobody would answer
-            free = not held and (carried is None or not carried.runs)
-            if wanted.show and free:
-                told["values"] = await asyncio.wrap_future(session.read(wanted.show))
-            if wanted.results and free:
-                told["results"] = await asyncio.wrap_future(session.results())
-                session.log.add(told["results"], told.get("emulation", {}).get("truth", {}))
-            told["kept"] = session.log.count
-            await socket.send_json(told)
-            rest_s = begin_s + wanted.every_s - clock()
-            await asyncio.wait([hears], timeout=max(rest_s, 0.0))
+                update |= await asyncio.to_thread(_emulation, session, logged)
+                logged = update.get("logged", logged)
+            held = update.get("emulation", {}).get("held", False)  # nothing would answer
+            free = not held and (transfer is None or not transfer.runs)
+            if subscription.show and free:
+                update["values"] = await asyncio.wrap_future(session.read(subscription.show))
+            if subscription.results and free:
+                update["results"] = await asyncio.wrap_future(session.results())
+                session.log.add(update["results"], update.get("emulation", {}).get("truth", {}))
+            update["results_logged"] = session.log.count
+            await socket.send_json(update)
+            rest_s = begin_s + subscription.every_s - clock()
+            await asyncio.wait([receiving], timeout=max(rest_s, 0.0))
     except (WebSocketDisconnect, RuntimeError):
-        pass  # it is gone
+        pass  # the tab has disconnected
     except ValueError:
-        await socket.close(NONSENSE)
+        await socket.close(INVALID_MESSAGE)
     finally:
-        hears.cancel()
+        receiving.cancel()
 
 
 def _emulation(session: TargetSession, logged: int) -> JsonObject:
-    """How the emulation is, and what its faults have done since line ``logged``."""
+    """State of the emulation, and lines of its fault log from ``logged`` on."""
     assert session.controls is not None
     client, device = session.controls.client, session.controls.device
     try:
@@ -274,32 +282,32 @@ def _emulation(session: TargetSession, logged: int) -> JsonObject:
         return {"emulation": {"error": str(error)}}
     own = state["devices"][device]
     emulation = {name: state[name] for name in SHARED} | own
-    seen = {"pictures": pictures, "log": log["log"], "logged": log["count"]}
-    return {"emulation": emulation, **seen}
+    more = {"pictures": pictures, "log": log["log"], "logged": log["count"]}
+    return {"emulation": emulation, **more}
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What a tab wants to be told: telemetry by name, results, and how often."""
+class Subscription:
+    """Content of a tab's updates: telemetry by name, results; and their interval."""
 
     show: Sequence[str] = ()
     results: bool = False
     every_s: float = EVERY_S
 
 
-def _wanted(message: object, session: TargetSession) -> Wanted:
-    """What a tab says that it wants; ValueError for nonsense."""
+def _subscription(message: object, session: TargetSession) -> Subscription:
+    """Raises ValueError for an invalid message."""
     if not isinstance(message, dict):
-        raise ValueError("a tab sends objects")
+        raise ValueError("a message must be an object")
     show, every_s = message.get("show", []), message.get("every_s", EVERY_S)
     if not isinstance(show, list) or not isinstance(every_s, int | float):
-        raise ValueError("'show' is a list of names, 'every_s' a number")
+        raise ValueError("'show' must be a list of names, 'every_s' a number")
     known = {one.name for one in session.target.interface.telemetries}
     names = [name for name in show if name in known][:MOST_SHOWN]
     results = bool(message.get("results")) and "results" not in session.about["missing"]
-    return Wanted(names, results, min(max(float(every_s), SHORTEST_S), LONGEST_S))
+    return Subscription(names, results, min(max(float(every_s), SHORTEST_S), LONGEST_S))
 
 
-async def _not_there(_request: Request, error: Exception) -> Response:
+async def _http_error(_request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     return refused(error.detail, HTTPStatus(error.status_code))

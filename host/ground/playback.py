@@ -1,4 +1,4 @@
-"""A recording as a target of a page: its telemetry as it was last read before a time that runs."""
+"""A recording as a target: telemetry as last read before the playback position."""
 
 import time
 from bisect import bisect_right
@@ -20,53 +20,53 @@ SUFFIX = ".rec"
 
 
 class PlaybackClient(Client):
-    """Answers telemetry as a recording has it, whatever is asked in which order.
+    """Answers telemetry from a recording, in any order of requests.
 
     Attributes:
-        end_s: when the last thing was said.
+        end_s: time of the last message.
     """
 
     def __init__(
         self, recording: Recording, interface: Interface, now: Callable[[], float] = time.monotonic
     ) -> None:
-        """Begin at time 0; ``now`` is what goes on meanwhile, in s."""
+        """Start at 0 s; ``now`` is the clock in s."""
         self.interface, self._now = interface, now
-        self._told = defaultdict[str, list[TranscriptEntry]](list)
+        self._entries = defaultdict[str, list[TranscriptEntry]](list)
         for one in transcript(recording, interface):
             if one.kind == MessageKind.TELEMETRY.value and one.values and not one.error:
-                self._told[one.name].append(one)
+                self._entries[one.name].append(one)
         self.end_s = recording.end_ps / 1e12
         self._at_s, self._since = 0.0, now()
         self._runs = True
 
     @property
     def time_s(self) -> float:
-        """Where it is; it stays at the end."""
-        gone = self._now() - self._since if self._runs else 0.0
-        return min(self._at_s + gone, self.end_s)
+        """Position; it stops at the end."""
+        elapsed_s = self._now() - self._since if self._runs else 0.0
+        return min(self._at_s + elapsed_s, self.end_s)
 
     @property
     def state(self) -> JsonObject:
         return {"time_s": self.time_s, "end_s": self.end_s, "runs": self._runs}
 
     def play(self, to_s: float | None, runs: bool) -> None:
-        """Go to a time, None: stay; then go on or hold. ValueError for a time that it has not."""
+        """Jump to ``to_s`` if given; run or pause. Raises ValueError for a time outside of it."""
         if to_s is not None and not 0 <= to_s <= self.end_s:
-            raise ValueError(f"the recording has 0 to {self.end_s:.6f} s, not {to_s}")
+            raise ValueError(f"a position must be 0 to {self.end_s:.6f} s, not {to_s}")
         self._at_s = self.time_s if to_s is None else to_s
         self._since, self._runs = self._now(), runs
 
     def telemetry(self, name: str) -> dict[str, Value]:
-        """See ``Client``; NoAnswerError for what nobody had read by then."""
-        told, at_s = self._told[self._asked(name).name], self.time_s
-        place = bisect_right(told, at_s, key=lambda one: one.time_s)
+        """See ``Client``; raises NoAnswerError if it was not read before the position."""
+        entries, at_s = self._entries[self._asked(name).name], self.time_s
+        place = bisect_right(entries, at_s, key=lambda one: one.time_s)
         if not place:
-            raise NoAnswerError(f"nobody had read {name} by {at_s:.3f} s of the recording")
-        return dict(told[place - 1].values)
+            raise NoAnswerError(f"{name} was not read before {at_s:.3f} s of the recording")
+        return dict(entries[place - 1].values)
 
     def command(self, name: str, **_parameters: object) -> None:
-        """Nothing can be told to a recording: TargetError."""
-        raise TargetError(f"{name}: a recording takes no telecommand")
+        """Raises TargetError."""
+        raise TargetError(f"{name}: a recording accepts no telecommands")
 
     def pause(self, seconds: float) -> None: ...
 
@@ -74,15 +74,15 @@ class PlaybackClient(Client):
 
 
 def is_recording(text: str) -> bool:
-    """Whether a target is one: ``recorded:FILE``, or a file that is called like one."""
+    """Whether a target is ``recorded:FILE`` or a file with its suffix."""
     return text.startswith(RECORDED) or text.endswith(SUFFIX)
 
 
 def open_recording(text: str) -> Target:
-    """The recording that ``text`` names.
+    """Open the recording ``text`` as a target.
 
-    Raises PortOpenError for no file, RecordingError for another file, TargetError for an unknown
-    device.
+    Raises PortOpenError if it can not be opened, RecordingError for an invalid file, TargetError
+    for an unknown device.
     """
     path = Path(text.removeprefix(RECORDED))
     try:

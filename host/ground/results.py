@@ -1,4 +1,4 @@
-"""A target's results, one after the other, kept for whoever saves them."""
+"""The log of a target's results."""
 
 import csv
 import json
@@ -14,20 +14,19 @@ from cubestack.host.devices.result_table import ANGLE
 from cubestack.host.export.parquet import parquet_file
 
 MOST = 1_000_000
-"""Lines that are kept: eleven days at one a second."""
-
+"""Most lines: eleven days at one line per second."""
 
 ALPHA, BETA = "_alpha_deg", "_beta_deg"
-"""Ends of the names of a direction's angles, along and across the picture."""
+"""Ends of the column names of a direction's angles, along x and y of the image."""
 
 Vector = tuple[float, float, float]
 
 
 class ResultLog:
-    """Lines in a file without a name, as those of a day would fill memory.
+    """A log in an unlinked temporary file.
 
     Attributes:
-        count: lines by now.
+        count: number of lines.
     """
 
     def __init__(self) -> None:
@@ -36,7 +35,7 @@ class ResultLog:
         self.count = 0
 
     def add(self, results: Columns, truth: Mapping[str, float | None]) -> None:
-        """Keep results as of now; ``truth`` by the same names gives the errors of the angles."""
+        """Log results with the current time, and errors of angles if ``truth`` has them."""
         if "error" in results or not results or self.count >= MOST:
             return
         utc = datetime.now(UTC).isoformat(timespec="milliseconds")
@@ -45,7 +44,7 @@ class ResultLog:
         self.count += 1
 
     def csv(self) -> bytes:
-        """All lines as a CSV file, a column for each name that came up."""
+        """A CSV file with a column for each name that occurs."""
         text, names = StringIO(newline=""), self._names()
         writer = csv.DictWriter(text, names)
         writer.writeheader()
@@ -53,7 +52,7 @@ class ResultLog:
         return text.getvalue().encode()
 
     def parquet(self) -> bytes:
-        """The same as a Parquet file; ValueError without pyarrow."""
+        """A Parquet file with the same columns; raises ValueError without pyarrow."""
         columns: dict[str, list[bool | int | float | str | None]] = {n: [] for n in self._names()}
         for line in self._lines():
             for name, column in columns.items():
@@ -69,28 +68,28 @@ class ResultLog:
     def _lines(self) -> Iterator[Columns]:
         rest, at, end = b"", 0, os.fstat(self._file).st_size
         while at < end:
-            part = os.pread(self._file, min(1 << 20, end - at), at)  # lines come meanwhile
+            part = os.pread(self._file, min(1 << 20, end - at), at)
             at += len(part)
             *lines, rest = (rest + part).split(b"\n")
             yield from map(json.loads, lines)
 
 
 def _errors(results: Columns, truth: Mapping[str, float | None]) -> Columns:
-    found: Columns = {}
+    errors: Columns = {}
     for name, value in results.items():
         true = truth.get(name) if name.endswith(ANGLE) else None
         if true is not None and isinstance(value, int | float):
-            found[f"{name.removesuffix(ANGLE)}_error{ANGLE}"] = (value - true + 180) % 360 - 180
+            errors[f"{name.removesuffix(ANGLE)}_error{ANGLE}"] = (value - true + 180) % 360 - 180
     for name in (one.removesuffix(ALPHA) for one in results if one.endswith(ALPHA)):
-        answer, true_ = (_direction(told, name) for told in (results, truth))
+        answer, true_ = (_direction(columns, name) for columns in (results, truth))
         if answer is not None and true_ is not None:
-            found[f"{name}_error{ANGLE}"] = _apart_deg(answer, true_)
-    return found
+            errors[f"{name}_error{ANGLE}"] = _apart_deg(answer, true_)
+    return errors
 
 
-def _direction(told: Mapping[str, object], name: str) -> Vector | None:
-    """Unit vector of the two angles of a direction; None where one is missing."""
-    alpha, beta = told.get(name + ALPHA), told.get(name + BETA)
+def _direction(columns: Mapping[str, object], name: str) -> Vector | None:
+    """Unit vector of a direction; None if an angle is missing."""
+    alpha, beta = columns.get(name + ALPHA), columns.get(name + BETA)
     if not isinstance(alpha, int | float) or not isinstance(beta, int | float):
         return None
     away, around = math.radians(math.hypot(alpha, beta)), math.atan2(beta, alpha)
@@ -106,4 +105,4 @@ FORMS: dict[str, Callable[[ResultLog], bytes]] = {
     "csv": ResultLog.csv,
     "parquet": ResultLog.parquet,
 }
-"""By the file's suffix."""
+"""By file suffix."""

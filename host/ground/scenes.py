@@ -1,4 +1,4 @@
-"""Scenes of a running emulation, as JSON has them: their keys, and where they are on the sky."""
+"""Scenes of a running emulation as JSON: their keys, and their position on the sky."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -20,20 +20,20 @@ from cubestack.host.recording.setups import written
 JsonObject = dict[str, Any]
 
 FILE = "scene"
-"""What a scene that has no file is called in messages."""
+"""Name of a scene without a file in messages."""
 
 FAINTEST = 7.0
-"""V of stars that are told at most: there are 15 000 then."""
+"""Highest V of listed stars; 15 000 are brighter."""
 
 
 def keys(device: AnyDevice) -> JsonObject:
-    """What the keys of its scene files are, by their kind; TargetError where it does not tell."""
+    """Keys of its scene files by kind; raises TargetError if it declares none."""
     return {"kinds": _form(device).keys}
 
 
 def present(emulated: AnyEmulated) -> JsonObject:
-    """What its cameras see, as the table of a scene file, and where that is on the sky; and what
-    moves it, in words.
+    """The current scene: ``table`` of a scene file, ``sight`` on the sky, and ``follows``: what
+    moves it, e.g. an orbit.
     """
     form = _form(emulated.device)
     view = form.view(emulated.board)
@@ -42,10 +42,7 @@ def present(emulated: AnyEmulated) -> JsonObject:
 
 
 def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:
-    """Where on the sky a scene would be whose file has ``table``; ValueError for one that is none.
-
-    Nothing of the emulation changes.
-    """
+    """The ``sight`` of a scene, without applying it; raises ValueError for an invalid table."""
     form = _form(emulated.device)
     with written(Document(FILE, text_of(table))) as path:
         try:
@@ -56,21 +53,20 @@ def look(emulated: AnyEmulated, table: Mapping[str, Any]) -> JsonObject:
 
 
 def text_of(table: Mapping[str, Any]) -> str:
-    """The text of a scene file that has ``table``; ValueError for what no file has."""
+    """The text of a scene file with ``table``; raises ValueError for unsupported values."""
     return toml_text(table)
 
 
 @lru_cache(maxsize=8)
 def stars(mag_limit: float, epoch: float) -> JsonObject:
-    """Stars with V below ``mag_limit`` at a Julian year, the brightest first: ``ra_deg``,
-    ``dec_deg``, ``v_mag``, and ``name``, empty where there is none.
+    """Stars with V below ``mag_limit`` at the Julian year ``epoch``, brightest first.
 
-    ValueError for a limit above `FAINTEST`, or an epoch that scenes can not have.
+    ``name`` may be empty. Raises ValueError if a value is out of range.
     """
     if not mag_limit <= FAINTEST:
-        raise ValueError(f"mag_limit is {FAINTEST:g} at most, not {mag_limit:g}")
+        raise ValueError(f"mag_limit must be at most {FAINTEST:g}, not {mag_limit:g}")
     if not EPOCHS[0] <= epoch <= EPOCHS[1]:
-        raise ValueError(f"an epoch is {EPOCHS[0]:g} to {EPOCHS[1]:g}, not {epoch:g}")
+        raise ValueError(f"epoch must be {EPOCHS[0]:g} to {EPOCHS[1]:g}, not {epoch:g}")
     sky = load_sky(epoch, mag_limit)
     order = np.argsort(sky.v_mag, kind="stable")
     x, y, z = sky.vectors[order].T
@@ -91,5 +87,5 @@ def stars(mag_limit: float, epoch: float) -> JsonObject:
 
 def _form(device: AnyDevice) -> SceneForm[Any]:
     if device.scene_form is None:
-        raise TargetError(f"{device.title} does not tell the keys of its scenes")
+        raise TargetError(f"{device.title} declares no scene keys")
     return device.scene_form()

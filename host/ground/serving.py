@@ -1,4 +1,4 @@
-"""Serves an ASGI application on this machine, in a thread beside whatever else goes on."""
+"""Serves an ASGI application on this machine, in a thread."""
 
 import asyncio
 import ipaddress
@@ -17,17 +17,17 @@ from cubestack.host.errors import PortOpenError
 LOOPBACK = "127.0.0.1"
 
 MOST_CONNECTIONS = 64
-"""At once; more are turned away, so that none takes what the emulation needs."""
+"""Most connections at once, so that clients can not slow down the emulation."""
 
 REQUEST_S = 5.0
-"""Wall time that a connection has for its first request."""
+"""Time-out of a connection's first request, wall time in s."""
 
 LARGEST_MESSAGE = 1 << 20
-"""Bytes of a message on a WebSocket."""
+"""Longest message on a WebSocket in bytes."""
 
 
 class _Connection(H11Protocol):
-    """One that is neither too many nor silent."""
+    """Closes excess connections, and those without a request."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
@@ -37,22 +37,19 @@ class _Connection(H11Protocol):
         self.loop.call_later(REQUEST_S, self._expire)
 
     def _expire(self) -> None:
-        asked = vars(self)["scope"] is not None  # declared as what is never None
-        if not asked and not self.transport.is_closing():
+        idle = vars(self)["scope"] is None  # its declared type excludes None
+        if idle and not self.transport.is_closing():
             self.transport.abort()
 
 
 class Serving:
-    """An application that is being served.
-
-    Attributes:
-        address: host and port.
-    """
+    """Serves an application at ``address``: host and port."""
 
     def __init__(self, app: ASGIApp, host: str, port: int, *, allow_remote: bool = False) -> None:
-        """Listen on ``host``:``port`` (0: any free one).
+        """Listen on ``port`` (0: any free one).
 
-        Raises PortOpenError: it is taken or none, or other machines could reach it.
+        Raises PortOpenError if it is in use or invalid, or if other machines could reach it
+        without ``allow_remote``.
         """
         self._socket = _listen(host, port, allow_remote=allow_remote)
         self.address: tuple[str, int] = self._socket.getsockname()[:2]
@@ -77,7 +74,7 @@ class Serving:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Serve in a thread as long as the block lasts."""
+        """Serve in a thread for the duration of the block."""
         thread = Thread(target=self._server.run, args=([self._socket],), daemon=True)
         thread.start()
         self._server.ready.wait()
@@ -90,7 +87,7 @@ class Serving:
 
 
 class _Server(Server):
-    """One that tells when it takes connections."""
+    """Sets ``ready`` when it accepts connections."""
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)
@@ -113,12 +110,12 @@ def _listen(host: str, port: int, *, allow_remote: bool) -> socket.socket:
     try:
         return socket.create_server(address[:2], family=family)
     except (OSError, OverflowError) as error:
-        told = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
-        raise PortOpenError(f"can not listen on {host}:{port}: {told}") from None
+        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else error
+        raise PortOpenError(f"can not listen on {host}:{port}: {reason}") from None
 
 
 def loopback_name(host: str) -> bool:
-    """Whether ``host``, as a request names it, is this machine to itself."""
+    """Whether ``host`` is a loopback name or address of this machine."""
     if host == "localhost":
         return True
     try:

@@ -1,4 +1,4 @@
-"""A target that pages look at: opened once, asked by one thread, in the shell's words."""
+"""A target of the page. All tabs share it, and one thread sends the requests to it."""
 
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,7 +13,7 @@ from cubestack.host.errors import CommandRefusedError, HostError
 from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.export.parquet import missing as parquet_missing
 from cubestack.host.ground.emulation import JsonObject
-from cubestack.host.ground.emulators import Emulator, SentFile
+from cubestack.host.ground.emulators import Emulator, UploadedFile
 from cubestack.host.ground.magnitudes import magnitude
 from cubestack.host.ground.playback import PlaybackClient
 from cubestack.host.ground.results import ResultLog
@@ -32,20 +32,18 @@ from cubestack.host.targets import Target
 
 T = TypeVar("T")
 
-FROM_A_PAGE = ("read", "write", "dump", "list", "bench", "raw", "fault", "power", "time", "help")
-"""Commands of the shell that touch no file of this machine, and end."""
+PAGE_COMMANDS = ("read", "write", "dump", "list", "bench", "raw", "fault", "power", "time", "help")
+"""Shell commands that access no file of this machine and always end."""
 
 LONGEST_LINE = 10_000
 
 
 @dataclass
-class Link:
-    """What became of what pages asked for.
-
-    Attributes:
-        failed: how much had no right answer in the end.
-        broken: whether the last had none.
-        error: of the last failure.
+class LinkState:
+    """Attributes:
+    failed: number of requests that failed after all retries.
+    broken: whether the last request failed.
+    error: of the last failure.
     """
 
     failed: int = 0
@@ -55,168 +53,184 @@ class Link:
 
 class TargetSession:
     """Attributes:
-    target: that is looked at.
-    link: how its link is.
-    carried: the latest picture that went over the wire; None for none.
-    begun: how often its emulation was started again.
+    target: the open target.
+    link: state of the link to it.
+    transfer: the latest image transfer; None before the first one.
+    restarts: number of restarts of its emulation.
     log: results that were read.
     """
 
     def __init__(self, target: Target, emulator: Emulator | None = None) -> None:
-        """Look at ``target``, which is closed with this, as is the ``emulator`` that it is of."""
-        self.target, self.link, self._emulator = target, Link(), emulator
-        self.carried: Transfer | None = None
-        self.begun = 0
+        """``close`` closes ``target``, and ``emulator`` if it runs the target."""
+        self.target, self.link, self._emulator = target, LinkState(), emulator
+        self.transfer: Transfer | None = None
+        self.restarts = 0
         self.log = ResultLog()
         self._shell = Shell(target)
         self._thread = ThreadPoolExecutor(1, "target")
 
     @cached_property
     def about(self) -> JsonObject:
-        """What it is, what can be asked and commanded, and what can not, with the reason."""
+        """Tables and options of the target; ``missing`` has the reason of each missing feature."""
         target, interface, controls = self.target, self.target.interface, self.controls
-        missing = {} if controls else {"controls": f"{target.name} has no control port"}
-        if controls and controls.no_past:
-            missing["past"] = f"there is no way back: {controls.no_past}"
-        if target.device is None or target.device.scene_form is None:
-            missing["scene_form"] = f"{interface.name} does not tell the keys of its scenes"
-        if target.line is None:
-            missing["raw"] = f"{target.name} is no serial line"
-        if self._overlay is None:
-            missing["found"] = f"{interface.name} does not tell what it found in a picture"
-        if not self._has("latest"):
-            missing["results"] = f"{interface.name} has no results to log"
-        if not self._has("picture"):
-            missing["download"] = f"{interface.name} sends no picture"
-        if not self._has("upload"):
-            missing["upload"] = f"{interface.name} has no image upload"
-        if self.played is not None:
-            for what in ("send", "download", "upload", "found", "sensor_registers"):
-                missing[what] = f"{target.name} is a recording, which takes no telecommand"
-        if target.registers is None:
-            missing["registers"] = f"no registers of {interface.name} are within reach here"
-        if target.device is None or target.device.image_sensor is None:
-            none = f"{interface.name} reads no single register of its image sensor"
-            missing["sensor_registers"] = none
-        if self._emulator is None:
-            missing["restart"] = f"no emulation of {target.name} was started by this page"
-        if controls is None and target.recorded is None:
-            missing["recording"] = f"{target.name} is not recorded: begin with --record FILE"
-        elif controls is not None and controls.no_past:
-            missing["recording"] = controls.no_past
-        if none := parquet_missing():
-            missing["parquet"] = none
-        if target.service_port is None:
-            missing["bench"] = "no line with the bench protocol is open"
+        device = target.device
         return {
             "name": target.name,
             "device": interface.name,
             "telemetries": [_message(one) for one in interface.telemetries],
             "telecommands": [_message(one) for one in interface.telecommands],
             "registers": [pointer_row(one) for one in Names(target).registers],
-            "settings": setting_rows(target.device) if target.device else [],
-            "sensor_registers": sensor_rows(target.device) if target.device else [],
+            "settings": setting_rows(device) if device else [],
+            "sensor_registers": sensor_rows(device) if device else [],
             "faults": list(controls.faults) if controls else [],
             "fault_parameters": dict(controls.fault_parameters) if controls else {},
             "channels": list(controls.channels) if controls else [],
             "chosen": controls.chosen if controls else {},
             "options": self._emulator.rows(controls.chosen) if self._emulator and controls else [],
-            "begun": self.begun,
+            "restarts": self.restarts,
             "sources": list(self._client.picture_sources) if self._client else [],
-            "played": self.played.state if self.played else None,
-            "missing": missing,
+            "playback": self.playback.state if self.playback else None,
+            "missing": self._missing(),
         }
+
+    def _missing(self) -> dict[str, str]:
+        target, device, controls = self.target, self.target.device, self.controls
+        name = target.interface.name
+        missing = {} if controls else {"controls": f"{target.name} has no control port"}
+        if controls and controls.no_past:
+            missing["history"] = missing["recording"] = f"no way back: {controls.no_past}"
+        if controls is None and target.recorded is None:
+            missing["recording"] = f"{target.name} is not recorded: start with --record FILE"
+        if device is None or device.scene_form is None:
+            missing["scene_form"] = f"{name} declares no scene keys"
+        if target.line is None:
+            missing["raw"] = f"{target.name} is not a serial line"
+        if self._overlay is None:
+            missing["detections"] = f"{name} does not report what it detected"
+        for what, method, reason in (
+            ("results", "latest", "has no results to log"),
+            ("download", "picture", "sends no image"),
+            ("upload", "upload", "has no image upload"),
+        ):
+            if not self._implements(method):
+                missing[what] = f"{name} {reason}"
+        if self.playback is not None:
+            for what in ("send", "download", "upload", "detections", "sensor_registers"):
+                missing[what] = f"{target.name} is a recording, which accepts no telecommands"
+        if target.registers is None:
+            missing["registers"] = f"no registers of {name} can be reached here"
+        if device is None or device.image_sensor is None:
+            none = f"{name} can not read single registers of its image sensor"
+            missing["sensor_registers"] = none
+        if self._emulator is None:
+            missing["restart"] = f"this page did not start an emulation of {target.name}"
+        if none := parquet_missing():
+            missing["parquet"] = none
+        if target.service_port is None:
+            missing["bench"] = "no line with the bench protocol is open"
+        return missing
 
     @property
     def health(self) -> JsonObject:
-        """How the link is: ``Link``, and what went over the wire as ``Exchanges`` counts it."""
-        registers, passed = self.target.registers, self.target.node.exchanges
-        return vars(self.link) | vars(passed if registers is None else passed + registers.exchanges)
+        """``LinkState``, and the counts of ``Exchanges``."""
+        registers, counts = self.target.registers, self.target.node.exchanges
+        return vars(self.link) | vars(counts if registers is None else counts + registers.exchanges)
 
     @property
     def controls(self) -> RemoteControls | None:
-        """Those of its emulation in another process."""
+        """Controls of an emulation in another process."""
         controls = self.target.controls
         return controls if isinstance(controls, RemoteControls) else None
 
     @property
-    def played(self) -> PlaybackClient | None:
+    def playback(self) -> PlaybackClient | None:
         return self.target.node if isinstance(self.target.node, PlaybackClient) else None
 
-    def do(self, line: str) -> "Future[JsonObject]":
-        """What a line of the shell gives: ``rows`` for a reader, and ``data``.
+    def execute(self, line: str) -> "Future[JsonObject]":
+        """Execute a line of the shell: ``rows`` of text, and ``data``.
 
-        Its exception: ShellError, InterfaceError, HostError.
+        The future raises ShellError, InterfaceError, HostError.
         """
-        return self._thread.submit(self._asked, lambda: self._do(line))
+        return self._request(lambda: self._execute(line))
 
     def read(self, names: Iterable[str]) -> "Future[JsonObject]":
-        """Telemetry by name: what it has, or the ``error`` in place of it."""
+        """Telemetry by name: its values, or ``error``."""
         return self._thread.submit(lambda: {name: self._read(name) for name in names})
 
-    def found(self, picture: str) -> "Future[JsonObject]":
-        """What it found in the memory called ``picture``: ``marks`` with column, row, name, empty
-        of unknown ones, and V magnitude, None where it has none; ``lines`` of columns and rows."""
-        return self._thread.submit(self._asked, lambda: self._found(picture))
+    def detections(self, memory: str) -> "Future[JsonObject]":
+        """Objects that the device detected in the image in ``memory``.
+
+        ``marks`` have column ``x`` and row ``y``, ``name`` (empty if not identified), and
+        ``v_mag`` or None; ``lines`` are lists of column and row.
+        """
+        return self._request(lambda: self._detections(memory))
 
     def sensor_register(self, name: str) -> "Future[JsonObject]":
-        """A register of its image sensor, as ``read_sensor_register`` gives it."""
-        return self._thread.submit(self._asked, lambda: self._sensor_register(name))
+        """A register of its image sensor; see ``read_sensor_register``."""
+        return self._request(lambda: self._sensor_register(name))
 
     def results(self) -> "Future[JsonObject]":
-        """Its latest result as a line of a log, or the ``error`` in place of it."""
+        """Its latest result by column name, or ``error``."""
         return self._thread.submit(self._results)
 
-    def transfer(self, what: str, source: str | None = None, content: bytes = b"") -> Transfer:
-        """Start a "download", of the memory ``source``, or an "upload" of a picture file.
+    def start_transfer(
+        self, what: str, source: str | None = None, content: bytes = b""
+    ) -> Transfer:
+        """Start a "download" from the memory ``source``, or an "upload" of an image file.
 
-        Nothing else is asked meanwhile. ValueError where it can not be, or another one runs.
+        All other requests wait until it ends. Raises ValueError if it is not possible or another
+        one runs.
         """
         client = self._client
-        if what in self.about["missing"]:
-            raise ValueError(self.about["missing"][what])
-        if self.carried is not None and self.carried.runs:
-            raise ValueError("another picture is on its way")
+        self._require(what)
+        self._require_no_transfer()
         assert client is not None
         if source is not None and source not in client.picture_sources:
             raise ValueError(f"no memory {source!r}; known: {', '.join(client.picture_sources)}")
         if what == "download":
-            self.carried = Transfer(what, lambda progress: client.picture(source, progress))
+            self.transfer = Transfer(what, lambda progress: client.picture(source, progress))
         else:
-            picture = grey_values(content)
-            self.carried = Transfer(what, lambda progress: client.upload(picture, progress))
-        self._thread.submit(self._asked, self.carried.run)
-        return self.carried
+            image = grey_values(content)
+            self.transfer = Transfer(what, lambda progress: client.upload(image, progress))
+        self._request(self.transfer.run)
+        return self.transfer
 
     def restart(
-        self, options: Mapping[str, Any], files: Mapping[str, SentFile]
+        self, options: Mapping[str, Any], files: Mapping[str, UploadedFile]
     ) -> "Future[JsonObject]":
-        """Emulate it anew, as ``Emulator.restart`` does: ``rows`` for a reader.
+        """Start its emulation again by ``Emulator.restart``; ``rows`` are its options.
 
-        ValueError where it can not be, or a picture is on its way.
+        Raises ValueError if it is not possible or a transfer runs.
         """
-        if self._emulator is None:
-            raise ValueError(self.about["missing"]["restart"])
-        if self.carried is not None and self.carried.runs:
-            raise ValueError("a picture is on its way")
+        self._require("restart")
+        self._require_no_transfer()
+        assert self._emulator is not None
         return self._thread.submit(self._restart, self._emulator, options, files)
 
     def close(self) -> None:
-        if self.carried is not None:
-            self.carried.give_up()
+        if self.transfer is not None:
+            self.transfer.cancel()
         self._thread.shutdown(cancel_futures=True)
         self.target.close()
         self.log.close()
         if self._emulator is not None:
             self._emulator.close()
 
+    def _require(self, what: str) -> None:
+        if what in self.about["missing"]:
+            raise ValueError(self.about["missing"][what])
+
+    def _require_no_transfer(self) -> None:
+        if self.transfer is not None and self.transfer.runs:
+            raise ValueError("an image transfer is in progress")
+
     def _restart(
-        self, emulator: Emulator, options: Mapping[str, Any], files: Mapping[str, SentFile]
+        self, emulator: Emulator, options: Mapping[str, Any], files: Mapping[str, UploadedFile]
     ) -> JsonObject:
         before = self.target
         self.target, end = emulator.restart(before, options, files)
-        self._shell, self.link, self.carried = Shell(self.target), Link(), None
-        self.begun += 1  # before what tells of it is told anew
+        self._shell, self.link, self.transfer = Shell(self.target), LinkState(), None
+        self.restarts += 1  # before ``about`` is computed again
         for name in ("about", "_client"):
             vars(self).pop(name, None)
         before.close()
@@ -228,19 +242,19 @@ class TargetSession:
         device = self.target.device
         return None if device is None else device.client(self.target.node)
 
-    def _has(self, method: str) -> bool:
+    def _implements(self, method: str) -> bool:
         own = getattr(type(self._client), method, None)
         return own is not None and own is not getattr(DeviceClient, method)
 
     @property
     def _overlay(self) -> Callable[[Any, str], Overlay] | None:
         own = None if self.target.device is None else self.target.device.overlay
-        return own or (star_overlay if self._has("stars") else None)
+        return own or (star_overlay if self._implements("stars") else None)
 
-    def _found(self, picture: str) -> JsonObject:
+    def _detections(self, memory: str) -> JsonObject:
         if self._overlay is None:
-            raise ValueError(self.about["missing"]["found"])
-        found = self._overlay(self._client, picture)
+            raise ValueError(self.about["missing"]["detections"])
+        overlay = self._overlay(self._client, memory)
         return {
             "marks": [
                 {
@@ -249,9 +263,9 @@ class TargetSession:
                     "name": one.name,
                     "v_mag": None if one.hipparcos is None else magnitude(one.hipparcos),
                 }
-                for one in found.marks
+                for one in overlay.marks
             ],
-            "lines": [line.tolist() for line in found.lines],
+            "lines": [line.tolist() for line in overlay.lines],
         }
 
     def _sensor_register(self, name: str) -> JsonObject:
@@ -261,7 +275,7 @@ class TargetSession:
 
     def _results(self) -> JsonObject:
         try:
-            return {} if self._client is None else dict(self._asked(self._latest))
+            return {} if self._client is None else dict(self._tracked(self._latest))
         except (HostError, ValueError) as error:
             return {"error": str(error)}
 
@@ -269,24 +283,30 @@ class TargetSession:
         assert self._client is not None
         return self._shell.asked(self._client.latest)
 
-    def _do(self, line: str) -> JsonObject:
+    def _execute(self, line: str) -> JsonObject:
         if len(line) > LONGEST_LINE:
             raise ShellError(f"a line has {LONGEST_LINE} characters at most")
         word = line.split(maxsplit=1)[0] if line.split() else ""
-        if word in self._shell.commands and word not in FROM_A_PAGE:
-            raise ShellError(f"{word}: not from a page; there are {', '.join(FROM_A_PAGE)}")
+        if word in self._shell.commands and word not in PAGE_COMMANDS:
+            raise ShellError(
+                f"{word} is not available on the page; available: {', '.join(PAGE_COMMANDS)}"
+            )
         result = self._shell.execute(line)
         return {"rows": result.rows if result else [], "data": result.data if result else {}}
 
     def _read(self, name: str) -> JsonObject:
         try:
-            return dict(self._asked(lambda: self._do(f"read {name}"))["data"]["values"])
+            return dict(self._tracked(lambda: self._execute(f"read {name}"))["data"]["values"])
         except (HostError, ValueError) as error:
             return {"error": str(error)}
 
-    def _asked(self, act: Callable[[], T]) -> T:
+    def _request(self, act: Callable[[], T]) -> "Future[T]":
+        return self._thread.submit(self._tracked, act)
+
+    def _tracked(self, act: Callable[[], T]) -> T:
+        """Result of ``act``, with its outcome in ``link``; a refusal is an answer."""
         try:
-            found = act()
+            result = act()
         except CommandRefusedError:
             self.link.broken = False
             raise
@@ -295,7 +315,7 @@ class TargetSession:
             self.link.broken, self.link.error = True, str(error)
             raise
         self.link.broken = False
-        return found
+        return result
 
 
 def _message(one: Message) -> JsonObject:

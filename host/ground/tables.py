@@ -1,4 +1,4 @@
-"""What a page shows beside what it reads: defaults of settings, registers and their bits."""
+"""Settings with their defaults, registers and their bits, for the page."""
 
 from collections.abc import Iterator
 
@@ -12,14 +12,14 @@ from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.ground.emulation import JsonObject
 
 SELECT, SELECTED = "SelectCameraRegister", "CameraRegister"
-"""Telecommand that chooses a register of an image sensor, telemetry that shows it."""
+"""Telecommand that selects a register of the image sensor, telemetry with its value."""
 
 PROCESSED_S = 10.0
-"""Virtual time that a device has to read one."""
+"""Time-out of a register read, virtual time in s."""
 
 
 def setting_rows(device: AnyDevice) -> list[JsonObject]:
-    """Settings that telemetry shows: where, which telecommand sets them, their default."""
+    """Settings in telemetry, with their telecommand, frame and default."""
     return [
         {
             "telecommand": one.telecommand.name,
@@ -37,7 +37,6 @@ def setting_rows(device: AnyDevice) -> list[JsonObject]:
 
 
 def pointer_row(register: PointerRegister) -> JsonObject:
-    """A register that is read by the shell's words."""
     return {
         "name": register.name,
         "address": register.address,
@@ -50,7 +49,7 @@ def pointer_row(register: PointerRegister) -> JsonObject:
 
 
 def sensor_rows(device: AnyDevice) -> list[JsonObject]:
-    """Registers of a device's image sensor; none where single ones can not be read."""
+    """Registers of the image sensor; empty if single ones can not be read."""
     return [_sensor_row(one) for one in device.image_sensor or ()]
 
 
@@ -64,10 +63,10 @@ def _sensor_row(register: CameraRegister) -> JsonObject:
 def read_sensor_register(device: AnyDevice, client: Client, name: str) -> JsonObject:
     """A register of the image sensor: ``value`` in hexadecimal, ``bits`` by name.
 
-    Raises ValueError for a name or device without, and the client's errors.
+    Raises TargetError for an unknown name or if single ones can not be read, and client errors.
     """
     if device.image_sensor is None:
-        raise TargetError(f"{device.title} reads no single register of its image sensor")
+        raise TargetError(f"{device.title} can not read single registers of its image sensor")
     known = {one.name: one for one in device.image_sensor}
     if name not in known:
         raise TargetError(f"{device.image_sensor.camera} has no register {name!r}")

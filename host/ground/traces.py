@@ -1,4 +1,4 @@
-"""Waveforms of a running emulation: a span of its past is done again in a process of its own."""
+"""Waveforms of a past time span, by a replay of the recording in another process."""
 
 import subprocess
 import sys
@@ -10,14 +10,14 @@ from threading import Lock
 from cubestack.host.errors import TargetError
 
 LONGEST_S = 60.0
-"""Virtual time that one waveform has."""
+"""Longest waveform, virtual time in s."""
 
-PATIENCE_S = 300.0
-"""Wall time that the process may take."""
+TIMEOUT_S = 300.0
+"""Time-out of the replay, wall time in s."""
 
 
 class Bench:
-    """Where waveforms are made, one at a time."""
+    """Runs replays, one at a time."""
 
     def __init__(self) -> None:
         self._free = Lock()
@@ -25,21 +25,21 @@ class Bench:
         self._closed = False
 
     def close(self) -> None:
-        """End what is being made; nothing more is."""
+        """End the current replay and reject new ones."""
         self._closed = True
         if self._process is not None:
             self._process.kill()
 
     def run(self, call: list[str]) -> str:
-        """Run a command to its end; what it said.
+        """Run a command; returns its error output.
 
-        Raises RuntimeError while another one runs, TargetError when it fails or takes too long.
+        Raises RuntimeError while another one runs, TargetError if it fails or times out.
         """
         if not self._free.acquire(blocking=False):
-            raise RuntimeError("another waveform is being made")
+            raise RuntimeError("another waveform is being computed")
         try:
             if self._closed:
-                raise TargetError("no waveform: the emulation ends")
+                raise TargetError("no waveform: the emulation is ending")
             return self._run(call)
         finally:
             self._free.release()
@@ -49,28 +49,28 @@ class Bench:
         with subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=pipe, text=True) as process:
             self._process = process
             try:
-                _, said = process.communicate(timeout=PATIENCE_S)
+                _, errors = process.communicate(timeout=TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
-                late = f"no waveform within {PATIENCE_S:g} s: there is too much before it"
+                late = f"no waveform within {TIMEOUT_S:g} s; choose an earlier time span"
                 raise TargetError(late) from None
             finally:
                 self._process = None
         if process.returncode:
-            told = said.strip().splitlines()
-            raise TargetError(f"no waveform: {told[-1] if told else process.returncode}")
-        return said
+            lines = errors.strip().splitlines()
+            raise TargetError(f"no waveform: {lines[-1] if lines else process.returncode}")
+        return errors
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A waveform that is to be made.
+    """A waveform to compute.
 
     Attributes:
-        bench: where.
-        recording: file of what was done to the device.
-        count: bytes of it that are written by now.
-        from_s, to_s: virtual time that it shows.
+        bench: runs the replay.
+        recording: of the device.
+        count: bytes of the recording to replay.
+        from_s, to_s: span of virtual time.
     """
 
     bench: Bench
@@ -79,16 +79,13 @@ class Trace:
     from_s: float
     to_s: float
 
-    def make(self) -> bytes:
-        """The VCD file (`cubestack replay --trace`).
-
-        Raises as ``Bench.run``.
-        """
+    def render(self) -> bytes:
+        """The VCD file of `cubestack replay --trace`; raises as ``Bench.run`` does."""
         with TemporaryDirectory(prefix="cubestack-") as folder:
-            past, made = Path(folder) / "past.rec", Path(folder) / "span.vcd"
+            recording, waveform = Path(folder) / "past.rec", Path(folder) / "span.vcd"
             with self.recording.open("rb") as stream:
-                past.write_bytes(stream.read(self.count))
+                recording.write_bytes(stream.read(self.count))
             span = ["--trace-from", repr(self.from_s), "--trace-to", repr(self.to_s)]
-            call = [sys.executable, "-m", "cubestack", "replay", str(past), "--trace", str(made)]
-            self.bench.run([*call, *span])
-            return made.read_bytes()
+            call = [sys.executable, "-m", "cubestack", "replay", str(recording)]
+            self.bench.run([*call, "--trace", str(waveform), *span])
+            return waveform.read_bytes()

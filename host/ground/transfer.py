@@ -1,4 +1,4 @@
-"""A picture on its way over the wire, down or up: how far it is, held, and given up."""
+"""Image transfers over the wire: progress, pause, cancel."""
 
 import threading
 import warnings
@@ -15,47 +15,46 @@ from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.pictures.images import png
 
 
-class GivenUpError(HostError):
-    """Somebody gave the transfer up."""
+class TransferCancelledError(HostError):
+    """A user cancelled the transfer."""
 
 
 class Transfer:
     """Attributes:
-    what: "download" or "upload", for whoever shows it.
-    picture: what a download gave, as PNG; None before its end.
+    what: "download" or "upload".
+    picture: the downloaded image as PNG; None before the end of a download.
     """
 
     def __init__(self, what: str, perform: Callable[[Progress], NDArray[np.uint8] | None]) -> None:
-        """To be ``run``; ``perform`` tells its progress, and gives the picture of a download."""
+        """``perform`` reports its progress, and returns the image of a download."""
         self.what, self._perform = what, perform
         self.picture: bytes | None = None
         self._blocks = (0, 0)
-        self._goes_on = threading.Event()
-        self._goes_on.set()
-        self._given_up = False
+        self._resumed = threading.Event()
+        self._resumed.set()
+        self._cancelled = False
         self._ended = ""
 
     @property
     def runs(self) -> bool:
-        """Whether it keeps the line to itself."""
         return not self._ended
 
     @property
     def state(self) -> JsonObject:
-        """For a page; ``ended`` is "" on the way, "done", or why it ended before."""
+        """``ended`` is "" in progress, "done", or the error; ``done`` and ``total`` are blocks."""
         done, total = self._blocks
-        held = self.runs and not self._goes_on.is_set()
+        paused = self.runs and not self._resumed.is_set()
         return {
             "what": self.what,
             "done": done,
             "total": total,
-            "held": held,
+            "paused": paused,
             "ended": self._ended,
             "saved": self.picture is not None,
         }
 
     def run(self) -> None:
-        """Perform it, in the thread that asks the target."""
+        """Perform it, in the thread of the target's requests."""
         try:
             self._step(0, 0)
             picture = self._perform(self._step)
@@ -64,30 +63,30 @@ class Transfer:
         except (HostError, ValueError) as error:
             self._ended = str(error)
         except BaseException as error:
-            self._ended = f"it failed: {error!r}"
+            self._ended = f"failed: {error!r}"
             raise
 
-    def hold(self) -> None:
-        """Ask for nothing more until it is to go on; a stream waits in the line's buffers."""
-        self._goes_on.clear()
+    def pause(self) -> None:
+        """Request no more blocks until ``resume``; a stream waits in the line's buffers."""
+        self._resumed.clear()
 
-    def go_on(self) -> None:
-        self._goes_on.set()
+    def resume(self) -> None:
+        self._resumed.set()
 
-    def give_up(self) -> None:
-        """End it after the block that is under way."""
-        self._given_up = True
-        self._goes_on.set()
+    def cancel(self) -> None:
+        """End it after the current block."""
+        self._cancelled = True
+        self._resumed.set()
 
     def _step(self, done: int, total: int) -> None:
         self._blocks = (done, total)
-        self._goes_on.wait()
-        if self._given_up:
-            raise GivenUpError(f"given up after {done} of {total} blocks")
+        self._resumed.wait()
+        if self._cancelled:
+            raise TransferCancelledError(f"cancelled after {done} of {total} blocks")
 
 
 def grey_values(content: bytes) -> NDArray[np.uint8]:
-    """Grey values (rows, columns) of a picture file; ValueError for what is none."""
+    """Grey values (rows, columns) of an image file; raises ValueError for any other file."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
@@ -95,4 +94,4 @@ def grey_values(content: bytes) -> NDArray[np.uint8]:
         with image:
             return np.asarray(image.convert("L"))
     except (OSError, Image.DecompressionBombError) as error:
-        raise ValueError(f"that is no picture: {error}") from None
+        raise ValueError(f"not an image file: {error}") from None

@@ -1,15 +1,15 @@
-// Where the sensor looks, on a sphere of the sky seen from outside: its answer, and the truth
-// beside it where that is known.
+// The measured and, if known, the true attitude on a sphere of the sky seen from outside.
 
-import { atNextFrame, make } from "./dom.js";
+import { atNextFrame, make, note } from "./dom.js";
+import { disc, line, ring } from "./draw.js";
+import { cross, RAD, vector } from "./sphere.js";
 
 const SIZE = 420;
 const RADIUS = 150;
 const LENGTH = 1.18; // of the boresight, in radii
-const AXIS = 0.35;
-const TURN_DEG = 10; // by an arrow key
-const ASIDE_DEG = 35; // that the first boresight stands aside of the one who looks at it
-const RAD = Math.PI / 180;
+const AXIS = 0.35; // of the image's axes, in radii
+const TURN_DEG = 10; // per arrow key
+const ASIDE_DEG = 35; // of the first boresight from the viewer
 const MEASURED = "#2f81f7";
 const TRUE = "#d29922";
 const STEPS = 60;
@@ -21,7 +21,7 @@ export class Attitude {
     this.drawSoon = atNextFrame(() => this.draw());
     this.azimuth = -30 * RAD;
     this.height = 20 * RAD;
-    this.told = make("p", { className: "quiet", id: "attitude-told" });
+    this.status = note(none ?? "no attitude yet", { id: "attitude-status" });
     this.canvas = make("canvas", {
       id: "sphere",
       width: SIZE,
@@ -36,29 +36,28 @@ export class Attitude {
     this.canvas.onpointermove = (event) => {
       if (event.buttons) this.turn(event.movementX / RADIUS, event.movementY / RADIUS);
     };
-    place.append(this.told, this.canvas);
-    this.told.textContent = none ?? "no attitude yet";
+    place.append(this.status, this.canvas);
     if (!none) this.draw();
   }
 
-  hear(results, truth = {}) {
+  update(results, truth = {}) {
     this.canvas.hidden = !("ra_deg" in results);
     if (this.canvas.hidden) {
-      this.told.textContent = results.error ?? `${this.device} answers no attitude`;
+      this.status.textContent = results.error ?? `${this.device} reports no attitude`;
       return;
     }
     const valid = results.ra_deg !== null;
     if (valid) this.measured = axes(results);
-    if (valid && !this.faced) this.azimuth = (ASIDE_DEG - 90 - results.ra_deg) * RAD;
-    this.faced ||= valid;
+    if (valid && !this.turned) this.azimuth = (ASIDE_DEG - 90 - results.ra_deg) * RAD;
+    this.turned ||= valid;
     this.truth = typeof truth.ra_deg === "number" ? axes(truth) : null;
     const words = [];
-    if (valid) words.push(`answer ${worded(results)}`);
-    else words.push(`no valid attitude${this.measured ? "; the last one is shown" : ""}`);
-    if (this.truth) words.push(`truth ${worded(truth)}`);
+    if (valid) words.push(`measured ${text(results)}`);
+    else words.push(`no valid attitude${this.measured ? "; showing the last one" : ""}`);
+    if (this.truth) words.push(`truth ${text(truth)}`);
     if (this.truth && valid)
-      words.push(`error ${apart(this.measured, this.truth).toFixed(4)}° in all`);
-    this.told.textContent = words.join("; ");
+      words.push(`total error ${apart(this.measured, this.truth).toFixed(4)}°`);
+    this.status.textContent = words.join("; ");
     this.drawSoon();
   }
 
@@ -76,8 +75,8 @@ export class Attitude {
     this.draw();
   }
 
-  // Column, row and nearness of a point; x to the right, z up, seen along minus y.
-  seen([x, y, z]) {
+  // Column, row and depth (positive in front) of a point; x is right, z up, seen along -y.
+  project([x, y, z]) {
     const [c, s] = [Math.cos(this.azimuth), Math.sin(this.azimuth)];
     const [right, far] = [c * x - s * y, s * x + c * y];
     const [ch, sh] = [Math.cos(this.height), Math.sin(this.height)];
@@ -92,56 +91,51 @@ export class Attitude {
     pen.font = "14px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    for (let ra = 0; ra < 360; ra += 30) this.curve(pen, (t) => sky(ra, 180 * t - 90));
-    for (let dec = -60; dec <= 60; dec += 30) this.curve(pen, (t) => sky(360 * t, dec));
+    for (let ra = 0; ra < 360; ra += 30) this.curve(pen, (t) => vector(ra, 180 * t - 90));
+    for (let dec = -60; dec <= 60; dec += 30) this.curve(pen, (t) => vector(360 * t, dec));
     pen.fillStyle = text;
-    for (let ra = 0; ra < 360; ra += 90) this.word(pen, `${ra / 15} h`, sky(ra, 0));
-    this.word(pen, "N", sky(0, 90));
-    this.word(pen, "S", sky(0, -90));
+    for (let ra = 0; ra < 360; ra += 90) this.word(pen, `${ra / 15} h`, vector(ra, 0));
+    this.word(pen, "N", vector(0, 90));
+    this.word(pen, "S", vector(0, -90));
     pen.strokeStyle = "#888";
-    pen.beginPath();
-    pen.arc(SIZE / 2, SIZE / 2, RADIUS, 0, 2 * Math.PI);
-    pen.stroke();
+    ring(pen, [SIZE / 2, SIZE / 2], RADIUS);
     if (this.truth) this.arrow(pen, this.truth, TRUE, [6, 4]);
     if (this.measured) this.arrow(pen, this.measured, MEASURED, []);
     pen.textAlign = "left";
     pen.fillStyle = MEASURED;
-    pen.fillText("– answer", 8, SIZE - 34);
+    pen.fillText("– measured", 8, SIZE - 34);
     if (this.measured) this.name(pen, this.measured);
     pen.fillStyle = TRUE;
     pen.fillText("- - truth", 8, SIZE - 14);
   }
 
-  // The half of it that is in front is drawn stronger.
+  // Its front half is drawn stronger.
   curve(pen, at) {
     for (let step = 0; step < STEPS; step++) {
-      const from = this.seen(at(step / STEPS));
-      const to = this.seen(at((step + 1) / STEPS));
+      const from = this.project(at(step / STEPS));
+      const to = this.project(at((step + 1) / STEPS));
       pen.strokeStyle = from[2] > 0 ? "#888b" : "#8883";
-      pen.beginPath();
-      pen.moveTo(from[0], from[1]);
-      pen.lineTo(to[0], to[1]);
-      pen.stroke();
+      line(pen, from, to);
     }
   }
 
   word(pen, text, direction) {
-    const [column, row, near] = this.seen(direction.map((part) => 1.1 * part));
+    const [column, row, near] = this.project(direction.map((part) => 1.1 * part));
     pen.globalAlpha = near > 0 ? 1 : 0.35;
     pen.fillText(text, column, row);
     pen.globalAlpha = 1;
   }
 
-  // What the thinner two of the lines are.
+  // Labels the axes of the image.
   name(pen, { boresight, right, up }) {
     for (const [text, side] of [["up", up], ["right", right]]) {
       const at = boresight.map((part, i) => LENGTH * part + 1.25 * AXIS * side[i]);
-      const [column, row] = this.seen(at);
+      const [column, row] = this.project(at);
       pen.fillText(text, column - pen.measureText(text).width / 2, row);
     }
   }
 
-  // Boresight, and up and right of the picture at its end.
+  // Draws the boresight, with up and right of the image at its end.
   arrow(pen, { boresight, right, up }, colour, dash) {
     const end = boresight.map((part) => LENGTH * part);
     pen.strokeStyle = pen.fillStyle = colour;
@@ -151,49 +145,34 @@ export class Attitude {
       [2, end, end.map((part, i) => part + AXIS * up[i])],
       [1, end, end.map((part, i) => part + AXIS * right[i])],
     ]) {
-      const [start, stop] = [this.seen(from), this.seen(to)];
+      const [start, stop] = [this.project(from), this.project(to)];
       pen.lineWidth = width;
-      pen.beginPath();
-      pen.moveTo(start[0], start[1]);
-      pen.lineTo(stop[0], stop[1]);
-      pen.stroke();
+      line(pen, start, stop);
     }
     pen.setLineDash([]);
     pen.lineWidth = 1;
-    const [column, row] = this.seen(end);
-    pen.beginPath();
-    pen.arc(column, row, 5, 0, 2 * Math.PI);
-    pen.fill();
+    disc(pen, this.project(end), 5);
   }
 }
 
-function sky(ra, dec) {
-  const across = Math.cos(dec * RAD);
-  return [across * Math.cos(ra * RAD), across * Math.sin(ra * RAD), Math.sin(dec * RAD)];
-}
-
-// Camera axes on the sky; roll turns the picture's up from north to east.
+// Camera axes on the sky; roll turns the image's up from north to east.
 function axes({ ra_deg, dec_deg, roll_deg }) {
-  const boresight = sky(ra_deg, dec_deg);
-  const north = sky(ra_deg, dec_deg + 90);
-  const east = sky(ra_deg + 90, 0);
+  const boresight = vector(ra_deg, dec_deg);
+  const north = vector(ra_deg, dec_deg + 90);
+  const east = vector(ra_deg + 90, 0);
   const [c, s] = [Math.cos(roll_deg * RAD), Math.sin(roll_deg * RAD)];
   const up = north.map((part, i) => c * part + s * east[i]);
   return { boresight, up, right: cross(boresight, up) };
 }
 
-function cross(a, b) {
-  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-}
-
-// Angle of the turn from one set of axes to the other, from its matrix and precise for small ones.
+// Rotation angle between two sets of axes in degrees, precise for small ones too.
 function apart(a, b) {
   const rows = (one) => [one.right, one.up, one.boresight];
   const far = rows(a).flatMap((row, i) => row.map((part, j) => (part - rows(b)[i][j]) ** 2));
-  const size = Math.sqrt(far.reduce((sum, part) => sum + part, 0)); // 2 sqrt 2 sin of half of it
+  const size = Math.sqrt(far.reduce((sum, part) => sum + part, 0)); // sqrt(8) sin(angle / 2)
   return (2 * Math.asin(Math.min(size / Math.sqrt(8), 1))) / RAD;
 }
 
-function worded({ ra_deg, dec_deg, roll_deg }) {
+function text({ ra_deg, dec_deg, roll_deg }) {
   return [ra_deg, dec_deg, roll_deg].map((deg) => `${deg.toFixed(4)}°`).join(" ");
 }

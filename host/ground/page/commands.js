@@ -1,18 +1,18 @@
-// Forms made of the device's own tables, and the shell's words for whatever has none.
+// Forms for telecommands, generated from the device's tables, and the shell.
 
-import { choose, labelled, make } from "./dom.js";
+import { choose, disabledIf, labelled, make, note, row } from "./dom.js";
 
 const HISTORY = 30;
 
 export class Commands {
-  // `act(line)` does a line of the shell, and tells of it.
-  constructor(place, about, act) {
+  // `execute(line)` executes a line of the shell.
+  constructor(place, about, execute) {
     this.about = about;
-    this.act = act;
+    this.execute = execute;
     const supported = about.telecommands.filter((one) => one.supported);
     this.byName = new Map(supported.map((one) => [one.name, one]));
     this.name = choose([...this.byName.keys()], { id: "command", onchange: () => this.show() });
-    this.meaning = make("p", { className: "quiet" });
+    this.meaning = note();
     this.fields = make("form", { onsubmit: (event) => this.send(event) });
     this.line = make("input", {
       id: "line",
@@ -25,16 +25,14 @@ export class Commands {
     this.history = make("datalist", { id: "history" });
     const shell = make(
       "form",
-      { onsubmit: (event) => this.say(event) },
-      labelled("in the shell's words", this.line),
-      make("button", { textContent: "Do" }),
+      { onsubmit: (event) => this.submit(event) },
+      labelled("shell command", this.line),
+      make("button", { textContent: "Run" }),
       this.history,
     );
-    const row = make("div", { className: "row" }, labelled("telecommand", this.name));
-    place.append(row, this.meaning, this.fields, shell);
-    const missing = Object.entries(about.missing).filter(([what]) => ["bench", "raw", "send"].includes(what));
-    for (const [what, why] of missing)
-      place.append(make("p", { className: "quiet", textContent: `no ${what}: ${why}` }));
+    place.append(row(labelled("telecommand", this.name)), this.meaning, this.fields, shell);
+    for (const [what, why] of Object.entries(about.missing))
+      if (["bench", "raw", "send"].includes(what)) place.append(note(`no ${what}: ${why}`));
     this.show();
   }
 
@@ -43,8 +41,7 @@ export class Commands {
     if (!one) return;
     this.meaning.textContent = `${one.id}: ${one.meaning}`;
     const inputs = one.fields.map((field) => labelled(field.name, input(field)));
-    const why = this.about.missing.send;
-    const state = { disabled: Boolean(why), title: why ?? "" };
+    const state = disabledIf(this.about.missing.send);
     const send = make("button", { className: "main", id: "send", textContent: "Send", ...state });
     this.fields.replaceChildren(...inputs, send);
   }
@@ -54,21 +51,21 @@ export class Commands {
     const values = [...this.fields.elements]
       .filter((element) => element.name)
       .map((element) => `${element.name}='${element.value.replaceAll("'", "")}'`);
-    this.do(["write", this.name.value, ...values].join(" "));
+    this.run(["write", this.name.value, ...values].join(" "));
   }
 
-  say(event) {
+  submit(event) {
     event.preventDefault();
-    if (this.line.value.trim()) this.do(this.line.value);
+    if (this.line.value.trim()) this.run(this.line.value);
     this.line.select();
   }
 
-  do(line) {
+  run(line) {
     const known = [...this.history.options].find((option) => option.value === line);
     if (known) known.remove();
     this.history.prepend(make("option", { value: line }));
     while (this.history.options.length > HISTORY) this.history.lastChild.remove();
-    this.act(line);
+    this.execute(line);
   }
 }
 

@@ -1,4 +1,4 @@
-// Elements from data. Text is set as text: what a device says is never markup.
+// Builds elements from data. Text from a device is set as text, never as markup.
 
 export function make(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
@@ -22,22 +22,48 @@ export function labelled(text, control, attributes = {}) {
   return make("label", attributes, text, control);
 }
 
-// `draw` with the next frame that the browser shows, once however often it is asked for by then.
+// A control after its label's text, on the same line.
+export function beside(text, control) {
+  return labelled(text, control, { className: "beside" });
+}
+
+export function row(...children) {
+  return make("div", { className: "row" }, ...children);
+}
+
+export function note(textContent, attributes = {}) {
+  return make("p", { className: "quiet", textContent: textContent ?? "", ...attributes });
+}
+
+// Attributes that disable a control and show the reason `why`, if there is one.
+export function disabledIf(why) {
+  return { disabled: Boolean(why), title: why ?? "" };
+}
+
+export function button(textContent, id, onclick, why = null) {
+  return make("button", { textContent, ...(id && { id }), type: "button", onclick, ...disabledIf(why) });
+}
+
+// Calls `draw` once in the browser's next frame, however often it is requested before.
 export function atNextFrame(draw) {
-  let asked = false;
+  let requested = false;
   return () => {
-    if (asked) return;
-    asked = true;
+    if (requested) return;
+    requested = true;
     requestAnimationFrame(() => {
-      asked = false;
+      requested = false;
       draw();
     });
   };
 }
 
-// A file for the user, as if it were downloaded.
 export function save(blob, name) {
   const address = URL.createObjectURL(blob);
   make("a", { href: address, download: name }).click();
   URL.revokeObjectURL(address);
+}
+
+export async function base64(file) {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
 }

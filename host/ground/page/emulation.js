@@ -1,48 +1,40 @@
-// What only an emulation lets one do: hold its time, and disturb it.
+// Controls of an emulation: virtual time, snapshots, faults and load switches.
 
-import { choose, labelled, make } from "./dom.js";
+import { button, choose, labelled, make, note, row } from "./dom.js";
 
 export class Emulation {
-  // `steer(call, body)` asks the emulation, `act(line)` does a line of the shell.
-  constructor(place, about, steer, act) {
+  // `control(call, body)` sends a call about virtual time, `execute(line)` a line of the shell.
+  constructor(place, about, control, execute) {
     const why = about.missing.controls;
     this.time = make("output", { id: "time", className: "value" });
-    this.state = make("p", { className: "quiet", id: "state" });
-    const button = (text, id, click) =>
-      make("button", { textContent: text, id, type: "button", onclick: click });
-    this.held = button("Pause", "pause", () => steer(this.isHeld ? "resume" : "pause", {}));
+    this.state = note(why, { id: "state" });
+    this.pause = button("Pause", "pause", () => control(this.held ? "resume" : "pause", {}));
     this.events = make("input", { type: "number", value: 1, min: 1, max: 100000, id: "events" });
     this.to = make("input", { type: "number", min: 0, step: "any", id: "to" });
     this.speed = choose(["0.1", "0.5", "1", "2", "5", "20", "fast"], { id: "speed", value: "1" });
     this.speed.onchange = () => {
       const fast = this.speed.value === "fast";
-      steer("pace", fast ? { pace: "fast" } : { pace: "real", speed: Number(this.speed.value) });
+      control("pace", fast ? { pace: "fast" } : { pace: "real", speed: Number(this.speed.value) });
     };
-    const step = () => steer("step", { events: Number(this.events.value) });
+    const step = () => control("step", { events: Number(this.events.value) });
     const go = () => {
       const to = Number(this.to.value);
-      if (to < this.now) steer("back", { to });
-      else steer("run", { to_s: to });
+      if (to < this.now) control("back", { to });
+      else control("run", { to_s: to });
     };
-    const time = make(
-      "div",
-      { className: "row" },
-      this.held,
+    const time = row(
+      this.pause,
       labelled("events", this.events),
       button("Step", "step", step),
-      labelled("to [s]", this.to),
-      button("Go", "go", go),
+      labelled("time [s]", this.to),
+      button("Go to time", "go", go),
       labelled("speed", this.speed),
     );
     this.snapshots = choose([], { id: "snapshots" });
-    const take = () => steer("snapshot", { name: `${this.now.toFixed(3)} s` });
-    const back = () => steer("back", { to: this.snapshots.value });
-    const past = make(
-      "div",
-      { className: "row" },
-      button("Snapshot", "snapshot", take),
-      labelled("snapshots", this.snapshots),
-      button("Go back", "back", back),
+    const history = row(
+      button("Save snapshot", "snapshot", () => control("snapshot", { name: `${this.now.toFixed(3)} s` })),
+      labelled("snapshot", this.snapshots),
+      button("Go back to snapshot", "back", () => control("back", { to: this.snapshots.value })),
     );
     this.fault = choose(about.faults, { id: "fault" });
     this.parameters = make("input", { id: "parameters", size: 26, placeholder: "for_s=2" });
@@ -56,49 +48,47 @@ export class Emulation {
       {
         onsubmit: (event) => {
           event.preventDefault();
-          act(`fault ${this.fault.value} ${this.parameters.value}`.trim());
+          execute(`fault ${this.fault.value} ${this.parameters.value}`.trim());
         },
       },
       labelled("fault", this.fault),
       labelled("parameters", this.parameters),
-      make("button", { className: "main", id: "inject", textContent: "Inject" }),
+      make("button", { className: "main", id: "inject", textContent: "Inject fault" }),
     );
-    this.channels = make("div", { className: "row" });
-    for (const channel of about.channels)
-      for (const to of ["on", "off"])
-        this.channels.append(
-          button(`${channel} ${to}`, `${channel}-${to}`, () => act(`power ${channel} ${to}`)),
-        );
+    const switches = about.channels.flatMap((channel) =>
+      ["on", "off"].map((to) =>
+        button(`${channel} ${to}`, `${channel}-${to}`, () => execute(`power ${channel} ${to}`)),
+      ),
+    );
     const chosen = Object.entries(about.chosen).map(([name, value]) => `${name} ${value}`);
     place.append(
       make("p", {}, "virtual time ", this.time),
-      make("p", { className: "quiet", id: "chosen", textContent: chosen.join(", ") }),
+      note(chosen.join(", "), { id: "chosen" }),
       this.state,
       time,
-      past,
+      history,
       faults,
-      this.channels,
+      row(...switches),
     );
-    if (why) this.state.textContent = why;
-    if (why) grey(place, why);
-    else if (about.missing.past) grey(past, about.missing.past);
+    if (why) disable(place, why);
+    else if (about.missing.history) disable(history, about.missing.history);
   }
 
-  hear(emulation) {
+  update(emulation) {
     if (emulation.error) {
       this.state.textContent = emulation.error;
       this.state.className = "bad";
       return;
     }
-    this.isHeld = emulation.held;
+    this.held = emulation.held;
     this.now = emulation.time_s;
     const names = Object.keys(emulation.snapshots);
     if (names.join() !== [...this.snapshots.options].map((one) => one.value).join()) {
       this.snapshots.replaceChildren(...choose(names).children);
       this.snapshots.selectedIndex = names.length - 1;
     }
-    this.held.textContent = emulation.held ? "Resume" : "Pause";
-    this.held.setAttribute("aria-pressed", String(emulation.held));
+    this.pause.textContent = emulation.held ? "Resume" : "Pause";
+    this.pause.setAttribute("aria-pressed", String(emulation.held));
     this.time.textContent = `${emulation.time_s.toFixed(6)} s`;
     const pace = emulation.pace === "fast" ? "fast" : String(emulation.speed);
     if (document.activeElement !== this.speed) this.speed.value = pace;
@@ -108,13 +98,13 @@ export class Emulation {
     const probes = Object.entries(emulation.probes)
       .map(([name, value]) => `${name} ${value}`)
       .join(", ");
-    const busy = emulation.held ? "held" : emulation.busy ? "at work" : "waits for the host";
+    const busy = emulation.held ? "paused" : emulation.busy ? "busy" : "waiting for the host";
     this.state.className = "quiet";
-    this.state.textContent = `${emulation.goes_back ? "goes back" : busy}; ${probes}; ${currents}`;
+    this.state.textContent = `${emulation.goes_back ? "going back" : busy}; ${probes}; ${currents}`;
   }
 }
 
-function grey(place, why) {
+function disable(place, why) {
   for (const one of place.querySelectorAll("button, input, select, textarea")) {
     one.disabled = true;
     one.title = why;

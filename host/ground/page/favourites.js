@@ -1,36 +1,30 @@
-// Lines of the shell that are kept in this browser, for each kind of device its own.
+// Shell commands that this browser saves, per kind of device.
 
-import { make } from "./dom.js";
+import { button, make, row } from "./dom.js";
 
 const MOST = 40;
 
 export class Favourites {
-  // `commands` has the line that is typed, and does lines.
   constructor(place, about, commands) {
     this.key = `cubestack lines ${about.device}`;
     this.commands = commands;
-    this.list = make("ul", { className: "kept", id: "kept" });
-    const keep = make("button", {
-      textContent: "Keep this line",
-      id: "keep",
-      type: "button",
-      onclick: () => this.keep(commands.line.value.trim()),
-    });
-    place.append(make("div", { className: "row" }, keep), this.list);
+    this.list = make("ul", { className: "saved-lines", id: "saved-lines" });
+    const add = () => this.add(commands.line.value.trim());
+    place.append(row(button("Save this command", "save-line", add)), this.list);
     this.show();
   }
 
-  // What is kept; nothing where the browser keeps nothing, or something else is there.
+  // Empty if the browser stores nothing or something else.
   lines() {
     try {
-      const kept = JSON.parse(localStorage.getItem(this.key));
-      return Array.isArray(kept) ? kept.filter((line) => typeof line === "string") : [];
+      const lines = JSON.parse(localStorage.getItem(this.key));
+      return Array.isArray(lines) ? lines.filter((line) => typeof line === "string") : [];
     } catch {
       return [];
     }
   }
 
-  keep(line) {
+  add(line) {
     if (line) this.store([line, ...this.lines().filter((one) => one !== line)].slice(0, MOST));
   }
 
@@ -38,23 +32,18 @@ export class Favourites {
     try {
       localStorage.setItem(this.key, JSON.stringify(lines));
     } catch {
-      // the browser keeps nothing
+      // The browser stores nothing.
     }
     this.show();
   }
 
   show() {
     const lines = this.lines();
-    const rows = lines.map((line) => {
-      const drop = make("button", {
-        textContent: "×",
-        type: "button",
-        onclick: () => this.store(lines.filter((one) => one !== line)),
-      });
-      drop.setAttribute("aria-label", `keep no more: ${line}`);
-      const act = make("button", { textContent: line, type: "button", onclick: () => this.commands.do(line) });
-      return make("li", {}, act, drop);
+    const items = lines.map((line) => {
+      const remove = button("×", "", () => this.store(lines.filter((one) => one !== line)));
+      remove.setAttribute("aria-label", `remove: ${line}`);
+      return make("li", {}, button(line, "", () => this.commands.run(line)), remove);
     });
-    this.list.replaceChildren(...rows);
+    this.list.replaceChildren(...items);
   }
 }

@@ -1,7 +1,7 @@
-// What the interface tables say of a field.
+// Named values of fields.
 
-// The name of its value among the fields of a frame; none where it has no name.
-export function named(field, values) {
+// The name of the field's value in a frame; undefined if it has none.
+export function valueName(field, values) {
   const value = Number(values[field.name]);
   const [other, sets] = field.choices_by ?? [];
   const choices = field.choices ?? sets?.[Number(values[other])] ?? {};

@@ -1,4 +1,7 @@
-// The page: which target is looked at, and what the parts of the page have to do with each other.
+// Shows the selected target, and distributes its live updates to the parts of the page.
+//
+// Parts are built with the section that they fill, `about`: the target's tables, the `path` of its
+// requests, and `report(text, kind)`, which writes a line into the log.
 
 import { Attitude } from "./attitude.js";
 import { Commands } from "./commands.js";
@@ -11,168 +14,149 @@ import { Playback } from "./playback.js";
 import { Results } from "./results.js";
 import { Scene } from "./scene.js";
 import { ask, listen } from "./server.js";
-import { Transcript } from "./transcript.js";
 import { Settings } from "./settings.js";
 import { Start } from "./start.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
+import { Transcript } from "./transcript.js";
 import { Transfer } from "./transfer.js";
 import { Waveform } from "./waveform.js";
 
-const KEPT_LINES = 500;
+const MOST_LINES = 500;
 
-const begun = Date.now();
-
-const parts = [
-  "played",
-  "picture",
-  "wire",
-  "attitude",
-  "said",
-  "results",
-  "loop",
-  "health",
-  "emulation",
-  "start",
-  "scene",
-  "commands",
-  "settings",
-  "waveform",
-  "telemetry",
-];
+const opened = Date.now();
 const lines = document.getElementById("lines");
 const link = document.getElementById("link");
 let live = null;
 let targets = [];
-let looked = 0;
-let renews = false;
+let selected = 0;
+let reloading = false;
 
-function tell(text, kind = "") {
+function report(text, kind = "") {
   const time = new Date().toLocaleTimeString();
   lines.prepend(make("li", { className: kind, textContent: `${time} ${text}` }));
-  while (lines.children.length > KEPT_LINES) lines.lastChild.remove();
+  while (lines.children.length > MOST_LINES) lines.lastChild.remove();
 }
 
-async function told(what, asked) {
+// Reports the answer to a request, or its error; returns the answer or null.
+async function reported(what, request) {
   try {
-    const answer = await asked;
+    const answer = await request;
     const rows = (answer.rows ?? []).map(([name, text]) => (name ? `${name}: ${text}` : text));
-    tell([what, ...rows].join("\n  "), "good");
+    report([what, ...rows].join("\n  "), "good");
     return answer;
   } catch (error) {
-    tell(`${what}\n  ${error.message}`, "bad");
+    report(`${what}\n  ${error.message}`, "bad");
     return null;
   }
 }
 
-function worded(results = {}) {
+function textsOf(results = {}) {
   return Object.fromEntries(Object.entries(results).filter(([, v]) => typeof v === "string"));
 }
 
-function look(number) {
+function select(number) {
   live?.close();
-  looked = number;
+  selected = number;
   const about = targets[number];
   document.title = `${about.device} – cubestack`;
-  for (const part of parts) {
-    const place = document.getElementById(part);
-    place.replaceChildren(place.querySelector("h2"));
-  }
+  for (const section of document.querySelectorAll("main > section:not(#log)"))
+    section.replaceChildren(section.querySelector("h2"));
   const place = (part) => document.getElementById(part);
   const path = `/targets/${number}`;
-  const act = (line) => told(line, ask(`${path}/do`, { line }));
-  const steer = (call, body) => told(call, ask(`${path}/${call}`, body));
-  const wanted = { show: [], results: false };
+  const execute = (line) => reported(line, ask(`${path}/shell`, { line }));
+  const control = (call, body) => reported(call, ask(`${path}/${call}`, body));
+  const subscription = { show: [], results: false };
   const frames = {}; // by the part that shows them
-  const want = (more) => {
-    Object.assign(wanted, more);
-    live?.want(wanted);
+  const subscribe = (more) => {
+    Object.assign(subscription, more);
+    live?.subscribe(subscription);
   };
   const show = (part, names) => {
     frames[part] = names;
-    want({ show: [...new Set(Object.values(frames).flat())] });
+    subscribe({ show: [...new Set(Object.values(frames).flat())] });
   };
-  const commands = new Commands(place("commands"), about, act);
+  live = null; // the parts' subscriptions are sent together, once it is open
+  const commands = new Commands(place("commands"), about, execute);
   new Favourites(place("commands"), about, commands);
-  new Settings(place("settings"), about, path, tell);
-  new Transcript(place("said"), about, path, tell);
-  const played = new Playback(place("played"), about, path, tell);
-  const waveform = new Waveform(place("waveform"), about, path, tell);
-  const emulation = new Emulation(place("emulation"), about, steer, act);
-  new Start(place("start"), about, path, told);
-  new Scene(place("scene"), about, path, told);
-  const pictures = new Pictures(place("picture"), about, path, (every_s) => want({ every_s }));
-  live = null; // what the parts want is told when it is there
-  const transfer = new Transfer(place("wire"), path, about, tell);
+  new Settings(place("settings"), about, path, report);
+  new Transcript(place("transcript"), about, path, report);
+  const playback = new Playback(place("playback"), about, path, report);
+  const waveform = new Waveform(place("waveform"), about, path, report);
+  const emulation = new Emulation(place("emulation"), about, control, execute);
+  new Start(place("start"), about, path, reported);
+  new Scene(place("scene"), about, path, reported);
+  const pictures = new Pictures(place("picture"), about, path, (every_s) => subscribe({ every_s }));
+  const transfer = new Transfer(place("transfer"), path, about, report);
   const attitude = new Attitude(place("attitude"), about);
-  const timeline = new Timeline(place("loop"), about, (names) => show("loop", names));
+  const timeline = new Timeline(place("timeline"), about, (names) => show("timeline", names));
   const lamps = new Lamps(place("health"), about, (names) => show("lamps", names));
-  const results = new Results(place("results"), about, path, tell, (on) => want({ results: on }));
+  const results = new Results(place("results"), about, path, report, (on) => subscribe({ results: on }));
   const telemetry = new Telemetry(place("telemetry"), about, (names) => show("telemetry", names));
   live = listen(
     `${path}/live`,
     (message) => {
-      if ((message.begun ?? about.begun) !== about.begun) {
-        renew();
+      if ((message.restarts ?? about.restarts) !== about.restarts) {
+        reload();
         return;
       }
       link.className = message.link.broken ? "bad" : "";
       link.textContent = about.name;
-      lamps.hearLink(message.link);
-      transfer.hear(message.carried);
-      played.hear(message.played);
+      lamps.updateLink(message.link);
+      transfer.update(message.transfer);
+      playback.update(message.playback);
       const { truth, time_s } = message.emulation ?? {};
       if (message.values) {
-        telemetry.hear(message.values);
-        lamps.hear(message.values);
+        telemetry.update(message.values);
+        lamps.update(message.values);
       }
       if (message.results) {
-        results.hear(message.results, truth, message.kept);
-        attitude.hear(message.results, truth);
+        results.update(message.results, truth, message.results_logged);
+        attitude.update(message.results, truth);
       }
-      const time = time_s ?? (Date.now() - begun) / 1000;
-      timeline.hear(worded(message.results), message.values ?? {}, time);
-      if (message.pictures) pictures.hear(message.pictures, message.emulation.busy);
+      const time = time_s ?? (Date.now() - opened) / 1000;
+      timeline.update(textsOf(message.results), message.values ?? {}, time);
+      if (message.pictures) pictures.update(message.pictures, message.emulation.busy);
       if (message.emulation) {
-        emulation.hear(message.emulation);
-        waveform.hear(message.emulation);
-        lamps.hearEmulation(message.emulation);
+        emulation.update(message.emulation);
+        waveform.update(message.emulation);
+        lamps.updateSupplies(message.emulation);
       }
-      for (const line of message.log ?? []) tell(line);
+      for (const line of message.log ?? []) report(line);
     },
     async () => {
       link.className = "bad";
-      link.textContent = "the program behind this page has gone; waiting for it";
-      // Another one in its place does not know this page.
-      await ask("/targets").catch((error) => (link.textContent = `${error.message}; waiting`));
+      link.textContent = "connection to the server lost; reconnecting";
+      // Another server on the same port rejects this page's token.
+      await ask("/targets").catch((error) => (link.textContent = `${error.message}; reconnecting`));
     },
   );
-  live.want(wanted);
+  live.subscribe(subscription);
   for (const [index, button] of [...document.getElementById("targets").children].entries())
     button.setAttribute("aria-current", String(index === number));
 }
 
-// What is looked at was started again: what there is of it may be other things.
-async function renew() {
-  if (renews) return;
-  renews = true;
+// After a restart of the emulation, its tables and options may be others.
+async function reload() {
+  if (reloading) return;
+  reloading = true;
   try {
     targets = await ask("/targets");
-    look(looked);
+    select(selected);
   } catch (error) {
-    tell(error.message, "bad");
+    report(error.message, "bad");
   }
-  renews = false;
+  reloading = false;
 }
 
 async function start() {
   link.textContent = "waiting for the devices to start";
   targets = await ask("/targets");
   const buttons = targets.map((about, number) =>
-    make("button", { textContent: about.device, onclick: () => look(number) }),
+    make("button", { textContent: about.device, onclick: () => select(number) }),
   );
   document.getElementById("targets").replaceChildren(...buttons);
-  look(0);
+  select(0);
 }
 
-start().catch((error) => tell(error.message, "bad"));
+start().catch((error) => report(error.message, "bad"));

@@ -1,108 +1,98 @@
-// The pictures in an emulation's memories: the newest by itself, brightened as one likes.
+// The images in an emulation's memories: the newest or a selected one, with detections drawn over it.
 
-import { choose, labelled, make } from "./dom.js";
-import { ZoomFrame } from "./zoom.js";
-import { drawFound } from "./overlay.js";
+import { beside, choose, disabledIf, labelled, make, note, row } from "./dom.js";
+import { drawDetections } from "./overlay.js";
 import { ask, fetched } from "./server.js";
+import { ZoomFrame } from "./zoom.js";
+
+const NONE = { marks: [], lines: [] };
 
 export class Pictures {
-  // `path` leads to the target, `every(seconds)` says how often it is looked for another one.
-  constructor(place, about, path, every) {
+  // `setPeriod(seconds)` sets the period of updates.
+  constructor(place, about, path, setPeriod) {
+    const { controls, detections } = about.missing;
     this.path = path;
     const rate = choose(["1", "2", "5"], {
       id: "rate",
-      title: "pictures and telemetry a second, at most",
-      disabled: Boolean(about.missing.controls),
-      onchange: () => every(1 / Number(rate.value)),
+      onchange: () => setPeriod(1 / Number(rate.value)),
+      ...disabledIf(controls),
     });
-    this.known = {};
-    this.found = { marks: [], lines: [] };
-    this.late = false;
+    this.changed_s = {};
+    this.detected = NONE;
+    this.pending = false; // whether detections are read when the device is not busy
     this.name = choose([], { id: "picture-name", onchange: () => this.fetch() });
+    const checkbox = (id, onchange) =>
+      make("input", { type: "checkbox", id, onchange, ...disabledIf(detections) });
     this.newest = make("input", { type: "checkbox", checked: true, id: "newest" });
-    const none = about.missing.found;
-    this.marks = make("input", {
-      type: "checkbox",
-      id: "marks",
-      disabled: Boolean(none),
-      title: none ?? "read over the wire after each picture; they are those of its latest one",
-      onchange: () => this.find(),
-    });
-    this.magnitudes = make("input", {
-      type: "checkbox",
-      id: "magnitudes",
-      disabled: Boolean(none),
-      title: none ?? "V of the stars that have a name",
-      onchange: () => this.drawFound(),
-    });
+    this.detections = checkbox("detections", () => this.detect());
+    this.detections.title ||= "read over the wire after each image; they belong to the latest one";
+    this.magnitudes = checkbox("magnitudes", () => this.drawOverlay());
+    this.magnitudes.title ||= "V of identified stars";
     const stretch = { type: "range", min: 0, max: 1, step: 0.02, value: 0.6, id: "stretch" };
     this.stretch = make("input", { ...stretch, oninput: () => this.draw() });
     this.canvas = make("canvas", { id: "canvas", width: 1, height: 1, role: "img" });
     this.canvas.onmousemove = (event) => this.point(event);
-    this.zoomFrame = new ZoomFrame(this.canvas, () => this.drawFound());
-    this.untold = make("p", { className: "quiet", id: "untold" });
+    this.zoomFrame = new ZoomFrame(this.canvas, () => this.drawOverlay());
+    this.hidden = note("", { id: "hidden-names" });
     const key = (kind, text) => make("li", { className: kind, textContent: text });
     this.legend = make(
       "ul",
-      { id: "found-legend", hidden: true },
-      key("known", "known"),
-      key("unknown", "found, not known"),
-      key("fitted", "fitted, or a window"),
+      { id: "detections-legend", hidden: true },
+      key("identified", "identified"),
+      key("unidentified", "not identified"),
+      key("fitted", "fitted curve or window"),
     );
-    this.value = make("p", { className: "quiet", textContent: "no picture yet" });
+    this.value = note(controls ?? "no image yet");
     place.append(
-      make(
-        "div",
-        { className: "row" },
+      row(
         labelled("memory", this.name),
-        labelled("the newest", this.newest, { className: "beside" }),
-        labelled("what it found", this.marks, { className: "beside" }),
-        labelled("magnitudes", this.magnitudes, { className: "beside" }),
+        beside("show newest", this.newest),
+        beside("detections", this.detections),
+        beside("magnitudes", this.magnitudes),
         labelled("brightness", this.stretch),
-        labelled("a second", rate),
+        labelled("images per second", rate),
       ),
       this.zoomFrame.place,
       this.zoomFrame.buttons,
       this.legend,
       this.value,
-      this.untold,
+      this.hidden,
     );
-    if (about.missing.controls) this.value.textContent = about.missing.controls;
   }
 
-  hear(pictures, busy) {
+  update(pictures, busy) {
     const names = Object.keys(pictures);
     if (names.length !== this.name.options.length)
       this.name.replaceChildren(...names.map((name) => make("option", { textContent: name })));
-    const changed = names.filter((name) => pictures[name].changed_s !== this.known[name]);
+    const changed = names.filter((name) => pictures[name].changed_s !== this.changed_s[name]);
     const at = (name) => pictures[name].changed_s;
     if (changed.length && this.newest.checked)
       this.name.value = changed.reduce((a, b) => (at(b) > at(a) ? b : a));
-    for (const name of changed) this.known[name] = at(name);
+    for (const name of changed) this.changed_s[name] = at(name);
     if (changed.length) {
-      this.late = true; // what it finds in a new picture comes when it is done with that
-      this.found = { marks: [], lines: [] };
+      this.pending = true; // what it finds in a new picture comes when it is done with that
+      this.detected = NONE;
       this.legend.hidden = true;
     }
     if (changed.includes(this.name.value)) this.fetch();
-    else if (this.late && !busy) this.find();
+    else if (this.pending && !busy) this.detect();
   }
 
-  async find() {
-    this.late = false;
-    this.found = { marks: [], lines: [] };
+  async detect() {
+    this.pending = false;
+    this.detected = NONE;
     this.legend.hidden = true;
-    if (this.marks.checked)
+    if (this.detections.checked)
       try {
-        this.found = await ask(`${this.path}/found/${encodeURIComponent(this.name.value)}`);
-        const { marks } = this.found;
-        const known = marks.filter((mark) => mark.name).length;
-        this.value.textContent = `${marks.length} found, ${known} of them known`;
+        this.detected = await ask(`${this.path}/detections/${encodeURIComponent(this.name.value)}`);
+        const { marks } = this.detected;
+        const identified = marks.filter((mark) => mark.name).length;
+        this.value.textContent = `${marks.length} detected, ${identified} identified`;
         this.legend.hidden = false;
       } catch (error) {
         this.value.textContent = error.message;
       }
-    this.drawFound();
+    this.drawOverlay();
   }
 
   async fetch() {
@@ -113,18 +103,18 @@ export class Pictures {
       bitmap = await createImageBitmap(await answer.blob());
     } catch (error) {
       this.value.textContent = error.message;
-      delete this.known[name]; // to be asked for again
+      delete this.changed_s[name]; // so that it is fetched again
       return;
     }
     const from = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
     from.drawImage(bitmap, 0, 0);
     this.pixels = from.getImageData(0, 0, bitmap.width, bitmap.height);
     const { width, height } = bitmap;
-    bitmap.close(); // its memory is the browser's, and not collected in time
+    bitmap.close(); // frees memory that is not collected in time
     this.canvas.width = width;
     this.canvas.height = height;
     this.canvas.setAttribute("aria-label", `${name}, ${width} x ${height}`);
-    this.value.textContent = `${name}: ${width} x ${height}, at ${this.known[name]} s`;
+    this.value.textContent = `${name}: ${width} x ${height}, at ${this.changed_s[name]} s`;
     this.draw();
   }
 
@@ -139,14 +129,14 @@ export class Pictures {
     }
     const pen = this.canvas.getContext("2d");
     pen.putImageData(shown, 0, 0);
-    this.drawFound();
+    this.drawOverlay();
   }
 
-  drawFound() {
-    const left = this.zoomFrame.drawOver((pen, place, size) =>
-      drawFound(pen, this.found, place, size, this.magnitudes.checked),
+  drawOverlay() {
+    const hidden = this.zoomFrame.drawOver((pen, place, size) =>
+      drawDetections(pen, this.detected, place, size, this.magnitudes.checked),
     );
-    this.untold.textContent = left ? `names without room: ${left}; enlarge it to read them` : "";
+    this.hidden.textContent = hidden ? `${hidden} names do not fit; zoom in to read them` : "";
   }
 
   point(event) {

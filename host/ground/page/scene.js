@@ -1,6 +1,6 @@
-// What an emulation's cameras see: on a map of the sky, in a form of all keys, or as a whole file.
+// The scene of an emulation: on a map of the sky, in a form with all keys, or as the text of a file.
 
-import { choose, labelled, make } from "./dom.js";
+import { button, choose, disabledIf, labelled, make, note, row } from "./dom.js";
 import { SceneForm } from "./sceneform.js";
 import { SkyMap } from "./skymap.js";
 import { ask } from "./server.js";
@@ -9,19 +9,17 @@ import { angles, vector } from "./sphere.js";
 const POINTING = "pointing";
 
 export class Scene {
-  // `path` leads to the target, `act(what, asked)` does something and tells of it.
-  constructor(place, about, path, act) {
+  // `reported(what, request)` reports the answer to a request.
+  constructor(place, about, path, reported) {
     this.path = path;
-    this.act = act;
+    this.reported = reported;
     const why = about.missing.controls;
     const formless = why ?? about.missing.scene_form;
-    this.map = new SkyMap((at) => this.put(at));
+    this.map = new SkyMap((at) => this.move(at));
     this.canvas = this.map.canvas;
-    this.told = make("p", { className: "quiet", id: "scene-told", role: "status" });
-    this.help = make("p", { className: "quiet", id: "scene-help", textContent: formless ? "" : "here is what the key says whose field one is in" });
-    const button = (text, id, onclick, reason) =>
-      make("button", { textContent: text, id, type: "button", onclick, disabled: Boolean(reason), title: reason ?? "" });
-    const none = { disabled: Boolean(formless), title: formless ?? "" };
+    this.status = note(formless, { id: "scene-status", role: "status" });
+    this.help = note(formless ? "" : "Select a field to see its description.", { id: "scene-help" });
+    const none = disabledIf(formless);
     this.kind = choose([], { id: "scene-kind", onchange: () => this.choose(this.kind.value), ...none });
     this.what = choose([], { id: "scene-what", onchange: () => this.show(), ...none });
     this.place = make("div", { id: "scene-keys" });
@@ -34,33 +32,29 @@ export class Scene {
       rows: 7,
       id: "scene-text",
       spellcheck: false,
-      disabled: Boolean(why),
-      title: why ?? "",
+      ...disabledIf(why),
       placeholder: 'kind = "sky"\nra_deg = 10.0\ndec_deg = -30.0\nroll_deg = 0.0',
     });
     place.append(
-      make(
-        "div",
-        { className: "row" },
+      row(
         labelled("kind of scene", this.kind),
-        labelled("the map puts", this.what),
-        button("Present scene", "scene-present", () => this.present(), formless),
+        labelled("map moves", this.what),
+        button("Load current scene", "scene-load", () => this.load(), formless),
         apply,
       ),
       this.canvas,
-      this.told,
+      this.status,
       this.help,
       this.place,
       make(
         "details",
         {},
-        make("summary", { textContent: "a whole scene file" }),
-        labelled("its text", this.text),
-        button("Show", "show-scene", () => this.apply({ text: this.text.value }), why),
+        make("summary", { textContent: "scene file" }),
+        labelled("text", this.text),
+        button("Apply file", "apply-file", () => this.apply({ text: this.text.value }), why),
       ),
     );
     this.canvas.hidden = Boolean(formless);
-    this.told.textContent = formless ?? "";
     if (!formless) this.start();
   }
 
@@ -72,23 +66,23 @@ export class Scene {
       this.kinds = kinds;
       this.map.stars = stars.map((star) => ({ ...star, at: vector(star.ra_deg, star.dec_deg) }));
       this.kind.replaceChildren(...choose(Object.keys(kinds)).children);
-      await this.present();
+      await this.load();
     } catch (error) {
-      this.tell(error.message);
+      this.setError(error.message);
     }
   }
 
-  // Fills the form with what is seen now.
-  async present() {
+  // Fills the form with the current scene.
+  async load() {
     try {
       const { table, sight, follows } = await ask(`${this.path}/scene`);
       this.follows = follows;
       this.kind.value = table.kind;
       this.choose(table.kind, table);
-      this.tell("");
+      this.setError("");
       this.show(sight);
     } catch (error) {
-      this.tell(error.message);
+      this.setError(error.message);
     }
   }
 
@@ -105,81 +99,81 @@ export class Scene {
 
   async apply(body = null) {
     try {
-      const done = await this.act("scene", ask(`${this.path}/scene`, body ?? { table: this.table }));
-      if (done) await this.present();
+      const done = await this.reported("scene", ask(`${this.path}/scene`, body ?? { table: this.table }));
+      if (done) await this.load();
     } catch (error) {
-      this.tell(error.message);
+      this.setError(error.message);
     }
   }
 
-  // The map shows what is filled in: one question at a time, and the last one always.
+  // Shows the form's scene on the map: one request at a time, and always the last one.
   async changed() {
-    this.asks = true;
-    if (this.asking) return;
-    this.asking = true;
-    while (this.asks) {
-      this.asks = false;
+    this.outdated = true;
+    if (this.requesting) return;
+    this.requesting = true;
+    while (this.outdated) {
+      this.outdated = false;
       try {
         const { sight } = await ask(`${this.path}/scene/look`, { table: this.table });
-        this.tell("");
+        this.setError("");
         this.show(sight);
       } catch (error) {
-        this.tell(error.message);
+        this.setError(error.message);
       }
     }
-    this.asking = false;
+    this.requesting = false;
   }
 
-  tell(error) {
+  setError(error) {
     this.error = error;
-    this.form?.accuse(error);
-    this.say();
+    this.form?.mark(error);
+    this.showStatus();
   }
 
-  // What the map puts: the camera's boresight, or any key that is a direction.
-  get things() {
-    const [[ra], [dec]] = ["ra", "dec"].map((role) => this.form.found(role));
+  // Objects that the map can move: the camera's boresight, and every key that is a direction.
+  get movable() {
+    const [[ra], [dec]] = ["ra", "dec"].map((role) => this.form.keysWith(role));
     const pointing = ra && dec && {
       name: POINTING,
       get: () => this.sight?.fields[0]?.axes[2] ?? vector(ra.get() ?? 0, dec.get() ?? 0),
-      put: (at) => {
+      set: (at) => {
         const [along, above] = angles(at);
-        ra.put(rounded(along, 2));
-        dec.put(rounded(above, 2));
+        ra.set(rounded(along, 2));
+        dec.set(rounded(above, 2));
       },
     };
-    const others = this.form.found("direction").map(({ name, key, get, put }) => ({
+    const others = this.form.keysWith("direction").map(({ name, key, get, set }) => ({
       name,
       get: () => unit(get()),
-      put: (at) => put(key.count ? at.map((part) => rounded(part, 4)) : angles(at).map((one) => rounded(one, 2))),
+      set: (at) => set(key.count ? at.map((part) => rounded(part, 4)) : angles(at).map((one) => rounded(one, 2))),
     }));
     return [...(pointing ? [pointing] : []), ...others];
   }
 
-  put(at) {
-    const thing = this.things.find(({ name }) => name === this.what.value);
-    if (!thing) return;
-    thing.put(at);
-    this.map.show(this.sight, at); // the rest follows when it is known
+  move(at) {
+    const object = this.movable.find(({ name }) => name === this.what.value);
+    if (!object) return;
+    object.set(at);
+    this.map.show(this.sight, at); // before the server answers
     this.changed();
   }
 
   show(sight = this.sight) {
     this.sight = sight;
-    const { things } = this;
-    const names = things.map(({ name }) => name);
+    const { movable } = this;
+    const names = movable.map(({ name }) => name);
     if (names.join() !== [...this.what.options].map((one) => one.value).join()) {
       const before = this.what.value;
       this.what.replaceChildren(...choose(names).children);
       this.what.value = names.includes(before) ? before : (names[0] ?? "");
     }
-    const thing = things.find(({ name }) => name === this.what.value);
-    this.map.show(sight, thing?.get() ?? null);
-    this.say();
+    const object = movable.find(({ name }) => name === this.what.value);
+    this.map.show(sight, object?.get() ?? null);
+    this.showStatus();
   }
 
-  say() {
-    this.told.className = this.error ? "bad" : "quiet";
+  showStatus() {
+    this.status.className = this.error ? "bad" : "quiet";
     const { title, fields, bodies } = this.sight ?? { fields: [], bodies: [] };
     const where = this.sight?.stars
       ? (one) => angles(one).map((deg) => `${deg.toFixed(1)}°`)
@@ -189,8 +183,8 @@ export class Scene {
       ...fields.map(({ name, axes }) => at(name, axes[2])),
       ...bodies.map(({ name, direction }) => at(name, direction)),
     ];
-    this.told.textContent = this.error || [title, ...words, this.follows].filter(Boolean).join("; ");
-    const keys = "a click or arrow keys, with shift faster, put what is chosen above";
+    this.status.textContent = this.error || [title, ...words, this.follows].filter(Boolean).join("; ");
+    const keys = "click, or use arrow keys (faster with shift), to move the selected object";
     this.canvas.setAttribute("aria-label", `map of the sky: ${words.join("; ")}; ${keys}`);
   }
 }

@@ -1,9 +1,9 @@
-// A form for the table of a scene file, made of what is told of its keys. What is left empty is not
-// in the table, and shows its default.
+// A form for the table of a scene file, generated from the declaration of its keys. An empty field is
+// not in the table; it shows the default.
 
-import { choose, labelled, make } from "./dom.js";
+import { button, choose, labelled, make, note, row } from "./dom.js";
 
-// Groups of keys, or lists of them, that `keys` tells; `changed` is called when something is.
+// A field for each of `keys`; calls `changed` after each change.
 export class SceneForm {
   constructor(keys, changed) {
     this.keys = keys;
@@ -12,11 +12,11 @@ export class SceneForm {
     const own = [...this.fields.values()];
     const plain = own.filter((one) => !one.apart).map((one) => one.element);
     const apart = own.filter((one) => one.apart).map((one) => one.element);
-    this.element = make("div", { className: "scene-form" }, make("div", { className: "row" }, ...plain), ...apart);
+    this.element = make("div", { className: "scene-form" }, row(...plain), ...apart);
     this.element.addEventListener("input", changed);
   }
 
-  // What is filled in; an Error names what is no value.
+  // The table; throws an Error that names an invalid field.
   get table() {
     const values = [...this.fields].map(([name, one]) => [name, one.value]);
     return Object.fromEntries(values.filter(([, value]) => value !== undefined));
@@ -31,32 +31,32 @@ export class SceneForm {
     if (one) one.value = value;
   }
 
-  // Every key with this role that is there now: its path in words, its value, and what puts one.
-  found(role, path = "") {
+  // Every present key with this role: its path, and functions that get and set its value.
+  keysWith(role, path = "") {
     const own = Object.entries(this.keys)
       .filter(([, key]) => key.role === role)
       .map(([name, key]) => ({
         name: path + name,
         key,
         get: () => this.fields.get(name).value ?? key.default,
-        put: (value) => {
+        set: (value) => {
           this.set(name, value);
-          this.empty(name);
+          this.clearAlternatives(name);
         },
       }));
     const groups = [...this.fields].flatMap(([name, one]) => one.groups?.(`${path}${name}.`) ?? []);
-    return [...own, ...groups.flatMap(([form, where]) => form.found(role, where))];
+    return [...own, ...groups.flatMap(([form, where]) => form.keysWith(role, where))];
   }
 
-  // Keys that stand instead of this one, or that it stands instead of, are left empty.
-  empty(name) {
+  // Empties the keys that exclude this one.
+  clearAlternatives(name) {
     for (const [other, key] of Object.entries(this.keys))
       if (key.instead?.includes(name) || this.keys[name].instead?.includes(other)) this.set(other, undefined);
   }
 
-  // The field whose key a message begins with is marked.
-  accuse(message) {
-    for (const [name, one] of this.fields) one.accuse(new RegExp(`\\b${name}\\b`).test(message ?? ""));
+  // Marks the fields that an error names.
+  mark(error) {
+    for (const [name, one] of this.fields) one.mark(new RegExp(`\\b${name}\\b`).test(error ?? ""));
   }
 }
 
@@ -64,15 +64,15 @@ function field(name, key, changed) {
   if (key.type === "table") return group(name, key, changed);
   if (key.type === "tables") return several(name, { [name]: key }, changed, (rows) => rows[name]);
   if (key.type === "kinds") return several(name, key.kinds, changed);
-  const made = key.type === "list" && key.count ? numbers(name, key) : single(name, key);
-  return { ...made, get value() { return made.get(); }, set value(value) { made.set(value); } };
+  const one = key.type === "list" && key.count ? numbers(name, key) : single(name, key);
+  return { ...one, get value() { return one.get(); }, set value(value) { one.set(value); } };
 }
 
 function about(name, key) {
   const limits = [key.low ?? key.of?.low, key.high ?? key.of?.high];
   const [low, high] = limits.map((limit) => (limit === undefined ? "" : String(limit)));
   const span = low && high ? `; ${low} to ${high}` : low ? `; ${low} or more` : "";
-  const usual = key.default === null ? "" : `; else ${shown(key.default)}`;
+  const usual = key.default === null ? "" : `; default ${shown(key.default)}`;
   return `${name}: ${key.meaning}${span}${key.unit && ` ${key.unit}`}${usual}`;
 }
 
@@ -100,12 +100,12 @@ function single(name, key) {
     if (!text) return undefined;
     if (isNumber) return Number(text);
     if (key.type === "flag") return text === "true";
-    return key.type === "list" ? listed(text) : text;
+    return key.type === "list" ? parseList(text) : text;
   };
   const set = (value) => {
-    input.value = value === undefined ? "" : Array.isArray(value) ? written(value) : String(value);
+    input.value = value === undefined ? "" : Array.isArray(value) ? listText(value) : String(value);
   };
-  return { element: labelled(caption(name, key), input), get, set, accuse: (bad) => mark(input, bad) };
+  return { element: labelled(caption(name, key), input), get, set, mark: (bad) => markInvalid(input, bad) };
 }
 
 function limited({ low, high, type }) {
@@ -113,16 +113,16 @@ function limited({ low, high, type }) {
   return { type: "number", step, ...(low !== undefined && { min: low }), ...(high !== undefined && { max: high }) };
 }
 
-// Lists of any length are written with commas, lists in them in brackets.
-function listed(text) {
+// Parses a list with commas, in which lists have brackets.
+function parseList(text) {
   try {
     return JSON.parse(`[${text}]`);
   } catch {
-    return text; // which the reader of the key refuses by its name
+    return text; // the server rejects it and names the key
   }
 }
 
-function written(list) {
+function listText(list) {
   return list.map((one) => JSON.stringify(one)).join(", ");
 }
 
@@ -143,27 +143,26 @@ function numbers(name, key) {
     return inputs.map((one, at) => (one.value ? Number(one.value) : (usual[at] ?? 0)));
   };
   const set = (value) => inputs.forEach((one, at) => (one.value = value?.[at] ?? ""));
-  const row = make("div", {}, ...inputs);
-  const element = make("div", { className: "scene-list", role: "group" }, caption(name, key), row);
+  const element = make("div", { className: "scene-list", role: "group" }, caption(name, key), make("div", {}, ...inputs));
   element.setAttribute("aria-label", name);
-  return { element, get, set, accuse: (bad) => inputs.forEach((one) => mark(one, bad)) };
+  return { element, get, set, mark: (bad) => inputs.forEach((one) => markInvalid(one, bad)) };
 }
 
-function mark(input, bad) {
+function markInvalid(input, bad) {
   if (bad) input.setAttribute("aria-invalid", "true");
   else input.removeAttribute("aria-invalid");
 }
 
-// A table of its own: there when anything in it is.
+// A nested table; absent while all its fields are empty.
 function group(name, key, changed) {
   const form = new SceneForm(key.keys, changed);
   const summary = make("summary", { textContent: name, title: key.meaning });
-  const element = make("details", {}, summary, make("p", { className: "quiet", textContent: key.meaning }), form.element);
+  const element = make("details", {}, summary, note(key.meaning), form.element);
   return {
     apart: true,
     element,
     groups: (path) => [[form, path]],
-    accuse: (bad) => summary.classList.toggle("bad", bad),
+    mark: (bad) => summary.classList.toggle("bad", bad),
     get value() {
       const { table } = form;
       return Object.keys(table).length ? table : undefined;
@@ -175,7 +174,7 @@ function group(name, key, changed) {
   };
 }
 
-// Tables that one adds and removes: of several kinds by name, or, by `only`, of one.
+// Tables that the user adds and removes: of several named kinds, or with `only` of one.
 function several(name, kinds, changed, only = null) {
   let rows = []; // kind, form, element
   const list = make("div");
@@ -184,40 +183,36 @@ function several(name, kinds, changed, only = null) {
     const { keys, meaning } = kinds[which];
     const form = new SceneForm(keys, changed);
     form.table = table;
-    const remove = make("button", { type: "button", textContent: "Remove", ariaLabel: `remove ${which}` });
-    const head = make("div", { className: "row" }, make("strong", { textContent: which }), remove);
-    const element = make("div", { className: "scene-row" }, head, make("p", { className: "quiet", textContent: meaning }), form.element);
-    const row = { which, form, element };
-    remove.onclick = () => {
-      rows = rows.filter((one) => one !== row);
+    const remove = button("Remove", "", () => {
+      rows = rows.filter((one) => one !== entry);
       element.remove();
       changed();
       adds.focus();
-    };
-    rows.push(row);
+    });
+    remove.ariaLabel = `remove ${which}`;
+    const head = row(make("strong", { textContent: which }), remove);
+    const element = make("div", { className: "scene-row" }, head, note(meaning), form.element);
+    const entry = { which, form, element };
+    rows.push(entry);
     list.append(element);
   };
-  const adds = make("button", {
-    type: "button",
-    textContent: "Add",
-    ariaLabel: `add to ${name}`,
-    onclick: () => {
-      add(kind.value);
-      changed();
-    },
+  const adds = button("Add", "", () => {
+    add(kind.value);
+    changed();
   });
+  adds.ariaLabel = `add to ${name}`;
   const summary = make("summary", { textContent: name });
-  const element = make("details", {}, summary, make("div", { className: "row" }, kind, adds), list);
+  const element = make("details", {}, summary, row(kind, adds), list);
   return {
     apart: true,
     element,
     groups: (path) => rows.map(({ which, form }, at) => [form, only ? `${path}${at + 1}.` : `${which}.`]),
-    accuse: (bad) => summary.classList.toggle("bad", bad),
+    mark: (bad) => summary.classList.toggle("bad", bad),
     get value() {
-      const found = {};
-      for (const { which, form } of rows) (found[which] ??= []).push(form.table);
+      const tables = {};
+      for (const { which, form } of rows) (tables[which] ??= []).push(form.table);
       if (!rows.length) return undefined;
-      return only ? only(found) : found;
+      return only ? only(tables) : tables;
     },
     set value(value) {
       rows = [];

@@ -1,46 +1,57 @@
-// What the page asks of its server, and what that tells by itself.
+// Requests to the server, and its live updates.
 
-const AGAIN_MS = 1000;
+import { save } from "./dom.js";
+
+const RECONNECT_MS = 1000;
 
 export async function ask(path, body = null) {
   return (await fetched(path, body)).json();
 }
 
-// The answer as it is, such as a file; throws what the server says against it.
+// The raw answer, such as a file; throws the server's error.
 export async function fetched(path, body = null) {
   const call = body === null ? {} : { method: "POST", body: JSON.stringify(body) };
   let answer;
   try {
     answer = await fetch(path, call);
   } catch {
-    throw new Error("the program behind this page does not answer");
+    throw new Error("the server does not answer");
   }
   if (!answer.ok) throw new Error((await answer.json()).error);
   return answer;
 }
 
-// A WebSocket that comes back; `hear` gets each message, `gone` is told of a lost one.
-export function listen(path, hear, gone) {
+// Saves the file at `path` as `name`.
+export async function saveFile(path, name, report) {
+  try {
+    save(await (await fetched(path)).blob(), name);
+  } catch (error) {
+    report(`${name}\n  ${error.message}`, "bad");
+  }
+}
+
+// A WebSocket that reconnects; calls `update` with each message, `lost` for each lost connection.
+export function listen(path, update, lost) {
   const address = new URL(path, location.href);
   address.protocol = address.protocol.replace("http", "ws");
   let socket = null;
-  let wanted = null;
+  let subscription = null;
   let ended = false;
   const open = () => {
     socket = new WebSocket(address);
-    socket.onopen = () => wanted && socket.send(JSON.stringify(wanted));
-    socket.onmessage = (event) => hear(JSON.parse(event.data));
+    socket.onopen = () => subscription && socket.send(JSON.stringify(subscription));
+    socket.onmessage = (event) => update(JSON.parse(event.data));
     socket.onclose = () => {
       if (ended) return;
-      gone();
-      setTimeout(open, AGAIN_MS);
+      lost();
+      setTimeout(open, RECONNECT_MS);
     };
   };
   open();
   return {
-    want(message) {
-      wanted = message;
-      if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(wanted));
+    subscribe(message) {
+      subscription = message;
+      if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(subscription));
     },
     close() {
       ended = true;

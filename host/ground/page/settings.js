@@ -1,75 +1,66 @@
-// Settings beside their defaults, and registers by name: read when it is asked for, as reading takes
-// time on the wire.
+// Settings and registers beside their defaults, read on request because reading takes wire time.
 
-import { make } from "./dom.js";
+import { button, make, row } from "./dom.js";
 import { ask } from "./server.js";
 
-const DIGITS = 6; // in which a setting of 32 bits is compared
+const DIGITS = 6; // of a float32 that are compared
 
 export class Settings {
-  // `path` leads to the target, `tell(text, kind)` tells what went wrong.
-  constructor(place, about, path, tell) {
+  constructor(place, about, path, report) {
     this.path = path;
-    this.tell = tell;
-    const none = about.settings.length ? null : `${about.device} shows no setting in telemetry`;
+    this.report = report;
+    const none = about.settings.length ? null : `${about.device} has no settings in telemetry`;
     this.settings = this.table(place, "settings", "setting", none, about.settings, {
       name: (one) => `${one.telecommand}.${one.parameter}`,
-      shown: (one) => `${one.frame}.${one.field}`,
+      where: (one) => `${one.frame}.${one.field}`,
       read: (rows) => this.readSettings(rows),
     });
     const { registers, sensor_registers } = about.missing;
     this.table(place, "registers", "register", registers, about.registers, {
       name: (one) => one.name,
-      shown: (one) => `${address(one)}, ${one.access}`,
+      where: (one) => `${address(one)}, ${one.access}`,
       read: (rows) => this.readRegisters(rows),
     });
     this.table(place, "sensor", "image sensor register", sensor_registers, about.sensor_registers, {
       name: (one) => one.name,
-      shown: (one) => `${address(one)}, ${one.access}`,
+      where: (one) => `${address(one)}, ${one.access}`,
       read: (rows) => this.readSensor(rows),
     });
   }
 
-  table(place, id, what, missing, list, { name, shown, read }) {
-    const told = make("span", { id: `${id}-told`, className: "quiet" });
+  table(place, id, what, missing, list, { name, where, read }) {
+    const status = make("span", { id: `${id}-status`, className: "quiet", textContent: missing ?? "" });
     const rows = list.map((one) => {
       const value = make("td", { className: "value", textContent: "–" });
-      const row = make(
+      const element = make(
         "tr",
-        { title: `${shown(one)}: ${one.details ?? one.meaning}` },
+        { title: `${where(one)}: ${one.details ?? one.meaning}` },
         make("th", { scope: "row", textContent: name(one) }),
         value,
         make("td", { className: "value quiet", textContent: text(one.default) }),
         make("td", { className: "quiet", textContent: one.unit ?? "" }),
       );
-      return { one, row, value };
+      return { one, element, value };
     });
-    const act = make("button", {
-      textContent: `Read ${what}s`,
-      id: `read-${id}`,
-      type: "button",
-      disabled: Boolean(missing),
-      title: missing ?? "",
-      onclick: async () => {
-        act.disabled = true;
-        told.textContent = "being read";
-        try {
-          await read(rows);
-          const differing = rows.filter(({ row }) => row.classList.contains("differs")).length;
-          told.textContent = `${differing} of ${rows.length} differ from their default`;
-        } catch (error) {
-          told.textContent = "not read to the end";
-          this.tell(`${what}s\n  ${error.message}`, "bad");
-        }
-        act.disabled = false;
-      },
-    });
-    if (missing) told.textContent = missing;
-    place.append(make("div", { className: "row" }, act, told));
+    const readAll = async () => {
+      act.disabled = true;
+      status.textContent = "reading";
+      try {
+        await read(rows);
+        const differing = rows.filter(({ element }) => element.classList.contains("differs")).length;
+        status.textContent = `${differing} of ${rows.length} differ from their default`;
+      } catch (error) {
+        status.textContent = "reading failed";
+        this.report(`${what}s\n  ${error.message}`, "bad");
+      }
+      act.disabled = false;
+    };
+    const act = button(`Read ${what}s`, `read-${id}`, readAll, missing);
+    place.append(row(act, status));
     if (!list.length) return;
     const titles = [what, "value", "default", ""];
     const head = titles.map((title) => make("th", { textContent: title, scope: "col" }));
-    const body = make("tbody", { id: `${id}-rows` }, ...rows.map(({ row }) => row));
+    const body = make("tbody", { id: `${id}-rows` }, ...rows.map(({ element }) => element));
     const summary = make("summary", { textContent: `${list.length} ${what}s` });
     const table = make("table", {}, make("thead", {}, make("tr", {}, ...head)), body);
     place.append(
@@ -80,7 +71,7 @@ export class Settings {
   async readSettings(rows) {
     const frames = [...new Set(rows.map(({ one }) => one.frame))];
     for (const frame of frames) {
-      const { data } = await ask(`${this.path}/do`, { line: `read ${frame}` });
+      const { data } = await ask(`${this.path}/shell`, { line: `read ${frame}` });
       for (const each of rows.filter(({ one }) => one.frame === frame))
         mark(each, data.values[each.one.field]);
     }
@@ -88,7 +79,7 @@ export class Settings {
 
   async readRegisters(rows) {
     for (const each of rows.filter(({ one }) => one.reads)) {
-      const { data } = await ask(`${this.path}/do`, { line: `read ${each.one.name}` });
+      const { data } = await ask(`${this.path}/shell`, { line: `read ${each.one.name}` });
       mark(each, data.values[each.one.name]);
     }
   }
@@ -99,16 +90,16 @@ export class Settings {
       const name = encodeURIComponent(each.one.name);
       const { value, bits } = await ask(`${this.path}/sensor-registers/${name}`);
       mark(each, value);
-      const named = Object.entries(bits).map(([bit, held]) => `${bit} ${held}`);
-      if (named.length) each.row.title = `${address(each.one)}: ${named.join(", ")}`;
+      const texts = Object.entries(bits).map(([bit, state]) => `${bit} ${state}`);
+      if (texts.length) each.element.title = `${address(each.one)}: ${texts.join(", ")}`;
     }
   }
 }
 
-function mark({ one, row, value }, found) {
+function mark({ one, element, value }, found) {
   value.textContent = text(found);
   const differs = !same(one, found);
-  row.classList.toggle("differs", differs);
+  element.classList.toggle("differs", differs);
   value.setAttribute("aria-label", `${text(found)}${differs ? ", differs from its default" : ""}`);
 }
 

@@ -1,32 +1,33 @@
-// A map of the whole sky: stars, what stands where, and what cameras see; a click, a drag or arrow
-// keys say where something is to be.
+// A map of the whole sky with stars, bodies and cameras' fields of view; a click, a drag or arrow keys
+// move the selected object.
 
 import { make } from "./dom.js";
-import { angles, circle, direction, dot, flat, turned, turnedBack, vector } from "./sphere.js";
+import { disc, overlap, ring, sharpPen } from "./draw.js";
+import { angles, circle, direction, dot, flat, RAD, turned, turnedBack, vector } from "./sphere.js";
 
 const GRID_DEG = 30;
 const LABELS_DEG = 60;
 const MARGIN = 8;
 const TEXT = 12;
-const SIGN = 4; // half of the width of a sign, on which nothing is written
-const FINE = 3; // pixels of the screen in which a disc is filled
-const STEP_DEG = 1; // by an arrow key
-const FAST = 10; // times that, with the shift key
-const NAMED = 1.7; // V up to which stars have their names, as far as there is room
+const SIGN = 4; // half of the width of a sign, which no text covers
+const FINE = 3; // step in CSS pixels when a disc is filled
+const STEP_DEG = 1; // per arrow key
+const FAST = 10; // factor of the shift key
+const NAMED = 1.7; // highest V of stars with a name, if there is room
 const COLOURS = {
   field: ["#0b5cad", "#6db3ff"],
   Sun: ["#a15c00", "#ffc53d"],
   Earth: ["#1a7f37", "#4ac26b"],
   other: ["#6b4fa0", "#c3a6ff"],
-}; // on a light ground, on a dark one
+}; // on a light and on a dark background
 
 export class SkyMap {
-  // `put(direction)` is told of a place that was chosen, in the axes of the scene.
-  constructor(put) {
-    this.put = put;
+  // Calls `move(direction)`, in the scene's axes, when the user chooses a position.
+  constructor(move) {
+    this.move = move;
     this.sight = null;
     this.stars = [];
-    this.chosen = null;
+    this.selected = null;
     this.canvas = make("canvas", { id: "sky-map", width: 1, height: 1, tabIndex: 0, role: "img" });
     this.canvas.onpointerdown = (event) => {
       this.canvas.focus();
@@ -46,10 +47,10 @@ export class SkyMap {
     scheme.addEventListener("change", redraw);
   }
 
-  // `chosen` is the direction that is being put, in the axes of the scene; null for none.
-  show(sight, chosen) {
+  // `selected` is the direction of the selected object in the scene's axes, or null.
+  show(sight, selected) {
     this.sight = sight;
-    this.chosen = chosen;
+    this.selected = selected;
     this.draw();
   }
 
@@ -58,21 +59,21 @@ export class SkyMap {
     const box = this.canvas.getBoundingClientRect();
     const { left, top, scale } = this.size();
     const at = direction((event.clientX - box.left - left) / scale, (event.clientY - box.top - top) / scale);
-    if (at) this.put(turnedBack(this.sight.turn, at));
+    if (at) this.move(turnedBack(this.sight.turn, at));
   }
 
   key(event) {
     const by = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const [along, above] = by[event.key] ?? [0, 0];
-    if ((!along && !above) || !this.chosen || event.ctrlKey || event.altKey || event.metaKey) return;
+    if ((!along && !above) || !this.selected || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
     const step = STEP_DEG * (event.shiftKey ? FAST : 1);
-    const [longitude, latitude] = angles(turned(this.sight.turn, this.chosen));
+    const [longitude, latitude] = angles(turned(this.sight.turn, this.selected));
     const up = Math.min(Math.max(latitude + step * above, -90), 90);
-    this.put(turnedBack(this.sight.turn, vector(longitude + step * along, up)));
+    this.move(turnedBack(this.sight.turn, vector(longitude + step * along, up)));
   }
 
-  // Of the map on the screen: its middle, and half of its height.
+  // The map on the screen: its size, middle, and half of its height (`scale`).
   size() {
     const width = this.canvas.clientWidth;
     const scale = Math.max((width - 2 * MARGIN) / 4, 1);
@@ -82,12 +83,8 @@ export class SkyMap {
   draw() {
     const { width, height, left, top, scale } = this.size();
     if (!width) return;
-    const fine = window.devicePixelRatio || 1;
-    this.canvas.width = width * fine;
-    this.canvas.height = height * fine;
+    const pen = sharpPen(this.canvas, width, height);
     this.canvas.style.aspectRatio = `${width} / ${height}`;
-    const pen = this.canvas.getContext("2d");
-    pen.scale(fine, fine);
     pen.font = `${TEXT}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     this.dark = matchMedia("(prefers-color-scheme: dark)").matches;
@@ -104,14 +101,14 @@ export class SkyMap {
     const signs = [...fields.map(({ axes }) => axes[2]), ...bodies.map((one) => one.direction)];
     for (const [x, y] of [...signs, ...Object.values(this.sight.marks)].map(this.place))
       this.taken.push({ left: x - SIGN, top: y - TEXT / 2, wide: 2 * SIGN });
-    for (const body of this.sight.bodies) this.disc(pen, body, left, top, scale);
+    for (const body of bodies) this.fillBody(pen, body, left, top, scale);
     this.grid(pen);
     for (const field of this.sight.now) this.field(pen, field, true);
-    for (const field of this.sight.fields) this.field(pen, field, false);
+    for (const field of fields) this.field(pen, field, false);
     for (const [name, mark] of Object.entries(this.sight.marks)) this.mark(pen, name, mark);
-    for (const body of this.sight.bodies) this.body(pen, body);
+    for (const body of bodies) this.body(pen, body);
     if (this.sight.stars) for (const star of this.stars) this.star(pen, star);
-    if (this.chosen) this.ring(pen, this.chosen);
+    if (this.selected) this.ring(pen);
   }
 
   colour(name) {
@@ -128,7 +125,7 @@ export class SkyMap {
     pen.stroke();
   }
 
-  // A line on the sphere; where it leaves the map on one side it goes on at the other.
+  // A line on the sphere; it may leave the map on one side and continue on the other.
   line(pen, points) {
     const far = this.size().scale;
     let before = null;
@@ -142,7 +139,7 @@ export class SkyMap {
     pen.stroke();
   }
 
-  // Of the map's own axes, which are the stars' where there are stars.
+  // Grid of the map's own axes, which are the stars' axes if there are stars.
   grid(pen) {
     const here = (along, above) => turnedBack(this.sight.turn, vector(along, above));
     const span = (from, to) => Array.from({ length: 61 }, (_, i) => from + ((to - from) * i) / 60);
@@ -158,11 +155,11 @@ export class SkyMap {
       if (above) this.word(pen, `${above > 0 ? "+" : "−"}${Math.abs(above)}°`, here(0, above), this.text, 9);
   }
 
-  disc(pen, { name, direction: centre, radius_deg }, left, top, scale) {
-    if (radius_deg * scale < 2 * FINE * 57.3) return; // it is no larger than its sign
+  fillBody(pen, { name, direction: centre, radius_deg }, left, top, scale) {
+    if (radius_deg * scale < (2 * FINE) / RAD) return; // no larger than its sign
     pen.fillStyle = this.colour(name);
     pen.globalAlpha = 0.22;
-    const edge = Math.cos((radius_deg * Math.PI) / 180);
+    const edge = Math.cos(radius_deg * RAD);
     for (let y = -scale; y < scale; y += FINE)
       for (let x = -2 * scale; x < 2 * scale; x += FINE) {
         const at = direction((x + FINE / 2) / scale, (y + FINE / 2) / scale);
@@ -173,14 +170,11 @@ export class SkyMap {
   }
 
   body(pen, { name, direction: centre, radius_deg }) {
-    const [x, y] = this.place(centre);
     const colour = this.colour(name);
     pen.strokeStyle = pen.fillStyle = colour;
     pen.lineWidth = 1.5;
     if (radius_deg > 2) this.line(pen, circle(centre, radius_deg));
-    pen.beginPath();
-    pen.arc(x, y, radius_deg > 2 ? 2 : 5, 0, 2 * Math.PI);
-    pen.fill();
+    disc(pen, this.place(centre), radius_deg > 2 ? 2 : 5);
     this.word(pen, name, centre, colour, 12, true);
   }
 
@@ -194,10 +188,7 @@ export class SkyMap {
     const up = boresight.map((part, i) => part - 0.14 * down[i]);
     if (!now) this.line(pen, [boresight, up]);
     pen.setLineDash([]);
-    const [x, y] = this.place(boresight);
-    pen.beginPath();
-    pen.arc(x, y, now ? 2 : 3.5, 0, 2 * Math.PI);
-    pen.fill();
+    disc(pen, this.place(boresight), now ? 2 : 3.5);
     this.word(pen, now ? `${name} now` : name, boresight, colour, 16, true);
   }
 
@@ -210,24 +201,18 @@ export class SkyMap {
   }
 
   star(pen, { name, v_mag, at }) {
-    const [x, y] = this.place(at);
     pen.fillStyle = this.text;
-    pen.beginPath();
-    pen.arc(x, y, Math.max(0.5, 2.2 - 0.45 * v_mag), 0, 2 * Math.PI);
-    pen.fill();
+    disc(pen, this.place(at), Math.max(0.5, 2.2 - 0.45 * v_mag));
     if (name && v_mag < NAMED) this.word(pen, name, at, this.text, 10);
   }
 
-  ring(pen, at) {
-    const [x, y] = this.place(at);
+  ring(pen) {
     pen.strokeStyle = this.text;
     pen.lineWidth = 2;
-    pen.beginPath();
-    pen.arc(x, y, 9, 0, 2 * Math.PI);
-    pen.stroke();
+    ring(pen, this.place(this.selected), 9);
   }
 
-  // Beside a place, where nothing is written yet; what `must` be written is, in the worst case over it.
+  // Text beside a direction where there is room; with `must` in the worst case over other text.
   word(pen, text, at, colour, aside, must = false) {
     const [x, y] = this.place(at);
     const wide = pen.measureText(text).width;
@@ -242,7 +227,7 @@ export class SkyMap {
       .flatMap(around)
       .map(([from, middle]) => ({ left: from, top: middle - TEXT / 2, wide }));
     const inside = (box) => box.left >= 0 && box.left + wide <= width && box.top >= 0 && box.top + TEXT <= height;
-    const free = (box) => !this.taken.some((other) => meet(box, other));
+    const free = (box) => !this.taken.some((other) => overlap(box, other, TEXT + 1, 5));
     const box = spots.find((one) => inside(one) && free(one)) ?? (must ? spots.find(inside) : null);
     if (!box) return;
     this.taken.push(box);
@@ -254,9 +239,4 @@ export class SkyMap {
     pen.fillStyle = colour;
     pen.fillText(text, box.left, box.top + TEXT / 2);
   }
-}
-
-function meet(a, b) {
-  const across = a.left < b.left + b.wide + 5 && b.left < a.left + a.wide + 5;
-  return across && Math.abs(a.top - b.top) < TEXT + 1;
 }

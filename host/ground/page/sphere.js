@@ -1,10 +1,9 @@
-// Directions on a map of the whole sky in Hammer's projection, which keeps areas: seen from inside,
-// so what is to the east is left.
+// Directions, and Hammer's equal-area projection of the whole sky seen from inside: east is left.
 
-const RAD = Math.PI / 180;
-const HALF = Math.SQRT2; // of the map's height, where its width is twice that
+export const RAD = Math.PI / 180;
+const HALF = Math.SQRT2; // half of the map's height; its width is twice its height
 
-// Rows of a matrix times a vector; and the same with rows for columns.
+// A matrix, and its transpose, times a vector.
 export function turned(matrix, vector) {
   return matrix.map((row) => dot(row, vector));
 }
@@ -17,7 +16,7 @@ export function dot(a, b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// Unit vector of an angle around z, and one above its equator, in degrees; and back.
+// Unit vector from longitude and latitude in degrees, and back.
 export function vector(along, above) {
   const across = Math.cos(above * RAD);
   return [across * Math.cos(along * RAD), across * Math.sin(along * RAD), Math.sin(above * RAD)];
@@ -28,21 +27,21 @@ export function angles([x, y, z]) {
   return [(along + 360) % 360, Math.atan2(z, Math.hypot(x, y)) / RAD];
 }
 
-// Unit vector in camera axes of the two angles that sun and nadir sensors give: parts of the angle
-// from the boresight, towards x and y.
+// Unit vector in camera axes from the two angles of Sun and nadir sensors: components towards x and
+// y of the angle from the boresight, in degrees.
 export function fromParts(alpha, beta) {
   const away = Math.hypot(alpha, beta) * RAD;
   const around = Math.atan2(beta, alpha);
   return [Math.sin(away) * Math.cos(around), Math.sin(away) * Math.sin(around), Math.cos(away)];
 }
 
-// Angle between two unit vectors in degrees, exact for small ones too.
+// Angle between two unit vectors in degrees, precise for small ones too.
 export function apart(a, b) {
   const chord = Math.hypot(...a.map((part, i) => part - b[i]));
   return (2 * Math.asin(Math.min(chord / 2, 1))) / RAD;
 }
 
-// Place in a map of half width 2 and half height 1 around 0, to the right and down.
+// Position on a map of half width 2 and half height 1, right and down from its middle.
 export function flat([x, y, z]) {
   const along = Math.atan2(y, x);
   const across = Math.hypot(x, y);
@@ -50,7 +49,7 @@ export function flat([x, y, z]) {
   return [(-2 * across * Math.sin(along / 2)) / size, -z / size];
 }
 
-// The direction at such a place; null beside the map.
+// The direction at such a position; null outside of the map.
 export function direction(right, down) {
   const [x, y] = [-right * HALF, -down * HALF];
   const size = 1 - (x / 4) ** 2 - (y / 2) ** 2;
@@ -61,7 +60,7 @@ export function direction(right, down) {
   return vector(along / RAD, above / RAD);
 }
 
-// Directions at an angle around another one, in order.
+// Directions on a circle of `radius` degrees around another one.
 export function circle(centre, radius, points = 120) {
   const least = centre.map(Math.abs).indexOf(Math.min(...centre.map(Math.abs)));
   const one = unit(cross(centre, [0, 1, 2].map((at) => Number(at === least))));
@@ -78,6 +77,6 @@ function unit(v) {
   return v.map((part) => part / size);
 }
 
-function cross(a, b) {
+export function cross(a, b) {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }

@@ -1,31 +1,30 @@
-// How an emulation was started, its profile and firmware above all, and to start it otherwise.
+// Options of the emulation, such as profile and firmware, and its restart with others.
 
-import { choose, labelled, make } from "./dom.js";
+import { base64, beside, choose, disabledIf, labelled, make, note, row } from "./dom.js";
 import { ask } from "./server.js";
 
-const OWN = "a file of one's own";
+const UPLOAD = "upload a file";
 
 export class Start {
-  // `path` leads to the target, `act(what, asked)` does something and tells of it.
-  constructor(place, about, path, act) {
+  // `reported(what, request)` reports the answer to a request.
+  constructor(place, about, path, reported) {
     const why = about.missing.controls ?? about.missing.restart;
     this.path = path;
-    this.act = act;
-    const now = Object.entries(about.chosen).map(([name, value]) => `${name} ${value}`);
-    this.told = make("p", { id: "start-told", textContent: now.length ? `runs now: ${now.join(", ")}` : "" });
+    this.reported = reported;
+    const current = Object.entries(about.chosen).map(([name, value]) => `${name} ${value}`);
+    const status = current.length ? `running: ${current.join(", ")}` : "";
     this.fields = about.options.map((option) => field(option));
     this.button = make("button", {
       className: "main",
       id: "restart",
-      textContent: "Start again",
-      disabled: Boolean(why),
-      title: why ?? "with the same scene and seed",
+      textContent: "Restart",
+      ...disabledIf(why),
     });
-    this.reason = make("p", { className: "quiet", textContent: why ?? "" });
+    this.button.title ||= "with the same scene and seed";
+    this.reason = note(why);
     const form = make(
       "form",
       {
-        id: "start-form",
         onsubmit: (event) => {
           event.preventDefault();
           this.restart();
@@ -34,17 +33,17 @@ export class Start {
       ...this.fields.flatMap((one) => one.elements),
       this.button,
     );
-    place.append(this.told, form, this.reason);
+    place.append(make("p", { id: "start-status", textContent: status }), form, this.reason);
   }
 
   async restart() {
     this.button.disabled = true;
-    this.reason.textContent = "the device starts again";
+    this.reason.textContent = "restarting";
     try {
       const options = {};
       const files = {};
-      for (const one of this.fields) await one.give(options, files);
-      await this.act("start again", ask(`${this.path}/restart`, { options, files }));
+      for (const one of this.fields) await one.collect(options, files);
+      await this.reported("restart", ask(`${this.path}/restart`, { options, files }));
       this.reason.textContent = "";
     } catch (error) {
       this.reason.textContent = error.message;
@@ -56,49 +55,43 @@ export class Start {
 function field(option) {
   const common = { id: `option-${option.name}`, title: option.help };
   if (option.file) return fileField(option, common);
+  const isFlag = !option.choices.length && !option.text;
   let input;
-  if (option.choices.length) {
+  if (isFlag) input = make("input", { ...common, type: "checkbox", checked: option.now === true });
+  else if (option.choices.length) {
     input = choose(option.choices, common);
     input.value = option.now;
-  } else if (option.text)
+  } else
     input = make("input", { ...common, value: option.now, placeholder: option.unset, autocomplete: "off", spellcheck: false });
-  else input = make("input", { ...common, type: "checkbox", checked: option.now === true });
-  const value = () => (input.type === "checkbox" ? input.checked : input.value.trim());
-  const beside = input.type === "checkbox" ? { className: "beside" } : {};
   return {
-    elements: [labelled(option.name, input, beside)],
-    give: (options) => {
-      if (value() !== option.default) options[option.name] = value();
+    elements: [(isFlag ? beside : labelled)(option.name, input)],
+    collect: (options) => {
+      const value = isFlag ? input.checked : input.value.trim();
+      if (value !== option.default) options[option.name] = value;
     },
   };
 }
 
-// What is known by a name, what runs now, or a file that is sent.
+// A choice between known names, the current file, and an upload.
 function fileField(option, common) {
   const names = [...new Set([...option.known, option.now])].filter(Boolean);
-  const input = choose([{ value: "", textContent: option.unset }, ...names, { value: OWN, textContent: OWN }], common);
+  const input = choose([{ value: "", textContent: option.unset }, ...names, { value: UPLOAD, textContent: UPLOAD }], common);
   input.value = option.now;
   const file = make("input", { type: "file", id: `${common.id}-file` });
   const address = make("input", { id: `${common.id}-address`, size: 12, placeholder: "@0x0", autocomplete: "off" });
-  const own = make(
-    "div",
-    { className: "row", hidden: true },
-    labelled(`${option.name}: the file`, file),
-    labelled("address of plain bytes", address),
-  );
-  input.onchange = () => (own.hidden = input.value !== OWN);
+  const upload = row(labelled(`${option.name}: file`, file), labelled("address of a raw binary", address));
+  upload.hidden = true;
+  input.onchange = () => (upload.hidden = input.value !== UPLOAD);
   return {
-    elements: [labelled(option.name, input), own],
-    give: async (options, files) => {
-      if (input.value !== OWN) {
+    elements: [labelled(option.name, input), upload],
+    collect: async (options, files) => {
+      if (input.value !== UPLOAD) {
         if (input.value !== option.default) options[option.name] = input.value;
         return;
       }
-      const [sent] = file.files;
-      if (!sent) throw new Error(`${option.name}: choose a file`);
-      const bytes = new Uint8Array(await sent.arrayBuffer());
-      const content = btoa(bytes.reduce((text, byte) => text + String.fromCharCode(byte), ""));
-      files[option.name] = { name: sent.name, content, suffix: address.value.trim() };
+      const [chosen] = file.files;
+      if (!chosen) throw new Error(`${option.name}: choose a file`);
+      files[option.name] = { name: chosen.name, content: await base64(chosen), suffix: address.value.trim() };
     },
   };
 }

@@ -1,29 +1,29 @@
-// Telemetry frames as they come in, and any number in them over time.
+// A telemetry frame, and plots of any of its numbers over time.
 
-import { atNextFrame, choose, labelled, make } from "./dom.js";
-import { named } from "./fields.js";
+import { atNextFrame, beside, choose, labelled, make, note, row } from "./dom.js";
+import { valueName } from "./fields.js";
 
-const KEPT = 3600; // points of a plot: an hour at one a second
+const MOST_POINTS = 3600; // of a plot: one hour at one point per second
 
 const COLOURS = ["#2f81f7", "#d29922", "#3fb950", "#db61a2", "#a371f7", "#f0883e"];
 
 export class Telemetry {
-  // `want(names)` says which frames are to be read again and again.
-  constructor(place, about, want) {
+  // `subscribe(names)` requests telemetry frames in every update.
+  constructor(place, about, subscribe) {
     this.byName = new Map(
       about.telemetries.filter((one) => one.supported).map((one) => [one.name, one]),
     );
-    this.want = want;
+    this.subscribe = subscribe;
     this.cells = new Map();
     this.plotted = [];
     this.times = [];
     this.drawSoon = atNextFrame(() => this.draw(true));
     this.name = choose([...this.byName.keys()], { id: "frame", onchange: () => this.show() });
-    this.meaning = make("p", { className: "quiet" });
+    this.meaning = note();
     this.table = make("tbody");
     this.figure = make("div", { id: "plot" });
     place.append(
-      make("div", { className: "row" }, labelled("frame", this.name)),
+      row(labelled("frame", this.name)),
       this.meaning,
       make("table", {}, this.table),
       this.figure,
@@ -40,7 +40,7 @@ export class Telemetry {
   show() {
     const one = this.byName.get(this.name.value);
     if (!one) return;
-    const note = one.changes ? "; reading it changes something" : "";
+    const note = one.changes ? "; reading it has side effects" : "";
     this.meaning.textContent = `${one.id}: ${one.meaning}${note}`;
     this.cells.clear();
     const rows = one.fields.map((field) => {
@@ -61,27 +61,27 @@ export class Telemetry {
         name,
         value,
         make("td", { className: "quiet", textContent: field.unit }),
-        make("td", {}, labelled("plot", plot, { className: "beside" })),
+        make("td", {}, beside("plot", plot)),
       );
     });
     this.table.replaceChildren(...rows);
-    this.want(this.names());
+    this.subscribe(this.names());
   }
 
   toggle(frame, field, on) {
     this.plotted = this.plotted.filter((p) => p.frame !== frame || p.field !== field);
     if (on) this.plotted.push({ frame, field, values: this.times.map(() => null) });
-    this.want(this.names());
+    this.subscribe(this.names());
     this.draw();
   }
 
-  hear(values) {
+  update(values) {
     const shown = values[this.name.value];
     const one = this.byName.get(this.name.value);
     if (shown && one) {
       for (const field of one.fields) {
         const cell = this.cells.get(field.name);
-        cell.textContent = "error" in shown ? "–" : worded(field, shown);
+        cell.textContent = "error" in shown ? "–" : text(field, shown);
       }
       this.meaning.classList.toggle("bad", "error" in shown);
       this.meaning.textContent = shown.error ?? `${one.id}: ${one.meaning}`;
@@ -89,7 +89,7 @@ export class Telemetry {
     if (!this.plotted.length) return;
     this.times.push(Date.now() / 1000);
     for (const p of this.plotted) p.values.push(Number(values[p.frame]?.[p.field.name] ?? NaN));
-    if (this.times.length > KEPT) {
+    if (this.times.length > MOST_POINTS) {
       this.times.shift();
       for (const p of this.plotted) p.values.shift();
     }
@@ -134,9 +134,9 @@ export class Telemetry {
   }
 }
 
-function worded(field, values) {
+function text(field, values) {
   const value = values[field.name];
-  const name = named(field, values);
+  const name = valueName(field, values);
   if (name) return `${name} (${value})`;
   if (typeof value === "number" && !Number.isInteger(value)) return value.toPrecision(7);
   return String(value);

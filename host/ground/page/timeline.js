@@ -1,25 +1,25 @@
-// Words that a device answers, task, mode or state, as bands over time: those of its results, and
-// any field of telemetry whose values have names.
+// Named values over time as bands: those of the results, such as task and mode, and telemetry fields
+// whose values have names.
 
-import { atNextFrame, choose, labelled, make } from "./dom.js";
-import { hasNames, named } from "./fields.js";
+import { atNextFrame, button, choose, labelled, make, note, row } from "./dom.js";
+import { hasNames, valueName } from "./fields.js";
 
 const SPANS_S = [60, 300, 1800];
-const KEPT = 20_000; // changes of a word, within the longest span
+const MOST_CHANGES = 20_000; // per band
 const ROW = 42;
 const TEXT = 20; // above the band
 const FOOT = 22;
-const PADDING = 32; // of what it stands in, left and right
+const PADDING = 32; // of the section, left and right
 const COLOURS = ["#58a6ff", "#d29922", "#3fb950", "#db61a2", "#a98bf7", "#f0883e", "#9aa3af"];
-const STRIPES = 6; // a colour that comes once more is striped
+const STRIPES = 6; // width; a colour that is used again is striped
 
 export class Timeline {
-  // `want(names)` says which frames are to be read again and again.
-  constructor(place, about, want) {
-    this.want = want;
+  // `subscribe(names)` requests telemetry frames in every update.
+  constructor(place, about, subscribe) {
+    this.subscribe = subscribe;
     this.drawSoon = atNextFrame(() => this.draw());
     this.bands = new Map();
-    this.looks = new Map();
+    this.colours = new Map();
     this.chosen = new Map(); // frame and field by the name of the band
     this.fields = new Map(
       about.telemetries
@@ -33,64 +33,55 @@ export class Timeline {
       SPANS_S.map((span) => ({ value: String(span), textContent: `${span} s` })),
       { id: "span", onchange: () => this.draw() },
     );
-    const add = make("button", {
-      id: "add-band",
-      type: "button",
-      textContent: "Add band",
-      disabled: none,
-      onclick: () => this.choose(this.field.value),
-    });
+    const add = button("Add band", "add-band", () => this.choose(this.field.value));
+    add.disabled = none;
     this.buttons = make("div", { className: "row", id: "bands" });
-    this.told = make("p", { className: "quiet", id: "timeline-told" });
-    this.canvas = make("canvas", { id: "timeline", width: 300, height: 1, role: "img" });
-    this.canvas.setAttribute("aria-label", "words that the device answered over time");
+    this.status = note("", { id: "timeline-status" });
+    this.canvas = make("canvas", { id: "bands-canvas", width: 300, height: 1, role: "img" });
+    this.canvas.setAttribute("aria-label", "named values over time");
     this.legend = make("ul", { id: "timeline-legend" });
     place.append(
-      make("div", { className: "row" }, labelled("field", this.field), add, labelled("last", this.span)),
+      row(labelled("field", this.field), add, labelled("time span", this.span)),
       this.buttons,
-      this.told,
+      this.status,
       this.canvas,
       this.legend,
     );
-    this.none = none ? `${about.device} has no words in telemetry` : null;
-    this.want([]);
+    this.none = none ? `${about.device} has no named values in telemetry` : null;
+    this.subscribe([]);
     if (about.missing.results && !none) this.choose(this.field.value);
-    new ResizeObserver(() => this.draw()).observe(this.told);
+    new ResizeObserver(() => this.draw()).observe(this.status);
   }
 
   choose(name) {
     if (this.chosen.has(name)) return;
     this.chosen.set(name, this.fields.get(name));
-    const remove = make("button", {
-      type: "button",
-      textContent: `${name} ×`,
-      ariaLabel: `remove the band ${name}`,
-      onclick: () => {
-        this.chosen.delete(name);
-        this.bands.delete(name);
-        remove.remove();
-        this.field.focus();
-        this.wanted();
-        this.draw();
-      },
+    const remove = button(`${name} ×`, "", () => {
+      this.chosen.delete(name);
+      this.bands.delete(name);
+      remove.remove();
+      this.field.focus();
+      this.subscribeFrames();
+      this.draw();
     });
+    remove.ariaLabel = `remove the band ${name}`;
     this.buttons.append(remove);
-    this.wanted();
+    this.subscribeFrames();
   }
 
-  wanted() {
-    this.want([...new Set([...this.chosen.values()].map((one) => one.frame))]);
+  subscribeFrames() {
+    this.subscribe([...new Set([...this.chosen.values()].map((one) => one.frame))]);
   }
 
-  // Words by name, and telemetry by frame, at a time in seconds.
-  hear(words, frames, time) {
-    if (this.time > time) this.bands.clear(); // it went back
+  // Texts by name, and telemetry by frame, at a time in seconds.
+  update(words, frames, time) {
+    if (this.time > time) this.bands.clear(); // it went back in time
     this.time = time;
     const found = { ...words };
     for (const [name, { frame, field }] of this.chosen) {
       const values = frames[frame];
       if (values?.[field.name] === undefined) continue;
-      found[name] = named(field, values) ?? String(values[field.name]);
+      found[name] = valueName(field, values) ?? String(values[field.name]);
     }
     for (const [name, word] of Object.entries(found)) {
       const changes = this.bands.get(name) ?? [];
@@ -99,21 +90,21 @@ export class Timeline {
       if (last) last.until = time;
       if (last?.word !== word) changes.push({ from: time, until: time, word });
       const begin = time - SPANS_S.at(-1);
-      while (changes[0].until < begin || changes.length > KEPT) changes.shift();
+      while (changes[0].until < begin || changes.length > MOST_CHANGES) changes.shift();
     }
     this.drawSoon();
   }
 
-  // Colour, and whether it is striped.
-  look(word) {
-    const number = this.looks.size;
-    if (!this.looks.has(word))
-      this.looks.set(word, [COLOURS[number % COLOURS.length], number >= COLOURS.length]);
-    return this.looks.get(word);
+  // The colour, and whether it is striped.
+  colourOf(word) {
+    const number = this.colours.size;
+    if (!this.colours.has(word))
+      this.colours.set(word, [COLOURS[number % COLOURS.length], number >= COLOURS.length]);
+    return this.colours.get(word);
   }
 
   draw() {
-    if (!this.canvas.isConnected) return; // another target is looked at
+    if (!this.canvas.isConnected) return; // another target is shown
     const height = this.bands.size ? ROW * this.bands.size + FOOT : 1;
     const width = Math.max(this.canvas.parentElement.clientWidth - PADDING, 1);
     if (this.canvas.height !== height) this.canvas.height = height;
@@ -121,7 +112,7 @@ export class Timeline {
     const pen = this.canvas.getContext("2d");
     pen.clearRect(0, 0, width, height);
     if (!this.bands.size) {
-      this.told.textContent = this.none ?? "no word yet";
+      this.status.textContent = this.none ?? "no values yet";
       this.explain([]);
       return;
     }
@@ -129,7 +120,7 @@ export class Timeline {
     const span = Number(this.span.value);
     const begin = Math.max(this.time - span, 0);
     const x = (time) => ((time - begin) / span) * width;
-    const seen = new Set();
+    const shown = new Set();
     pen.font = "13px system-ui, sans-serif";
     pen.textBaseline = "middle";
     pen.textAlign = "left";
@@ -142,7 +133,7 @@ export class Timeline {
       for (const { from, until, word } of changes) {
         if (until < begin) continue;
         const left = x(Math.max(from, begin));
-        seen.add(word);
+        shown.add(word);
         this.band(pen, word, left, top + TEXT, Math.max(x(until) - left, 1), ROW - TEXT - 4);
       }
     });
@@ -151,12 +142,12 @@ export class Timeline {
     pen.textAlign = "right";
     pen.fillText(`${(begin + span).toFixed(0)} s`, width, height - FOOT / 2);
     const words = [...this.bands].map(([name, changes]) => `${name} ${changes.at(-1).word}`);
-    this.told.textContent = words.join(", ");
-    this.explain([...seen].sort());
+    this.status.textContent = words.join(", ");
+    this.explain([...shown].sort());
   }
 
   band(pen, word, left, top, wide, high) {
-    const [colour, striped] = this.look(word);
+    const [colour, striped] = this.colourOf(word);
     pen.fillStyle = colour;
     pen.fillRect(left, top, wide, high);
     pen.fillStyle = "#0006";
@@ -168,13 +159,13 @@ export class Timeline {
     pen.fillText(word, left + 4, top + high / 2);
   }
 
-  // What has no room in a band is told below.
+  // Lists all values below the bands, where some have no room.
   explain(words) {
     const shown = [...this.legend.children].map((one) => one.textContent);
     if (shown.join() === words.join()) return;
     this.legend.replaceChildren(
       ...words.map((word) => {
-        const [colour, striped] = this.look(word);
+        const [colour, striped] = this.colourOf(word);
         const swatch = make("span", { className: striped ? "swatch striped" : "swatch" });
         swatch.style.backgroundColor = colour;
         return make("li", {}, swatch, word);

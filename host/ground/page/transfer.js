@@ -1,31 +1,21 @@
-// A picture down or up over the wire, as any host could have it: with progress, held, given up.
+// Downloads and uploads of images over the wire, with progress, pause and cancel.
 
-import { choose, labelled, make } from "./dom.js";
+import { base64, button, choose, disabledIf, labelled, make, note, row } from "./dom.js";
 import { ask } from "./server.js";
 
 export class Transfer {
-  // `path` leads to the target, `tell(text, kind)` tells what happened.
-  constructor(place, path, about, tell) {
+  constructor(place, path, about, report) {
     this.path = path;
-    this.tell = tell;
+    this.report = report;
     const { download, upload } = about.missing;
-    const button = (text, id, click, why) =>
-      make("button", {
-        textContent: text,
-        id,
-        type: "button",
-        onclick: click,
-        disabled: Boolean(why),
-        title: why ?? "",
-      });
     this.source = choose(about.sources, { id: "source", hidden: !about.sources.length });
-    const start = () => this.do("download", { source: this.source.value || null });
-    this.hold = button("Hold", "hold", () => this.do(`transfer/${this.held ? "go-on" : "hold"}`));
-    this.end = button("Give up", "give-up", () => this.do("transfer/give-up"));
+    const start = () => this.call("download", { source: this.source.value || null });
+    this.pause = button("Pause", "pause-transfer", () => this.call(`transfer/${this.paused ? "resume" : "pause"}`));
+    this.cancel = button("Cancel", "cancel-transfer", () => this.call("transfer/cancel"));
     this.save = make("a", {
-      href: `${path}/carried`,
+      href: `${path}/transfer/image`,
       download: "",
-      id: "carried",
+      id: "save-image",
       textContent: "Save as PNG",
       hidden: true,
     });
@@ -33,60 +23,53 @@ export class Transfer {
       type: "file",
       id: "upload",
       accept: "image/*",
-      disabled: Boolean(upload),
-      title: upload ?? "",
       onchange: () => this.upload(),
+      ...disabledIf(upload),
     });
     this.bar = make("progress", { id: "progress", max: 1, value: 0 });
-    this.told = make("p", { className: "quiet", id: "transfer-told" });
+    this.status = note([download, upload].filter(Boolean).join("; "), { id: "transfer-status" });
     place.append(
-      make(
-        "div",
-        { className: "row" },
+      row(
         labelled("", this.source),
         button("Download", "download", start, download),
-        this.hold,
-        this.end,
+        this.pause,
+        this.cancel,
         this.save,
       ),
-      labelled("upload a picture file", this.file),
+      labelled("upload an image file", this.file),
       this.bar,
-      this.told,
+      this.status,
     );
-    const why = [download, upload].filter(Boolean);
-    this.told.textContent = why.join("; ");
-    this.hear(null);
+    this.update(null);
   }
 
-  async do(call, body = {}) {
+  async call(call, body = {}) {
     try {
-      this.hear(await ask(`${this.path}/${call}`, body));
+      this.update(await ask(`${this.path}/${call}`, body));
     } catch (error) {
-      this.tell(`${call}\n  ${error.message}`, "bad");
+      this.report(`${call}\n  ${error.message}`, "bad");
     }
   }
 
   async upload() {
     const [file] = this.file.files;
     if (!file) return;
-    const bytes = new Uint8Array(await file.arrayBuffer());
-    const text = Array.from(bytes, (byte) => String.fromCharCode(byte)).join("");
-    await this.do("upload", { picture: btoa(text) });
+    await this.call("upload", { picture: await base64(file) });
     this.file.value = "";
   }
 
-  hear(carried) {
-    const runs = Boolean(carried) && !carried.ended;
-    this.held = runs && carried.held;
-    this.hold.disabled = this.end.disabled = !runs;
-    this.hold.textContent = this.held ? "Go on" : "Hold";
-    this.bar.hidden = !carried;
-    if (!carried) return;
-    const { what, done, total, ended } = carried;
+  update(transfer) {
+    const runs = Boolean(transfer) && !transfer.ended;
+    this.paused = runs && transfer.paused;
+    this.pause.disabled = this.cancel.disabled = !runs;
+    this.pause.textContent = this.paused ? "Resume" : "Pause";
+    this.bar.hidden = !transfer;
+    if (!transfer) return;
+    const { what, done, total, ended } = transfer;
     this.bar.max = total || 1;
     this.bar.value = done;
-    this.save.hidden = !carried.saved;
-    const state = ended || (this.held ? "held" : "on its way; nothing else is asked meanwhile");
-    this.told.textContent = `${what}: ${done} of ${total} blocks, ${state}`;
+    this.save.hidden = !transfer.saved;
+    const state = ended || (this.paused ? "paused" : "in progress; other requests wait");
+    this.status.textContent = `${what}: ${done} of ${total} blocks, ${state}`;
   }
 }

@@ -1,6 +1,8 @@
-// A VCD file as what changed when.
+// Reader of VCD files.
 
-// Variables of the scope `within`, each with its width and its changes [time in s, value].
+const UNITS = { s: 1, ms: 1e-3, us: 1e-6, ns: 1e-9, ps: 1e-12 };
+
+// Variables of the scope `within`: name, bits, and changes [time in s, value].
 export function readVcd(text, within) {
   const variables = new Map();
   const scopes = [];
@@ -24,5 +26,3 @@ export function readVcd(text, within) {
   }
   return [...variables.values()];
 }
-
-const UNITS = { s: 1, ms: 1e-3, us: 1e-6, ns: 1e-9, ps: 1e-12 };

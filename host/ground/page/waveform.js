@@ -1,88 +1,85 @@
-// A span of an emulation's past as a waveform: to save, and the FPGA's pins around their last change.
+// A past time span as a waveform: the FPGA's pins around their last change, and a VCD file.
 
-import { labelled, make, save } from "./dom.js";
+import { button, disabledIf, labelled, make, note, row, save } from "./dom.js";
+import { fetched } from "./server.js";
 import { readVcd } from "./vcd.js";
 
-const SPAN_S = 2; // before now, unless another one is wanted
-const SHOWN = 40; // changes before the last one that are drawn at first
+const SPAN_S = 2; // default span, up to the current time
+const SHOWN = 40; // last changes that are shown at first
 const ROW = 24;
 const NAMES = 190; // pixels
 const WIDTH = 1000;
 
 export class Waveform {
-  // `path` leads to the target, `tell(text, kind)` tells what went wrong.
-  constructor(place, about, path, tell) {
-    const why = about.missing.controls ?? about.missing.past;
+  constructor(place, about, path, report) {
+    const why = about.missing.controls ?? about.missing.history;
     this.path = path;
-    this.tell = tell;
-    const number = (id) => make("input", { type: "number", min: 0, step: "any", id, disabled: Boolean(why) });
+    this.report = report;
+    const number = (id) => make("input", { type: "number", min: 0, step: "any", id, ...disabledIf(why) });
     this.from = number("trace-from");
     this.to = number("trace-to");
-    this.told = make("p", { className: "quiet", id: "waveform-told", textContent: why ?? "" });
-    const button = (text, id, onclick) =>
-      make("button", { textContent: text, id, type: "button", onclick, disabled: Boolean(why), title: why ?? "" });
-    this.wider = button("Wider", "wider", () => this.zoom(2));
-    this.closer = button("Closer", "closer", () => this.zoom(0.5));
-    this.earlier = button("Earlier", "earlier", () => this.shift(-1));
-    this.later = button("Later", "later", () => this.shift(1));
-    this.steps = make("div", { className: "row", hidden: true }, this.earlier, this.later, this.wider, this.closer);
+    this.status = note(why, { id: "waveform-status" });
+    this.steps = row(
+      button("Earlier", "earlier", () => this.shift(-1)),
+      button("Later", "later", () => this.shift(1)),
+      button("Zoom out", "waves-out", () => this.zoom(2)),
+      button("Zoom in", "waves-in", () => this.zoom(0.5)),
+    );
+    this.steps.hidden = true;
     this.canvas = make("canvas", { id: "waves", width: WIDTH, hidden: true, role: "img" });
     place.append(
-      make(
-        "div",
-        { className: "row" },
+      row(
         labelled("from [s]", this.from),
         labelled("to [s]", this.to),
-        button("Show pins", "show-waves", () => this.show()),
-        button("Save VCD", "save-waves", () => this.save(about.device)),
+        button("Show pins", "show-waves", () => this.show(), why),
+        button("Save VCD", "save-waves", () => this.save(about.device), why),
       ),
-      this.told,
+      this.status,
       this.steps,
       make("div", { className: "frame" }, this.canvas),
     );
   }
 
-  hear({ time_s }) {
+  update({ time_s }) {
     this.now = time_s;
     if (!this.to.value) this.to.placeholder = time_s?.toFixed(3);
     if (!this.from.value) this.from.placeholder = this.span()[0].toFixed(3);
   }
 
-  // What is wanted, else the last moments.
+  // The entered time span, or the default.
   span() {
     const to = this.to.value ? Number(this.to.value) : this.now;
     return [this.from.value ? Number(this.from.value) : Math.max(0, to - SPAN_S), to];
   }
 
-  async fetched() {
+  async fetch() {
     const [from, to] = this.span();
-    this.told.textContent = "the emulation's past is played again";
+    this.status.textContent = "replaying the recording";
     try {
-      const answer = await fetch(`${this.path}/trace?from_s=${from}&to_s=${to}`);
-      if (!answer.ok) throw new Error((await answer.json()).error);
-      this.told.textContent = `${from.toFixed(6)} to ${to.toFixed(6)} s`;
+      const answer = await fetched(`${this.path}/trace?from_s=${from}&to_s=${to}`);
+      this.status.textContent = `${from.toFixed(6)} to ${to.toFixed(6)} s`;
       return await answer.text();
     } catch (error) {
-      this.told.textContent = error.message;
-      this.tell(`waveform\n  ${error.message}`, "bad");
+      this.status.textContent = error.message;
+      this.report(`waveform\n  ${error.message}`, "bad");
       return null;
     }
   }
 
   async save(device) {
-    const text = await this.fetched();
+    const text = await this.fetch();
     if (text === null) return;
     save(new Blob([text], { type: "text/plain" }), `${device.toLowerCase()}.vcd`);
   }
 
   async show() {
     const [from, to] = this.span();
-    const text = await this.fetched();
+    const text = await this.fetch();
     if (text === null) return;
     this.pins = readVcd(text, "fpga");
     this.canvas.hidden = this.steps.hidden = !this.pins.length;
     if (!this.pins.length) {
-      this.told.textContent += ": this device has no FPGA";
+      this.status.textContent += ": this device has no FPGA";
       return;
     }
     const times = this.pins.flatMap(({ changes }) => changes.map(([time]) => time)).filter((time) => time > from);
@@ -91,7 +88,7 @@ export class Waveform {
     const first = times.at(-SHOWN) ?? times[0] ?? from;
     const margin = (last - first) / 10 || (to - from) / 20;
     this.view = [first - margin, last + margin];
-    this.told.textContent += `: ${times.length} changes, the last at ${last.toFixed(9)} s`;
+    this.status.textContent += `: ${times.length} changes, the last at ${last.toFixed(9)} s`;
     this.draw();
   }
 
@@ -132,7 +129,7 @@ export class Waveform {
   }
 }
 
-// Levels of one pin as a line, those of several bits as boxes with a number.
+// Draws one bit as a line, several bits as boxes with their hexadecimal value.
 function drawPin(pen, { bits, changes }, top, x, colour) {
   const bottom = top + ROW - 8;
   pen.beginPath();

@@ -1,59 +1,51 @@
-// A frame in which a picture is enlarged and moved: by keys, buttons, wheel or pointer.
+// A frame that zooms and moves an image by keys, buttons, wheel or pointer.
 
-import { make } from "./dom.js";
+import { button, make, row } from "./dom.js";
+import { sharpPen } from "./draw.js";
 
-const LARGEST = 16; // times as wide as it is whole
-const BY = 2;
+const LARGEST = 16; // relative to the fitted image
+const STEP = 2;
 
 export class ZoomFrame {
-  // `changed` is called when it stands elsewhere on the screen, or in another size.
+  // Calls `changed` when its position or size on the screen changes.
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.changed = changed;
     this.zoom = 1;
-    this.frame = make("div", { className: "frame", id: "frame-of-picture", tabIndex: 0 });
+    this.frame = make("div", { className: "frame", id: "zoom-frame", tabIndex: 0 });
     this.frame.setAttribute("role", "group");
-    this.frame.setAttribute("aria-label", "picture; + - and 0 size it, arrow keys move it");
+    this.frame.setAttribute("aria-label", "image; + and - zoom, 0 fits, arrow keys move it");
     this.frame.append(canvas);
-    // Has the pixels of the screen, so that what is written on it stays sharp.
-    this.over = make("canvas", { id: "over", width: 1, height: 1 });
-    this.over.setAttribute("aria-hidden", "true");
-    this.place = make("div", { className: "under" }, this.frame, this.over);
+    this.overlay = make("canvas", { id: "overlay", width: 1, height: 1 });
+    this.overlay.setAttribute("aria-hidden", "true");
+    this.place = make("div", { className: "under" }, this.frame, this.overlay);
     this.frame.onscroll = () => this.changed();
     this.frame.onkeydown = (event) => this.key(event);
     this.frame.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.frame.onpointerdown = (event) => {
-      if (event.pointerType !== "mouse") return; // a finger scrolls it anyhow
+      if (event.pointerType !== "mouse") return; // a finger scrolls it
       this.frame.setPointerCapture(event.pointerId);
     };
     this.frame.onpointermove = (event) => {
       if (!this.frame.hasPointerCapture(event.pointerId)) return;
       this.frame.scrollBy(-event.movementX, -event.movementY);
     };
-    const button = (text, told, act) =>
-      make("button", { textContent: text, type: "button", title: told, ariaLabel: told, onclick: act });
-    this.buttons = make(
-      "div",
-      { className: "row", id: "sizes" },
-      button("+", "enlarge the picture", () => this.enlarge(BY)),
-      button("−", "make the picture smaller", () => this.enlarge(1 / BY)),
-      button("whole", "show the whole picture", () => this.enlarge(0)),
+    this.buttons = row(
+      button("Zoom in", "zoom-in", () => this.scale(STEP)),
+      button("Zoom out", "zoom-out", () => this.scale(1 / STEP)),
+      button("Fit", "zoom-fit", () => this.scale(0)),
     );
     new ResizeObserver(() => this.changed()).observe(this.frame);
   }
 
-  // What `draw` draws over the picture; it is given a pen, what makes the screen's columns and
-  // rows of the picture's, and the size of what is seen.
+  // Draws over the image by `draw(pen, place, size)`: `place` maps a column and row of the image to
+  // the overlay, whose `size` is that of the frame.
   drawOver(draw) {
-    const { frame, canvas, over } = this;
+    const { frame, canvas, overlay } = this;
     const size = { width: frame.clientWidth, height: frame.clientHeight };
-    const fine = window.devicePixelRatio || 1;
-    over.width = size.width * fine;
-    over.height = size.height * fine;
-    over.style.width = `${size.width}px`;
-    over.style.height = `${size.height}px`;
-    const pen = over.getContext("2d");
-    pen.scale(fine, fine);
+    const pen = sharpPen(overlay, size.width, size.height);
+    overlay.style.width = `${size.width}px`;
+    overlay.style.height = `${size.height}px`;
     const scale = canvas.clientWidth / canvas.width;
     const { scrollLeft, scrollTop } = frame;
     const place = (x, y) => [scale * (x + 0.5) - scrollLeft, scale * (y + 0.5) - scrollTop];
@@ -61,25 +53,25 @@ export class ZoomFrame {
   }
 
   key(event) {
-    const factor = { "+": BY, "-": 1 / BY, 0: 0 }[event.key];
+    const factor = { "+": STEP, "-": 1 / STEP, 0: 0 }[event.key];
     if (factor === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
-    this.enlarge(factor);
+    this.scale(factor);
   }
 
   wheel(event) {
-    const chosen = this.frame.contains(document.activeElement) || event.ctrlKey || event.altKey;
-    if (!chosen) return; // the page scrolls
+    const focused = this.frame.contains(document.activeElement) || event.ctrlKey || event.altKey;
+    if (!focused) return; // the page scrolls
     event.preventDefault();
     const box = this.canvas.getBoundingClientRect();
     const across = (event.clientX - box.left) / box.width;
     const down = (event.clientY - box.top) / box.height;
-    this.enlarge(event.deltaY < 0 ? 1.25 : 0.8, across, down);
+    this.scale(event.deltaY < 0 ? 1.25 : 0.8, across, down);
   }
 
-  // By a factor, and the place at these shares of width and height stays where it is; without
-  // them the middle of what is seen does.
-  enlarge(factor, across = null, down = null) {
+  // Zooms by a factor around the point at the shares `across` and `down` of the image's size, by
+  // default the middle of the frame.
+  scale(factor, across = null, down = null) {
     const { frame, canvas } = this;
     const before = canvas.getBoundingClientRect();
     const x = across ?? (frame.scrollLeft + frame.clientWidth / 2) / before.width;

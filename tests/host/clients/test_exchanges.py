@@ -70,7 +70,7 @@ def test_a_page_tells_what_a_recording_has(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     target = open_target("emulated:cubesense", record=path)
     session = TargetSession(target)
-    session.do("write DetectionThreshold1 77").result()
+    session.execute("write DetectionThreshold1 77").result()
     session.read(["Configuration", "Identification"]).result()
     session.results().result()
     health = session.health

@@ -78,24 +78,24 @@ def test_a_scene_is_sent_as_its_text(controlled: Controlled) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "body", "status", "error"),
     [
-        ("GET", "/stat", None, 404, "there is /back"),
+        ("GET", "/stat", None, 404, "known: /back"),
         ("DELETE", "/state", None, 405, "Method Not Allowed"),
-        ("POST", "/step", b"{", 400, "the body is no JSON"),
-        ("POST", "/step", b"\xff\xfe", 400, "the body is no JSON"),
-        ("POST", "/step", b"[" * 100_000, 400, "the body is no JSON"),
-        ("POST", "/step", [], 400, "the body is a JSON object with events"),
-        ("POST", "/step", {"evnts": 1}, 400, "'evnts' means nothing to /step; it takes events"),
-        ("POST", "/step", {"events": "1"}, 400, "'events' of /step can not be '1'"),
-        ("POST", "/step", {"events": True}, 400, "'events' of /step can not be True"),
+        ("POST", "/step", b"{", 400, "the body is not valid JSON"),
+        ("POST", "/step", b"\xff\xfe", 400, "the body is not valid JSON"),
+        ("POST", "/step", b"[" * 100_000, 400, "the body is not valid JSON"),
+        ("POST", "/step", [], 400, "the body must be a JSON object with events"),
+        ("POST", "/step", {"evnts": 1}, 400, "/step has no member 'evnts'; known: events"),
+        ("POST", "/step", {"events": "1"}, 400, "'events' of /step must be an integer, not '1'"),
+        ("POST", "/step", {"events": True}, 400, "'events' of /step must be an integer, not True"),
         ("POST", "/step", {"events": 0}, 400, "a step is 1 to 100000 events, not 0"),
         ("POST", "/run", {}, 400, "/run needs 'to_s'"),
-        ("POST", "/run", {"to_s": -1}, 400, "a time is 0 to 1e+08 s, not -1"),
-        ("POST", "/run", b'{"to_s": NaN}', 400, "a time is 0 to 1e+08 s, not nan"),
-        ("POST", "/back", b'{"to": NaN}', 400, "back is 0 to "),
-        ("POST", "/back", {"to": True}, 400, "'to' of /back can not be True"),
-        ("POST", "/pace", {"pace": "slow"}, 400, "a pace is real or fast, not 'slow'"),
+        ("POST", "/run", {"to_s": -1}, 400, "to_s must be 0 to 1e+08 s, not -1"),
+        ("POST", "/run", b'{"to_s": NaN}', 400, "to_s must be 0 to 1e+08 s, not nan"),
+        ("POST", "/back", b'{"to": NaN}', 400, "to must be 0 to "),
+        ("POST", "/back", {"to": True}, 400, "'to' of /back must be a number or a text, not True"),
+        ("POST", "/pace", {"pace": "slow"}, 400, "pace must be real or fast, not 'slow'"),
         ("GET", "/devices/cubestat", None, 400, "no device 'cubestat' is emulated here"),
-        ("POST", "/devices/cubestar/act", {"words": [1]}, 400, "'words' are texts"),
+        ("POST", "/devices/cubestar/act", {"words": [1]}, 400, "'words' must be texts"),
         ("POST", "/devices/cubestar/act", {"words": ["dance"]}, 400, "nothing does 'dance'"),
         ("POST", "/devices/cubestar/act", {"words": ["fault", "flod"]}, 400, "flod"),
     ],
@@ -148,7 +148,7 @@ def test_it_goes_back_to_a_time_and_to_a_snapshot(controlled: Controlled) -> Non
     assert there["devices"] == at_rest
     assert list(there["snapshots"]) == ["rest"]
     status, told = controlled.ask("POST", "/back", {"to": "late"})
-    assert (status, told["error"]) == (400, "no snapshot 'late'; there are rest")
+    assert (status, told["error"]) == (400, "no snapshot 'late'; known: rest")
     for never in (20.5, -1, 1e300):
         assert controlled.ask("POST", "/back", {"to": never})[0] == 400
     assert controlled.ask("POST", "/back", {"to": 0})[1]["time_s"] == 0
@@ -172,5 +172,5 @@ def test_without_a_record_there_is_no_way_back(controlled: Controlled) -> None:
         ("GET", "/devices/cubestar/recording", None),
     ):
         status, told = controlled.ask(method, path, body)
-        assert (status, told["error"]) == (400, "there is no way back: --gdb goes forward only")
+        assert (status, told["error"]) == (400, "no way back: --gdb goes forward only")
     assert controlled.ask("GET", "/devices/cubestar")[1]["no_past"] == "--gdb goes forward only"

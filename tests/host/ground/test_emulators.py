@@ -12,7 +12,7 @@ import pytest
 
 from cubestack.firmware_model.reference.image import reference_image
 from cubestack.host.errors import PortOpenError, TargetError
-from cubestack.host.ground.emulators import Emulator, SentFile, words
+from cubestack.host.ground.emulators import Emulator, UploadedFile, words
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.scenes import text_of
@@ -62,16 +62,16 @@ def test_a_profile_is_chosen_and_scene_and_seed_stay(
     shown = scene(session) | {"ra_deg": 10.0, "hazards": {"moon": [{"direction": [12.0, 0.0]}]}}
     act = {"words": ["scene", "scene"], "text": text_of(shown)}
     session.controls.client.ask("POST", "/devices/cubestar/act", act)
-    before, begun = session.controls.client.url, session.begun
+    before, begun = session.controls.client.url, session.restarts
     status, told = restart(served, {"options": {"profile": "extended"}})
     assert (status, told["rows"]) == (200, [["seed", "7"], ["profile", "extended"]])
     assert session.controls.client.url != before
-    assert session.begun == begun + 1
+    assert session.restarts == begun + 1
     assert "recording" not in session.about["missing"]  # the emulation records itself
     assert scene(session) == shown
     now = {row["name"]: row["now"] for row in session.about["options"]}
     assert (now["profile"], now["firmware"]) == ("extended", "")
-    values = session.do("read Identification").result()["data"]["values"]
+    values = session.execute("read Identification").result()["data"]["values"]
     assert values["NodeType"] > 0
 
 
@@ -81,7 +81,7 @@ def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> N
     status, told = restart(served, {"files": {"firmware": own}})
     assert status == 200, told
     assert "/my_own_.elf#" in dict(told["rows"])["firmware"]
-    assert session.do("read Identification").result()["data"]["values"]["NodeType"] > 0
+    assert session.execute("read Identification").result()["data"]["values"]["NodeType"] > 0
     # What runs can be kept, and has no profile.
     kept = next(row["now"] for row in session.about["options"] if row["name"] == "firmware")
     status, told = restart(served, {"options": {"firmware": kept, "profile": "extended"}})
@@ -100,14 +100,14 @@ def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> N
         ({"options": {"set": 3}}, 400, "set of cubestar must be text, not 3"),
         ({"options": {"uart": "node"}}, 400, "uart is an option of cubesense, not of cubestar"),
         ({"options": {"scene": "/etc/passwd"}}, 400, "scene is no option of cubestar"),
-        ({"options": {"firmware": "/etc/passwd"}}, 400, "firmware: send the file itself"),
-        ({"options": []}, 400, "'options' and 'files' are objects"),
-        ({"files": {"firmware": 3}}, 400, "a file has 'name', 'content' in base 64"),
+        ({"options": {"firmware": "/etc/passwd"}}, 400, "firmware: upload the file itself"),
+        ({"options": []}, 400, "'options' and 'files' must be objects"),
+        ({"files": {"firmware": 3}}, 400, "a file must have 'name', 'content' in base 64"),
         ({"files": {"firmware": {"name": "a", "content": "%"}}}, 400, "base64"),
         (
             {"files": {"firmware": {"name": "a", "content": "", "suffix": "/../x"}}},
             400,
-            "an address of plain bytes is like @0x0",
+            "the address of a raw binary must be like @0x0",
         ),
         ({"files": {"firmware": {"name": "a.elf", "content": "AAAA"}}}, 502, "is not an ELF file"),
     ],
@@ -115,18 +115,18 @@ def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> N
 def test_what_can_not_be_started_is_one_line_and_the_old_one_runs(
     session: TargetSession, served: Serving, body: object, status: int, error: str
 ) -> None:
-    begun = session.begun
+    begun = session.restarts
     found, told = restart(served, body)
-    assert (found, session.begun) == (status, begun)
+    assert (found, session.restarts) == (status, begun)
     assert error in told["error"]
     assert "\n" not in told["error"]
-    assert session.do("read Identification").result()["data"]["values"]["NodeType"] > 0
+    assert session.execute("read Identification").result()["data"]["values"]["NodeType"] > 0
 
 
 def test_only_who_may_starts_it_again(session: TargetSession, served: Serving) -> None:
-    begun = session.begun
+    begun = session.restarts
     assert restart(served, {}, "guess")[0] == 401
-    assert session.begun == begun
+    assert session.restarts == begun
 
 
 def test_one_that_does_not_start_is_told() -> None:
@@ -143,7 +143,7 @@ def test_options_are_words_of_the_command_line() -> None:
 
 def test_a_sent_file_stays_in_its_folder(tmp_path: Path) -> None:
     for name in ("..", "/etc/passwd", "a/../../b", "", "\0", "é.bin"):
-        path = Path(SentFile(name, b"x", "@0x10").written(tmp_path).removesuffix("@0x10"))
+        path = Path(UploadedFile(name, b"x", "@0x10").save(tmp_path).removesuffix("@0x10"))
         assert path.parent == tmp_path
         assert path.read_bytes() == b"x"
     with pytest.raises(TargetError):

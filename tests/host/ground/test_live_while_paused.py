@@ -51,6 +51,6 @@ def test_it_is_asked_when_time_goes_on() -> None:
         while "values" not in (told := json.loads(socket.recv(SOON_S))):
             pass
         assert told["values"]["Identification"]["NodeType"] is not None
-        assert told["kept"] == 1
+        assert told["results_logged"] == 1
         assert told["emulation"]["truth"]["ra_deg"] > 0
     opened.result().close()

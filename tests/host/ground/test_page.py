@@ -15,15 +15,16 @@ pytestmark = pytest.mark.xdist_group("page")  # so that its emulations are start
 def test_attitude_words_and_flags_are_shown(page: Any) -> None:
     page.select_option("#command", "CaptureAndProcess")
     page.click("#send")
-    told = page.locator("#attitude-told")
+    told = page.locator("#attitude-status")
     page.wait_for_function(
-        "() => / error [0-9.]+° in all$/.test(document.querySelector('#attitude-told').textContent)"
+        "() => / total error [0-9.]+°$/"
+        ".test(document.querySelector('#attitude-status').textContent)"
     )
     assert float(told.inner_text().split("error ")[1].split("°")[0]) < 0.1
     before = page.evaluate("document.querySelector('#sphere').toDataURL()")
     page.press("#sphere", "ArrowLeft")
     assert page.evaluate("document.querySelector('#sphere').toDataURL()") != before
-    page.wait_for_selector("#timeline-told >> text=/task CALCULATED/")
+    page.wait_for_selector("#timeline-status >> text=/task CALCULATED/")
     # More stars than it lists, which is a flag of its own.
     page.wait_for_selector("#health li.lit >> text=MaxStarsDetection")
     assert page.locator("#health li.lit").count() == 1
@@ -38,15 +39,15 @@ def test_any_word_of_telemetry_is_a_band(page: Any) -> None:
     assert len(fields) > 3
     page.select_option("#band", "AttitudeQuaternion.Mode")
     page.press("#add-band", "Enter")
-    page.wait_for_selector("#timeline-told >> text=AttitudeQuaternion.Mode")
-    word = page.inner_text("#timeline-told").split("AttitudeQuaternion.Mode ")[1].split(",")[0]
+    page.wait_for_selector("#timeline-status >> text=AttitudeQuaternion.Mode")
+    word = page.inner_text("#timeline-status").split("AttitudeQuaternion.Mode ")[1].split(",")[0]
     assert not word.isdigit()
     assert word in page.locator("#timeline-legend li").all_inner_texts()
-    tall = "document.querySelector('#timeline').height"
+    tall = "document.querySelector('#bands-canvas').height"
     before = page.evaluate(tall)
     page.press("#bands button", "Enter")
     page.wait_for_function(f"() => {tall} < {before}")
-    assert "AttitudeQuaternion" not in page.inner_text("#timeline-told")
+    assert "AttitudeQuaternion" not in page.inner_text("#timeline-status")
     assert page.evaluate("document.activeElement.id") == "band"
     look(page, "AraMiS")
     assert page.locator("#band option").all_inner_texts() != fields

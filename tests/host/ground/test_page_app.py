@@ -14,7 +14,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.ground.guard import Guard
 from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.serving import Serving
-from cubestack.host.ground.session import FROM_A_PAGE, LONGEST_LINE, TargetSession
+from cubestack.host.ground.session import LONGEST_LINE, PAGE_COMMANDS, TargetSession
 from cubestack.host.targets import open_target
 
 from .conftest import SOON_S, TOKEN
@@ -45,7 +45,7 @@ def ask(served: Serving, method: str, path: str, body: Any = None) -> tuple[int,
 
 
 def do(served: Serving, line: str) -> tuple[int, Any]:
-    status, told = ask(served, "POST", "/targets/0/do", {"line": line})
+    status, told = ask(served, "POST", "/targets/0/shell", {"line": line})
     return status, json.loads(told)
 
 
@@ -90,7 +90,7 @@ def test_the_shell_s_words_are_done(served: Serving) -> None:
 
 def test_stars_are_those_that_the_device_found(served: Serving) -> None:
     assert do(served, "write CaptureAndProcess")[0] == 200
-    status, told = ask(served, "GET", "/targets/0/found/SRAM")
+    status, told = ask(served, "GET", "/targets/0/detections/SRAM")
     stars = json.loads(told)["marks"]
     assert status == 200
     summary = do(served, "read DetectionSummary")[1]["data"]["values"]
@@ -106,9 +106,9 @@ def test_stars_are_those_that_the_device_found(served: Serving) -> None:
     [
         ("read Nonsense", 400, "nothing is called 'Nonsense'"),
         ("write setDetectionThresholds 300 31", 400, "DetectionThreshold"),
-        ("image a.png", 400, "image: not from a page"),
-        ("scene /etc/passwd", 400, "scene: not from a page"),
-        ("watch Identification 9999", 400, "watch: not from a page"),
+        ("image a.png", 400, "image is not available on the page"),
+        ("scene /etc/passwd", 400, "scene is not available on the page"),
+        ("watch Identification 9999", 400, "watch is not available on the page"),
         ("read '", 400, "No closing quotation"),
         ("read " + "x" * LONGEST_LINE, 400, "characters at most"),
     ],
@@ -122,10 +122,10 @@ def test_what_can_not_be_is_told(served: Serving, line: str, status: int, error:
 @pytest.mark.parametrize(
     ("path", "body", "status"),
     [
-        ("/targets/1/do", {"line": "help"}, 404),
-        ("/targets/0/do", {}, 400),
-        ("/targets/0/do", [], 400),
-        ("/targets/0/do", b"{", 400),
+        ("/targets/1/shell", {"line": "help"}, 404),
+        ("/targets/0/shell", {}, 400),
+        ("/targets/0/shell", [], 400),
+        ("/targets/0/shell", b"{", 400),
         ("/targets/0/pause", {}, 400),
         ("/targets/0/dance", {}, 400),
         ("/targets/0/scene", {"text": ""}, 400),
@@ -164,7 +164,7 @@ def test_a_table_of_results_is_saved_as_a_file(served: Serving) -> None:
 
 
 def test_commands_from_a_page_touch_no_file() -> None:
-    assert not {"image", "scene", "watch"} & set(FROM_A_PAGE)
+    assert not {"image", "scene", "watch"} & set(PAGE_COMMANDS)
 
 
 def test_what_a_tab_shows_is_read_again_and_again(served: Serving) -> None:

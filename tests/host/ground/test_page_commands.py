@@ -31,7 +31,7 @@ def test_a_setting_that_differs_is_marked(page: Any) -> None:
     look(page, "CubeSense")
     line(page, "write DetectionThreshold1 77")
     page.click("#read-settings")
-    page.wait_for_selector("#settings-told >> text=/[0-9]+ of [0-9]+ differ/")
+    page.wait_for_selector("#settings-status >> text=/[0-9]+ of [0-9]+ differ/")
     row = page.locator("#settings-rows tr", has_text="DetectionThreshold1.Threshold")
     assert row.locator("td").nth(0).inner_text() == "77"
     assert row.locator("td").nth(1).inner_text() == "225"
@@ -39,13 +39,13 @@ def test_a_setting_that_differs_is_marked(page: Any) -> None:
     other = page.locator("#settings-rows tr", has_text="DetectionThreshold2.Threshold")
     assert not other.get_attribute("class")
     assert page.locator("#read-sensor").is_disabled()
-    assert "no single register" in page.inner_text("#sensor-told")
+    assert "no single register" in page.inner_text("#sensor-status")
 
 
 def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
     look(page, "CubeStar")
     page.click("#read-sensor")
-    page.wait_for_selector("#sensor-told >> text=/ differ from their default$/")
+    page.wait_for_selector("#sensor-status >> text=/ differ from their default$/")
     assert page.locator("#sensor-rows tr").count() == 9
     page.click("#settings summary >> text=image sensor register")
     row = page.locator("#sensor-rows tr", has_text="CLOCKS_PER_SECOND")
@@ -60,7 +60,7 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     page.click("#pause")
     page.wait_for_selector("#pause[aria-pressed=true]")
     page.click("#show-waves")
-    page.wait_for_selector("#waveform-told >> text=/ [1-9][0-9]* changes, the last at /")
+    page.wait_for_selector("#waveform-status >> text=/ [1-9][0-9]* changes, the last at /")
     blue = (
         "() => { const c = document.querySelector('#waves');"
         "const d = c.getContext('2d').getImageData(190, 0, 810, c.height).data;"
@@ -69,7 +69,7 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     )
     drawn = page.evaluate(blue)
     assert drawn > 1000
-    page.click("#wider")
+    page.click("#waves-out")
     assert page.evaluate(blue) != drawn
     with page.expect_download() as saving:
         page.click("#save-waves")
@@ -80,7 +80,7 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     assert any(len(found[name]) > 2 for name in found if name.startswith("fpga."))
     page.fill("#trace-to", "1e6")
     page.click("#show-waves")
-    page.wait_for_selector("#waveform-told >> text=/at most 60 s of the time up to now/")
+    page.wait_for_selector("#waveform-status >> text=/at most 60 s of the time up to now/")
     page.click("#pause")
     page.wait_for_selector("#pause[aria-pressed=false]")
 
@@ -88,25 +88,25 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
 def test_lines_are_kept_by_the_browser_for_a_device(page: Any) -> None:
     look(page, "CubeSense")
     page.fill("#line", "read Identification RuntimeSeconds")
-    page.click("#keep")
+    page.click("#save-line")
     page.fill("#line", HOSTILE)
-    page.click("#keep")
+    page.click("#save-line")
     page.reload()
     page.wait_for_selector("#line")
     look(page, "CubeStar")
-    assert page.locator("#kept li").count() == 0
+    assert page.locator("#saved-lines li").count() == 0
     look(page, "CubeSense")
-    assert page.locator("#kept li").all_inner_texts()[0].startswith(HOSTILE)
+    assert page.locator("#saved-lines li").all_inner_texts()[0].startswith(HOSTILE)
     assert page.evaluate("document.hacked") is None
-    page.click("#kept >> text=read Identification RuntimeSeconds")
+    page.click("#saved-lines >> text=read Identification RuntimeSeconds")
     page.wait_for_selector("#lines li.good >> text=RuntimeSeconds:")
-    page.click(f"[aria-label='keep no more: {HOSTILE}']")
-    assert page.locator("#kept li").count() == 1
+    page.click(f"[aria-label='remove: {HOSTILE}']")
+    assert page.locator("#saved-lines li").count() == 1
     page.evaluate("localStorage.setItem('cubestack lines CubeSense', '{nonsense')")
     page.reload()
-    page.wait_for_selector("#keep")
+    page.wait_for_selector("#save-line")
     look(page, "CubeSense")
-    assert page.locator("#kept li").count() == 0
+    assert page.locator("#saved-lines li").count() == 0
 
 
 def test_a_recording_is_played(chromium: Any, tmp_path: Path) -> None:
@@ -118,12 +118,12 @@ def test_a_recording_is_played(chromium: Any, tmp_path: Path) -> None:
     target.node.telemetry("Configuration")
     target.close()
     with station(str(path)) as address, shown(chromium, address) as page:
-        page.wait_for_selector("#played-time >> text=/ of 6[0-9][.][0-9]+ s$/")
+        page.wait_for_selector("#playback-time >> text=/ of 6[0-9][.][0-9]+ s$/")
         page.select_option("#frame", "Configuration")
         cell = "#telemetry table tr >> nth=0"
         page.wait_for_selector(f"{cell} >> text=225")
-        page.focus("#played-to")
-        page.press("#played-to", "End")
+        page.focus("#playback-position")
+        page.press("#playback-position", "End")
         page.wait_for_selector(f"{cell} >> text=/9/")
         assert page.locator("#send").is_disabled()
         assert page.locator("#pause").is_disabled()

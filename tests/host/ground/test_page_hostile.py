@@ -49,7 +49,7 @@ def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: boo
             route.fulfill(json=abouts)
 
         page.route("**/targets", told)
-        page.route("**/do", lambda route: route.fulfill(json={"rows": [[HOSTILE, HOSTILE]]}))
+        page.route("**/shell", lambda route: route.fulfill(json={"rows": [[HOSTILE, HOSTILE]]}))
         page.reload()
         page.wait_for_selector(f"nav >> text={HOSTILE}")
         for number in (0, 1):
@@ -77,7 +77,7 @@ def test_no_text_of_a_live_device_is_markup(chromium: Any, address: str) -> None
         page.click("#snapshot")
         page.wait_for_selector("#lines li.good >> text=snapshot")
         lives(page, change)
-        for place in ("#lines li", "#results td", "#timeline-told", "#supplies li", "#state"):
+        for place in ("#lines li", "#results td", "#timeline-status", "#supplies li", "#state"):
             page.locator(place).filter(has_text=HOSTILE).first.wait_for()
         page.locator("#telemetry td").filter(has_text=HOSTILE).first.wait_for()
         for chooser in ("#snapshots option", "#picture-name option"):
@@ -99,9 +99,9 @@ def test_no_live_failure_is_markup(chromium: Any, address: str) -> None:
 
     with shown(chromium, address) as page:
         lives(page, change)
-        for place in ("#link-health", "#transfer-told", "#telemetry p", "#results", "#state"):
+        for place in ("#link-health", "#transfer-status", "#telemetry p", "#results", "#state"):
             page.locator(place).filter(has_text=HOSTILE).first.wait_for()
-        page.locator("#attitude-told").filter(has_text=HOSTILE).wait_for()
+        page.locator("#attitude-status").filter(has_text=HOSTILE).wait_for()
         nothing_ran(page)
 
 
@@ -115,10 +115,10 @@ def test_no_answer_is_markup(chromium: Any, address: str) -> None:
         page.click("#settings summary >> text=image sensor register")
         page.locator("#sensor-rows td").filter(has_text=HOSTILE).first.wait_for()
         star = {"x": 500, "y": 200, "name": HOSTILE, "v_mag": 1.0}
-        page.route("**/found/*", lambda r: r.fulfill(json={"marks": [star], "lines": []}))
-        page.check("#marks")
-        page.wait_for_selector("#picture >> text=/1 found, 1 of them known/")
-        for path in ("do", "pause", "sensor-registers/*", "found/*", "download"):
+        page.route("**/detections/*", lambda r: r.fulfill(json={"marks": [star], "lines": []}))
+        page.check("#detections")
+        page.wait_for_selector("#picture >> text=/1 detected, 1 identified/")
+        for path in ("shell", "pause", "sensor-registers/*", "detections/*", "download"):
             page.route(
                 f"**/{path}", lambda route: route.fulfill(status=400, json={"error": HOSTILE})
             )
@@ -129,8 +129,8 @@ def test_no_answer_is_markup(chromium: Any, address: str) -> None:
         line(page, "help")
         bad = page.locator("#lines li.bad").filter(has_text=HOSTILE)
         bad.nth(before + 3).wait_for()
-        page.uncheck("#marks")
-        page.check("#marks")
+        page.uncheck("#detections")
+        page.check("#detections")
         page.locator("#picture p").filter(has_text=HOSTILE).first.wait_for()
         nothing_ran(page)
 
@@ -138,9 +138,9 @@ def test_no_answer_is_markup(chromium: Any, address: str) -> None:
 def test_a_scene_s_name_and_a_snapshot_s_are_text(chromium: Any, address: str) -> None:
     """What a user writes comes back from the emulation, in a refusal and in a list."""
     with shown(chromium, address) as page:
-        page.click("#scene summary >> text=a whole scene file")
+        page.click("#scene summary >> text=scene file")
         page.fill("#scene-text", f"kind = '{HOSTILE}'")
-        page.click("#show-scene")
+        page.click("#apply-file")
         page.locator("#lines li.bad").filter(has_text=HOSTILE).wait_for()
         path = "/targets/0/snapshot"
         page.evaluate(

@@ -45,7 +45,7 @@ def test_telemetry_and_commands_go_over_the_bus(page: Any) -> None:
     line(page, "write DetectionThreshold1 77")
     page.select_option("#frame", "Configuration")
     page.locator("#telemetry td.value").first.filter(has_text="77").wait_for()
-    assert "is no serial line" in page.inner_text("#commands")
+    assert "is not a serial line" in page.inner_text("#commands")
     page.click("nav >> text=CubeStar")
     page.wait_for_selector(f"#link >> text=i2c:{BUS}:0x1a")
     assert "NodeType: 5" in line(page, "read Identification")
@@ -61,7 +61,7 @@ def test_registers_behind_a_pointer_are_read_and_written(page: Any) -> None:
     told = line(page, "write NADIR_THRESHOLD 0x21")
     assert "done" in told, told
     page.click("#read-registers")
-    page.wait_for_selector("#registers-told >> text=/[0-9]+ of [0-9]+ differ/")
+    page.wait_for_selector("#registers-status >> text=/[0-9]+ of [0-9]+ differ/")
     for name, one in named.items():
         row = page.locator("#registers-rows tr", has=page.locator(f"th >> text=/^{name}$/"))
         value, default = row.locator("td").all_inner_texts()[:2]

@@ -44,11 +44,11 @@ def test_tables_are_the_same_in_both_forms(chromium: Any, tmp_path: Path) -> Non
     with station("emulated:cubestar", "--seed", "5") as address, shown(chromium, address) as page:
         line(page, "write setDetectionThresholds 33 34")
         line(page, "write CaptureAndProcess")
-        page.locator("#attitude-told").filter(has_text="answer").wait_for()
+        page.locator("#attitude-status").filter(has_text="answer").wait_for()
         page.uncheck("#results-on")
         for name, buttons in (
             ("results", ("#save", "#save-parquet")),
-            ("said", ("#said-csv", "#said-parquet")),
+            ("said", ("#transcript-csv", "#transcript-parquet")),
         ):
             rows = rows_of(saved(page, buttons[0], tmp_path / f"{name}.csv"))
             path = saved(page, buttons[1], tmp_path / f"{name}.parquet")
@@ -80,10 +80,10 @@ def test_a_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
             assert kept.read_bytes().startswith(path.read_bytes())
     with station(str(path)) as address, shown(chromium, address) as page:
         page.select_option("#frame", "Configuration")
-        page.press("#played-to", "End")
+        page.press("#playback-position", "End")
         page.locator("#telemetry td.value").first.filter(has_text="77").wait_for()
         assert saved(page, "#recording", tmp_path / "again.rec").read_bytes() == path.read_bytes()
-        rows = rows_of(saved(page, "#said-csv", tmp_path / "said.csv"))
+        rows = rows_of(saved(page, "#transcript-csv", tmp_path / "said.csv"))
     assert "DetectionThreshold1" in {row["message"] for row in rows}
 
 
@@ -95,8 +95,8 @@ def test_what_can_not_be_saved_is_greyed(chromium: Any, tmp_path: Path) -> None:
         port = next(found[1] for one in said if (found := SERVES.search(one)))
         words = [port, "--device", "cubesense"]
         with station(*words, environment=environment) as address, shown(chromium, address) as page:
-            page.wait_for_selector("#said >> text=begin with --record FILE")
-            for button in ("#recording", "#said-csv", "#said-parquet", "#save-parquet"):
+            page.wait_for_selector("#transcript >> text=start with --record FILE")
+            for button in ("#recording", "#transcript-csv", "#transcript-parquet", "#save-parquet"):
                 assert page.locator(button).is_disabled()
             assert "pip install" in page.locator("#save-parquet").get_attribute("title")
             assert page.locator("#save").is_enabled()

@@ -98,7 +98,7 @@ def test_every_telecommand_is_sent_by_its_form(opened: Opened) -> None:
         told = sent(page, interface.telecommand(STREAMS), {})
         assert "has 128 bytes" in told  # of a picture, which comes without being asked for
         page.wait_for_function(
-            "() => document.querySelector('#state').textContent.startsWith('waits for the host')"
+            "() => document.querySelector('#state').textContent.startsWith('waiting for the host')"
         )
 
 

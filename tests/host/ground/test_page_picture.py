@@ -12,7 +12,7 @@ from cubestack.host.pictures.images import save_picture
 from .browser import line, look
 
 GREEN = (
-    "() => { const c = document.querySelector('#over');"
+    "() => { const c = document.querySelector('#overlay');"
     "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
     "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 1] > d[i] + 60) n++;"
     "return n }"
@@ -32,8 +32,8 @@ def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
         "const lit = d.filter((v, i) => i % 4 === 0 && v > 200).length;"
         "return c.width === 1024 && lit > 10 && lit < 20000 }"
     )
-    page.check("#marks")
-    page.wait_for_selector("#picture >> text=/found, .* of them known/")
+    page.check("#detections")
+    page.wait_for_selector("#picture >> text=/detected, .* identified/")
     page.select_option("#frame", "AttitudeQuaternion")
     page.wait_for_function(
         "() => document.querySelector('#telemetry').innerText.includes('LOST_IN')"
@@ -42,20 +42,20 @@ def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
 
 def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
     look(page, "CubeSense")
-    page.wait_for_selector("#attitude-told >> text=CubeSense answers no attitude")
-    page.check("#marks")
+    page.wait_for_selector("#attitude-status >> text=CubeSense reports no attitude")
+    page.check("#detections")
     line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
-    page.wait_for_selector("#picture >> text=/^[1-9][0-9]* found/")
+    page.wait_for_selector("#picture >> text=/^[1-9][0-9]* detected/")
     assert page.evaluate(GREEN) > 50
-    assert page.locator("#found-legend").is_visible()
+    assert page.locator("#detections-legend").is_visible()
 
 
 @pytest.mark.slow
 def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
     """By keys alone, by the wheel once it is chosen, and by the pointer."""
-    picture = page.locator("#frame-of-picture")
+    picture = page.locator("#zoom-frame")
     wide = "document.querySelector('#canvas').clientWidth"
-    shifted = "document.querySelector('#frame-of-picture').scrollLeft"
+    shifted = "document.querySelector('#zoom-frame').scrollLeft"
     page.wait_for_function("() => document.querySelector('#canvas').width === 1024")
     before = page.evaluate(wide)
     picture.press("+")
@@ -77,15 +77,15 @@ def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
     page.mouse.move(box["x"] + box["width"] / 2 + 40, box["y"] + box["height"] / 2)
     page.mouse.up()
     assert page.evaluate(shifted) == at - 40
-    page.click("#sizes >> text=whole")
+    page.click("#zoom-fit")
     assert page.evaluate(wide) == before
 
 
 @pytest.mark.slow
 def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
-    page.check("#marks")
+    page.check("#detections")
     line(page, "write CaptureAndProcess")
-    page.wait_for_selector("#picture >> text=/found, .* of them known/")
+    page.wait_for_selector("#picture >> text=/detected, .* identified/")
     page.wait_for_function(f"() => ({GREEN})() > 50")
     before = page.evaluate(GREEN)
     page.check("#magnitudes")
@@ -101,25 +101,25 @@ def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> No
     save_picture(picture, sent)
     page.select_option("#speed", "fast")
     page.set_input_files("#upload", sent)
-    page.wait_for_selector("#transfer-told >> text=/^upload: .* done$/")
+    page.wait_for_selector("#transfer-status >> text=/^upload: .* done$/")
     page.click("#download")
     page.wait_for_function("() => document.querySelector('#progress').value > 20")
-    page.click("#hold")
-    page.wait_for_selector("#transfer-told >> text=/ held$/")
-    page.click("#hold")
-    page.wait_for_selector("#transfer-told >> text=/^download: 4096 of 4096 blocks, done$/")
+    page.click("#pause-transfer")
+    page.wait_for_selector("#transfer-status >> text=/ paused$/")
+    page.click("#pause-transfer")
+    page.wait_for_selector("#transfer-status >> text=/^download: 4096 of 4096 blocks, done$/")
     with page.expect_download() as saving:
-        page.click("#carried")
+        page.click("#save-image")
     saving.value.save_as(tmp_path / "back.png")
     assert np.array_equal(np.asarray(Image.open(tmp_path / "back.png")), picture)
     page.click("#download")
-    page.wait_for_selector("#transfer-told >> text=/^download: .* on its way/")
-    page.click("#give-up")
-    page.wait_for_selector("#transfer-told >> text=/given up after/")
+    page.wait_for_selector("#transfer-status >> text=/^download: .* in progress/")
+    page.click("#cancel-transfer")
+    page.wait_for_selector("#transfer-status >> text=/cancelled after/")
     page.select_option("#speed", "1")
     look(page, "CubeSense")
     assert page.locator("#upload").is_disabled()
-    assert "takes no picture" in page.inner_text("#transfer-told")
+    assert "takes no picture" in page.inner_text("#transfer-status")
     assert page.locator("#source option").all_inner_texts() == ["sram1", "sram2"]
 
 

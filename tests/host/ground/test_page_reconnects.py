@@ -33,7 +33,7 @@ def test_a_connection_is_lost_and_comes_back(chromium: Any, relayed: tuple[Relay
         value = page.locator("#telemetry td.value").first
         value.filter(has_text="77").wait_for()
         relay.cut()
-        page.locator("#link.bad").filter(has_text="waiting").wait_for()
+        page.locator("#link.bad").filter(has_text="reconnecting").wait_for()
         assert "does not answer" in line(page, "read Identification")
         relay.up = True
         page.wait_for_selector("#link:not(.bad) >> text=emulated:cubesense")
@@ -51,7 +51,7 @@ def test_another_program_in_its_place_is_told(chromium: Any, relayed: tuple[Rela
         relay.cut()
         relay.to_port = urlsplit(other).port or 0
         relay.up = True
-        page.locator("#link.bad").filter(has_text="open the address that was printed").wait_for()
+        page.locator("#link.bad").filter(has_text="open the printed address").wait_for()
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
 def stage(page: Any, device: str) -> None:
     """Look at a device, and wait for its scene; that of its power-up."""
     look(page, device)
-    page.wait_for_selector("#scene-told >> text=/camera/")
+    page.wait_for_selector("#scene-status >> text=/camera/")
 
 
 def value(page: Any, key: str) -> float:
@@ -56,7 +56,7 @@ def fill(page: Any, key: str, text: str) -> None:
 
 
 def told(page: Any, text: str) -> None:
-    page.wait_for_selector(f"#scene-told >> text={text}")
+    page.wait_for_selector(f"#scene-status >> text={text}")
 
 
 def place(page: Any, right: float, down: float) -> dict[str, float]:
@@ -112,7 +112,7 @@ def test_keys_alone_put_the_pointing_and_the_emulation_sees_it(page: Any) -> Non
     page.wait_for_selector("#lines li.good >> text=scene")
     page.select_option("#command", "CaptureAndProcess")
     page.click("#send")
-    page.wait_for_selector("#attitude-told >> text=/truth 101.0000° .*0.0000° 45.0000°/")
+    page.wait_for_selector("#attitude-status >> text=/truth 101.0000° .*0.0000° 45.0000°/")
 
 
 @pytest.mark.slow
@@ -123,7 +123,7 @@ def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
     assert field.get_attribute("aria-invalid") == "true"
     page.click("#scene-apply")
     page.wait_for_selector("#lines li.bad >> text=scene: ra_deg must be -360 to 360 deg, not 400")
-    page.click("#scene-present")
+    page.click("#scene-load")
     told(page, "/^right ascension/")
     assert field.get_attribute("aria-invalid") is None
 
@@ -156,7 +156,7 @@ def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
     told(page, "/Moon (0.0|360.0)°/")
     page.click("#scene-apply")
     page.wait_for_selector("#lines li.good >> text=scene")
-    page.click("#scene-present")
+    page.click("#scene-load")
     told(page, "/Moon (0.0|360.0)°/")
     page.click("[aria-label='remove moon']")
     told(page, "/camera [^;]*$/")
@@ -166,13 +166,13 @@ def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
 
 @pytest.mark.slow
 def test_a_whole_file_is_shown(page: Any) -> None:
-    page.click("#scene summary >> text=a whole scene file")
+    page.click("#scene summary >> text=scene file")
     page.fill("#scene-text", 'kind = "sky"\nra_deg = 200.0\ndec_deg = -40.0\n')
-    page.click("#show-scene")
+    page.click("#apply-file")
     told(page, "/camera 200.0° -40.0°/")
     assert value(page, "ra_deg") == 200
     page.fill("#scene-text", "[pointin]\n")
-    page.click("#show-scene")
+    page.click("#apply-file")
     page.wait_for_selector("#lines li.bad >> text=scene: ")
 
 
@@ -187,7 +187,7 @@ def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
     told(page, "/Moon/")
     page.click("#scene-apply")
     page.wait_for_selector("#lines li.good >> text=scene")
-    page.click("#scene-present")
+    page.click("#scene-load")
     told(page, "/Earth -?0.00 -?0.00 1.00.*Moon/")
 
 
@@ -265,8 +265,8 @@ def test_what_is_not_emulated_has_no_scene(chromium: Any, tmp_path: Any) -> None
     target.node.telemetry("Configuration")
     target.close()
     with station(str(path)) as address, shown(chromium, address) as page:
-        page.wait_for_selector("#scene-told >> text=/has no control port/")
-        for control in ("#scene-apply", "#scene-present", "#scene-kind", "#scene-text"):
+        page.wait_for_selector("#scene-status >> text=/has no control port/")
+        for control in ("#scene-apply", "#scene-load", "#scene-kind", "#scene-text"):
             assert page.locator(control).is_disabled()
             assert "no control port" in page.locator(control).get_attribute("title")
         assert not page.locator("#sky-map").is_visible()

@@ -33,9 +33,9 @@ def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
     if source is not None:
         page.select_option("#source", source)
     page.click("#download")
-    page.wait_for_selector("#transfer-told >> text=/^download: .* done$/")
+    page.wait_for_selector("#transfer-status >> text=/^download: .* done$/")
     with page.expect_download() as saving:
-        page.click("#carried")
+        page.click("#save-image")
     saving.value.save_as(path)
     return path.read_bytes()
 
@@ -48,7 +48,7 @@ def test_what_is_uploaded_is_downloaded(chromium: Any, tmp_path: Path, port: str
     save_picture(sent[0], tmp_path / "sent.png")
     with station(port, "--device", "cubestar") as address, shown(chromium, address) as page:
         page.set_input_files("#upload", tmp_path / "sent.png")
-        page.wait_for_selector("#transfer-told >> text=/^upload: .* done$/")
+        page.wait_for_selector("#transfer-status >> text=/^upload: .* done$/")
     with closing(connect(port, "cubestar")) as client:
         assert client.picture().tobytes() == sent[0].tobytes()
         client.upload(sent[1])

@@ -27,9 +27,9 @@ def test_two_tabs_look_at_what_they_like(chromium: Any, address: str, page: Any)
         page.click("#add-band")
         other.select_option("#band", "NadirSearchMode.Search")
         other.click("#add-band")
-        page.wait_for_selector("#timeline-told >> text=/IDMode.Mode [A-Z]/")
-        other.wait_for_selector("#timeline-told >> text=/NadirSearchMode.Search [A-Z]/")
-        assert "Nadir" not in page.inner_text("#timeline-told")
+        page.wait_for_selector("#timeline-status >> text=/IDMode.Mode [A-Z]/")
+        other.wait_for_selector("#timeline-status >> text=/NadirSearchMode.Search [A-Z]/")
+        assert "Nadir" not in page.inner_text("#timeline-status")
         assert other.locator("#supplies li").count() > page.locator("#supplies li").count()
 
 
@@ -41,7 +41,7 @@ def test_the_view_can_be_reached_by_tab(page: Any) -> None:
     for _ in range(80):
         reached.append(page.evaluate("document.activeElement.id"))
         page.keyboard.press("Tab")
-    sought = ("magnitudes", "frame-of-picture", "sphere", "band", "add-band", "lamps-ErrorFlags")
+    sought = ("magnitudes", "zoom-frame", "sphere", "band", "add-band", "lamps-ErrorFlags")
     at = [reached.index(name) for name in sought]
     assert at == sorted(at)
 

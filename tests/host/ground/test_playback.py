@@ -32,7 +32,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
     clock = [100.0]
     client = PlaybackClient(load_recording(made), INTERFACE, lambda: clock[0])
-    with pytest.raises(NoAnswerError, match=r"by 0\.000 s"):
+    with pytest.raises(NoAnswerError, match=r"before 0\.000 s"):
         client.telemetry("Configuration")
     clock[0] += 1.0
     assert client.telemetry("Configuration")["Threshold1"] == 225
@@ -47,7 +47,7 @@ def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
     clock[0] += 0.25
     assert client.time_s == 1.75
     for nonsense in (-1.0, 1e9, float("nan")):
-        with pytest.raises(ValueError, match="the recording has 0 to"):
+        with pytest.raises(ValueError, match="a position must be 0 to"):
             client.play(nonsense, runs=True)
 
 
@@ -57,21 +57,21 @@ def test_a_page_has_it_as_a_target(made: Path) -> None:
     session = TargetSession(open_recording(str(made)))
     assert {"send", "controls", "raw", "download"} <= session.about["missing"].keys()
     assert "recording" not in session.about["missing"]
-    assert session.played is not None
-    session.played.play(session.played.end_s, runs=False)
+    assert session.playback is not None
+    session.playback.play(session.playback.end_s, runs=False)
     values = session.read(["Configuration", "Result1"]).result()
     assert values["Configuration"]["Threshold1"] == 9
-    assert "nobody had read Result1" in values["Result1"]["error"]
-    with pytest.raises(TargetError, match="takes no telecommand"):
-        session.do("write DetectionThreshold1 7").result()
+    assert "Result1 was not read" in values["Result1"]["error"]
+    with pytest.raises(TargetError, match="accepts no telecommands"):
+        session.execute("write DetectionThreshold1 7").result()
     with pytest.raises(ValueError, match="is a recording"):
-        session.transfer("download")
+        session.start_transfer("download")
     session.close()
 
 
 def test_what_is_not_recorded_says_how_it_would_be() -> None:
     session = TargetSession(Target("fake", INTERFACE, NodeClient(LetterLine(), INTERFACE)))
-    with pytest.raises(ValueError, match="fake is not recorded: begin with --record FILE"):
+    with pytest.raises(ValueError, match="fake is not recorded: start with --record FILE"):
         recording(session)
-    assert session.about["missing"]["recording"] == "fake is not recorded: begin with --record FILE"
+    assert session.about["missing"]["recording"] == "fake is not recorded: start with --record FILE"
     session.close()

@@ -119,5 +119,5 @@ def test_the_default_scene_of_every_device_is_told(name: str) -> None:
 
 def test_a_device_without_a_form_says_so() -> None:
     none = replace(device("cubestar"), scene_form=None)
-    with pytest.raises(TargetError, match="CubeStar does not tell the keys of its scenes"):
+    with pytest.raises(TargetError, match="CubeStar declares no scene keys"):
         scenes.keys(none)

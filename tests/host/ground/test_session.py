@@ -8,7 +8,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
-from cubestack.host.ground.session import Link, TargetSession
+from cubestack.host.ground.session import LinkState, TargetSession
 from cubestack.host.targets import Target
 
 from ..conftest import FakeCubeStar, UartLink
@@ -33,18 +33,18 @@ def behind() -> Iterator[Behind]:
 def test_a_refusal_is_told_and_the_link_is_whole(behind: Behind) -> None:
     behind.node.refusals.append(AckError.BAD_PARAMETER)
     with pytest.raises(CommandRefusedError, match="CaptureAndProcess refused: BAD_PARAMETER"):
-        behind.session.do("write CaptureAndProcess").result()
-    assert behind.session.link == Link()
+        behind.session.execute("write CaptureAndProcess").result()
+    assert behind.session.link == LinkState()
 
 
 def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) -> None:
     behind.node.lost = 100
     with pytest.raises(NoAnswerError):
-        behind.session.do("read TaskStatus").result()
+        behind.session.execute("read TaskStatus").result()
     link = behind.session.link
     assert (link.failed, link.broken) == (1, True)
     behind.node.lost = 0
-    behind.session.do("read TaskStatus").result()
+    behind.session.execute("read TaskStatus").result()
     assert (link.failed, link.broken) == (1, False)
 
 
@@ -55,6 +55,6 @@ def test_what_can_not_be_asked_is_told_with_the_reason(client: str | None) -> No
     session = TargetSession(
         Target("fake", INTERFACE, NodeClient(line, INTERFACE), line, device=known)
     )
-    without = {"found", "results", "download", "upload", "scene_form", "sensor_registers"}
+    without = {"detections", "results", "download", "upload", "scene_form", "sensor_registers"}
     assert without & session.about["missing"].keys() == (set() if client else without)
     session.close()

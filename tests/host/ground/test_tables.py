@@ -19,7 +19,7 @@ def session(request: pytest.FixtureRequest) -> Iterator[TargetSession]:
 
 
 def shown(session: TargetSession, row: dict[str, object]) -> object:
-    return session.do(f"read {row['frame']} {row['field']}").result()["data"]["values"][
+    return session.execute(f"read {row['frame']} {row['field']}").result()["data"]["values"][
         row["field"]
     ]
 
@@ -42,7 +42,7 @@ def test_a_setting_that_was_changed_differs() -> None:
     rows = {(one["frame"], one["field"]): one for one in setting_rows(device("cubesense"))}
     row = rows["Masks1", "YMax3"]
     assert (row["telecommand"], row["default"], shown(session, row)) == ("Mask1", 0, 0)
-    session.do("write Mask1 3 1 9 2 8").result()
+    session.execute("write Mask1 3 1 9 2 8").result()
     assert shown(session, row) == 8
     session.close()
 
@@ -64,6 +64,6 @@ def test_registers_of_the_image_sensor_are_read_by_name(session: TargetSession) 
 def test_a_register_of_several_bytes_has_its_highest_first() -> None:
     session = TargetSession(open_target("emulated:cubestar"))
     (row,) = [one for one in sensor_rows(device("cubestar")) if one["name"] == "CLOCKS_PER_SECOND"]
-    session.do(f"write WriteCameraRegister {row['address']} 0x12").result()
+    session.execute(f"write WriteCameraRegister {row['address']} 0x12").result()
     assert session.sensor_register(row["name"]).result()["value"] == "12" + row["default"][2:]
     session.close()

@@ -44,9 +44,9 @@ def test_a_span_of_the_past_as_waveform(controlled: Controlled) -> None:
     [
         ("from_s=0.5", "needs 'to_s'"),
         ("from_s=0&to_s=much", "could not convert"),
-        ("from_s=nan&to_s=0.5", "up to now"),
-        ("from_s=0.4&to_s=0.4", "up to now"),
-        ("from_s=0&to_s=99", "up to now"),
+        ("from_s=nan&to_s=0.5", "current time"),
+        ("from_s=0.4&to_s=0.4", "current time"),
+        ("from_s=0&to_s=99", "current time"),
     ],
 )
 def test_spans_that_are_none(controlled: Controlled, span: str, error: str) -> None:
@@ -68,7 +68,7 @@ def test_one_at_a_time(controlled: Controlled) -> None:
     controlled.ask("POST", "/run", {"to_s": 0.6})
     with controlled.emulation.bench._free:
         status, told = controlled.ask("GET", f"{TRACE}?from_s=0&to_s=0.5")
-    assert (status, told["error"]) == (409, "another waveform is being made")
+    assert (status, told["error"]) == (409, "another waveform is being computed")
 
 
 def test_what_is_being_made_ends_with_the_emulation() -> None:
@@ -82,7 +82,7 @@ def test_what_is_being_made_ends_with_the_emulation() -> None:
     bench.close()
     making.join(SOON_S)
     assert said == ["no waveform: -9"]
-    assert failed(bench, for_ever) == "no waveform: the emulation ends"
+    assert failed(bench, for_ever) == "no waveform: the emulation is ending"
 
 
 def failed(bench: Bench, call: list[str]) -> str:

@@ -43,7 +43,7 @@ def test_it_tells_how_far_it_is_and_gives_the_picture() -> None:
     started(transfer).join(SOON_S)
     assert not transfer.runs
     assert transfer.state == {
-        **{"what": "download", "done": 3, "total": 3, "held": False},
+        **{"what": "download", "done": 3, "total": 3, "paused": False},
         **{"ended": "done", "saved": True},
     }
     assert transfer.picture is not None
@@ -53,12 +53,12 @@ def test_it_tells_how_far_it_is_and_gives_the_picture() -> None:
 def test_held_it_asks_for_nothing_more() -> None:
     sender = Sender()
     transfer = Transfer("download", sender)
-    transfer.hold()
+    transfer.pause()
     thread = started(transfer)
     sender.let.release(3)
-    assert transfer.state["held"]
+    assert transfer.state["paused"]
     assert not sender.sent.acquire(timeout=0.05)  # not even the first one
-    transfer.go_on()
+    transfer.resume()
     thread.join(SOON_S)
     assert (transfer.state["ended"], sender.count) == ("done", 3)
 
@@ -71,16 +71,16 @@ def test_given_up_it_ends_after_a_block(held: bool) -> None:
     sender.let.release(1)
     assert sender.sent.acquire(timeout=SOON_S)
     if held:
-        transfer.hold()
-    transfer.give_up()
+        transfer.pause()
+    transfer.cancel()
     sender.let.release(2)
     thread.join(SOON_S)
-    assert transfer.state["ended"].startswith("given up after ")
+    assert transfer.state["ended"].startswith("cancelled after ")
     assert transfer.picture is None
     assert sender.count < 3
 
 
 def test_what_is_no_picture() -> None:
-    with pytest.raises(ValueError, match="that is no picture"):
+    with pytest.raises(ValueError, match="not an image file"):
         grey_values(b"GIF89a and no more")
     assert np.array_equal(grey_values(png(np.eye(3, dtype=np.uint8))), np.eye(3))
