@@ -39,7 +39,7 @@ def test_a_setting_that_differs_is_marked(page: Any) -> None:
     other = page.locator("#settings-rows tr", has_text="DetectionThreshold2.Threshold")
     assert not other.get_attribute("class")
     assert page.locator("#read-sensor").is_disabled()
-    assert "no single register" in page.inner_text("#sensor-status")
+    assert "single registers" in page.inner_text("#sensor-status")
 
 
 def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
@@ -80,7 +80,9 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     assert any(len(found[name]) > 2 for name in found if name.startswith("fpga."))
     page.fill("#trace-to", "1e6")
     page.click("#show-waves")
-    page.wait_for_selector("#waveform-status >> text=/at most 60 s of the time up to now/")
+    page.wait_for_selector(
+        "#waveform-status >> text=/at most 60 s long and before the current time/"
+    )
     page.click("#pause")
     page.wait_for_selector("#pause[aria-pressed=false]")
 

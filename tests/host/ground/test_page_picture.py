@@ -119,7 +119,7 @@ def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> No
     page.select_option("#speed", "1")
     look(page, "CubeSense")
     assert page.locator("#upload").is_disabled()
-    assert "takes no picture" in page.inner_text("#transfer-status")
+    assert "no image upload" in page.inner_text("#transfer-status")
     assert page.locator("#source option").all_inner_texts() == ["sram1", "sram2"]
 
 
