@@ -1,4 +1,4 @@
-"""Devices from outside, installed for a test without pip: what an installer leaves behind."""
+"""Installs plug-in devices for a test without pip, by writing their metadata."""
 
 import os
 import subprocess
@@ -24,17 +24,15 @@ PLUGIN = "cubestack.host.pytest_plugin"
 
 @dataclass(frozen=True)
 class Installed:
-    """A distribution that this process and its children find in folders ``paths``."""
+    """A distribution in folders ``paths``, visible to this process and its children."""
 
     paths: tuple[Path, ...]
 
     @property
     def environment(self) -> dict[str, str]:
-        """For programs."""
         return {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, self.paths))}
 
     def run(self, *command: str | Path) -> "subprocess.CompletedProcess[str]":
-        """Run a program of a user's; its exit status and output."""
         return subprocess.run(
             [str(word) for word in command],
             env=self.environment,
@@ -46,7 +44,7 @@ class Installed:
 
 @contextmanager
 def installed(project: Path, site: Path) -> Iterator[Installed]:
-    """The distribution of folder ``project``, its metadata in ``site``."""
+    """Installs the distribution of folder ``project`` with its metadata in ``site``."""
     told = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     info = site / f"{told['name'].replace('-', '_')}-{told['version']}.dist-info"
     info.mkdir(parents=True)
@@ -74,7 +72,7 @@ def installed(project: Path, site: Path) -> Iterator[Installed]:
 
 
 def plugins() -> tuple[str, ...]:
-    """Options of pytest: an installation that is older than the entry point needs them."""
+    """Options for pytest, needed by installations older than the entry point."""
     known = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
     return () if known else ("-p", PLUGIN)
 
@@ -86,7 +84,7 @@ def _forget() -> None:
 
 @pytest.fixture
 def cubestack(run: Run) -> Callable[..., str]:
-    """Runs a command in this process; what it prints."""
+    """Runs a command in this process; returns its output."""
 
     def call(*words: str | Path, code: int = 0) -> str:
         outcome = run(*words)

@@ -1,5 +1,3 @@
-"""An outsider writes a new sensor, edits one formula, and gets a line for each mistake."""
-
 import ast
 import re
 import subprocess
@@ -68,7 +66,7 @@ class TestEditedSensor:
         report = cubestack("conformance", "emulated:glow", "--allow-write")
         assert re.search(r"emulated:glow: \d\d passed, 0 failed, 0 skipped", report)
 
-    def test_is_in_the_shell(self, cubestack: Command) -> None:
+    def test_shell_commands(self, cubestack: Command) -> None:
         commands = "write Measure; time 0.1; read Light; power photodiode off"
         assert re.search(r"Count +1", cubestack("shell", "emulated:glow", "-c", commands))
 
@@ -82,7 +80,7 @@ class TestEditedSensor:
             with pytest.raises(ValueError, match="SetSamples needs a value for Samples"):
                 glow.client.set_samples()
 
-    def test_its_scenes_have_a_form(self) -> None:
+    def test_has_a_scene_form(self) -> None:
         keys = scenes.keys(device("glow"))["kinds"]["light"]
         assert (keys["lux"]["unit"], keys["lux"]["high"]) == ("lx", 150_000)
         with library.open_device("glow") as glow:
@@ -91,7 +89,7 @@ class TestEditedSensor:
         assert shown["table"] == {"kind": "light", "lux": 3.0}
         assert shown["sight"]["fields"] == []
 
-    def test_refuses_what_it_does_not_have(self) -> None:
+    def test_rejects_engines_and_other_scenes(self) -> None:
         with pytest.raises(ValueError, match="Glow has no FPGA; omit engine 'python'"):
             library.open_device("glow", engine="python")
         with (
@@ -109,7 +107,7 @@ class TestEditedSensor:
             glow.client.measure()
             assert glow.client.light()["Illuminance"] == pytest.approx(10_000, abs=80)
 
-    def test_a_new_interpreter_lists_it_without_its_board(self, edited: Installed) -> None:
+    def test_is_listed_without_loading_its_board(self, edited: Installed) -> None:
         script = (
             "import sys; from cubestack.host.devices.registry import device;"
             "print(device('glow').title);"
@@ -254,7 +252,7 @@ def numbered(line: str, folder: Path) -> re.Pattern[str]:
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_in_a_declaration_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
+def test_mistake_in_a_declaration_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
     edit, line = MISTAKES[mistake]
     with new_sensor(tmp_path, edit):
         for command in (
@@ -269,7 +267,7 @@ def test_a_mistake_in_a_declaration_is_one_line(mistake: str, run: Run, tmp_path
 
 
 @pytest.mark.parametrize("mistake", WHILE_RUNNING)
-def test_a_mistake_in_the_firmware_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
+def test_mistake_in_the_firmware_is_one_line(mistake: str, run: Run, tmp_path: Path) -> None:
     edit, line = WHILE_RUNNING[mistake]
     with new_sensor(tmp_path, edit):
         for command in (
@@ -282,7 +280,7 @@ def test_a_mistake_in_the_firmware_is_one_line(mistake: str, run: Run, tmp_path:
             assert numbered(line, tmp_path).search(error), error
 
 
-def test_the_edits_of_the_document_are_possible(
+def test_edits_of_the_document_work(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (ROOT / "docs" / "adding-a-sensor.md").read_text(encoding="utf-8")
@@ -297,7 +295,7 @@ def test_the_edits_of_the_document_are_possible(
         assert run("measure", "glow").line == line
 
 
-def test_sensors_of_others_import_public_modules_only(tmp_path: Path) -> None:
+def test_plugins_import_public_modules_only(tmp_path: Path) -> None:
     example = (ROOT / "examples" / "linear_sun_sensor" / "linear_sun_sensor").glob("*.py")
     texts = {str(path): path.read_text(encoding="utf-8") for path in example}
     texts |= {path: text for path, text in rendered("glow") if path.endswith(".py")}

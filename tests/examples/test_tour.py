@@ -1,5 +1,3 @@
-"""The notebook, executed as it is: what it says is measured."""
-
 import re
 from pathlib import Path
 
@@ -19,7 +17,7 @@ def text_of(notebook: nbformat.NotebookNode) -> str:
     return "\n".join(one.get("text") or one.data["text/plain"] for one in outputs)
 
 
-def test_it_is_kept_without_outputs() -> None:
+def test_notebook_has_no_outputs() -> None:
     notebook = nbformat.read(FILE, as_version=4)
     nbformat.validate(notebook)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
@@ -29,7 +27,7 @@ def test_it_is_kept_without_outputs() -> None:
 
 
 @pytest.mark.slow
-def test_its_cells_run_and_the_attitude_is_right(
+def test_notebook_runs_and_finds_the_attitude(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("JUPYTER_RUNTIME_DIR", "JUPYTER_DATA_DIR", "JUPYTER_CONFIG_DIR", "IPYTHONDIR"):

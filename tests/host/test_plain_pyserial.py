@@ -1,5 +1,3 @@
-"""The example that knows the published protocol and nothing of this project."""
-
 import socket
 import subprocess
 import sys
@@ -40,7 +38,7 @@ def run_against(uart: Any) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.mark.parametrize("qbar0", [0.1, 0.7967])  # the second is 1F 1F on the wire
-def test_it_prints_the_attitude(uart: Any, node: Any, qbar0: float) -> None:
+def test_prints_the_attitude(uart: Any, node: Any, qbar0: float) -> None:
     node.values["TaskStatus"] = {"taskStatus": 29}
     node.values["AttitudeData"] = {"Qbar0": qbar0, "Qbar3": -0.6044}
     node.values["AttitudeData"] |= {"RightAscension": -3.1, "Declination": 1.5}
@@ -54,7 +52,7 @@ def test_it_prints_the_attitude(uart: Any, node: Any, qbar0: float) -> None:
     assert [name for name, _ in node.log] == ["CaptureAndProcess"]
 
 
-def test_it_tells_a_picture_without_attitude(uart: Any, node: Any) -> None:
+def test_reports_a_picture_without_attitude(uart: Any, node: Any) -> None:
     node.values["TaskStatus"] = {"taskStatus": 25}
     result = run_against(uart)
-    assert (result.returncode, result.stderr) == (1, "no attitude in this picture\n")
+    assert (result.returncode, result.stderr) == (1, "no attitude in this image\n")

@@ -1,5 +1,3 @@
-"""The plugin in a pytest of its own, as a user's project would have it."""
-
 import re
 import subprocess
 import sys
@@ -40,8 +38,7 @@ def run(tmp_path: Path) -> Run:
     return run
 
 
-def test_a_failed_test_tells_what_the_faults_did(run: Run, tmp_path: Path) -> None:
-    """And beside it, one with the profile that is the default."""
+def test_failed_test_reports_the_fault_log(run: Run, tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text('seed = 2\n[[fault]]\nkind = "latch-up"\n')
     done = run(
         "pytestmark = pytest.mark.cubestack(seed=3)\n"
@@ -62,7 +59,7 @@ def test_a_failed_test_tells_what_the_faults_did(run: Run, tmp_path: Path) -> No
     assert 'name="cubestack.cubestar.fault_events" value="1"' in report
 
 
-def test_seed_and_profile_are_the_marker_s_or_the_command_line_s(run: Run) -> None:
+def test_seed_and_profile_come_from_marker_or_command_line(run: Run) -> None:
     text = (
         "def test_it(cubestar, aramis):\n"
         "    assert cubestar.seed == 8\n"
@@ -86,7 +83,7 @@ WRONG_MARKERS = {
 }
 
 
-def test_what_a_marker_gets_wrong(run: Run) -> None:
+def test_rejects_invalid_markers(run: Run) -> None:
     done = run(
         "".join(
             f"@pytest.mark.cubestack{marker}\ndef test_{number}(aramis): pass\n"
@@ -105,7 +102,7 @@ def test_every_registered_device_has_a_fixture(run: Run) -> None:
         assert f"\n{name} -- " in done.stdout
 
 
-def test_the_plugin_costs_nothing_before_it_is_used(run: Run) -> None:
+def test_plugin_imports_nothing_heavy(run: Run) -> None:
     text = (
         "import sys\n"
         "def test_it():\n"
@@ -115,13 +112,13 @@ def test_the_plugin_costs_nothing_before_it_is_used(run: Run) -> None:
     assert run(text, "-p", "no:hypothesispytest", "-p", "no:cacheprovider").returncode == 0
 
 
-def test_the_entry_point_leads_to_the_plugin() -> None:
+def test_entry_point_names_the_plugin() -> None:
     project = Path(__file__).parents[2] / "pyproject.toml"
     assert f'cubestack = "{PLUGIN}"' in project.read_text()
 
 
 @pytest.mark.slow
-def test_a_driver_that_sleeps_is_left_as_it_is(run: Run, tmp_path: Path) -> None:
+def test_sleeping_driver_runs_in_virtual_time(run: Run, tmp_path: Path) -> None:
     (tmp_path / "driver.py").write_text(
         "from time import monotonic, sleep\n"
         "def measure(port):\n"

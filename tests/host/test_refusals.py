@@ -1,12 +1,12 @@
-"""What can not be done is refused in a sentence that says why, and leaves nothing half done."""
-
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+import smbus2
 from PIL import Image
 
 from cubestack.emulator.native.compiler import find_compiler
@@ -26,7 +26,8 @@ from cubestack.host.shell.language import Shell
 from cubestack.host.shell.result import ShellError
 from cubestack.host.studies import workers
 from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.fidelity.table import fidelity_of, rewritten
+from cubestack.host.studies.fidelity import table as fidelity
+from cubestack.host.studies.fidelity.table import fidelity_of
 from cubestack.host.studies.hazards import album
 from cubestack.host.studies.upsets import experiment as upsets
 from cubestack.host.studies.upsets.clean import Interval
@@ -54,33 +55,16 @@ compiled = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
             ["run", "--device", "cubestar", "--device", "aramis", "--scene", "x", "--", "true"],
             "--scene and --faults are of one device",
         ),
-        (["picture", "cubestar", "--ra", "1", "--out", "x.png"], "needs both --ra and --dec"),
-        (["picture", "cubestar", "--dec", "1", "--out", "x.png"], "needs both --ra and --dec"),
-        (["picture", "cubestar", "--roll", "1", "--out", "x.png"], "needs both --ra and --dec"),
-        (["picture", "cubestar", "--out", "x.png"], "needs a pose, --ra and --dec, or --scene"),
+        (["emulate", "cubestar", "--gdb-wait"], "--gdb-wait: give the port as well: --gdb PORT"),
     ],
 )
-def test_wrong_calls_are_one_line(run: Run, words: list[str], told: str) -> None:
+def test_rejects_wrong_arguments(run: Run, words: list[str], told: str) -> None:
     found = run(*words)
-    assert found.code == 2
-    assert told in found.line
-
-
-@compiled
-@pytest.mark.parametrize(
-    ("more", "told"),
-    [
-        (["--listen", "0.0.0.0"], "--listen: of which port? It goes with --tcp, --rfc2217 or"),
-        (["--gdb-wait"], "--gdb-wait: give the port as well: --gdb PORT"),
-    ],
-)
-def test_options_of_ports_that_are_not_served(run: Run, more: list[str], told: str) -> None:
-    found = run("emulate", "cubestar", *more)
     assert found.code == 2
     assert told in found.err
 
 
-def test_a_scene_that_is_no_sky_has_no_pose(run: Run, tmp_path: Path) -> None:
+def test_picture_rejects_a_scene_without_sky(run: Run, tmp_path: Path) -> None:
     Image.fromarray(np.zeros((512, 1024), np.uint8)).save(tmp_path / "p.png")
     (tmp_path / "s.toml").write_text('kind = "picture"\nfile = "p.png"\n', "utf-8")
     words = ["picture", "cubestar", "--scene", tmp_path / "s.toml", "--out", tmp_path / "x.png"]
@@ -89,35 +73,23 @@ def test_a_scene_that_is_no_sky_has_no_pose(run: Run, tmp_path: Path) -> None:
 
 
 @compiled
-def test_a_picture_that_can_not_be_written(run: Run, tmp_path: Path) -> None:
+def test_picture_names_an_unwritable_file(run: Run, tmp_path: Path) -> None:
     out = tmp_path / "no" / "x.png"
     found = run("picture", "cubestar", "--ra", "84", "--dec", "-1", "--out", out)
     assert found.code == 2
     assert f"can not write {out}: No such file" in found.err
 
 
-def test_without_pyarrow_there_is_no_parquet(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    from cubestack.host.cli.decode import _write
-
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ValueError, match="pyarrow: pip install pyarrow"):
-        _write(tmp_path / "x.parquet", [])
-
-
 # --- targets and clients --------------------------------------------------------------------------
 
 
-def test_no_emulation_here_has_a_control_port() -> None:
+def test_control_is_rejected_for_an_emulation_in_this_process() -> None:
     for text in ("emulated:cubestar", "recorded:a.rec"):
         with pytest.raises(TargetError, match=f"--control is for a device that another .* {text}"):
             open_target(text, control="http://127.0.0.1:1")
-        with pytest.raises(TargetError, match=f"--backup is for a serial line, not for {text}"):
-            open_target(text, backup=True)
 
 
-def test_what_nobody_registered_has_no_client(
+def test_connect_rejects_an_unregistered_device(
     node: FakeCubeStar, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = Target("x", INTERFACE, over_i2c(node))
@@ -126,9 +98,7 @@ def test_what_nobody_registered_has_no_client(
         connect("x")
 
 
-def test_a_bus_that_one_may_not_open_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    import smbus2
-
+def test_missing_permission_for_a_bus_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(_number: int) -> Any:
         raise PermissionError(13, "Permission denied")
 
@@ -137,19 +107,16 @@ def test_a_bus_that_one_may_not_open_is_told(monkeypatch: pytest.MonkeyPatch) ->
         open_target("i2c:7:0x1a")
 
 
-@pytest.mark.parametrize("text", ["i2c:7:0x07", "i2c:7:0x78", "i2c:-1:0x1a", "i2c:x", "i2c:7:x"])
-def test_addresses_that_no_device_may_have(text: str) -> None:
-    with pytest.raises(TargetError, match=f"{text}: must be i2c:BUS:ADDR, as in i2c:7:0x1a"):
-        open_target(text, "cubestar")
+def test_i2c_addresses_are_0x08_to_0x77() -> None:
+    for text in ("i2c:7:0x07", "i2c:7:0x78", "i2c:-1:0x1a", "i2c:x", "i2c:7:x", "i2c:x:0x1a"):
+        with pytest.raises(TargetError, match=f"{text}: must be i2c:BUS:ADDR, as in i2c:7:0x1a"):
+            open_target(text, "cubestar")
+    for address in ("0x08", "0x77"):
+        with pytest.raises(PortOpenError, match="can not open /dev/i2c-250"):
+            open_target(f"i2c:250:{address}", "cubestar")
 
 
-@pytest.mark.parametrize("address", ["0x08", "0x77"])
-def test_the_first_and_the_last_address_are_good(address: str) -> None:
-    with pytest.raises(PortOpenError, match="can not open /dev/i2c-250"):
-        open_target(f"i2c:250:{address}", "cubestar")
-
-
-def test_what_a_device_does_not_do_is_told_by_its_name(node: FakeCubeStar) -> None:
+def test_unsupported_operations_are_rejected(node: FakeCubeStar) -> None:
     client = DeviceClient(NodeClient(UartLink(node), INTERFACE))
     with pytest.raises(TargetError, match="CubeStar has no image upload"):
         client.upload(np.zeros((2, 2), np.uint8))
@@ -159,7 +126,7 @@ def test_what_a_device_does_not_do_is_told_by_its_name(node: FakeCubeStar) -> No
 
 
 @pytest.mark.parametrize("length", [127, 129, 0])
-def test_a_block_of_another_length_is_no_part_of_a_picture(
+def test_stream_rejects_blocks_of_another_length(
     node: FakeCubeStar, monkeypatch: pytest.MonkeyPatch, length: int
 ) -> None:
     client = CubeStar(NodeClient(UartLink(node), INTERFACE))
@@ -179,28 +146,25 @@ def test_a_block_of_another_length_is_no_part_of_a_picture(
         ("write", "usage: write NAME"),
         ("write UploadBlock 0 xy", "field Data: 'xy' is not hexadecimal"),
         ("raw 00", "raw: x is no serial line"),
-        ("bench q", "bench: CubeStar has no bench protocol"),
-        ("image x.jpg", r"image: x\.jpg must end in \.png"),
-        ("image x.png", "image: CubeStar sends no picture"),
     ],
 )
-def test_the_shell_says_what_there_is_not(node: FakeCubeStar, line: str, told: str) -> None:
+def test_shell_rejects_invalid_lines_over_i2c(node: FakeCubeStar, line: str, told: str) -> None:
     shell = Shell(Target("x", INTERFACE, over_i2c(node)))
     with pytest.raises(ValueError, match=told):
         shell.execute(line)
 
 
-def test_a_bench_line_must_be_given(sense: Any) -> None:
+def test_bench_command_needs_a_bench_line(sense: Any) -> None:
     with pytest.raises(ShellError, match="no line with the bench protocol is open: give --bench"):
         Shell(Target("x", sense.interface, over_i2c(sense))).execute("bench q")
 
 
-def test_a_document_that_can_not_be_read(tmp_path: Path) -> None:
+def test_unreadable_document_is_reported(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"can not read .*none\.toml: No such file"):
         read_document(tmp_path / "none.toml")
 
 
-def test_a_picture_follows_no_orbit() -> None:
+def test_orbit_rejects_a_picture_scene() -> None:
     looking: Any = SimpleNamespace(scene=object(), device=device("cubestar"))
     with pytest.raises(ValueError, match="cubestar looks at a picture, which follows no orbit"):
         _seen(SimpleNamespace(), looking)  # type: ignore[arg-type]
@@ -218,7 +182,9 @@ def test_a_picture_follows_no_orbit() -> None:
         ("aramis", "assisted", "--mode assisted needs a scene whose attitude is known"),
     ],
 )
-def test_a_hint_needs_a_truth(name: str, mode: str, told: str, tmp_path: Path) -> None:
+def test_assisted_mode_needs_a_known_attitude(
+    name: str, mode: str, told: str, tmp_path: Path
+) -> None:
     size = (512, 1024) if name == "cubestar" else (1024, 1280)
     Image.fromarray(np.zeros(size, np.uint8)).save(tmp_path / "p.png")
     with pytest.raises(ValueError, match=told):
@@ -226,15 +192,12 @@ def test_a_hint_needs_a_truth(name: str, mode: str, told: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("name", ["options", "grid", "random"])
-def test_tables_of_a_plan_are_tables(name: str) -> None:
+def test_plan_sections_must_be_tables(name: str) -> None:
     with pytest.raises(ValueError, match=f"{name} must be a table of options"):
         CampaignPlan(device="cubestar", frames=1, **{name: [1]})  # type: ignore[arg-type]
 
 
-def test_a_device_without_figures_or_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dataclasses import replace
-
-    from cubestack.host.studies.fidelity import table as fidelity
+def test_unknown_figures_and_commands_are_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
 
     bare = replace(device("cubestar"), studies={})
     monkeypatch.setattr(fidelity, "registered", lambda _name: bare)
@@ -244,13 +207,7 @@ def test_a_device_without_figures_or_command(monkeypatch: pytest.MonkeyPatch) ->
         experiment_of(device("cubestar"), "dance")
 
 
-def test_a_page_without_a_place_for_a_table() -> None:
-    row: Any = SimpleNamespace(table="pace")
-    with pytest.raises(ValueError, match="the page has no line '<!-- rows: pace -->'"):
-        rewritten("nothing\n", [row])
-
-
-def test_what_must_be_installed_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_missing_packages_name_their_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name in ("matplotlib.figure", "distributed"):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(ValueError, match="figures need matplotlib: pip install"):
@@ -265,12 +222,10 @@ def test_what_must_be_installed_is_told(monkeypatch: pytest.MonkeyPatch, tmp_pat
 
 
 @pytest.mark.parametrize(("threads", "told"), [({}, "has no workers"), ({"a": 2, "b": 3}, "")])
-def test_a_cluster_needs_workers(
+def test_cluster_without_workers_is_rejected(
     monkeypatch: pytest.MonkeyPatch, threads: dict[str, int], told: str
 ) -> None:
     class Client:
-        """Of a scheduler."""
-
         def __init__(self, address: str, timeout: object) -> None:
             self.address = address
 
@@ -295,7 +250,7 @@ def test_a_cluster_needs_workers(
         assert found == ("executor, pure: False", 5)
 
 
-def test_a_phase_that_a_loop_has_not_is_told_with_those_it_has() -> None:
+def test_upset_moments_are_uniform_in_a_phase() -> None:
     loop = [Interval("idle", 0, 10), Interval("storing", 10, 30), Interval("idle", 30, 60)]
     rng = np.random.default_rng(1)
     with pytest.raises(ValueError, match="a loop has no phase reading: "):

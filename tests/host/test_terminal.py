@@ -1,5 +1,3 @@
-"""How far a long work is."""
-
 from collections.abc import Iterator
 from io import StringIO
 from threading import Event
@@ -11,21 +9,45 @@ from rich.table import Table
 
 from cubestack.host import terminal
 
+TERMINAL = {"TERM": "xterm"}
 
-def test_off_a_terminal_lines_tell_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines, heard = list[str](), Event()
 
-    def say(text: str) -> None:
-        lines.append(text)
-        heard.set()
+class Lines(list[str]):
+    """Progress lines; ``heard`` is set by each one."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.heard = Event()
+
+    def say(self, text: str) -> None:
+        self.append(text)
+        self.heard.set()
+
+
+@pytest.fixture
+def lines(monkeypatch: pytest.MonkeyPatch) -> Lines:
+    made = Lines()
     monkeypatch.setattr(terminal, "EVERY_S", 0.01)
-    monkeypatch.setattr(terminal, "say", say)
+    monkeypatch.setattr(terminal, "say", made.say)
+    return made
 
+
+def replace_console(
+    monkeypatch: pytest.MonkeyPatch, width: int, *, is_terminal: bool, name: str = "console"
+) -> StringIO:
+    file = StringIO()
+    console = Console(
+        file=file, width=width, force_terminal=is_terminal, color_system=None, _environ=TERMINAL
+    )
+    monkeypatch.setattr(terminal, name, console)
+    return file
+
+
+def test_progress_prints_plain_lines_when_not_a_tty(lines: Lines) -> None:
     def slow() -> Iterator[int]:
         for number in range(3):
-            assert heard.wait(10.0)  # one takes as long as it does
-            heard.clear()
+            assert lines.heard.wait(10.0)
+            lines.heard.clear()
             yield number
 
     assert list(terminal.progress(slow(), 3, "measuring")) == [0, 1, 2]
@@ -34,77 +56,58 @@ def test_off_a_terminal_lines_tell_how_far_it_is(monkeypatch: pytest.MonkeyPatch
     assert all(line.endswith(" s left") for line in lines[1:] if "0 of 3" not in line)
 
 
-def test_what_was_done_before_tells_nothing_about_the_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines, heard = list[str](), Event()
-    monkeypatch.setattr(terminal, "EVERY_S", 0.01)
-    monkeypatch.setattr(terminal, "say", lambda text: (lines.append(text), heard.set()))
-
+def test_earlier_steps_do_not_count_for_the_rate(lines: Lines) -> None:
     def items() -> Iterator[int]:
         yield from range(1000)
-        assert heard.wait(10.0)
+        assert lines.heard.wait(10.0)
 
     assert len(list(terminal.progress(items(), 1001, "measuring", before=1000))) == 1000
     assert lines[-1] == "measuring: 1000 of 1001, 0 s"
 
 
-def test_what_has_no_steps_tells_how_long_it_has_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines, heard = list[str](), Event()
-    monkeypatch.setattr(terminal, "EVERY_S", 0.01)
-    monkeypatch.setattr(terminal, "say", lambda text: (lines.append(text), heard.set()))
+def test_busy_prints_the_elapsed_time(lines: Lines) -> None:
     with terminal.busy("starting CubeStar"):
-        assert heard.wait(10.0)
+        assert lines.heard.wait(10.0)
     assert set(lines) == {"starting CubeStar: 0 s"}
 
 
-def test_only_the_innermost_tells(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines, heard = list[str](), Event()
-    monkeypatch.setattr(terminal, "EVERY_S", 0.01)
-    monkeypatch.setattr(terminal, "say", lambda text: (lines.append(text), heard.set()))
+def test_only_the_innermost_work_is_reported(lines: Lines) -> None:
     with terminal.busy("starting AraMiS"):
         with terminal.busy("scanning the sky") as shown:
             shown(3, 10)
             for _ in range(3):
-                heard.clear()
-                assert heard.wait(10.0)
+                lines.heard.clear()
+                assert lines.heard.wait(10.0)
             inside = lines[-2:]
-        heard.clear()
-        assert heard.wait(10.0)
+        lines.heard.clear()
+        assert lines.heard.wait(10.0)
     assert all(line.startswith("scanning the sky: 3 of 10, ") for line in inside)
     assert lines[-1].startswith("starting AraMiS: ")
 
 
 @pytest.mark.parametrize("is_terminal", [False, True])
-def test_a_long_line_of_a_result_is_not_broken(
+def test_long_result_lines_are_not_wrapped(
     monkeypatch: pytest.MonkeyPatch, is_terminal: bool
 ) -> None:
-    file, long = StringIO(), "[no markup] " + "many words " * 20
-    console = Console(
-        file=file, width=30, force_terminal=is_terminal, color_system=None, _environ=TERMINAL
-    )
-    monkeypatch.setattr(terminal, "console", console)
+    long = "[no markup] " + "many words " * 20
+    file = replace_console(monkeypatch, 30, is_terminal=is_terminal)
     terminal.tell(long)
     terminal.head(long)
     assert file.getvalue().splitlines() == [long, f"== {long} =="]
 
 
 @pytest.mark.parametrize("title", ["a title", "as long as a row of thirty"])
-def test_a_title_is_ruled_where_it_has_room(monkeypatch: pytest.MonkeyPatch, title: str) -> None:
-    file = StringIO()
-    console = Console(
-        file=file, width=30, force_terminal=True, color_system=None, _environ=TERMINAL
-    )
-    monkeypatch.setattr(terminal, "console", console)
+def test_title_has_a_rule_if_it_fits(monkeypatch: pytest.MonkeyPatch, title: str) -> None:
+    file = replace_console(monkeypatch, 30, is_terminal=True)
     terminal.head(title)
     assert f"─ {title} ─" in file.getvalue()
 
 
-def test_quick_or_quiet_work_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+def test_quick_or_quiet_work_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
     assert list(terminal.progress([1, 2], 2, "measuring")) == [1, 2]
     assert list(terminal.progress([1, 2], 2, "measuring", quiet=True)) == [1, 2]
     assert capfd.readouterr() == ("", "")
 
-
-TERMINAL = {"TERM": "xterm"}
 
 ROWS = [("0", "calculated, MaxStarsDetection"), ("12", "no\nstars [2]")]
 
@@ -119,17 +122,13 @@ def table() -> Table:
 
 
 def printed(monkeypatch: pytest.MonkeyPatch, width: int, *, is_terminal: bool) -> list[str]:
-    file = StringIO()
-    console = Console(
-        file=file, width=width, force_terminal=is_terminal, color_system=None, _environ=TERMINAL
-    )
-    monkeypatch.setattr(terminal, "console", console)
+    file = replace_console(monkeypatch, width, is_terminal=is_terminal)
     terminal.show(table())
     return file.getvalue().splitlines()
 
 
 @pytest.mark.parametrize(("width", "is_terminal"), [(80, False), (20, False), (20, True)])
-def test_a_table_is_plain_lines_in_a_pipe_and_where_it_is_too_wide(
+def test_table_is_plain_in_a_pipe_or_a_narrow_terminal(
     monkeypatch: pytest.MonkeyPatch, width: int, is_terminal: bool
 ) -> None:
     title, head, *rows = printed(monkeypatch, width, is_terminal=is_terminal)
@@ -139,22 +138,18 @@ def test_a_table_is_plain_lines_in_a_pipe_and_where_it_is_too_wide(
     assert cells == [["0", "calculated, MaxStarsDetection"], ["12", "no  stars [2]"]]
 
 
-def test_a_table_is_drawn_where_it_has_room(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_table_is_drawn_if_it_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = printed(monkeypatch, 80, is_terminal=True)
     assert any("┃" in line for line in lines)
     assert any("calculated, MaxStarsDetection" in line for line in lines)
 
 
 @pytest.mark.parametrize("is_terminal", [False, True])
-def test_results_come_above_the_bar_or_go_to_their_file(
+def test_results_are_printed_above_the_bar_or_to_their_file(
     monkeypatch: pytest.MonkeyPatch, is_terminal: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    results, errors = StringIO(), StringIO()
-    for name, file, drawn in (("console", results, is_terminal), ("_errors", errors, True)):
-        console = Console(
-            file=file, width=30, force_terminal=drawn, color_system=None, _environ=TERMINAL
-        )
-        monkeypatch.setattr(terminal, name, console)
+    results = replace_console(monkeypatch, 30, is_terminal=is_terminal)
+    errors = replace_console(monkeypatch, 30, is_terminal=True, name="_errors")
     long = "a result that is longer than the terminal is wide"
     for _ in terminal.progress(range(2), 2, "proofs"):
         terminal.tell(long)
@@ -165,7 +160,7 @@ def test_results_come_above_the_bar_or_go_to_their_file(
     assert capsys.readouterr().out == "printed\nprinted\n"
 
 
-def test_where_nothing_can_be_drawn_lines_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dumb_terminal_gets_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     file = StringIO()
     dumb = Console(file=file, force_terminal=True, _environ={"TERM": "dumb"})
     monkeypatch.setattr(terminal, "_errors", dumb)
@@ -175,3 +170,41 @@ def test_where_nothing_can_be_drawn_lines_tell(monkeypatch: pytest.MonkeyPatch) 
     with terminal.busy("starting"):
         assert heard.wait(10.0)
     assert file.getvalue().startswith("starting: 0 s")
+
+
+@pytest.fixture
+def screen(monkeypatch: pytest.MonkeyPatch) -> StringIO:
+    monkeypatch.setenv("TERM", "xterm")
+    return replace_console(monkeypatch, 100, is_terminal=True, name="_errors")
+
+
+def test_nested_loops_share_one_display(screen: StringIO) -> None:
+    found, displays = [], set()
+    for outer in terminal.progress("ab", 2, "outside"):
+        for inner in terminal.progress(range(2), 2, "inside"):
+            found.append((outer, inner))
+            (display,) = terminal._open
+            displays.add(id(display))
+            names = [task.description for task in display.tasks]
+            assert names[:2] == ["outside", "inside"]
+            assert [task.completed for task in display.tasks[:1]] == [ord(outer) - ord("a")]
+    assert found == [("a", 0), ("a", 1), ("b", 0), ("b", 1)]
+    assert len(displays) == 1
+    assert "outside" in screen.getvalue()
+    assert terminal._open == []
+
+
+def test_error_removes_the_display(screen: StringIO) -> None:
+    def failing() -> None:
+        for _ in terminal.progress(range(3), 3, "measuring"):
+            raise ValueError("wrong")
+
+    with pytest.raises(ValueError, match="wrong"):
+        failing()
+    assert list(terminal.progress(range(2), 2, "again")) == [0, 1]
+    assert terminal._open == []
+
+
+def test_quiet_progress_has_no_bar(screen: StringIO) -> None:
+    assert list(terminal.progress(range(3), 3, "measuring", quiet=True)) == [0, 1, 2]
+    assert screen.getvalue() == ""

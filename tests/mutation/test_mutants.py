@@ -1,5 +1,3 @@
-"""What the mutants are, and which tests they have to face."""
-
 import ast
 import json
 from pathlib import Path
@@ -48,21 +46,21 @@ def test_mutants_of_a_text(text: str, expected: list[str]) -> None:
     assert sorted(m.put_into(text) for m in mutants(HERE, text)) == sorted(expected)
 
 
-def test_every_mutant_is_a_program_and_another_one() -> None:
+def test_every_mutant_parses_and_differs() -> None:
     for path in modules(ROOT)[::40]:
         text = (ROOT / path).read_text("utf-8")
         for mutant in mutants(path, text)[::20]:
             assert ast.dump(ast.parse(mutant.put_into(text))) != ast.dump(ast.parse(text)), mutant
 
 
-def test_the_seed_decides() -> None:
+def test_seed_determines_the_selection() -> None:
     folder = Path("firmware_model/attitude")
     one, same, other = ([str(m) for m in chosen(folder, seed)] for seed in (1, 1, 2))
     assert one == same != other
     assert sorted(one) == sorted(other)
 
 
-def test_what_changes_elsewhere_leaves_the_choice(
+def test_changes_elsewhere_keep_the_selection(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tests.mutation.__main__.ROOT", tmp_path)
@@ -83,22 +81,20 @@ def test_what_changes_elsewhere_leaves_the_choice(
     assert 5 < sum("one" in path.parts for path in first) < 30  # of a third of all lines
 
 
-def test_the_mirror_image_comes_first() -> None:
+def test_mirrored_test_file_comes_first() -> None:
     found = files_for(Path("firmware_model/attitude/quest.py"))
     assert found[0] == Path("tests/firmware_model/attitude/test_quest.py")
     assert {file.parent for file in found} == {Path("tests/firmware_model/attitude")}
 
 
-def test_who_imports_it_comes_before_who_only_stands_beside_it() -> None:
+def test_importing_test_files_come_before_neighbours() -> None:
     found = files_for(Path("firmware_model/attitude/quest.py"))[1:]
     imports = ["attitude.quest import" in (ROOT / file).read_text("utf-8") for file in found]
     assert any(imports)
     assert imports == sorted(imports, reverse=True)
 
 
-def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_beside(
-    tmp_path: Path,
-) -> None:
+def test_unrecorded_tests_are_run_for_near_modules(tmp_path: Path) -> None:
     own = "tests/firmware_model/attitude/test_quest.py::"
     other = "tests/emulator/bus/test_uart.py::"
     (tmp_path / FOLDER).mkdir(parents=True)
@@ -112,7 +108,7 @@ def test_tests_that_are_newer_than_the_record_are_faced_by_what_they_stand_besid
     assert near(Path("emulator/bus/uart.py"), new) == [other + "test_old[2]"]
 
 
-def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) -> None:
+def test_mutant_faces_the_tests_that_run_its_line(tmp_path: Path) -> None:
     (tmp_path / FOLDER).mkdir(parents=True)
     # However many they are, the others are faced as well.
     of_documents = [f"{DOCUMENTS[0]}::test_defaults[{number}]" for number in range(MOST_TESTS)]
@@ -137,7 +133,7 @@ def test_a_line_faces_who_runs_it_and_a_table_the_documents_too(tmp_path: Path) 
     assert reached.tests(at_import, {"test_c.py"}) == [*run, beside, *of_documents]
 
 
-def test_a_module_s_own_tests_are_faced_first(tmp_path: Path) -> None:
+def test_tests_of_the_module_come_first(tmp_path: Path) -> None:
     own = [f"tests/mutation/test_mutants.py::test_a[{number}]" for number in range(99)]
     beside = [f"tests/mutation/test_other.py::test_b[{number}]" for number in range(99)]
     slow, far = "tests/mutation/test_mutants.py::test_slow", "tests/test_far.py::test_c"

@@ -1,8 +1,8 @@
-"""A program that does with a port what no program should: bad_client.py ROLE PORT QUESTION.
+"""A misbehaving client: bad_client.py ROLE PORT QUESTION.
 
-ROLE: flood (asks as fast as the port takes it), unread (asks, and never reads an answer) or stopped
-(stops in the middle of its question, with a signal). PORT: a path of a terminal or of a Unix
-socket, or tcp://HOST:PORT. QUESTION: hexadecimal bytes.
+ROLE: flood (sends requests as fast as possible), unread (never reads answers) or stopped (a signal
+stops it in the middle of a request). PORT: path of a terminal or Unix socket, or tcp://HOST:PORT.
+QUESTION: hexadecimal bytes.
 """
 
 import os
@@ -18,7 +18,6 @@ PAUSE_MS = 10
 
 
 def opened(port: str) -> tuple[int, object]:
-    """Descriptor, without blocking, and what keeps it open."""
     if "://" in port:
         host, number = port.split("://")[1].rsplit(":", 1)
         connection = socket.create_connection((host, int(number)))
@@ -34,7 +33,7 @@ def opened(port: str) -> tuple[int, object]:
 
 
 def main(role: str, port: str, question: bytes) -> None:
-    """Never ends by itself, but when the port hangs up."""
+    """Runs until the port hangs up."""
     fd, _kept = opened(port)
     if role == "stopped":
         os.write(fd, question[: len(question) // 2])

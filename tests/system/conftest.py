@@ -1,7 +1,7 @@
-"""What the tests of the whole stack share: emulated boards, the command, and served ports.
+"""Fixtures for the whole stack: emulated boards, commands and served ports.
 
-Everything runs on the compiled FPGA, which is built once and cached; without a C++ compiler these
-tests are skipped, as full-size pictures take minutes in the reference simulator.
+Tests use the compiled FPGA, which is built once and cached. Without a C++ compiler they are
+skipped, because full-size pictures take minutes in the reference simulator.
 """
 
 import io
@@ -42,7 +42,7 @@ def _compiler() -> None:
 
 @pytest.fixture
 def photographs() -> Path:
-    """Folder with photographs of the sky and their truth, which are no part of the project."""
+    """Folder with photographs of the sky and their truth; not part of the project."""
     folder = ROOT.parent / "shared" / "data" / "sky"
     if not (folder / "truth.json").is_file():
         pytest.skip(f"no photographs of the sky in {folder}")
@@ -51,13 +51,13 @@ def photographs() -> Path:
 
 @pytest.fixture(scope="session")
 def device_name() -> str:
-    """The device of this folder's tests, as the command line has it."""
+    """Name of the device that the tests of this folder use."""
     return "cubestar"
 
 
 @pytest.fixture(scope="module")  # of a session, it would be the first folder's
 def measure(device_name: str) -> Measure:
-    """`cubestack measure` this device `--json` with more arguments; the results that it prints."""
+    """Runs `cubestack measure DEVICE --json` with more arguments; returns its results."""
 
     def run(*arguments: object) -> Frames:
         out, err = io.StringIO(), io.StringIO()
@@ -72,13 +72,12 @@ def measure(device_name: str) -> Measure:
 
 @pytest.fixture
 def session(device_name: str, profile: str) -> Open:
-    """Opens this device, looking at a scene."""
     return partial(open_device, device_name, profile=profile)
 
 
 @pytest.fixture
 def emulate(device_name: str, tmp_path: Path) -> Emulate:
-    """Runs `cubestack emulate` this device with more arguments as a process of its own."""
+    """Runs `cubestack emulate DEVICE` with more arguments in another process."""
 
     @contextmanager
     def run(*arguments: object) -> Iterator[Served]:
@@ -89,15 +88,10 @@ def emulate(device_name: str, tmp_path: Path) -> Emulate:
 
 
 class Served:
-    """A process of `cubestack emulate` that serves, to be used in a ``with`` block.
-
-    Attributes:
-        process: the process.
-        said: what it said until it served.
-    """
+    """A process of `cubestack emulate`, as a context manager; ``said`` is its output so far."""
 
     def __init__(self, arguments: list[str], folder: Path, *, last: str = " serves on ") -> None:
-        """Start it in ``folder``, and wait until it says ``last``."""
+        """Starts it in ``folder`` and waits until it prints ``last``."""
         self.process = subprocess.Popen(
             [*COMMAND, "emulate", *arguments],
             cwd=folder,
@@ -122,14 +116,12 @@ class Served:
 
     @property
     def port(self) -> str:
-        """What it serves on first."""
         return self.said.split(" serves on ")[1].split()[0]
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Terminate it if it still runs."""
         self.process.terminate()
         self._rest.join()
         with self.process:
@@ -137,12 +129,12 @@ class Served:
 
 
 class Ear:
-    """Hears what passes on a device's line.
+    """Records the traffic on the line of a device.
 
     Attributes:
-        sent: bytes of the device, time of the first one, and of each, in ps.
-        heard: each byte that it got, and when it began.
-        errors: when there was a framing error.
+        sent: bytes from the device, start of the first byte and duration of each, in ps.
+        heard: each received byte and its start, in ps.
+        errors: times of framing errors, in ps.
     """
 
     def __init__(self, uart: Uart) -> None:

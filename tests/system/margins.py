@@ -1,11 +1,11 @@
-"""Algorithm 2 as printed, stars alone, by its search tolerance: an experiment behind profiles.md.
+"""Identification rate of the published Algorithm 2 by search tolerance, for profiles.md.
 
 ::
 
     .venv/bin/python tests/system/margins.py --frames 2000
 
-Percent of pictures with three stars right, with one wrong, and of the listed stars in a picture
-those that are right.
+Prints the percentages of pictures with three right stars, of pictures with a wrong star, and of
+right stars among the listed stars.
 """
 
 import argparse
@@ -28,8 +28,8 @@ PX = 512 / math.tan(math.radians(27))
 
 
 def centroids_alone(rng: Any, v: float, false: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """A random picture of the published field as unit vectors (n, 3), the first 20 from the top on,
-    0.03 px off, and their stars' places in the list, -1 for false ones."""
+    """A random picture of the published field: unit vectors (n, 3) of the first 20 stars from the
+    top, 0.03 px off, and their places in the list, -1 for false stars."""
     catalogue = onboard_catalogue(pair_limit_deg=PUBLISHED_PAIR_LIMIT_DEG)
     rays = catalogue.vectors @ matrix_from_quaternion(random_quaternion(rng)).T
     places = PX * rays[:, :2] / np.where(rays[:, 2:] > 0, rays[:, 2:], np.nan)

@@ -60,7 +60,6 @@ class Pasted(NamedTuple):
 
     @property
     def good(self) -> bool:
-        """Whether it did not fail."""
         return not self.code
 
     def __str__(self) -> str:
@@ -147,7 +146,6 @@ class Shell:
         return code, log.read_text().splitlines()
 
     def hang_up(self) -> None:
-        """Press Ctrl-C where something serves."""
         while self._served:
             process = self._served.pop()
             with suppress(ProcessLookupError):  # it may have ended by itself
@@ -155,7 +153,6 @@ class Shell:
             self.run(f"wait {process}", ENDING_S)
 
     def close(self) -> None:
-        """End it, and what it began."""
         self.hang_up()
         self._process.communicate("exit\n", ENDING_S)
         self._listener.join(ENDING_S)
@@ -235,7 +232,6 @@ def fresh(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Paste, and report."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("documents", nargs="*", help="README.md, docs/….md; default: all")
     parser.add_argument("--long", action="store_true", help="those too that take minutes to hours")

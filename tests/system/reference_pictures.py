@@ -125,7 +125,6 @@ def _compared(mode: str, own: Telemetry, model: Telemetry) -> Compared:
 
 
 def main() -> None:
-    """Compare pictures, and say how many differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--frames", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

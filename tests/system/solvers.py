@@ -122,7 +122,6 @@ def wrong_by(found: Attitude, truth: Attitude) -> tuple[float, float]:
 
 
 def row(solve: Solver, pictures: list[Centroids], *, mirrored: bool) -> str:
-    """Cells of the table."""
     right = enough = wrong = 0
     spent = 0.0
     for each in pictures:

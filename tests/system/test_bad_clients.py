@@ -43,7 +43,6 @@ READ_BUS = LENGTH.pack(len(RDWR)) + RDWR
 
 
 def memory_bytes(process: subprocess.Popen[str]) -> int:
-    """Resident memory."""
     pages = Path(f"/proc/{process.pid}/statm").read_text().split()[1]
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 

@@ -1,5 +1,3 @@
-"""`cubestack calibrate`: lenses that the tables do not have, found from pictures."""
-
 import json
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""A debugger, and the files about own firmware, by the command line."""
-
 import io
 import json
 import re
@@ -29,14 +27,11 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Client:
-    """Speaks GDB's protocol by hand."""
-
     def __init__(self, address: str) -> None:
         host, port = address.rsplit(":", 1)
         self._socket = socket.create_connection((host, int(port)), timeout=20)
 
     def ask(self, text: str) -> str:
-        """What a packet is answered with."""
         self.send(text)
         return self.answer()
 
@@ -181,7 +176,6 @@ def processed(halting: bool) -> tuple[str, object, int]:
 
 @pytest.mark.slow
 def test_halts_leave_no_mark_while_the_fpga_stores_a_picture() -> None:
-    """Every pin, byte, function and cycle is the same."""
     alone, halting = processed(False), processed(True)
     assert halting[2] > 1000
     assert alone[:2] == halting[:2]

@@ -1,5 +1,3 @@
-"""Same seed and same host bytes at the same virtual times: the same bytes at the same times."""
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

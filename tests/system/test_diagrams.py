@@ -1,5 +1,3 @@
-"""The committed diagrams are those that today's runs draw, and their pages show them."""
-
 from pathlib import Path
 
 import pytest

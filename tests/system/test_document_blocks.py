@@ -172,7 +172,6 @@ def test_it_runs(document: str, line: str, folder: Path, run: Run) -> None:
 
 
 def python_of(document: str, first: str) -> str:
-    """The block of Python that begins so."""
     (text,) = (
         one.text
         for one in BLOCKS
@@ -182,7 +181,6 @@ def python_of(document: str, first: str) -> str:
 
 
 def test_the_first_script_of_the_readme(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Against what the command above it serves."""
     line = "emulate cubestar --pty ./ttyCUBESTAR"
     assert ("README.md", line) in OWN
     with Served(shlex.split(line)[1:], folder):

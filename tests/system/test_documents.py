@@ -1,5 +1,3 @@
-"""What documents say, against what is there."""
-
 import re
 import tomllib
 from pathlib import Path
@@ -34,7 +32,6 @@ def text_of(name: str) -> str:
 
 
 def load(folder: Path, text: str) -> Any:
-    """What a scene file gives."""
     path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
     return (
@@ -243,7 +240,6 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
 
 
 def test_reads_that_act_are_those_of_the_tables() -> None:
-    """A telecommand without parameters is whole with its ID, which is where a read begins."""
     rows = section(text_of("docs/i2c-bus.md"), "Reads that act").splitlines()
     for device in devices():
         found = [

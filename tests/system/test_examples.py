@@ -1,5 +1,3 @@
-"""Every program in examples/ does what it says, as a user would run it."""
-
 import shutil
 import subprocess
 import sys
@@ -29,7 +27,6 @@ def device() -> Any:
 
 @pytest.fixture(scope="session")
 def flight_driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The C driver, compiled without a warning."""
     compiler = find_c_compiler()
     if compiler is None:
         pytest.skip("no C compiler")
@@ -58,7 +55,6 @@ def test_flight_driver(device: Any, flight_driver: Path) -> None:
 
 
 def test_flight_driver_on_a_bad_line(device: Any, flight_driver: Path) -> None:
-    """For a while every answer is spoilt, so the driver has to ask again."""
     device.faults.inject("uart-corrupt", direction="to-host", at_s=0.3, for_s=0.3)
     done = device.run(flight_driver, "{port}", pace="real")
     assert done.returncode == 0, done.stderr

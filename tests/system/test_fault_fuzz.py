@@ -135,7 +135,6 @@ class Fuzzer:
         pytest.fail("the device does not stop talking")
 
     def _listen(self, seconds: float) -> bool:
-        """Let time pass; whether the device said something."""
         self.kernel.advance_to(self.kernel.now + int(seconds * PS_PER_S))
         heard = False
         for line in self.lines.values():

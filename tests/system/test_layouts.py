@@ -1,5 +1,3 @@
-"""CubeStar's further memory layouts, whole: the host sees what it sees of the published one."""
-
 import io
 import json
 import sys
@@ -44,12 +42,10 @@ class Node:
         self.client = self.cubestar.client
 
     def do(self, command: str, **values: object) -> None:
-        """And wait until it is done."""
         self.client.command(command, **values)
         self.client.wait_processed(10.0)
 
     def block(self, number: int) -> bytes:
-        """A block of the picture, read in interrupts."""
         self.do("ImageBlockSet", BlockNumber=number, BlockSize=ImageBlockSize.BYTES_128)
         found: bytes = self.client.telemetry("ImageBlock")["Block"]
         return found
@@ -108,7 +104,6 @@ def published() -> Published:
 
 @pytest.fixture(params=ON_BUS, ids=lambda layout: layout.value)
 def node(request: pytest.FixtureRequest) -> Iterator[Node]:
-    """Its FPGAs and memories break no rule."""
     with open_device("cubestar", ORION, layout=request.param.value) as opened:
         yield Node(opened, request.param)
         assert not opened.board.engine.violation_counts
@@ -118,7 +113,6 @@ only = pytest.mark.parametrize("node", [Layout.SHARED], indirect=True)
 
 
 def test_the_same_scene_gives_the_same_bytes_and_attitude(node: Node, published: Published) -> None:
-    """Detected over the bus, zeroed and written back there, not copied; downloaded in two ways."""
     assert node.seen() == published.seen
     phases = node.cubestar.phase_times()
     assert (phases["transfer"], phases["capture"]) == (0, pytest.approx(384, abs=1))
@@ -196,7 +190,6 @@ def test_a_latch_up_of_the_memory_loses_the_picture_only(node: Node, published: 
 
 
 def test_a_latch_up_of_the_boards_in_a_search_costs_the_picture(node: Node) -> None:
-    """Nothing is found from there on, and what was found stays zero."""
     node.cubestar.capture()
     picture = node.memory[: 1 << 19].copy()
     node.client.command("DetectStars")
@@ -262,7 +255,6 @@ def test_the_loops_keep_their_rate_and_age(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize("node", [Layout.TWO_MEMORIES], indirect=True)
 def test_two_memories_are_filled_in_turn(node: Node) -> None:
-    """And the one that is not stored in is worked on, beside the pixels."""
     into = []
     set_pin = node.board.engine.set_pin
 

@@ -98,7 +98,7 @@ def test_errors_without_noise_are_small_and_noise_makes_others(measure: Measure)
 
 
 def test_form_of_a_frame_and_its_errors_are_those_of_the_quaternions(measure: Measure) -> None:
-    """Scalar last and inertial to camera, as scipy applies it; camera axis z is the boresight."""
+    """Quaternions are scalar last, inertial to camera; the boresight is camera axis z."""
     for frame in measure("--frames", 5, "--mag-limit", 3.8, "--seed", 2):
         assert frame.keys() == KEYS
         assert frame["phase_ms"].keys() == PHASES

@@ -1,5 +1,3 @@
-"""A program in C that knows the published tables alone sees what the shell shows."""
-
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,6 @@ COUNTING = {"Runtime", "RuntimeSeconds", "RuntimeMilliseconds", "TcmdCount", "Tl
 
 @pytest.fixture(scope="session")
 def outsider(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The program, compiled without a warning."""
     compiler = find_c_compiler()
     if compiler is None:
         pytest.skip("no C compiler")
@@ -37,7 +34,6 @@ def outsider(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def measure(device: AnyEmulated) -> None:
-    """Results to look at, none of them zero."""
     node = device.client.client
     steps: tuple[tuple[str, dict[str, Any]], ...] = (
         ("IDStars", {}),  # too early: a flag

@@ -1,5 +1,3 @@
-"""Own firmware end to end: serial line, camera bus, monitors, comparator, watchdog, recordings."""
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Pasting the documents: what lines become, in one shell, with what serves beside them."""
-
 import signal
 import stat
 from pathlib import Path

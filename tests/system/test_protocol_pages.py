@@ -1,5 +1,3 @@
-"""The pages on the protocols: layouts are those of the tables, examples those of the device."""
-
 import re
 from dataclasses import replace
 

@@ -1,5 +1,3 @@
-"""README.md is short, and its caption comes from the run that drew its picture."""
-
 import re
 from pathlib import Path
 

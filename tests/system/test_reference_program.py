@@ -184,7 +184,6 @@ def test_the_same_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
 
 
 def test_conformance_of_what_is_read(star: AnyEmulated, node: NodeClient) -> None:
-    """All telemetry and framing, and no telecommand: `cubestack conformance` does those as well."""
     notes = device("cubestar").conformance
     target = Target("emulated", INTERFACE, node, controls=EmulatedControls(star))
     run = CheckRun(target, notes=notes)

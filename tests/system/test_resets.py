@@ -1,5 +1,3 @@
-"""Every reset of every device keeps what the pages on the protocols say, item by item."""
-
 from collections.abc import Callable
 from typing import Any
 
@@ -171,7 +169,6 @@ def table(name: str) -> dict[str, list[str]]:
 
 
 def there_is(name: str, bench: Any) -> dict[str, object]:
-    """Every item before a reset."""
     stored = {"saved configuration": {"Timeout": 7}}  # not read: that would bring it back
     return {item: stored.get(item) or read(bench) for item, read in ITEMS[name].items()}
 
@@ -215,7 +212,6 @@ def test_reset(name: str, column: int, what: str, parameters: dict[str, Any]) ->
 
 @pytest.mark.parametrize("name", BENCHES)
 def test_power_cycle(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A new board, but for the processor's flash."""
     with powered(name, "published") as bench:
         saved = PREPARE[name](bench)
         before = there_is(name, bench)

@@ -1,5 +1,3 @@
-"""An emulator process that any program can talk to, and the README's word about it."""
-
 import os
 import re
 import signal

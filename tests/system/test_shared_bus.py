@@ -1,5 +1,3 @@
-"""Three devices on one I2C bus of an emulation, reached by other processes."""
-
 import os
 import subprocess
 import sys

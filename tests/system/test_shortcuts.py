@@ -1,5 +1,3 @@
-"""With the designs' strides and without: the same bytes at the same times, whatever goes wrong."""
-
 from io import StringIO
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Section 6.2: what is tracked at the rates of the telescope's mount and of a satellite's orbit."""
-
 import pytest
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES

@@ -1,5 +1,3 @@
-"""Telecommands choose profile and switches of a running device; telemetry says which run."""
-
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -49,7 +47,6 @@ def extended() -> Iterator[dict[str, AnyEmulated]]:
 
 @pytest.fixture(params=NAMES)
 def unit(request: pytest.FixtureRequest, extended: dict[str, AnyEmulated]) -> AnyEmulated:
-    """Powered up with `extended`; tests leave it so."""
     opened = extended[request.param]
     opened.client.set_profile("extended")
     return opened
@@ -61,7 +58,6 @@ def perform(unit: AnyEmulated, name: str, parameters: dict[str, Any]) -> None:
 
 
 def everything(unit: AnyEmulated) -> dict[str, Any]:
-    """All telemetry, but what reading starts a measurement."""
     shown = [m for m in unit.device.interface.telemetries if m.supported]
     return {m.name: unit.client.client.telemetry(m.name) for m in shown if not m.starts_measurement}
 
@@ -84,7 +80,6 @@ def test_each_value_of_each_switch_is_set_and_read_back(unit: AnyEmulated) -> No
 @pytest.mark.parametrize("mixed", [False, True], ids=["profile", "switches"])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_changed_device_measures_as_one_that_was_powered_up_so(name: str, mixed: bool) -> None:
-    """Each telecommand goes to both, so that neither is ahead in time; one board is the other's."""
     profile, other = PROFILES if mixed else PROFILES[::-1]
     changes = OTHERS[name] if mixed else ""
     declared = device(name).switches.declared()

@@ -1,5 +1,3 @@
-"""The tutorial, done by its text alone: files as they are named in it, commands in their order."""
-
 import os
 import re
 import shutil
@@ -45,7 +43,6 @@ def commands() -> list[str]:
 
 @pytest.fixture
 def sensor(folder: Path) -> Iterator[None]:
-    """The second terminal."""
     (line,) = (one for one in commands() if one.startswith(SERVES))
     with Served(line.removeprefix(SERVES).split(), folder):
         yield

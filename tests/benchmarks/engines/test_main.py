@@ -15,7 +15,7 @@ RATES = {"compiled": 45e6, "verilator": 15e6, "cocotb": 30e3, "amaranth": 900.0}
 
 @pytest.fixture
 def figures(monkeypatch):
-    """Sets what is measured; ``missing`` engines are absent."""
+    """Replaces the measurement; engines in ``missing`` are absent."""
 
     def use(missing: dict[str, str], broken: str = "") -> None:
         def measure(top: str) -> Iterator[Speed]:
@@ -30,7 +30,7 @@ def figures(monkeypatch):
     return use
 
 
-def test_each_top_and_engine_with_its_ratio(figures, capsys):
+def test_table_has_each_top_and_engine_with_its_ratio(figures, capsys):
     figures({})
     assert main([]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -42,7 +42,7 @@ def test_each_top_and_engine_with_its_ratio(figures, capsys):
         assert "30.0 k x 1,500" in line
 
 
-def test_json_and_what_is_absent(figures, capsys):
+def test_json_names_absent_engines(figures, capsys):
     figures({"verilator": "Verilator"})
     assert main(["--json"]) == 0
     report = json.loads(capsys.readouterr().out)
@@ -63,7 +63,7 @@ def test_absent_engines_are_named_below_the_table(figures, capsys):
     assert "compiled is absent: install a C++ compiler" in captured.err
 
 
-def test_an_engine_that_stores_something_else_is_an_error(figures, capsys):
+def test_engine_with_a_wrong_picture_is_an_error(figures, capsys):
     figures({}, broken="cubestar-double")
     assert main([]) == 2
     assert "error: SRAM has 1 at row 0" in capsys.readouterr().err

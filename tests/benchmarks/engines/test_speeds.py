@@ -1,5 +1,3 @@
-"""The engines' comparison: samples are checked, and what is absent is named."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +16,7 @@ from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
 
 
 @pytest.mark.slow
-def test_every_top_that_has_a_wiring_is_measured():
+def test_every_wired_top_has_a_workload():
     for name, workload in WORKLOADS.items():
         wiring = workload.wiring()
         rtlil_text(wiring.component)  # a design must be used, Amaranth says
@@ -30,7 +28,7 @@ def test_every_top_that_has_a_wiring_is_measured():
 
 
 @pytest.mark.parametrize("name", WORKLOADS)
-def test_the_simulator_stores_the_sample(name):
+def test_simulator_stores_the_sample(name):
     load = WORKLOADS[name]
     engine = make_engine(load.wiring(), "python", skipping=False)
     load.begin(engine)
@@ -46,7 +44,7 @@ def test_the_simulator_stores_the_sample(name):
 
 @pytest.mark.slow
 @pytest.mark.skipif(missing_for_cocotb() is not None, reason="no cocotb or no Icarus Verilog")
-def test_cocotb_stores_the_sample_and_says_when_it_does_not():
+def test_cocotb_stores_the_sample_and_reports_failures():
     load = WORKLOADS["cubestar-double"]
     assert run_cocotb(load, 1) > 0
     with pytest.raises(WrongPictureError, match="SRAM2 has 0 at row 0, column 0"):
@@ -65,7 +63,7 @@ def test_figures_are_positive(monkeypatch):
     assert all(0 < speed.clocks_per_s < float("inf") for speed in found)
 
 
-def test_what_is_not_installed_is_named(monkeypatch):
+def test_missing_tools_are_named(monkeypatch):
     monkeypatch.setattr(speeds, "missing_for_cocotb", lambda: "cocotb")
     monkeypatch.setattr(speeds, "verilator_root", lambda: None)
     monkeypatch.setattr(speeds, "find_compiler", lambda: "c++")
@@ -74,14 +72,14 @@ def test_what_is_not_installed_is_named(monkeypatch):
     assert {*absent()} == {"cocotb", "compiled", "verilator"}
 
 
-def test_verilator_is_found_where_it_says_it_is(monkeypatch, tmp_path):
+def test_verilator_root_is_read_from_the_environment(monkeypatch, tmp_path):
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "verilator_bin").touch()
     monkeypatch.setenv("VERILATOR_ROOT", str(tmp_path))
     assert verilator_root() == tmp_path
 
 
-def test_samples_are_the_same_each_time():
+def test_samples_are_reproducible():
     load = WORKLOADS["cubesense-pair"]
     first, second = load.cameras(), load.cameras()
     for name in first:

@@ -1,5 +1,3 @@
-"""What ``import cubestack`` gives."""
-
 import subprocess
 import sys
 from importlib.metadata import version
@@ -11,7 +9,7 @@ import cubestack
 
 
 @pytest.mark.parametrize("name", cubestack.__all__)
-def test_every_public_name_is_there_and_documented(name: str) -> None:
+def test_every_public_name_is_documented(name: str) -> None:
     value = getattr(cubestack, name)
     assert name == "__version__" or value.__doc__
     assert name in dir(cubestack)
@@ -23,20 +21,20 @@ def test_the_lazy_names_are_the_public_ones() -> None:
         _ = cubestack.opendevice
 
 
-def test_importing_it_loads_nothing_heavy() -> None:
+def test_import_loads_no_heavy_module() -> None:
     script = "import sys, cubestack; print({'numpy', 'amaranth', 'simpy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.stdout.strip() == "set()", done.stderr
 
 
-def test_the_command_tells_its_version() -> None:
+def test_command_prints_its_version() -> None:
     script = str(Path(sys.executable).parent / "cubestack")
     for command in ([script], [sys.executable, "-m", "cubestack"]):
         done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)
         assert done.stdout == f"cubestack {version('cubestack')}\n"
 
 
-def test_a_script_needs_one_import_line() -> None:
+def test_script_needs_one_import() -> None:
     with cubestack.connect("emulated:aramis") as aramis:
         assert isinstance(aramis, cubestack.Aramis)
         assert aramis.client.telemetry("Identification")["InterfaceVersion"] == 1

@@ -1,5 +1,3 @@
-"""``cubestack.sensor``: what sensors of other distributions import."""
-
 import subprocess
 import sys
 from pathlib import Path

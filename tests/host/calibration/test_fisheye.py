@@ -1,4 +1,4 @@
-"""Fits against lenses that are known; points of a limb are those of a cone turned by scipy."""
+"""Oracles: lenses with known parameters; limbs are cones rotated by scipy."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ TRUE = Fisheye(371.4, 235.7, (0.0, 1.003, 3e-5, CUBE, 0.0), 2.9, 95.0)
 ANGLES = np.array([[a, b] for a in range(-35, 66, 20) for b in range(-55, 36, 20)], float)
 
 
-def test_an_axis_and_a_polynomial_are_found_from_lights() -> None:
+def test_fits_axis_and_polynomial_from_lights() -> None:
     fit = fit_fisheye(TRUE.project(ANGLES), lambda _: ANGLES, TABLES, outline=False)
     assert (fit.lens.x_px, fit.lens.y_px) == pytest.approx((TRUE.x_px, TRUE.y_px), abs=0.01)
     np.testing.assert_allclose(fit.lens.project(ANGLES), TRUE.project(ANGLES), atol=0.05)
@@ -29,20 +29,14 @@ def limb(radius_deg: float, centre_deg: tuple[float, float]) -> np.ndarray:
     """Angles (n, 2) all around a circle in the sky."""
     around = np.radians(np.arange(0, 360, 20))
     cone = np.radians(radius_deg)
-    circle = np.stack(
-        [
-            np.sin(cone) * np.cos(around),
-            np.sin(cone) * np.sin(around),
-            np.full(len(around), np.cos(cone)),
-        ],
-        axis=1,
-    )
+    ring = np.sin(cone) * np.stack([np.cos(around), np.sin(around)])
+    circle = np.vstack([ring, np.full(len(around), np.cos(cone))]).T
     a, b = np.radians(centre_deg)
     x, y, z = Rotation.from_rotvec([-b, a, 0]).apply(circle).T
     return np.degrees(np.arctan2(np.hypot(x, y), z) / np.hypot(x, y))[:, None] * np.stack([x, y], 1)
 
 
-def test_the_same_from_limbs() -> None:
+def test_fits_axis_and_polynomial_from_limbs() -> None:
     centres = [(0.0, 0.0), (25.0, 0.0), (-10.0, 20.0), (0.0, -28.0), (-22.0, -5.0)]
     angles = [limb(63.48, centre) for centre in centres]
     at = np.concatenate(
@@ -56,6 +50,6 @@ def test_the_same_from_limbs() -> None:
     assert fit.after_px < 0.03 < 0.3 < fit.before_px
 
 
-def test_too_few_lights_are_told() -> None:
+def test_rejects_fewer_than_8_lights() -> None:
     with pytest.raises(ValueError, match="needs 8 places at least; 7 were found"):
         fit_fisheye(TRUE.project(ANGLES[:7]), lambda _: ANGLES[:7], TABLES, outline=False)

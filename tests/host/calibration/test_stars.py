@@ -1,4 +1,4 @@
-"""Fits against cameras that are known; attitudes are scipy's."""
+"""Oracles: cameras with known parameters; attitudes by scipy."""
 
 from dataclasses import asdict
 
@@ -16,7 +16,6 @@ SIZE = (1023, 511)
 
 
 def sights(count: int, noise_px: float = 0.0, stars: int = 15, seed: int = 1) -> list[Sight]:
-    """Random skies through the camera, places with noise."""
     rng, found = np.random.default_rng(seed), []
     for turn in Rotation.random(count, random_state=seed):
         plane = np.stack([rng.uniform(-0.5, 0.5, 400), rng.uniform(-0.25, 0.35, 400)], axis=1)
@@ -29,14 +28,14 @@ def sights(count: int, noise_px: float = 0.0, stars: int = 15, seed: int = 1) ->
     return found
 
 
-def test_a_camera_is_recovered_exactly_from_exact_stars() -> None:
+def test_exact_stars_give_the_exact_camera() -> None:
     fit = fit_camera(sights(4), GUESS)
     assert asdict(fit.camera) == pytest.approx(asdict(TRUE), rel=1e-6, abs=1e-8)
     assert fit.after_px < 1e-6 < 0.5 < fit.before_px
     assert (fit.pictures, len(fit.places), fit.rejected) == (4, 60, 0)
 
 
-def test_errors_are_as_large_as_the_fit_says() -> None:
+def test_sigma_matches_the_scatter_of_fits() -> None:
     fits = [fit_camera(sights(6, 0.05, seed=seed), GUESS) for seed in range(12)]
     assert np.mean([fit.after_px for fit in fits]) == pytest.approx(0.05 * np.sqrt(2), rel=0.15)
     for name in PARAMETERS:
@@ -44,7 +43,7 @@ def test_errors_are_as_large_as_the_fit_says() -> None:
         assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.7
 
 
-def test_wrong_stars_are_left_out() -> None:
+def test_rejects_wrong_stars() -> None:
     given = sights(6, 0.02)
     for sight in given:
         sight.pixels[3] += 60
@@ -57,7 +56,7 @@ def test_wrong_stars_are_left_out() -> None:
     assert fit.camera.f_px == pytest.approx(TRUE.f_px, abs=0.3)
 
 
-def test_what_was_left_out_leaves_no_trace_in_the_camera() -> None:
+def test_rejected_star_does_not_change_the_camera() -> None:
     given = sights(4)
     given[0].pixels[7] += 3  # near enough to be taken at first
     fit = fit_camera(given, GUESS)
@@ -70,20 +69,20 @@ def test_pairs_near_the_middle_give_the_focal_length() -> None:
     assert fit.pairs_f_px == pytest.approx(TRUE.f_px, rel=0.01)
 
 
-def test_parameters_that_are_not_free_stay() -> None:
+def test_fixed_parameters_do_not_change() -> None:
     fit = fit_camera(sights(4), GUESS, ("f_px", "cx_px"))
     assert fit.sigma.keys() == {"f_px", "cx_px"}
     assert (fit.camera.cy_px, fit.camera.k1) == (GUESS.cy_px, GUESS.k1)
 
 
 @pytest.mark.parametrize("given", [sights(2), sights(5, stars=4), []])
-def test_too_few_stars_are_told(given: list[Sight]) -> None:
+def test_rejects_too_few_stars(given: list[Sight]) -> None:
     with pytest.raises(ValueError, match=r"needs 3 pictures .*; of \d pictures \d have them"):
         fit_camera(given, GUESS)
 
 
-def test_a_camera_file_is_read_as_it_was_written(tmp_path) -> None:
+def test_camera_file_round_trip(tmp_path) -> None:
     save_camera(TRUE, tmp_path / "camera.json")
     assert load_camera(tmp_path / "camera.json") == TRUE
-    with pytest.raises(CameraFileError, match="a file is to be written here"):
+    with pytest.raises(CameraFileError, match="choose a path that can be written"):
         save_camera(TRUE, tmp_path)

@@ -1,5 +1,3 @@
-"""Completion, tried in the shells that are here."""
-
 import shutil
 import subprocess
 from pathlib import Path
@@ -38,7 +36,7 @@ def test_bash_completes_commands_devices_and_options(run: Run, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_each_shells_script_is_one_that_it_reads(shell: str, run: Run, tmp_path: Path) -> None:
+def test_completion_script_is_valid_for_its_shell(shell: str, run: Run, tmp_path: Path) -> None:
     printed = run("completion", shell)
     assert (printed.code, printed.err) == (0, "")
     for name in commands():

@@ -1,5 +1,3 @@
-"""What the help calls a default is one, of every option of every command."""
-
 import argparse
 import re
 from collections.abc import Iterator
@@ -30,21 +28,19 @@ NUMBERS = [
 ]
 
 
-def test_there_are_many() -> None:
+def test_numbers_are_found_in_the_help() -> None:
     assert len(NUMBERS) > 30
 
 
 @pytest.mark.parametrize(("name", "action", "told"), NUMBERS, ids=[one[0] for one in NUMBERS])
-def test_a_number_that_is_told_is_the_default(
-    name: str, action: argparse.Action, told: str
-) -> None:
+def test_default_in_the_help_is_the_default(name: str, action: argparse.Action, told: str) -> None:
     values = action.default if isinstance(action.default, tuple) else (action.default,)
     assert [float(value) for value in told.rstrip(".").split(",")] == pytest.approx(
         list(values), rel=1e-4
     )
 
 
-def test_flags_are_down() -> None:
+def test_flags_default_to_false() -> None:
     for name, action in ALL:
         if isinstance(action, argparse._StoreTrueAction):
             assert action.default is False, name

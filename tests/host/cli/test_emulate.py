@@ -1,10 +1,10 @@
-"""`cubestack emulate` in this process: what it serves, says and keeps; its pipe ends it."""
-
 import os
 import re
 import signal
 import threading
+from argparse import Namespace
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,10 @@ BUS = 213  # nobody's
 
 
 class Serving:
-    """Runs the command, and a function beside it once it serves; then its pipe ends.
+    """Runs the command, calls a function once it serves, then closes its pipe.
 
     Attributes:
-        said: lines for the reader.
+        said: printed lines.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,7 +46,7 @@ class Serving:
             self._serves.set()
 
     def __call__(self, *words: object, last: str, beside: Callable[[], None]) -> int:
-        """The exit status; ``last`` names the device that is told of last."""
+        """Returns the exit status; ``last`` is the device that is announced last."""
         self._last = last
         reading, writing = os.pipe()
 
@@ -71,7 +71,6 @@ class Serving:
         return code
 
     def ports(self, title: str) -> list[str]:
-        """Where a device serves, in its order."""
         (line,) = (line for line in self.said if line.startswith(f"{title} serves on "))
         return re.findall(r"(\S+) at \d+ baud", line)
 
@@ -84,22 +83,18 @@ def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Serving]:
         signal.signal(number, handler)
 
 
-def asked(port: str, name: str) -> dict[str, Any]:
-    """Who answers at a port."""
-    target = open_target(port, name)
-    try:
+def identification(port: str, name: str) -> dict[str, Any]:
+    with closing(open_target(port, name)) as target:
         return dict(target.node.telemetry("Identification"))
-    finally:
-        target.close()
 
 
-def test_a_terminal_is_served_and_what_is_said_recorded(serving: Serving, tmp_path: Path) -> None:
+def test_serves_a_pty_and_records_the_session(serving: Serving, tmp_path: Path) -> None:
     port, kept = tmp_path / "tty", tmp_path / "kept.rec"
     found = dict[str, Any]()
 
     def beside() -> None:
         assert port.is_symlink()
-        found.update(asked(str(port), "cubestar"))
+        found.update(identification(str(port), "cubestar"))
 
     words = ("cubestar", "--pty", port, "--pace", "fast", "--record", kept, "--seed", "7")
     assert serving(*words, "--baud", "115200", last="CubeStar", beside=beside) == 0
@@ -112,14 +107,14 @@ def test_a_terminal_is_served_and_what_is_said_recorded(serving: Serving, tmp_pa
     assert recording.sent("uart", "host")[0]
 
 
-def test_several_devices_share_a_bus_and_have_ports_of_their_own(serving: Serving) -> None:
+def test_several_devices_share_a_bus_and_have_their_own_ports(serving: Serving) -> None:
     found = list[int]()
 
     def beside() -> None:
         (star,), (sense, bench) = serving.ports("CubeStar"), serving.ports("CubeSense")
         assert len({star, sense, bench}) == 3
-        found.extend(asked(port, name)["NodeType"]
-                     for port, name in ((star, "cubestar"), (sense, "cubesense")))  # fmt: skip
+        for port, name in ((star, "cubestar"), (sense, "cubesense")):
+            found.append(identification(port, name)["NodeType"])
         assert socket_path(BUS).exists()
 
     words = ("cubestar", "cubesense", "--tcp", "0", "--pace", "fast", "--i2c", BUS)
@@ -131,21 +126,19 @@ def test_several_devices_share_a_bus_and_have_ports_of_their_own(serving: Servin
     assert re.search(r"^CubeSense serves on tcp://\S+ at 57600 baud, .*\w+ on tcp://\S+ at", line)
 
 
-def test_what_faults_do_is_told(serving: Serving, tmp_path: Path) -> None:
+def test_prints_what_faults_do(serving: Serving, tmp_path: Path) -> None:
     plan, port = tmp_path / "plan.toml", tmp_path / "tty"
     plan.write_text("[[fault]]\nkind = 'latch-up'\ntarget = 'imager'\nat_s = 1e-4\n", "utf-8")
 
     def beside() -> None:
-        asked(str(port), "cubestar")
+        identification(str(port), "cubestar")
 
     words = ("cubestar", "--pty", port, "--pace", "fast", "--faults", plan)
     assert serving(*words, last="CubeStar", beside=beside) == 0
     assert any("latch-up imager" in line for line in serving.said)
 
 
-def test_it_is_steered_with_its_token_alone(
-    serving: Serving, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_control_needs_its_token(serving: Serving, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(TOKEN, "a-secret")
     about = dict[str, Any]()
 
@@ -177,7 +170,7 @@ def test_it_is_steered_with_its_token_alone(
         ("coverage-out", "x"),
     ],
 )
-def test_options_of_one_device_are_refused_for_several(
+def test_rejects_options_of_one_device_for_several(
     run: Run, option: str, given: str | None
 ) -> None:
     found = run("emulate", "cubestar", "aramis", f"--{option}", *([given] if given else []))
@@ -185,7 +178,7 @@ def test_options_of_one_device_are_refused_for_several(
     assert found.line.endswith(f"--{option} applies to one device, but several are given")
 
 
-def test_an_orbit_that_does_not_fit_is_told_with_its_file(run: Run, tmp_path: Path) -> None:
+def test_names_an_invalid_orbit_file(run: Run, tmp_path: Path) -> None:
     orbit = tmp_path / "orbit.toml"
     orbit.write_text("altitude = high\n", "utf-8")
     found = run("emulate", "cubestar", "--pty", tmp_path / "tty", "--orbit", orbit)
@@ -206,12 +199,9 @@ def test_an_orbit_that_does_not_fit_is_told_with_its_file(run: Run, tmp_path: Pa
     ],
 )
 @pytest.mark.parametrize("devices", [1, 2])
-def test_why_nobody_can_go_back(
+def test_explains_why_going_back_is_disabled(
     monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], past: str, devices: int
 ) -> None:
-    from argparse import Namespace
-    from contextlib import ExitStack
-
     recorded = list[Any]()
     monkeypatch.setattr(emulate.device_options, "record", lambda *of: recorded.append(of[1]))
     nothing = dict.fromkeys(("control", *emulate.FORWARD_ONLY))

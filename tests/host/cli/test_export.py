@@ -1,5 +1,3 @@
-"""The command that writes a device's interface for other programs."""
-
 from pathlib import Path
 
 import pytest
@@ -10,7 +8,7 @@ from tests.conftest import Run
 
 
 @pytest.mark.parametrize("form", [*OF_INTERFACE, *OF_PROCESSOR])
-def test_it_writes_what_it_prints(form: str, run: Run, tmp_path: Path) -> None:
+def test_out_writes_the_printed_text(form: str, run: Run, tmp_path: Path) -> None:
     for device in devices():
         printed = run("export", device.name, "--format", form)
         if form in OF_PROCESSOR and device.processor is None:
@@ -25,13 +23,13 @@ def test_it_writes_what_it_prints(form: str, run: Run, tmp_path: Path) -> None:
         assert path.read_text(encoding="utf-8") == printed.out
 
 
-def test_a_folder_that_is_not_there_is_named(run: Run, tmp_path: Path) -> None:
+def test_names_a_missing_folder(run: Run, tmp_path: Path) -> None:
     outcome = run("export", "aramis", "--format", "c", "--out", tmp_path / "not" / "there.h")
     assert outcome.code != 0
     assert "there.h" in outcome.line
 
 
-def test_a_folder_in_place_of_a_file_is_named(run: Run, tmp_path: Path) -> None:
+def test_rejects_a_folder_as_output_file(run: Run, tmp_path: Path) -> None:
     outcome = run("export", "aramis", "--format", "c", "--out", tmp_path)
     assert outcome.code == 2
     assert outcome.line == (f"cubestack export: --out {tmp_path} is a folder; name a file in it")

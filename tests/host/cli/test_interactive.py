@@ -1,5 +1,3 @@
-"""The shell on a terminal: what is asked, what is kept, and that an error ends nothing."""
-
 import io
 import json
 import sys
@@ -60,19 +58,16 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
 
 
 class Terminal(io.StringIO):
-    """Standard input, typed by somebody."""
-
     def isatty(self) -> bool:
         return True
 
 
 @pytest.fixture
 def typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
-    """Lines that are typed, and exceptions that come in place of one; and prompts."""
-    lines, prompts = list[Any](), list[str]()
+    """Lines to type; an exception among them is raised instead."""
+    lines = list[Any]()
 
-    def ask(prompt: str) -> str:
-        prompts.append(prompt)
+    def ask(_prompt: str) -> str:
         line = lines.pop(0) if lines else EOFError()
         if isinstance(line, BaseException):
             raise line
@@ -81,14 +76,15 @@ def typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     monkeypatch.setattr("builtins.input", ask)
     monkeypatch.setattr(sys, "stdin", Terminal())
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    lines.extend([])
     return lines
 
 
 SHOWN = "a       1\nlonger  2\nalone\n"
 
 
-def test_commands_are_asked_for_until_the_end(run: Run, asked: Asked, typed: list[Any]) -> None:
+def test_prompt_repeats_after_errors_until_end_of_input(
+    run: Run, asked: Asked, typed: list[Any]
+) -> None:
     typed += ["one", "nothing", "wrong", "silent", KeyboardInterrupt(), "two"]
     code, out, err = run("shell", "fake")
     assert code == 0
@@ -103,13 +99,13 @@ def test_commands_are_asked_for_until_the_end(run: Run, asked: Asked, typed: lis
 
 
 @pytest.mark.parametrize("word", ["quit", "exit", " quit "])
-def test_quit_ends_it(run: Run, asked: Asked, typed: list[Any], word: str) -> None:
+def test_quit_closes_the_device(run: Run, asked: Asked, typed: list[Any], word: str) -> None:
     typed += ["one", word, "two"]
     assert run("shell", "fake").code == 0
     assert (asked.lines, typed, asked.closed) == (["one"], ["two"], True)
 
 
-def test_what_was_typed_is_kept_and_words_complete(
+def test_history_is_saved_and_tab_completes(
     run: Run, asked: Asked, typed: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     readline = pytest.importorskip("readline")
@@ -118,8 +114,6 @@ def test_what_was_typed_is_kept_and_words_complete(
     monkeypatch.setattr(readline, "get_line_buffer", lambda: seen["line"] + " behind the cursor")
 
     class Typist(list[Any]):
-        """Looks at completions before the line is done."""
-
         def pop(self, *_at: Any) -> Any:
             complete, found = readline.get_completer(), {}
             for line in ("re", "write A ", "x"):
@@ -147,7 +141,7 @@ def test_what_was_typed_is_kept_and_words_complete(
     assert readline.get_history_item(readline.get_current_history_length()) == "what was typed"
 
 
-def test_a_terminal_without_an_editor_is_asked_as_well(
+def test_prompts_without_readline(
     run: Run, asked: Asked, typed: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "readline", None)
@@ -156,14 +150,16 @@ def test_a_terminal_without_an_editor_is_asked_as_well(
     assert asked.lines == ["one"]
 
 
-def test_a_pipe_is_read_to_its_end(run: Run, asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reads_commands_from_a_pipe(
+    run: Run, asked: Asked, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sys, "stdin", io.StringIO("one\nnothing\n  exit \ntwo\n"))
     assert run("shell", "fake") == (0, SHOWN, "")
     assert asked.lines == ["one", "nothing"]
     assert asked.closed
 
 
-def test_json_has_an_object_for_each_command_and_no_rows_between(run: Run, asked: Asked) -> None:
+def test_json_prints_one_object_per_command(run: Run, asked: Asked) -> None:
     code, out, _ = run("shell", "fake", "--json", "-c", "rows; nothing", "-c", "two")
     assert code == 0
     assert [json.loads(line)["line"] for line in out.splitlines()] == ["rows", "two"]
@@ -171,8 +167,11 @@ def test_json_has_an_object_for_each_command_and_no_rows_between(run: Run, asked
     assert shown == "row  1\n" + SHOWN
 
 
-def test_the_first_failure_ends_a_script_and_closes_the_device(run: Run, asked: Asked) -> None:
-    assert run("shell", "fake", "-c", "one;wrong;two").code == 2
+@pytest.mark.parametrize("options", [["-c", "one;wrong;two"], ["-c", "one", "-c", "wrong;two"]])
+def test_script_stops_at_the_first_failure_and_closes_the_device(
+    run: Run, asked: Asked, options: list[str]
+) -> None:
+    assert run("shell", "fake", *options).code == 2
     assert (asked.lines, asked.closed) == (["one", "wrong"], True)
     assert run("shell", "fake", "-c", "silent").code == 1
 
@@ -188,5 +187,7 @@ def test_the_first_failure_ends_a_script_and_closes_the_device(run: Run, asked: 
         ("", [""]),
     ],
 )
-def test_commands_are_split_outside_of_quotes(text: str, commands: list[str]) -> None:
+def test_semicolons_and_newlines_separate_commands_outside_quotes(
+    text: str, commands: list[str]
+) -> None:
     assert list(shell.split_commands(text)) == commands

@@ -1,5 +1,3 @@
-"""The command: what it takes, exit status, one-line errors, and output for scripts."""
-
 import json
 import os
 import subprocess
@@ -23,22 +21,21 @@ from cubestack.host.studies.cubestar.demo import RENDERED
 from ...conftest import Outcome, Run
 
 DONE, FAILED, WRONG_CALL = 0, 1, 2
+NEEDS_COMPILER = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
 def check_one_line(outcome: Outcome, *words: str) -> None:
-    """A wrong call: one line that names what is wrong and what would be right."""
     assert outcome.code == WRONG_CALL
     for word in words:
         assert word in outcome.line
 
 
 def dark_picture(path: Path, size: tuple[int, int] = (1024, 512)) -> Path:
-    """A picture file, columns x rows."""
     Image.fromarray(np.zeros(size[::-1], np.uint8)).save(path)
     return path
 
 
-def test_a_command_loads_itself_alone(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_imports_only_its_own_module(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = list[str]()
     load = registry.import_module
     monkeypatch.setattr(registry, "import_module", lambda name: loaded.append(name) or load(name))
@@ -49,7 +46,7 @@ def test_a_command_loads_itself_alone(run: Run, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("words", ["--help", "registers cubestar", "shell --help", "nonsense"])
-def test_a_command_without_emulation_loads_no_emulator(words: str) -> None:
+def test_command_without_emulation_imports_no_emulator(words: str) -> None:
     script = (
         "import sys; from cubestack.host.cli.main import main\n"
         "try: main(sys.argv[1:])\nexcept SystemExit: pass\n"
@@ -62,7 +59,7 @@ def test_a_command_without_emulation_loads_no_emulator(words: str) -> None:
 
 
 @pytest.mark.parametrize("command", [None, *commands(), *reports()])
-def test_help(run: Run, command: str | None) -> None:
+def test_help_exits_with_0(run: Run, command: str | None) -> None:
     outcome = run(*([command] if command else []), "--help")
     assert outcome.code == DONE
     assert outcome.out.startswith("usage: cubestack")
@@ -78,47 +75,37 @@ def test_help(run: Run, command: str | None) -> None:
         (("measure", "cubestarr"), ("cubestarr", "cubestar")),
         (("emulate", "cubestarr"), ("cubestarr", "cubestar")),
         (("measure", "cubestar", "--frames", "0"), ("0", "at least 1")),
-        (("measure", "cubestar", "--frames", "many"), ("many", "a whole number")),
         (("measure", "cubestar", "--crop", "0;256"), ("0;256", "a list of 2 numbers")),
         (("measure", "cubestar", "--crop", "0,256"), ("--crop", "--image")),
         (("measure", "cubestar", "--camera", "c.json"), ("--camera", "--image")),
         (("measure", "cubestar", "--image", "a.png", "--scene", "b.toml"), ("--scene", "--image")),
-        (("measure", "cubestar", "--false-stars", "-1"), ("false", "-1")),
         (("measure", "cubestar", "--mag-limit", "nan"), ("mag-limit", "nan", "number")),
         (("measure", "cubestar", "--scene", "a.toml", "--mag-limit", "3"), ("scene", "mag_limit")),
         (("measure", "cubestar", "--image", "a.png", "--false-stars", "1"), ("--false-stars",)),
         (("measure", "cubestar", "--image", "a.png", "--no-noise"), ("--no-noise",)),
         (("catalogue", "--epoch", "inf"), ("--epoch: must be a number, not inf",)),
-        (("catalogue", "--epoch", "1e9"), ("--epoch: must be 1800 to 2200, not 1000000000",)),
         (("demo", "--seed", "-1"), ("seed", "-1")),
-        (("measure", "cubestar", "--seed", "-1"), ("seed", "-1")),
-        (("measure", "cubestar", "--hint-error", "-5", "--mode", "assisted"), ("hint", "-5")),
         (("measure", "cubestar", "--mode", "guessing"), ("guessing", "tracking")),
         (("emulate", "cubestar", "--pty", "a", "--tcp", "4000"), ("--pty", "--tcp")),
         (("emulate", "cubestar", "--tcp", "70000"), ("70000", "65535")),
         (("emulate", "aramis", "--engine", "compiled"), ("--engine", "FPGA")),
         (("emulate", "cubestar", "cubestar"), ("once", "cubestar")),
         (("emulate", "cubestar", "--mcu-addressing"), ("--mcu-addressing", "cubesense")),
-        (("emulate", "cubestar", "aramis", "--scene", "a.toml"), ("--scene", "several")),
-        (("emulate", "cubestar", "aramis", "--record", "a"), ("--record", "several")),
-        (("emulate", "cubestar", "aramis", "--set", "voting=confirmed"), ("--set", "several")),
         (("emulate", "cubestar", "--i2c", "256"), ("256", "255")),
         (("emulate", "cubestar", "--baud", "0"), ("baud", "0")),
         (("emulate", "cubestar", "--pace", "slow"), ("slow", "fast")),
         (("registers", "cubestar", "--format", "pdf"), ("pdf", "markdown")),
         (("measure", "cubestar", "--scene", "missing.toml"), ("missing.toml", "No such file")),
         (("measure", "cubestar", "--image", "missing.png"), ("missing.png", "No such file")),
-        (("measure", "cubesense", "--frames", "0"), ("0", "at least 1")),
-        (("measure", "cubesense", "--altitude", "-3"), ("altitude", "above 0")),
-        (("measure", "cubesense", "--sensor", "star"), ("star", "nadir")),
         (("measure", "cubesense", "--search", "samples", "--memory", "other"), ("--memory other",)),
         (("measure", "cubesense", "--scene", "a.toml", "--tilt", "3"), ("--tilt", "scene")),
         (("measure", "cubesense", "--scene", "a.toml", "--no-noise"), ("--no-noise", "scene")),
-        (("measure", "cubesense", "--scene", "missing.toml"), ("missing.toml", "No such file")),
         (("measure", "cubesense", "--mode", "lis"), ("--mode",)),
     ],
 )
-def test_wrong_calls(run: Run, arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
+def test_wrong_arguments_are_one_line(
+    run: Run, arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
     check_one_line(run(*arguments), *words)
 
 
@@ -135,7 +122,7 @@ def test_wrong_calls(run: Run, arguments: tuple[str, ...], words: tuple[str, ...
     ],
 )
 @pytest.mark.parametrize("command", ["measure", "emulate"])
-def test_wrong_scenes(
+def test_rejects_invalid_scene_files(
     run: Run, tmp_path: Path, command: str, text: str, words: tuple[str, ...]
 ) -> None:
     scene = tmp_path / "scene.toml"
@@ -151,14 +138,14 @@ def test_wrong_scenes(
         ((1024, 512), "1,0", ("1025 x 512",)),
     ],
 )
-def test_wrong_pictures(
+def test_rejects_pictures_smaller_than_the_frame(
     run: Run, tmp_path: Path, size: tuple[int, int], crop: str, words: tuple[str, ...]
 ) -> None:
     picture = dark_picture(tmp_path / "sky.png", size)
     check_one_line(run("measure", "cubestar", "--image", picture, "--crop", crop), *words)
 
 
-def test_a_wrong_picture_format(run: Run, tmp_path: Path) -> None:
+def test_rejects_other_picture_formats(run: Run, tmp_path: Path) -> None:
     picture = dark_picture(tmp_path / "sky.gif")
     check_one_line(run("measure", "cubestar", "--image", picture), "GIF", "PNG, JPEG, TIFF")
     picture.write_text("stars")
@@ -176,7 +163,9 @@ def test_a_wrong_picture_format(run: Run, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_wrong_cameras(run: Run, tmp_path: Path, text: str, words: tuple[str, ...]) -> None:
+def test_rejects_invalid_camera_files(
+    run: Run, tmp_path: Path, text: str, words: tuple[str, ...]
+) -> None:
     picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
     camera.write_text(text, encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera)
@@ -184,7 +173,9 @@ def test_wrong_cameras(run: Run, tmp_path: Path, text: str, words: tuple[str, ..
 
 
 @pytest.mark.parametrize("images", ["[]", "{}", '{"sky.png": 1}', '{"other.png": {}}'])
-def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, images: str) -> None:
+def test_camera_file_without_the_picture_has_no_truth(
+    run: Run, tmp_path: Path, images: str
+) -> None:
     picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
     camera.write_text(
         f'{{"f_px": 1071, "cx_px": 512, "cy_px": 256, "images": {images}}}', encoding="utf-8"
@@ -194,20 +185,20 @@ def test_a_camera_that_does_not_know_the_picture(run: Run, tmp_path: Path, image
     assert json.loads(outcome.out)["truth"] is None
 
 
-def test_no_compiler(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compiled_engine_needs_a_compiler(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cubestack.emulator.native.compiler.find_compiler", lambda: None)
     outcome = run("measure", "cubestar", "--engine", "compiled")
     assert outcome.code == FAILED
     assert "no C++ compiler" in outcome.line
 
 
-def test_the_shipped_picture_is_found_from_anywhere() -> None:
+def test_shipped_picture_has_an_absolute_path() -> None:
     for path in (RENDERED, RENDERED.with_suffix(".json")):
         assert path.is_absolute()
         assert path.is_file()
 
 
-def test_paths_that_can_not_be_served(run: Run, tmp_path: Path) -> None:
+def test_rejects_pty_paths_that_exist_or_have_no_folder(run: Run, tmp_path: Path) -> None:
     taken = tmp_path / "ttyCUBESTAR"
     taken.write_text("a file of the user's", encoding="utf-8")
     outcome = run("emulate", "cubestar", "--pty", taken)
@@ -241,15 +232,12 @@ def test_memory_report_names_every_buffer_and_fits(run: Run) -> None:
 
 
 @pytest.mark.parametrize("command", ["measure", "emulate"])
-def test_a_scene_of_the_other_device_is_refused(run: Run, tmp_path: Path, command: str) -> None:
+def test_rejects_the_scene_of_another_device(run: Run, tmp_path: Path, command: str) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text('kind = "sky"\nra_deg = 1\ndec_deg = 1\n', encoding="utf-8")
     check_one_line(run(command, "cubesense", "--scene", scene), "scene.toml", "earth-sun", "sky")
     scene.write_text('kind = "earth-sun"\n', encoding="utf-8")
     check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", "sky", "earth-sun")
-
-
-NEEDS_COMPILER = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
 @dataclass(frozen=True)
@@ -270,7 +258,7 @@ class Judged(Result):
         ([None, False], 0, ""),
     ],
 )
-def test_enough_results_are_right(
+def test_min_right_compares_the_share_of_right_results(
     capsys: pytest.CaptureFixture[str], verdicts: list[bool | None], least: float, said: str
 ) -> None:
     assert _are_right([Judged(verdict) for verdict in verdicts], least) is (not said)
@@ -278,7 +266,7 @@ def test_enough_results_are_right(
 
 
 @NEEDS_COMPILER
-def test_measure_as_a_check(run: Run) -> None:
+def test_measure_exit_status_follows_min_right(run: Run) -> None:
     call = ["measure", "cubestar", "--threshold", "250", "--frames", "2"]
     outcome = run(*call, "--min-right", "50", "--json")
     assert (outcome.code, outcome.err) == (FAILED, "0.0 % of 2 right; --min-right wants 50 %\n")
@@ -296,7 +284,7 @@ LATCH_UP = "[[fault]]\nkind = 'latch-up'\nat_s = 0.3\n"
 
 
 @NEEDS_COMPILER
-def test_measure_follows_the_plan_of_faults(run: Run, tmp_path: Path) -> None:
+def test_measure_applies_the_fault_plan(run: Run, tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text(LATCH_UP + "target = 'imager'\n")
     call = ["measure", "cubestar", "--mag-limit", "3.8", "--frames", "2", "--json"]
@@ -315,7 +303,7 @@ def test_measure_follows_the_plan_of_faults(run: Run, tmp_path: Path) -> None:
         ("[[fault]]\nkind = 'smoke'\n", "fault 1: unknown fault 'smoke'; known: uart-drop"),
     ],
 )
-def test_a_wrong_plan_is_a_wrong_call(run: Run, tmp_path: Path, text: str, message: str) -> None:
+def test_rejects_invalid_fault_plans(run: Run, tmp_path: Path, text: str, message: str) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text(text)
     outcome = run("measure", "cubesense", "--frames", "1", "--faults", plan)
@@ -333,8 +321,8 @@ def loudness(*words: str, environment: dict[str, str]) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_verbose_tells_of_what_is_loaded_and_quiet_of_nothing(tmp_path: Path) -> None:
+@NEEDS_COMPILER
+def test_verbose_logs_loaded_libraries_and_quiet_logs_nothing(tmp_path: Path) -> None:
     environment = {"XDG_CACHE_HOME": str(tmp_path)}
     told = loudness("-v", environment=environment)
     assert "INFO cubestack.emulator.native.cache: " in told
@@ -342,5 +330,5 @@ def test_verbose_tells_of_what_is_loaded_and_quiet_of_nothing(tmp_path: Path) ->
     assert "INFO" not in loudness(environment=environment)
 
 
-def test_verbose_and_quiet_do_not_go_together(run: Run) -> None:
+def test_verbose_and_quiet_exclude_each_other(run: Run) -> None:
     assert run("-v", "-q", "bench").code == WRONG_CALL

@@ -1,5 +1,3 @@
-"""What is said of what goes wrong outside: in words, on one line, with what would help."""
-
 import os
 import subprocess
 import sys
@@ -55,7 +53,9 @@ FAILED, WRONG_CALL = 1, 2
         ),
     ],
 )
-def test_it_is_said_in_words(run: Run, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
+def test_error_is_one_plain_line(
+    run: Run, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
     outcome = run(*(word.format(folder=tmp_path) for word in words))
     assert outcome.code in (FAILED, WRONG_CALL)
     assert outcome.line == f"cubestack {words[0]}: {said.format(folder=tmp_path)}"
@@ -73,9 +73,7 @@ def process(text: str, **environment: str) -> "subprocess.CompletedProcess[str]"
 
 
 @pytest.mark.parametrize("quiet", [(), ("-q",)])
-def test_without_a_compiler_one_line_says_what_to_install(
-    tmp_path: Path, quiet: tuple[str, ...]
-) -> None:
+def test_missing_compiler_prints_what_to_install(tmp_path: Path, quiet: tuple[str, ...]) -> None:
     words = [*quiet, "shell", "emulated:cubestar", "-c", "read Identification"]
     text = (
         "import cubestack.emulator.native.compiler as k\n"
@@ -100,7 +98,7 @@ def test_without_a_compiler_one_line_says_what_to_install(
 ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 
 
-def test_a_locale_without_letters_of_ours_is_no_error() -> None:
+def test_ascii_locale_replaces_other_characters() -> None:
     text = (
         "import sys\n"
         "from cubestack.host.cli import main\n"
@@ -119,14 +117,14 @@ def test_a_locale_without_letters_of_ours_is_no_error() -> None:
 
 
 @pytest.mark.parametrize("words", [("registers", "cubesense"), ("measure", "cubesense")])
-def test_commands_run_in_such_a_locale(words: tuple[str, ...]) -> None:
+def test_commands_run_in_an_ascii_locale(words: tuple[str, ...]) -> None:
     done = process(f"from cubestack.host.cli.main import main; main({list(words)})", **ASCII)
     assert done.returncode == 0, done.stderr
     assert done.stdout
 
 
 @pytest.mark.parametrize("command", commands())
-def test_help_that_names_documents_says_where_they_are(run: Run, command: str) -> None:
+def test_help_links_to_the_documents_it_names(run: Run, command: str) -> None:
     shown = run(command, "--help").out
     assert ("docs/" in shown) == ("\ndocs/: https://" in shown)
     assert "docs/" in shown or command != "emulate"

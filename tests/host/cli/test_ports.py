@@ -1,5 +1,3 @@
-"""Options of serial ports: what opens for which line, and what is refused."""
-
 import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -48,7 +46,7 @@ def ports(opened, tmp_path, monkeypatch):
     return call
 
 
-def test_terminals_by_default_and_by_name(ports, opened):
+def test_pty_names_default_to_the_device_or_follow_the_option(ports, opened):
     assert ports() == ["ttyCUBESENSE", "ttyCUBESENSE.bench"]
     assert ports("--pty", "y") == ["y", "y.bench"]
     devices = [emulated("CubeStar", ("node protocol", "")), opened]
@@ -64,24 +62,24 @@ def test_free_tcp_ports(ports, kind):
 
 
 @pytest.mark.parametrize("devices", [1, 2])
-def test_not_enough_ports(ports, opened, devices):
+def test_rejects_a_port_range_that_is_too_small(ports, opened, devices):
     with pytest.raises(ValueError, match=f"CubeSense needs {2 * devices} ports, 65535 and up"):
         ports("--rfc2217", "65535", devices=[opened] * devices)
 
 
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
-def test_other_machines_must_be_allowed(ports, kind):
+def test_remote_listening_needs_allow_remote(ports, kind):
     with pytest.raises(PortError, match=r"0\.0\.0\.0 is open to other machines"):
         ports(f"--{kind}", "0", "--listen", "0.0.0.0")
     assert len(ports(f"--{kind}", "0", "--listen", "0.0.0.0", "--allow-remote")) == 2
 
 
-def test_one_end_only(ports):
+def test_tcp_and_rfc2217_exclude_each_other(ports):
     with pytest.raises(argparse.ArgumentError, match="not allowed with"):
         ports("--tcp", "0", "--rfc2217", "0")
 
 
-def test_a_tcp_port_has_no_line_to_be_strict_with(ports):
+def test_strict_line_rejects_tcp(ports):
     with pytest.raises(ValueError, match="a TCP client sets no baud rate; use --pty or --rfc2217"):
         ports("--tcp", "0", "--strict-line")
     assert ports("--strict-line") == ports()

@@ -1,5 +1,3 @@
-"""`cubestack replay`: recordings made and played by the options of the commands."""
-
 import argparse
 import json
 from contextlib import ExitStack
@@ -20,7 +18,6 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 @pytest.fixture
 def recording(tmp_path):
-    """Some telemetry of a CubeSense."""
     path = tmp_path / "a.rec"
     args = argparse.Namespace(record=path, trace=tmp_path / "a.vcd")
     with open_device("cubesense", seed=3) as opened, ExitStack() as stack:
@@ -82,8 +79,7 @@ def session(tmp_path, run):
     return made, scenes, outcome.out
 
 
-def test_a_session_says_how_it_was_made(session, run, tmp_path):
-    """Seed, scene, faults and switches come from the recording, its scene files gone or not."""
+def test_recording_stores_seed_scenes_faults_and_switches(session, run, tmp_path):
     made, scenes, said = session
     results = [line.split()[1:] for line in said.splitlines() if line.startswith("Alpha")]
     first, second = results
@@ -109,7 +105,7 @@ def test_a_session_of_each_device_replays(tmp_path, run, device, commands):
     check_same(run("replay", made))
 
 
-def test_a_recording_has_its_profile_and_without_one_is_of_the_extended(tmp_path, run):
+def test_recording_stores_the_profile_and_defaults_to_extended(tmp_path, run):
     made, header = (
         tmp_path / "session.rec",
         '"options":{"profile":"extended","set":"voting=confirmed"}',
@@ -128,7 +124,7 @@ def test_a_recording_has_its_profile_and_without_one_is_of_the_extended(tmp_path
     assert run("replay", made).code == 1
 
 
-def test_what_is_not_as_it_was_is_told(session, run, tmp_path):
+def test_replay_reports_options_that_differ_from_the_recording(session, run, tmp_path):
     made, scenes, _ = session
     plan = tmp_path / "plan.toml"
     plan.write_text("seed = 1\n")
@@ -183,21 +179,21 @@ def test_plan_of_faults_and_options_are_in_the_header(tmp_path, run, monkeypatch
         ('{"recording":1,"device":"cubestar","lines":{"bench_uart":1}}', "has port bench_uart"),
     ],
 )
-def test_file_that_can_not_be_replayed(tmp_path, run, content, error):
+def test_rejects_invalid_recordings(tmp_path, run, content, error):
     path = tmp_path / "x.rec"
     path.write_text(content)
     outcome = run("replay", path)
     assert (outcome.code, error in outcome.line) == (2, True)
 
 
-def test_files_that_can_not_be_opened(recording, run):
+def test_reports_files_that_cannot_be_opened(recording, run):
     outcome = run("replay", "no.rec")
     assert (outcome.code, "no.rec" in outcome.line) == (1, True)
     outcome = run("replay", recording, "--trace", "no/folder/x.vcd")
     assert (outcome.code, "can not write no/folder/x.vcd" in outcome.line) == (2, True)
 
 
-def test_a_span_as_waveform(recording, run, tmp_path):
+def test_trace_of_a_time_span(recording, run, tmp_path):
     made = tmp_path / "span.vcd"
     assert run("replay", recording, "--trace", made, "--trace-to", "0.001").code == 0
     times = [int(line[1:]) for line in made.read_text().splitlines() if line.startswith("#")]

@@ -1,5 +1,3 @@
-"""The bus that a program runs on: who is on it."""
-
 import argparse
 import errno
 import sys
@@ -15,7 +13,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="/dev/i2c-N is o
 
 
 @pytest.mark.parametrize("names", [("aramis",), ("cubestar", "aramis")])
-def test_all_devices_that_were_asked_for_are_on_one_bus(names: tuple[str, ...]) -> None:
+def test_all_requested_devices_share_one_bus(names: tuple[str, ...]) -> None:
     parser = argparse.ArgumentParser()
     run.add_arguments(parser)
     asked = [word for name in names for word in ("--device", name)]

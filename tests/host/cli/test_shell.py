@@ -1,5 +1,3 @@
-"""`cubestack shell` on emulated devices and recordings: outputs and exit status."""
-
 import json
 import os
 import pty
@@ -12,7 +10,6 @@ import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.cubesense.codes import ImageSize
-from cubestack.host.cli.shell import split_commands
 from cubestack.host.clients.cubesense import client
 from cubestack.host.clients.cubesense.download import download_image
 
@@ -67,23 +64,13 @@ def test_emulated_cubestar_with_a_script(shell, tmp_path):
         (["emulated:cubesense", "-c", "fault uart-drop fault=x"], 2, "unknown parameter 'fault'"),
     ],
 )
-def test_failures_are_one_line(shell, arguments, code, error):
+def test_failure_prints_one_line(shell, arguments, code, error):
     outcome = shell(*arguments)
     assert outcome.code == code
     assert error in outcome.line
 
 
-@pytest.mark.parametrize(
-    "commands", [["read SUN_GAIN; read x; read SUN_GAIN"], ["read SUN_GAIN", "read x"]]
-)
-def test_commands_of_all_options_run_until_the_first_failure(shell, commands):
-    options = [word for command in commands for word in ("-c", command)]
-    code, out, err = shell("emulated:cubesense", *options)
-    assert (code, out.count("SUN_GAIN")) == (2, 1)
-    assert "nothing is called 'x'" in err
-
-
-def test_a_picture_whose_memory_is_cut_off(shell, tmp_path, monkeypatch):
+def test_image_reports_an_over_current_of_its_memory(shell, tmp_path, monkeypatch):
     # Whole pictures have 2176 chunks of margin before the first that is read from the memory.
     small = partial(download_image, size=ImageSize.SIDE_64)
     monkeypatch.setattr(client, "download_image", lambda node, sram, *_: small(node, sram))
@@ -96,12 +83,7 @@ def test_a_picture_whose_memory_is_cut_off(shell, tmp_path, monkeypatch):
     assert "SRAM1 drew too much current" in err
 
 
-def test_semicolons_in_quotes_are_kept():
-    assert list(split_commands("a; b 'x;y' ;\nc")) == ["a", " b 'x;y' ", "", "c"]
-
-
 def test_interactive(tmp_path):
-    """On a terminal: Tab completes, errors do not end it, the history is kept."""
     master, slave = pty.openpty()
     environment = os.environ | {"XDG_STATE_HOME": str(tmp_path), "TERM": "dumb"}
     command = [sys.executable, "-m", "cubestack.host.cli.main", "shell", "emulated:cubesense"]

@@ -1,5 +1,3 @@
-"""`cubestack shell`: the same words give the same answers on every kind of target."""
-
 import contextlib
 import io
 import os
@@ -39,7 +37,7 @@ KINDS = ("pty", "tcp", "rfc2217", "i2c", "recorded", "recorded i2c")
 
 @contextlib.contextmanager
 def serving(kind, folder):
-    """A CubeSense on a port of that kind, and the target that leads to it."""
+    """Serves a CubeSense on a port of ``kind``; yields the target that opens it."""
     with open_device("cubesense") as opened, contextlib.ExitStack() as stack:
         board = opened.board
         adapter = I2cAdapter(board.kernel, board.i2c_bus)
@@ -81,15 +79,14 @@ def shell_on(tmp_path, monkeypatch, run):
 
 @pytest.fixture(scope="module")
 def emulated():
-    """What a device in the same process says."""
+    """Result of the commands on a device in this process."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(["shell", "emulated:cubesense", "-c", COMMANDS])
     return code, out.getvalue(), err.getvalue()
 
 
-def test_an_emulated_device(emulated):
-    """The last of the words makes no sense."""
+def test_emulated_device_runs_the_commands(emulated):
     code, out, err = emulated
     assert code == 2
     for text in SAID:
@@ -98,5 +95,5 @@ def test_an_emulated_device(emulated):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_same_words_say_the_same(shell_on, emulated, kind):
+def test_every_kind_of_target_gives_the_same_output(shell_on, emulated, kind):
     assert shell_on(kind, COMMANDS) == emulated

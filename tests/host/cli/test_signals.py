@@ -1,5 +1,3 @@
-"""Signals end a command in order: what is open is closed, what is done is shown."""
-
 import os
 import select
 import signal
@@ -37,7 +35,7 @@ def alive(process: int) -> bool:
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
-def test_no_link_is_left(number: signal.Signals, tmp_path: Path) -> None:
+def test_signal_removes_the_pty_link(number: signal.Signals, tmp_path: Path) -> None:
     link = tmp_path / "tty"
     with begun("emulate", "cubestar", "--pty", str(link)) as process:
         assert process.stderr is not None
@@ -52,7 +50,7 @@ def test_no_link_is_left(number: signal.Signals, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", quick([signal.SIGKILL, signal.SIGTERM], 1))
 @pytest.mark.parametrize("words", [("ground", "emulated:cubestar"), ("demo", "--out", "{folder}")])
-def test_no_emulation_is_left(
+def test_signal_ends_the_emulation_process(
     words: tuple[str, ...], number: signal.Signals, tmp_path: Path
 ) -> None:
     with begun(*(word.format(folder=tmp_path) for word in words)) as process:
@@ -76,7 +74,7 @@ def children(process: int) -> set[int]:
 
 
 @pytest.mark.slow
-def test_what_was_measured_is_shown() -> None:
+def test_interrupt_shows_the_measurements_so_far() -> None:
     with begun("measure", "cubestar", "--frames", "5000", "--threshold", "25") as process:
         assert process.stderr is not None
         while " of 5000, " not in (line := process.stderr.readline()):

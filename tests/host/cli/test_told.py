@@ -1,5 +1,3 @@
-"""What commands tell and return: exit status, tables, lines for a reader, what stops them."""
-
 import argparse
 import json
 import logging
@@ -45,11 +43,9 @@ def ending(monkeypatch: pytest.MonkeyPatch) -> list[BaseException | int | None]:
 
 
 @pytest.mark.parametrize(
-    ("end", "code", "told"),
+    ("end", "code", "error"),
     [
-        (None, 0, ""),
-        (0, 0, ""),
-        (1, 1, ""),
+        *((status, status or 0, "") for status in (None, 0, 1)),
         (KeyboardInterrupt(), 130, ""),
         (BrokenPipeError(), 1, ""),
         (ValueError("3 is no colour"), 2, "cubestack bench: 3 is no colour\n"),
@@ -57,14 +53,14 @@ def ending(monkeypatch: pytest.MonkeyPatch) -> list[BaseException | int | None]:
         (CompilerError("no compiler"), 1, "cubestack bench: no compiler\n"),
     ],
 )
-def test_the_way_a_command_ends_is_its_exit_code(
-    run: Run, ending: list[Any], end: Any, code: int, told: str
+def test_exit_status_and_error_line_follow_from_how_a_command_ends(
+    run: Run, ending: list[Any], end: Any, code: int, error: str
 ) -> None:
     ending.append(end)
-    assert run("bench") == (code, "", told)
+    assert run("bench") == (code, "", error)
 
 
-def test_what_is_a_mistake_of_ours_is_shown_whole(run: Run, ending: list[Any]) -> None:
+def test_unexpected_exception_keeps_its_traceback(run: Run, ending: list[Any]) -> None:
     ending.append(RuntimeError("impossible"))
     with pytest.raises(RuntimeError, match="impossible"):
         run("bench")
@@ -73,35 +69,31 @@ def test_what_is_a_mistake_of_ours_is_shown_whole(run: Run, ending: list[Any]) -
 @pytest.mark.parametrize(
     ("words", "level"),
     [
-        ((), logging.WARNING),
-        (("-v",), logging.INFO),
-        (("-vv",), logging.DEBUG),
-        (("-vvv",), logging.DEBUG),
-        (("-q",), logging.ERROR),
+        ([], logging.WARNING),
+        (["-v"], logging.INFO),
+        (["-vv"], logging.DEBUG),
+        (["-vvv"], logging.DEBUG),
+        (["-q"], logging.ERROR),
     ],
 )
-def test_loudness(
-    run: Run, monkeypatch: pytest.MonkeyPatch, words: Sequence[str], level: int
+def test_log_level_is_set_during_the_command_and_restored_after(
+    run: Run, monkeypatch: pytest.MonkeyPatch, words: list[str], level: int
 ) -> None:
-    """While a command runs; who calls it as a function has what was before."""
     from cubestack.host import terminal
 
     def state() -> tuple[int, int, bool]:
         return own.level, len(own.handlers), terminal._errors.quiet
 
     own, during = logging.getLogger("cubestack"), list[tuple[int, int, bool]]()
-    monkeypatch.setattr(
-        "cubestack.host.studies.bench.command.run", lambda _: during.append(state())
-    )
+    command = "cubestack.host.studies.bench.command.run"
+    monkeypatch.setattr(command, lambda _: during.append(state()))
     before = state()
     assert run(*words, "bench").code == 0
     assert during == [(level, before[1] + 1, "-q" in words)]
     assert state() == before
 
 
-def test_signals_end_in_order_unless_somebody_else_takes_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_only_signals_with_the_default_handler_are_handled(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = {signal.SIGTERM: signal.SIG_DFL, signal.SIGHUP: signal.SIG_IGN}
     monkeypatch.setattr(signal, "getsignal", taken.__getitem__)
     monkeypatch.setattr(signal, "signal", taken.__setitem__)
@@ -113,17 +105,11 @@ def test_signals_end_in_order_unless_somebody_else_takes_them(
     assert end.value.code == 128 + 15
 
 
-def test_examples_have_names_of_devices() -> None:
+def test_help_examples_name_registered_devices() -> None:
     first, second, third = device_names()[:3]
     assert entry._with_names("a {first} b {second} {third} {fourth}") == (
         f"a {first} b {second} {third} {{fourth}}"
     )
-
-
-def test_the_version_is_told(run: Run) -> None:
-    from importlib.metadata import version
-
-    assert run("--version").out == f"cubestack {version('cubestack')}\n"
 
 
 # --- experiments ----------------------------------------------------------------------------------
@@ -131,15 +117,11 @@ def test_the_version_is_told(run: Run) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted(Options):
-    """How many."""
-
     frames: int = whole(1, "number", 1)
 
 
 @dataclass(frozen=True)
 class Number(Result):
-    """One."""
-
     number: int
     right: bool = True
 
@@ -179,7 +161,9 @@ def counted(experiment: Counting, frames: int, *, as_json: bool = False, **more:
     return measure.run_experiment(args, device("aramis"), experiment)
 
 
-def test_a_table_has_the_first_results_and_their_sum(capsys: pytest.CaptureFixture[str]) -> None:
+def test_table_shows_the_first_40_results_and_the_summary(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert counted(Counting(), 43) == 0
     out = capsys.readouterr().out
     lines = [line.split() for line in out.splitlines()]
@@ -192,7 +176,7 @@ def test_a_table_has_the_first_results_and_their_sum(capsys: pytest.CaptureFixtu
     assert "more" not in capsys.readouterr().out
 
 
-def test_json_is_a_line_each_with_what_ran_and_nothing_else(
+def test_json_prints_one_line_per_result_with_its_profile(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert counted(Counting(), 3, as_json=True) == 0
@@ -202,17 +186,16 @@ def test_json_is_a_line_each_with_what_ran_and_nothing_else(
     assert {json.loads(line)["profile"] for line in out.splitlines()} == {"published"}
 
 
-def test_an_experiment_has_no_sections_of_its_own_accord() -> None:
+def test_failed_experiment_exits_with_1_and_has_no_sections(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert list(Counting().sections([{"number": 1}])) == []
-
-
-def test_what_is_no_success_is_told_by_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Counting, "good", False)
     assert counted(Counting(), 1) == 1
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_what_was_counted_before_a_stop_is_shown(
+def test_interrupted_experiment_shows_the_results_so_far(
     as_json: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(Counting, "stop", 2)
@@ -227,7 +210,7 @@ def test_what_was_counted_before_a_stop_is_shown(
     assert capsys.readouterr().out == ""
 
 
-def test_results_without_a_verdict_can_not_be_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_min_right_rejects_results_without_a_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     @dataclass(frozen=True)
     class Silent(Result):
         number: int
@@ -245,7 +228,7 @@ POINTS = [
 ]
 
 
-def test_hazards_are_told_with_limits(
+def test_hazards_table_shows_confidence_limits(
     run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     asked = list[Any]()
@@ -274,7 +257,7 @@ def test_hazards_are_told_with_limits(
     assert [json.loads(line)["right"] for line in listed] == [13, 20]
 
 
-def test_all_devices_are_measured_by_default(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hazards_measures_all_devices_by_default(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = list[Any]()
     monkeypatch.setattr(hazards.curves, "run", lambda jobs, _workers: asked.extend(jobs) or [])
     assert run("hazards", "--hazard", "fog", "--json").code == 2
@@ -282,7 +265,7 @@ def test_all_devices_are_measured_by_default(run: Run, monkeypatch: pytest.Monke
     assert {job.device for job in asked} == set(hazards.curves.devices_with_hazards())
 
 
-def test_the_scale_of_each_hazard_is_listed(run: Run) -> None:
+def test_list_shows_the_strengths_of_each_hazard(run: Run) -> None:
     from cubestack.host.experiments.hazard_options import known
 
     lines = run("hazards", "--list").out.splitlines()
@@ -324,7 +307,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     return made
 
 
-def test_a_campaign_tells_rates_with_limits(run: Run, folder: SimpleNamespace) -> None:
+def test_campaign_prints_rates_with_confidence_limits(run: Run, folder: SimpleNamespace) -> None:
     told = run("campaign", "plan.toml", "--workers", "2")
     assert told.code == 0
     rows = [line.split() for line in told.out.splitlines()]
@@ -340,7 +323,7 @@ def test_a_campaign_tells_rates_with_limits(run: Run, folder: SimpleNamespace) -
     assert folder.asked[-1][0] >= 1
 
 
-def test_failed_frames_are_told_and_are_no_success(run: Run, folder: SimpleNamespace) -> None:
+def test_failed_frames_are_reported_and_exit_with_1(run: Run, folder: SimpleNamespace) -> None:
     folder.ended = {(("stars", 3),): Counter(failed=2), (("stars", 9),): Counter(failed=1, right=1)}
     told = run("campaign", "plan.toml")
     assert told.code == 1
@@ -348,7 +331,7 @@ def test_failed_frames_are_told_and_are_no_success(run: Run, folder: SimpleNames
 
 
 @pytest.mark.parametrize(("stop", "code"), [(KeyboardInterrupt(), 130), (OSError("full"), 1)])
-def test_how_to_go_on_is_told(
+def test_stopped_campaign_explains_how_to_resume(
     run: Run, folder: SimpleNamespace, stop: BaseException, code: int
 ) -> None:
     folder.stop = stop
@@ -357,7 +340,7 @@ def test_how_to_go_on_is_told(
     assert f"3 of 8 results are in {folder.path}; --resume continues" in told.err
 
 
-def test_plans_that_come_along_are_listed(run: Run) -> None:
+def test_list_shows_the_shipped_plans(run: Run) -> None:
     plain, data = run("campaign", "--list"), run("campaign", "--list", "--json")
     told = [json.loads(line) for line in data.out.splitlines()]
     assert len(told) == len(plain.out.splitlines()) > 3
@@ -369,7 +352,7 @@ def test_plans_that_come_along_are_listed(run: Run) -> None:
 
 @pytest.mark.parametrize("as_json", [False, True])
 @pytest.mark.parametrize("worse", [False, True])
-def test_a_report_tells_what_is_worse(
+def test_report_prints_what_got_worse(
     run: Run, folder: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, worse: bool, as_json: bool
 ) -> None:
     changes = [

@@ -1,5 +1,3 @@
-"""``cubestack hdl wave``: finding a failed test's waveform, and showing it."""
-
 import json
 from pathlib import Path
 
@@ -55,7 +53,7 @@ def test_text_ends_where_the_test_failed(name: str, folder: Path, run: Run) -> N
     assert [line.split() for line in lines[8:]] == [["ACK", "1"], ["DATA", "28"]]
 
 
-def test_internal_signals_on_demand(folder: Path) -> None:
+def test_internal_signals_are_optional(folder: Path) -> None:
     path = folder / "cubestar_top.stores-8-4-1.whole_frame.vcd"
     assert read(path).signals == ["DATA", "ACK"]
     trace = read(path, 4, internal=True)
@@ -68,7 +66,7 @@ def test_internal_signals_on_demand(folder: Path) -> None:
     ]
 
 
-def test_viewer_is_opened_where_there_is_a_screen(
+def test_opens_the_viewer_when_there_is_a_display(
     folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, run: Run
 ) -> None:
     seen = tmp_path / "seen"
@@ -92,14 +90,16 @@ def test_viewer_is_opened_where_there_is_a_screen(
         (["whole_frame", "--last", "0"], 2, "must be at least 1, not 0"),
     ],
 )
-def test_wrong_calls(arguments: list[str], code: int, error: str, folder: Path, run: Run) -> None:
+def test_rejects_wrong_arguments(
+    arguments: list[str], code: int, error: str, folder: Path, run: Run
+) -> None:
     outcome = run("hdl", "wave", *arguments, "--folder", folder)
     assert outcome.code == code
     assert error in outcome.err
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x00\xff", b"$scope module"])
-def test_what_is_no_waveform_is_one_line(content: bytes, tmp_path: Path, run: Run) -> None:
+def test_rejects_files_that_are_no_vcd(content: bytes, tmp_path: Path, run: Run) -> None:
     (tmp_path / "x.vcd").write_bytes(content)
     outcome = run("hdl", "wave", tmp_path / "x.vcd", "--text")
     assert outcome.code == (0 if not content else 2)

@@ -1,5 +1,3 @@
-"""What the clients of all devices, and the buses under them, have in common."""
-
 from typing import Any
 
 import pytest
@@ -33,7 +31,7 @@ DEVICES = pytest.mark.parametrize(
 
 
 @DEVICES
-def test_a_full_buffer_is_waited_for_once(interface: Interface, device: type[DeviceClient]) -> None:
+def test_full_buffer_is_retried_once(interface: Interface, device: type[DeviceClient]) -> None:
     node = FakeNode(interface)
     client = device(NodeClient(UartLink(node), interface))
     node.refusals.append(AckError.BUFFER_FULL)
@@ -45,7 +43,7 @@ def test_a_full_buffer_is_waited_for_once(interface: Interface, device: type[Dev
 
 
 @DEVICES
-def test_no_stars_and_no_stream_over_i2c(interface: Interface, device: type[Any]) -> None:
+def test_i2c_has_no_stream(interface: Interface, device: type[Any]) -> None:
     client = device(over_i2c(FakeNode(interface)))
     assert client.stars() == []
     with pytest.raises(TypeError, match=r"StreamDownImage: .* over a UART only"):
@@ -53,13 +51,13 @@ def test_no_stars_and_no_stream_over_i2c(interface: Interface, device: type[Any]
 
 
 @pytest.mark.parametrize("wrong", [{}, {"Q3": 0.5}, {"Q0": 2.0}, {"Q1": float("nan")}])
-def test_a_quaternion_that_is_no_rotation_is_told(wrong: dict[str, float]) -> None:
+def test_rejects_a_quaternion_that_is_no_rotation(wrong: dict[str, float]) -> None:
     values = dict.fromkeys(("Q0", "Q1", "Q2", "Q3"), 0.0) | wrong
     with pytest.raises(BadAnswerError, match=r"quaternion has length (0|0\.5|2|nan), not 1"):
         unit_quaternion(values)
 
 
-def test_a_device_without_a_picture_says_so(node: FakeNode) -> None:
+def test_picture_is_rejected_where_there_is_none(node: FakeNode) -> None:
     with pytest.raises(TargetError, match="CubeStar sends no picture"):
         DeviceClient(NodeClient(UartLink(node), CUBESTAR)).picture()
     with pytest.raises(TargetError, match="AraMiS sends its image over a serial line only"):

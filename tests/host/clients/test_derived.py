@@ -1,5 +1,3 @@
-"""Clients that follow from an interface."""
-
 from typing import Any
 
 import pytest
@@ -67,16 +65,16 @@ def test_telecommands_take_parameters_by_position_or_name(spy: Spy, client: Any)
         client.set_adc_pair(1, 2, Third=3)
 
 
-def test_telemetry_is_returned_by_field(client: Any) -> None:
+def test_telemetry_returns_fields_by_name(client: Any) -> None:
     assert client.adc_pair()["Second"] == 0
     assert client.adc_pair.__doc__ == "both"
 
 
-def test_names_of_every_client_keep_their_meaning(spy: Spy, client: Any) -> None:
+def test_message_name_does_not_replace_a_client_method(spy: Spy, client: Any) -> None:
     client.close()
     assert spy.sent == [("close", {})]
 
 
-def test_messages_that_no_node_serves_have_no_method(client: Any) -> None:
+def test_unsupported_messages_have_no_method(client: Any) -> None:
     assert type(client).__name__ == "Plain"
     assert not hasattr(client, "hidden")

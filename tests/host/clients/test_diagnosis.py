@@ -1,5 +1,3 @@
-"""Lines on which no node answers: what is told of them."""
-
 import re
 import shutil
 import socket
@@ -32,7 +30,7 @@ SERVES = re.compile(r" serves on (\S+) at ")
 
 @contextmanager
 def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
-    """A port of somebody who answers to what comes."""
+    """A TCP port that answers each request with ``answer(request)``."""
 
     def serve() -> None:
         client, _ = server.accept()
@@ -57,7 +55,7 @@ def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
         (lambda _data: b"login: ", "bytes arrive, but no frame: .* (6c 6f 67 69 6e 3a 20)"),
     ],
 )
-def test_what_comes_tells_what_it_is(answer: Callable[[bytes], bytes], told: str) -> None:
+def test_diagnosis_follows_from_the_answer(answer: Callable[[bytes], bytes], told: str) -> None:
     with answering(answer) as port:
         line = open_transport(port, INTERFACE.baud)
         found = why_silent(line, INTERFACE)
@@ -66,14 +64,14 @@ def test_what_comes_tells_what_it_is(answer: Callable[[bytes], bytes], told: str
     assert bool(found) == bool(told)
 
 
-def test_lines_that_are_no_port_are_not_asked(sense: object) -> None:
+def test_other_lines_are_not_diagnosed(sense: object) -> None:
     assert why_silent(UartLink(sense), INTERFACE) == ""  # type: ignore[arg-type]
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's
 @pytest.mark.parametrize("how", quick(["--strict-line --pty", "--rfc2217 0"], 1))
-def test_the_right_baud_rate_is_found(how: str, tmp_path: Path) -> None:
+def test_finds_the_baud_rate(how: str, tmp_path: Path) -> None:
     words = how.split() + ([str(tmp_path / "tty")] if "pty" in how else [])
     with emulating(["cubesense", "--baud", "38400", *words]) as said:
         served = next(found[1] for one in said if (found := SERVES.search(one)))
@@ -96,10 +94,7 @@ def test_the_right_baud_rate_is_found(how: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("socat") is None, reason="no socat")
-def test_a_line_between_two_terminals_with_nobody_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As with a cable whose other end hangs in the air: all rates are tried, and none is left."""
+def test_open_cable_restores_the_baud_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(diagnosis, "SILENCE_S", 0.02)
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     ends = [f"pty,raw,echo=0,link={end}" for end in (ours, theirs)]

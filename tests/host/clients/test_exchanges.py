@@ -1,5 +1,3 @@
-"""What goes over the wire is counted, request by request."""
-
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from cubestack.host.targets import open_target
 from ..conftest import Slave, over_i2c
 
 
-def test_answers_lost_and_refused_on_a_serial_line(node: Any, uart: Any) -> None:
+def test_counts_lost_and_refused_answers(node: Any, uart: Any) -> None:
     client = NodeClient(uart, node.interface)
     node.lost = 2
     client.telemetry("Identification")
@@ -36,14 +34,14 @@ def test_answers_lost_and_refused_on_a_serial_line(node: Any, uart: Any) -> None
     assert client.exchanges == Exchanges(sent=5, answered=2, late=3, repeated=2, refused=1)
 
 
-def test_frames_of_a_picture_come_without_requests(node: Any, uart: Any) -> None:
+def test_counts_streamed_frames(node: Any, uart: Any) -> None:
     client = NodeClient(uart, node.interface)
     uart.later += encode_frame(b"\x07") * 3
     assert len([*client.stream("StreamDownImage", 3)]) == 3
     assert client.exchanges == Exchanges(sent=1, answered=1, streamed=3)
 
 
-def test_transfers_that_are_not_acknowledged(node: Any) -> None:
+def test_counts_transfers_without_acknowledge(node: Any) -> None:
     client = over_i2c(node)
     assert isinstance(client, I2cClient)
     client._bus.failures = 1  # type: ignore[attr-defined]
@@ -54,7 +52,7 @@ def test_transfers_that_are_not_acknowledged(node: Any) -> None:
     assert client.exchanges.sent == 2
 
 
-def test_registers_are_counted_too() -> None:
+def test_counts_register_transfers() -> None:
     registers = device("cubesense").interface.registers
     assert registers is not None
     slave = Slave()
@@ -65,8 +63,7 @@ def test_registers_are_counted_too() -> None:
     assert client.exchanges + client.exchanges == Exchanges(sent=4, answered=2, late=2, repeated=2)
 
 
-def test_a_page_tells_what_a_recording_has(tmp_path: Path) -> None:
-    """Every frame that the host put on the line, those of waiting and of pictures among them."""
+def test_page_counters_match_the_recording(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     target = open_target("emulated:cubesense", record=path)
     session = TargetSession(target)

@@ -16,7 +16,7 @@ def client(i2c: I2cLink) -> I2cClient:
     return I2cClient(i2c, INTERFACE, wait=i2c.waits.append)
 
 
-def test_a_telecommand_waits_until_it_is_processed_or_is_late(node: Any, i2c: Any) -> None:
+def test_telecommand_waits_until_processed_or_times_out(node: Any, i2c: Any) -> None:
     client = I2cClient(i2c, INTERFACE, wait=i2c.waits.append, processing_timeout_s=0.5)
     node.busy = 4
     client.command("CaptureImage")
@@ -27,7 +27,7 @@ def test_a_telecommand_waits_until_it_is_processed_or_is_late(node: Any, i2c: An
     assert sum(i2c.waits[4:]) == pytest.approx(0.5)
 
 
-def test_what_the_node_could_not_refuse_visibly_is_not_sent(client: I2cClient, node: Any) -> None:
+def test_invalid_parameters_are_not_sent(client: I2cClient, node: Any) -> None:
     with pytest.raises(CommandRefusedError, match=r"BAD_PARAMETER \(3\), IdMode is out of range"):
         client.command("setIDMode", IdMode=7)
     with pytest.raises(InterfaceError, match="did you mean IdMode"):
@@ -35,7 +35,7 @@ def test_what_the_node_could_not_refuse_visibly_is_not_sent(client: I2cClient, n
     assert node.log == []
 
 
-def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any) -> None:
+def test_error_code_in_the_acknowledge_telemetry_is_raised(sense: Any) -> None:
     client = over_i2c(sense)
     client.command("CaptureAndDetect", Camera=0, Sram=0)
     for code, text in ((4, r"BUFFER_FULL \(4\)"), (99, r"unknown code \(99\)")):
@@ -44,7 +44,7 @@ def test_an_error_code_in_the_acknowledge_telemetry_is_told(sense: Any) -> None:
             client.command("CaptureAndDetect", Camera=0, Sram=0)
 
 
-def test_telemetry_is_asked_for_again(client: I2cClient, i2c: Any) -> None:
+def test_telemetry_is_retried(client: I2cClient, i2c: Any) -> None:
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}
     assert client.exchanges.repeated == 0
     i2c.failures = 2
@@ -52,7 +52,7 @@ def test_telemetry_is_asked_for_again(client: I2cClient, i2c: Any) -> None:
     assert client.exchanges.repeated == 2
 
 
-def test_a_telecommand_that_was_not_acknowledged_is_never_repeated(
+def test_telecommand_without_acknowledge_is_not_retried(
     client: I2cClient, node: Any, i2c: Any
 ) -> None:
     i2c.failures = 1
@@ -61,7 +61,7 @@ def test_a_telecommand_that_was_not_acknowledged_is_never_repeated(
     assert node.log == []
 
 
-def test_a_silent_address_is_named(i2c: Any) -> None:
+def test_silent_address_is_named(i2c: Any) -> None:
     client = I2cClient(i2c, INTERFACE, 0x55, wait=i2c.waits.append)
     with pytest.raises(NoAnswerError, match=r"telemetry ErrorFlags .* address 0x55 in 3 attempts"):
         client.telemetry("ErrorFlags")
@@ -70,9 +70,7 @@ def test_a_silent_address_is_named(i2c: Any) -> None:
 
 
 @pytest.mark.parametrize("bus", ["uart", "i2c"])
-def test_what_the_tables_call_unsupported_is_not_asked_for(
-    bus: str, node: Any, uart: Any, i2c: Any
-) -> None:
+def test_unsupported_telemetry_is_not_requested(bus: str, node: Any, uart: Any, i2c: Any) -> None:
     client = NodeClient(uart, INTERFACE) if bus == "uart" else I2cClient(i2c, INTERFACE)
     (name,) = (message.name for message in INTERFACE.telemetries if not message.supported)
     with pytest.raises(NotSupportedError, match=f"telemetry {name} is not supported by the node"):

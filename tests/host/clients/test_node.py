@@ -34,7 +34,7 @@ def test_every_telemetry_frame_arrives(message: Message, data: st.DataObject) ->
 
 
 @pytest.mark.parametrize("chunk", [1, 2, 7, 4096])
-def test_answers_may_come_in_pieces_behind_noise(
+def test_accepts_answers_in_pieces_after_noise(
     client: NodeClient, uart: Any, node: Any, chunk: int
 ) -> None:
     uart.chunk = chunk
@@ -43,22 +43,17 @@ def test_answers_may_come_in_pieces_behind_noise(
     assert client.telemetry("powerstatus")["Current"] == 177
 
 
-def test_what_came_behind_an_answer_is_not_taken_for_the_next_one(
-    client: NodeClient, uart: Any
-) -> None:
+def test_extra_and_late_answers_are_dropped(client: NodeClient, uart: Any) -> None:
+    uart.pending += encode_frame(b"\x07")
+    assert client.telemetry("TcmdProcessed") == {"Processed": 1}
     uart.mangle = lambda data: data + encode_frame(b"\x07")
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}
     uart.mangle = lambda data: data
     assert client.telemetry("TcmdProcessed") == {"Processed": 1}
 
 
-def test_a_late_answer_is_not_taken_for_the_next_one(client: NodeClient, uart: Any) -> None:
-    uart.pending += encode_frame(b"\x07")
-    assert client.telemetry("TcmdProcessed") == {"Processed": 1}
-
-
 @pytest.mark.parametrize("code", [error for error in AckError if error])
-def test_a_refusal_names_the_telecommand_and_the_error(
+def test_refusal_names_the_telecommand_and_the_error(
     client: NodeClient, node: Any, code: AckError
 ) -> None:
     node.refusals.append(code)
@@ -68,7 +63,7 @@ def test_a_refusal_names_the_telecommand_and_the_error(
     assert caught.value.code is code
 
 
-def test_what_the_node_alone_refuses(client: NodeClient, uart: Any) -> None:
+def test_refusals_of_the_node_are_raised(client: NodeClient, uart: Any) -> None:
     with pytest.raises(CommandRefusedError, match=r"setIDMode refused: BAD_PARAMETER \(3\)"):
         client.command("setIDMode", IdMode=7)
     uart.mangle = lambda _data: encode_frame(b"\x63")
@@ -84,7 +79,7 @@ def test_what_the_node_alone_refuses(client: NodeClient, uart: Any) -> None:
         ("Exposure", {"exposure": 70_000}, "70000 does not fit; u16 carries 0 to 65535 lines"),
     ],
 )
-def test_what_the_tables_lack_is_never_sent(
+def test_unknown_names_and_values_are_not_sent(
     client: NodeClient, node: Any, name: str, parameters: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(InterfaceError, match=re.escape(message)):
@@ -92,7 +87,7 @@ def test_what_the_tables_lack_is_never_sent(
     assert node.log == []
 
 
-def test_telemetry_is_asked_for_three_times(client: NodeClient, node: Any, uart: Any) -> None:
+def test_telemetry_is_requested_three_times(client: NodeClient, node: Any, uart: Any) -> None:
     node.lost = 2
     assert client.telemetry("Identification")["InterfaceVersion"] == 0
     node.lost = 3
@@ -102,14 +97,14 @@ def test_telemetry_is_asked_for_three_times(client: NodeClient, node: Any, uart:
     assert [silence for silence in uart.silences if silence] == [1.0, 1.0, 1.0]
 
 
-def test_telecommands_are_never_repeated(client: NodeClient, node: Any) -> None:
+def test_telecommands_are_not_retried(client: NodeClient, node: Any) -> None:
     node.lost = 1
     with pytest.raises(TimeoutError, match="no acknowledge of telecommand CaptureImage within 1 s"):
         client.command("CaptureImage")
     assert [name for name, _ in node.log] == ["CaptureImage"]
 
 
-def test_answers_of_a_wrong_length_are_told(client: NodeClient, uart: Any) -> None:
+def test_rejects_answers_of_a_wrong_length(client: NodeClient, uart: Any) -> None:
     uart.mangle = lambda _data: encode_frame(b"abc")
     with pytest.raises(BadAnswerError, match="telemetry Quaternion has 3 bytes, not 8"):
         client.telemetry("Quaternion")
@@ -117,7 +112,7 @@ def test_answers_of_a_wrong_length_are_told(client: NodeClient, uart: Any) -> No
         client.command("Reset")
 
 
-def test_a_babbling_line_ends_as_no_answer() -> None:
+def test_endless_noise_counts_as_no_answer() -> None:
     class Babble(LetterLine):
         reads = 0
 
@@ -140,7 +135,7 @@ def test_processing_is_polled(client: NodeClient, node: Any, uart: Any) -> None:
         client.wait_processed(0.03)
 
 
-def test_a_with_block_closes_the_transport(uart: Any) -> None:
+def test_with_block_closes_the_transport(uart: Any) -> None:
     closed = []
     uart.close = lambda: closed.append(True)
     with NodeClient(uart, INTERFACE) as client:

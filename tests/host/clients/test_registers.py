@@ -21,9 +21,7 @@ def client(slave: Slave) -> RegisterClient:
     return RegisterClient(slave, REGISTERS, wait=slave.waits.append)
 
 
-def test_measurements_are_signed_with_the_most_significant_byte_first(
-    client: RegisterClient, slave: Slave
-) -> None:
+def test_measurements_are_signed_big_endian(client: RegisterClient, slave: Slave) -> None:
     slave.content[REGISTERS["NADIR_X"].address] = bytes.fromhex("FB2E")
     slave.content[REGISTERS["SUN_Y"].address] = bytes.fromhex("04D2")
     assert client.read("nadir_x") == -12.34
@@ -38,7 +36,7 @@ def test_configuration_is_one_byte(client: RegisterClient, slave: Slave) -> None
     assert client.read("NADIR_THRESHOLD") == 85
 
 
-def test_the_picture_comes_in_reads_that_a_bus_driver_takes_and_begins_anew(
+def test_picture_is_read_in_chunks_and_restarts_after_a_failure(
     client: RegisterClient, slave: Slave
 ) -> None:
     picture = np.random.default_rng(2).integers(0, 256, 307_200, np.uint8).tobytes()
@@ -63,7 +61,7 @@ def test_the_picture_comes_in_reads_that_a_bus_driver_takes_and_begins_anew(
         ("MEASURE", 4, "register MEASURE: 4 is out of range"),
     ],
 )
-def test_what_the_map_lacks_is_never_sent(
+def test_unknown_names_and_values_are_not_sent(
     client: RegisterClient, slave: Slave, name: str, value: object, message: str
 ) -> None:
     with pytest.raises(InterfaceError, match=re.escape(message)):
@@ -71,12 +69,12 @@ def test_what_the_map_lacks_is_never_sent(
     assert slave.transfers == 0
 
 
-def test_a_command_can_not_be_read(client: RegisterClient) -> None:
+def test_write_only_register_cannot_be_read(client: RegisterClient) -> None:
     with pytest.raises(InterfaceError, match="register MEASURE is write-only"):
         client.read("MEASURE")
 
 
-def test_reads_are_repeated_and_writes_are_not(client: RegisterClient, slave: Slave) -> None:
+def test_reads_are_retried_and_writes_are_not(client: RegisterClient, slave: Slave) -> None:
     slave.content[0] = b"\x07"
     slave.failures = [0, 1]
     assert client.read("SUN_THRESHOLD") == 7
@@ -86,7 +84,7 @@ def test_reads_are_repeated_and_writes_are_not(client: RegisterClient, slave: Sl
     assert slave.written == []
 
 
-def test_a_silent_address_is_named(slave: Slave) -> None:
+def test_silent_address_is_named(slave: Slave) -> None:
     client = RegisterClient(slave, REGISTERS, 0x33, wait=slave.waits.append)
     with pytest.raises(NoAnswerError, match=r"register SUN_X .* address 0x33 in 3 attempts"):
         client.read("SUN_X")
@@ -94,7 +92,7 @@ def test_a_silent_address_is_named(slave: Slave) -> None:
 
 
 class Line:
-    """A serial line: requests, and answers in pieces of 5000 bytes; the first so many fail."""
+    """A serial line that answers in pieces of 5000 bytes; the first ``failures`` are cut short."""
 
     def __init__(self, answer: bytes, failures: int = 0) -> None:
         self.answer, self.failures, self.written = answer, failures, b""

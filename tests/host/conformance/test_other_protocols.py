@@ -1,5 +1,3 @@
-"""Checks of registers behind a pointer and of bench letters: what is good passes, the rest not."""
-
 from dataclasses import replace
 from typing import Any
 
@@ -23,11 +21,11 @@ LETTERS = INTERFACE.service_port.letters
 
 
 class Registers(Slave):
-    """Behave well: a value that is not allowed is ignored.
+    """Registers that ignore invalid values.
 
     Attributes:
         kept: names of registers that no write changes.
-        takes_all: whether any value is taken.
+        takes_all: whether invalid values are stored.
     """
 
     def __init__(self) -> None:
@@ -57,7 +55,6 @@ def bench() -> LetterLine:
 
 
 def checked(slave: Slave | None, bench: LetterLine | None, **notes: Any) -> dict[str, CheckResult]:
-    """The checks that were run, by name."""
     client = NodeClient(UartLink(FakeNode(BARE)), BARE, retries=0)
     registers = None if slave is None else RegisterClient(slave, REGISTERS)
     target = Target("fake", BARE, client, registers=registers, service_port=bench)
@@ -70,7 +67,7 @@ def failed(checks: dict[str, CheckResult]) -> dict[str, str]:
     return {name: one.detail for name, one in checks.items() if one.verdict is Verdict.FAILED}
 
 
-def test_what_behaves_well_passes_and_is_as_before(slave: Registers, bench: LetterLine) -> None:
+def test_correct_device_passes_and_keeps_its_settings(slave: Registers, bench: LetterLine) -> None:
     before = dict(slave.content)
     checks = checked(slave, bench)
     assert {one.verdict for one in checks.values()} == {Verdict.PASSED}
@@ -102,7 +99,7 @@ def test_each_setting_is_written_at_both_ends_and_beyond(
 
 
 @pytest.mark.parametrize("name", [one.name for one in SETTINGS])
-def test_a_setting_that_does_not_change_is_found(
+def test_setting_that_does_not_change_is_found(
     name: str, slave: Registers, bench: LetterLine
 ) -> None:
     slave.kept = {name}
@@ -112,7 +109,7 @@ def test_a_setting_that_does_not_change_is_found(
     assert failed(checked(slave, bench, optional=frozenset({name}))) == {}
 
 
-def test_a_wrong_value_that_is_taken_is_found(slave: Registers, bench: LetterLine) -> None:
+def test_stored_invalid_value_is_found(slave: Registers, bench: LetterLine) -> None:
     slave.takes_all = True
     narrow = [one for one in SETTINGS if not one.allows(one.decode(b"\xff"))]
     found = failed(checked(slave, bench))
@@ -120,7 +117,7 @@ def test_a_wrong_value_that_is_taken_is_found(slave: Registers, bench: LetterLin
     assert all("is not allowed, but" in detail for detail in found.values())
 
 
-def test_without_lines_they_are_left_out() -> None:
+def test_checks_without_a_line_are_skipped() -> None:
     checks = checked(None, None)
     skipped = {name: one.detail for name, one in checks.items() if one.verdict is Verdict.SKIPPED}
     assert set(checks) - set(skipped) == {"unknown telecommand IDs"}
@@ -129,20 +126,16 @@ def test_without_lines_they_are_left_out() -> None:
         assert detail.startswith(expected)
 
 
-def test_an_answer_that_is_too_short_is_found(slave: Registers, bench: LetterLine) -> None:
-    one = next(letter for letter in LETTERS if letter.answer is None and letter.length > 1)
-    bench.answers[one.letter] = bytes(one.length - 1)
+def test_wrong_bench_answers_are_found(slave: Registers, bench: LetterLine) -> None:
+    short = next(one for one in LETTERS if one.answer is None and one.length > 1)
+    wrong = next(one for one in LETTERS if one.answer is not None)
+    bench.answers |= {short.letter: bytes(short.length - 1), wrong.letter: bytes(wrong.length)}
     found = failed(checked(slave, bench))
-    assert f"declared {one.length}" in found[f"bench letter {one.letter!r}"]
+    assert f"declared {short.length}" in found[f"bench letter {short.letter!r}"]
+    assert f"bench letter {wrong.letter!r}" in found
 
 
-def test_a_wrong_fixed_answer_is_found(slave: Registers, bench: LetterLine) -> None:
-    one = next(letter for letter in LETTERS if letter.answer is not None)
-    bench.answers[one.letter] = bytes(one.length)
-    assert f"bench letter {one.letter!r}" in failed(checked(slave, bench))
-
-
-def test_an_answer_to_no_letter_is_found(slave: Registers, bench: LetterLine) -> None:
+def test_answer_to_an_unknown_letter_is_found(slave: Registers, bench: LetterLine) -> None:
     class Chatty(LetterLine):
         def write(self, data: bytes) -> None:
             super().write(data)

@@ -1,5 +1,3 @@
-"""Devices by name: those of this distribution, those of others, and wrong registrations."""
-
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,7 +15,6 @@ from cubestack.host.errors import TargetError
 
 @pytest.fixture
 def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[EntryPoint]]:
-    """What other distributions register; to be filled."""
     others: list[EntryPoint] = []
     monkeypatch.setattr(registry, "entry_points", lambda group: others)
     registry._entries.cache_clear()

@@ -1,5 +1,3 @@
-"""Logs of results: their lines in time, and how much they scatter about straight lines."""
-
 import csv
 import io
 from itertools import islice
@@ -16,8 +14,6 @@ from tests.conftest import Run
 
 
 class Clock:
-    """Time that passes when somebody waits."""
-
     now = 100.0
     interface = CUBESENSE
 

@@ -1,5 +1,3 @@
-"""Which telecommands' settings telemetry shows, and where."""
-
 from collections import Counter
 
 import pytest

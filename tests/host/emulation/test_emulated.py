@@ -1,5 +1,3 @@
-"""An emulated device for a driver: its ports, its scene, its time."""
-
 import subprocess
 import sys
 from collections.abc import Iterator

@@ -1,5 +1,3 @@
-"""Devices go back: what they say after that is what they said then, byte for byte."""
-
 import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future

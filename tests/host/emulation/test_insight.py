@@ -1,5 +1,3 @@
-"""Files of what firmware did are of all devices; a debugger's port goes with its device."""
-
 import socket
 from contextlib import ExitStack
 from pathlib import Path
@@ -20,7 +18,6 @@ from tests.emulator.iss.efm32gg.bench import MS, Bench
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_profile_has_the_cycles_of_all_devices(tmp_path: Path, count: int) -> None:
-    """Of which each runs a loop on the spot for a time of its own."""
     path, cycles = tmp_path / "profile", 0
     with ExitStack() as stack:
         watch = InsightFiles(profile=path).open(stack)

@@ -1,5 +1,3 @@
-"""Devices that look at what is around their satellite."""
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""A driver that sleeps and watches the clock, in virtual time."""
-
 import queue
 import sys
 import threading
@@ -22,8 +20,6 @@ REAL = {name: getattr(time, name) for name in ("sleep", *CLOCKS, *(f"{one}_ns" f
 
 
 class FakeDevice:
-    """Virtual time alone."""
-
     def __init__(self, time_s: float = 0.0) -> None:
         self.time_s = time_s
 

@@ -1,5 +1,3 @@
-"""pyserial's port in virtual time: what it reads, and how long it waits for it."""
-
 from typing import Any
 
 import pytest

@@ -1,4 +1,4 @@
-"""Hazards as an option: names and strengths that can be, and where a frame gets them."""
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +12,18 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.experiments.cubesense.measure import CubeSenseOptions, random_view
 from cubestack.host.experiments.cubestar.measure import CubeStarOptions
-from cubestack.host.experiments.hazard_options import Asked, around_earth, known, with_hazards
+from cubestack.host.experiments.hazard_options import (
+    Asked,
+    around_earth,
+    check,
+    known,
+    with_hazards,
+)
 
 VIEW = SkyView(SkyScene.pointing(84, -1), CONDITION)
 
 
-def test_a_hazard_is_a_name_and_perhaps_a_strength() -> None:
+def test_hazard_option_has_a_name_and_an_optional_strength() -> None:
     options = CubeStarOptions(hazard=("moon", "gradient=60"))
     assert options.hazard == (Asked("moon"), Asked("gradient", 60.0))
     assert [str(one) for one in options.hazard] == ["moon", "gradient=60"]
@@ -32,7 +38,7 @@ def test_a_hazard_is_a_name_and_perhaps_a_strength() -> None:
     ],
 )
 @pytest.mark.parametrize("options", [CubeStarOptions, CubeSenseOptions])
-def test_what_is_no_hazard_is_refused(
+def test_rejects_unknown_hazards_and_strengths(
     options: type[CubeStarOptions | CubeSenseOptions], given: str, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
@@ -40,7 +46,7 @@ def test_what_is_no_hazard_is_refused(
 
 
 @pytest.mark.parametrize("name", sorted(set(known()) - set(EARTH_HAZARDS)))
-def test_every_hazard_goes_where_it_belongs_at_every_strength(name: str) -> None:
+def test_hazard_is_added_to_scene_or_condition_at_every_strength(name: str) -> None:
     for strength in known()[name].strength.values:
         view = with_hazards(VIEW, (Asked(name, strength),), np.random.default_rng(1))
         assert len(view.scene.hazards) + len(view.condition.hazards) == 1
@@ -49,9 +55,7 @@ def test_every_hazard_goes_where_it_belongs_at_every_strength(name: str) -> None
 
 @pytest.mark.parametrize("camera", CameraTarget)
 @pytest.mark.parametrize("name", sorted(known()))
-def test_around_the_earth_every_hazard_goes_where_it_belongs(
-    name: str, camera: CameraTarget
-) -> None:
+def test_earth_hazard_is_added_for_its_cameras_only(name: str, camera: CameraTarget) -> None:
     kind = known()[name]
     view = random_view(CubeSenseOptions(), Camera(camera), np.random.default_rng(1))
     concerned = camera.name.lower() in getattr(kind, "cameras", ("nadir", "sun"))
@@ -71,3 +75,20 @@ def test_the_moon_is_in_the_field_of_every_frame() -> None:
         assert abs(np.degrees(np.arctan2(y, z))) < 20
         places.add((round(x, 6), round(y, 6)))
     assert len(places) == 20
+
+
+def test_without_a_hazard_the_view_does_not_change() -> None:
+    rng: Any = None  # nothing may be drawn
+    assert with_hazards(VIEW, (), rng) is VIEW
+    earth = random_view(CubeSenseOptions(), Camera.SUN, np.random.default_rng(1))
+    assert around_earth(earth, CameraTarget.SUN, (), rng) is earth
+    check(())
+    picture: Any = SkyView(object(), CONDITION)  # type: ignore[arg-type]
+    assert with_hazards(picture, (Asked("moon"),), rng) is picture
+
+
+@pytest.mark.parametrize("name", ["clouds", "terminator"])
+def test_hazards_of_the_earth_are_rejected_for_the_sky(name: str) -> None:
+    check((Asked(name),), earth=True)
+    with pytest.raises(ValueError, match=f"hazard: there is no '{name}'; known: "):
+        check((Asked(name),))

@@ -1,5 +1,3 @@
-"""What experiments tell a reader: rows, rates and summaries of results that are made up."""
-
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,17 +8,12 @@ import pytest
 
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.firmware_model.interface.cubesense.codes import Camera
-from cubestack.host.experiments.attitude import (
-    AttitudeExperiment,
-    AttitudeResult,
-    arcsec,
-    is_right,
-    percentile_95,
-)
+from cubestack.host.experiments.attitude import AttitudeExperiment, AttitudeResult, arcsec
 from cubestack.host.experiments.cubesense import measure as cubesense
 from cubestack.host.experiments.cubesense.measure import SensorResult
 from cubestack.host.experiments.cubestar import measure as cubestar
 from cubestack.host.experiments.cubestar.measure import CubeStarResult
+from cubestack.host.experiments.facts import Facts, Telling
 from cubestack.host.experiments.rates import outcome
 from cubestack.host.studies.cubesense import ball
 from cubestack.host.studies.cubestar.layouts import EXPERIMENT as LAYOUTS
@@ -52,8 +45,6 @@ UNKNOWN = replace(RIGHT, right=None, wrong=None, truth=None, **NONE)
 
 
 class Trackers(AttitudeExperiment[Any, Any, AttitudeResult]):
-    """Of no device."""
-
     def run(self, opened: Any, options: Any) -> Iterator[AttitudeResult]:
         return iter(())
 
@@ -65,6 +56,16 @@ def summary(*results: AttitudeResult) -> str:
     return "\n".join(EXPERIMENT.summarise(results, 2.5))
 
 
+class Given(Telling):
+    def run(self, _opened: Any, _options: Any) -> Iterator[Facts]:
+        yield Facts({"name": "sun", "angle_deg": 1.5, "found": None})
+
+
+def test_default_row_has_the_values_in_order() -> None:
+    (result,) = Given().run(None, None)
+    assert Given().row(0, result) == ("sun", "1.5", "None")
+
+
 @pytest.mark.parametrize(
     ("result", "row"),
     [
@@ -74,12 +75,12 @@ def summary(*results: AttitudeResult) -> str:
         (UNKNOWN, ("7", "-", "12", "9", "-", "-", "-", "calculated")),
     ],
 )
-def test_a_frame_is_told_in_a_row(result: AttitudeResult, row: tuple[str, ...]) -> None:
+def test_row_of_an_attitude(result: AttitudeResult, row: tuple[str, ...]) -> None:
     assert EXPERIMENT.row(7, result) == row
     assert len(row) == len(EXPERIMENT.columns)
 
 
-def test_rates_are_of_all_frames() -> None:
+def test_rates_count_all_frames() -> None:
     told = summary(RIGHT, RIGHT, WRONG, REFUSED, replace(REFUSED, reason=None), UNKNOWN)
     assert told.startswith(
         "of 6: 66.7 % solved, 33.3 % right, 1 wrong, 2.5 s wall time\nrefused: 1 too few\n"
@@ -91,7 +92,7 @@ def test_rates_are_of_all_frames() -> None:
     assert "refused: 2 dark, 1 few" in summary(*many)
 
 
-def test_percentiles_are_of_the_right_ones() -> None:
+def test_percentiles_count_right_frames_only() -> None:
     several = [
         replace(RIGHT, error_cross_deg=n / 3600, error_roll_deg=-2 * n / 3600) for n in range(101)
     ]
@@ -111,37 +112,24 @@ def test_claims_are_counted_by_axis() -> None:
 
 
 @pytest.mark.parametrize(("right", "helps"), [(1, True), (2, False), (3, False)])
-def test_help_is_offered_below_half(right: int, helps: bool) -> None:
+def test_advice_is_printed_below_half_right(right: int, helps: bool) -> None:
     told = summary(*[RIGHT] * right, *[REFUSED] * (4 - right), *[UNKNOWN] * 9)
     assert ("what may help: --mode assisted" in told) == helps
 
 
-def test_where_nothing_is_judged_nothing_may_help() -> None:
+def test_no_advice_without_truth() -> None:
     assert "what may help" not in summary(UNKNOWN)
 
 
-def test_a_section_has_a_map_where_truth_is_known() -> None:
+def test_report_section_needs_a_known_truth() -> None:
     pytest.importorskip("matplotlib")
     (section,) = EXPERIMENT.sections([vars(RIGHT), vars(UNKNOWN), vars(REFUSED)])
     assert section.png.startswith(b"\x89PNG")
     assert list(EXPERIMENT.sections([vars(UNKNOWN)])) == []
 
 
-@pytest.mark.parametrize(
-    ("cross", "roll", "right"),
-    [
-        *((0.0999, 0.2999, True), (0.0999, -0.2999, True), (0.1, 0.0, False)),
-        *((0.0, 0.3, False), (0.0, -0.3, False)),
-    ],
-)
-def test_right_is_near_across_and_about(cross: float, roll: float, right: bool) -> None:
-    assert is_right(cross, roll) == right
-
-
-def test_angles_for_readers() -> None:
+def test_arcseconds() -> None:
     assert (arcsec(None), arcsec(0.5), arcsec(-0.001)) == ("-", "1800.0", "-3.6")
-    assert percentile_95(iter([None, None])) is None
-    assert percentile_95(iter([-1.0, None, 0.0])) == pytest.approx(0.95)
 
 
 # --- CubeStar -------------------------------------------------------------------------------------
@@ -151,14 +139,14 @@ def star_tracker(**more: Any) -> CubeStarResult:
     return CubeStarResult(**vars(RIGHT) | more, threshold=25, searched=False)
 
 
-def test_a_searched_threshold_is_told() -> None:
+def test_summary_names_a_searched_threshold() -> None:
     told = list(cubestar.EXPERIMENT.summarise([replace(star_tracker(), searched=True)], 1.0))
     assert told[0].startswith("detection threshold 25 DN, from a search")
     assert not any("from a search" in line for line in
                    cubestar.EXPERIMENT.summarise([star_tracker()], 1.0))  # fmt: skip
 
 
-def test_the_longest_step_is_told_beside_its_limit() -> None:
+def test_summary_compares_the_longest_steps_with_their_limits() -> None:
     results = [
         star_tracker(phase_ms={"detect": 100.0, "match": 7.0}),
         star_tracker(phase_ms={"detect": 90.0, "match": 12.25}),
@@ -176,32 +164,21 @@ def test_the_longest_step_is_told_beside_its_limit() -> None:
         (20, "pictures full of stars: --threshold above 25"),
     ],
 )
-def test_advice_goes_by_how_many_stars_were_found(stars: int, advice: str) -> None:
+def test_advice_depends_on_the_number_of_stars(stars: int, advice: str) -> None:
     results = [star_tracker(centroids=count) for count in (0, stars, 99)]
     assert cubestar.EXPERIMENT.advice(results).startswith(advice)
     assert cubestar.EXPERIMENT.advice([star_tracker(centroids=stars)]).startswith(advice)
 
 
 LAYOUT = LayoutResult(
-    layout="2",
-    fpgas=1,
-    pins=70,
-    tiles=500,
-    fits=True,
-    attitudes=9,
-    right=9,
-    rate_hz=2.0,
-    age_ms=812.4,
-    oldest_ms=1312.6,
-    power_mw=396.2,
-    energy_mj=198.4,
+    **{"layout": "2", "fpgas": 1, "pins": 70, "tiles": 500, "fits": True},
+    **{"attitudes": 9, "right": 9, "rate_hz": 2.0, "violations": 0, "published": "2 Hz"},
+    **{"age_ms": 812.4, "oldest_ms": 1312.6, "power_mw": 396.2, "energy_mj": 198.4},
     phase_ms={"transfer": 404.1},
-    violations=0,
-    published="2 Hz",
 )
 
 
-def test_layouts_are_told_with_what_can_not_be_built() -> None:
+def test_layout_rows_mark_what_cannot_be_built() -> None:
     row = LAYOUTS.row(0, LAYOUT)
     assert row == ("2", "2.00", "812 to 1313", "396", "198", "404", "70", "500")
     two = replace(LAYOUT, layout="two", fpgas=2, pins=99, fits=False)
@@ -248,7 +225,7 @@ def told_of_sensors(*results: SensorResult) -> list[str]:
     return list(cubesense.EXPERIMENT.summarise(results, 3.25))
 
 
-def test_a_direction_is_told_in_a_row() -> None:
+def test_row_of_a_direction() -> None:
     row = cubesense.EXPERIMENT.row(0, SUN)
     numbers = ("10.00", "10.10", "-5.00", "-5.00", "0.100", "-", "150", "50.0")
     assert row == ("sun", *numbers, "detected")
@@ -270,17 +247,17 @@ def test_a_direction_is_told_in_a_row() -> None:
         ({"capture": "stored_late"}, "detected"),
     ],
 )
-def test_an_ending_says_why(more: dict[str, Any], ending: str) -> None:
+def test_last_column_names_the_reason(more: dict[str, Any], ending: str) -> None:
     assert cubesense.EXPERIMENT.row(0, replace(SUN, **more))[-1] == ending
 
 
-def test_a_wrong_direction_is_no_refused_one() -> None:
+def test_outcome_distinguishes_wrong_from_refused() -> None:
     assert outcome(SUN) == "right"
     assert outcome(replace(SUN, right=False)) == "wrong"
     assert outcome(replace(SUN, **NOTHING)) == "refused"
 
 
-def test_sensors_are_summed_each_for_itself() -> None:
+def test_summary_has_one_line_per_sensor() -> None:
     slow = replace(SUN, error_deg=0.3, right=False, phase_ms=SUN.phase_ms | {"total": 70.0})
     lines = told_of_sensors(SUN, slow, replace(SUN, **NOTHING), NADIR)
     assert lines == [
@@ -293,7 +270,7 @@ def test_sensors_are_summed_each_for_itself() -> None:
     assert told_of_sensors(replace(SUN, **NOTHING))[0] == "sun: 0 of 1 detected, 0 right"
 
 
-def test_claims_of_directions_are_compared_on_both_axes() -> None:
+def test_claimed_sigma_is_compared_on_both_axes() -> None:
     times = {"a": 3.0, "b": 9.0, "total": 20.0}
     rated = replace(SUN, sigma_deg=(0.2, 0.01), beta_deg=-4.95, phase_ms=times)
     other = replace(rated, sigma_deg=(0.01, 0.2), phase_ms=times | {"a": 11.5, "total": 30.0})
@@ -313,7 +290,7 @@ def test_claims_of_directions_are_compared_on_both_axes() -> None:
         (Camera.SUN, 60.0, (0.1, 0.2), 2.0),
     ],
 )
-def test_a_direction_is_right_within_the_goal_or_three_sigma(
+def test_direction_tolerance_is_the_goal_or_three_sigma(
     sensor: Camera, angle_deg: float, claimed: tuple[float, float] | None, goal: float
 ) -> None:
     angle = np.radians(angle_deg)
@@ -322,7 +299,7 @@ def test_a_direction_is_right_within_the_goal_or_three_sigma(
     assert cubesense._tolerance_deg(sensor, None, None) == 0.2
 
 
-def test_a_pose_is_within_its_angles_and_lit_from_behind() -> None:
+def test_random_pose_keeps_its_angles_and_is_lit_from_behind() -> None:
     rng = np.random.default_rng(3)
     options = cubesense.CubeSenseOptions(tilt=12.0, sun_angle=60.0, bloom=3.0, no_noise=True)
     found: dict[Camera, list[float]] = {camera: [] for camera in Camera}
@@ -344,7 +321,7 @@ def test_a_pose_is_within_its_angles_and_lit_from_behind() -> None:
     assert (usual.condition.bloom_px, usual.condition.noise) == (7.0, True)
 
 
-def test_a_ball_is_told_by_direction() -> None:
+def test_row_and_summary_of_the_ball() -> None:
     result = ball.BallResult("left", 9, 10, 0.1234, 0.2, 0.05)
     assert ball.EXPERIMENT.row(0, result) == ("left", "0.123", "0.200", "0.050", "9 of 10")
     none = ball.BallResult("up", 0, 10, None, None, None)

@@ -1,5 +1,3 @@
-"""Measuring from a program: options as keywords, results as they come, and what is refused."""
-
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -56,13 +54,12 @@ class Counting(Experiment[Any, Wanted, Number]):
 
 @pytest.fixture
 def counting(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A device that is measured by counting."""
     counted = replace(device("cubestar"), experiment=Counting)
     monkeypatch.setattr(measuring, "registered", lambda _name: counted)
 
 
 @pytest.mark.usefixtures("counting")
-def test_results_come_one_by_one_with_progress() -> None:
+def test_results_are_yielded_one_by_one_with_progress() -> None:
     told: list[tuple[int, int]] = []
     results = measure("cubestar", frames=3, progress=lambda *done: told.append(done))
     assert told == []
@@ -85,21 +82,21 @@ def test_results_come_one_by_one_with_progress() -> None:
         ({"quick": True, "tilt": 1}, "--tilt takes its time"),
     ],
 )
-def test_wrong_options_are_refused_at_once_with_what_is_right(
-    options: dict[str, Any], complaint: str
-) -> None:
+def test_rejects_invalid_options_before_it_starts(options: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         measure("cubestar", **options)
 
 
-def test_options_of_the_board_are_checked_as_such() -> None:
+def test_board_options_are_checked() -> None:
     with pytest.raises(ValueError, match="layout of cubestar must be one of 1, 2, 3, two-boards"):
         measure("cubestar", layout="4")
     with pytest.raises(ValueError, match="no option 'layout' for cubesense"):
         measure("cubesense", layout="2")
 
 
-def test_unknown_devices_and_those_without_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rejects_unknown_devices_and_devices_without_experiment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with pytest.raises(TargetError, match="no device 'cubestarr'; known: cubestar"):
         measure("cubestarr")
     silent = replace(device("cubestar"), experiment=None)
@@ -114,7 +111,7 @@ def parse(*arguments: str) -> Wanted:
     return chosen(parser.parse_args(arguments), Wanted)
 
 
-def test_the_command_line_takes_what_programs_give() -> None:
+def test_command_line_and_keywords_give_the_same_options() -> None:
     assert parse() == Wanted()
     assert parse("--frames", "3", "--corner", "0,256", "--tilt", "5") == Wanted(
         frames=3, corner=(0, 256), tilt=5.0
@@ -131,7 +128,7 @@ def test_the_command_line_takes_what_programs_give() -> None:
         (("--way", "left"), "argument --way: must be one of up, down, not 'left'"),
     ],
 )
-def test_wrong_arguments(
+def test_command_line_rejects_invalid_arguments(
     arguments: tuple[str, ...], complaint: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
@@ -140,7 +137,7 @@ def test_wrong_arguments(
 
 
 @pytest.mark.parametrize("name", [one.name for one in devices()])
-def test_every_declared_experiment_report_and_demonstration_loads(name: str) -> None:
+def test_every_declared_study_loads(name: str) -> None:
     one = device(name)
     assert one.experiment is not None
     assert callable(one.study("demo"))

@@ -1,5 +1,3 @@
-"""What experiments power up: the options that go there, and nothing left open after an error."""
-
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +12,7 @@ PLAN = "[[fault]]\nkind = 'uart-drop'\nat_s = 1.0\n"
 
 
 class Emulated:
-    """What stands for a powered-up device.
-
-    Attributes:
-        asked: how it was powered up.
-        plans: those that were loaded.
-        closed: how often it was.
-        complaint: raised for any plan.
-    """
+    """A powered-up device; ``complaint`` is raised for any fault plan."""
 
     complaint: Exception | None = None
 
@@ -42,7 +33,6 @@ class Emulated:
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[Emulated]:
-    """Devices that were powered up."""
     found = list[Emulated]()
 
     def power_up(*given: Any, **options: Any) -> Emulated:
@@ -63,13 +53,11 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Emulated]:
         ({"firmware": "a.elf"}, False),
     ],
 )
-def test_only_our_own_firmware_of_today_rates_its_results(
-    board: dict[str, Any], rates: bool
-) -> None:
+def test_only_the_extended_profile_rates_its_results(board: dict[str, Any], rates: bool) -> None:
     assert Opener(device("cubestar"), board=board).rates is rates
 
 
-def test_switches_are_those_of_the_profile_with_what_was_set() -> None:
+def test_set_changes_switches_of_the_profile() -> None:
     opened = Opener(device("cubestar"), board={"profile": "extended", "set": "voting=algorithm-2"})
     plain = Opener(device("cubestar"), board={"profile": "extended"})
     assert plain.switches == device("cubestar").switches.of("extended", "")
@@ -77,7 +65,7 @@ def test_switches_are_those_of_the_profile_with_what_was_set() -> None:
     assert Opener(device("cubestar")).switches.profile == "published"
 
 
-def test_options_of_the_experiment_come_before_those_of_the_user(made: list[Emulated]) -> None:
+def test_experiment_options_override_user_options(made: list[Emulated]) -> None:
     told = list[Any]()
     opened = Opener(
         device("cubestar"), "reference", {"profile": "extended", "layout": "2"}, opened=told.append
@@ -92,14 +80,14 @@ def test_options_of_the_experiment_come_before_those_of_the_user(made: list[Emul
 
 
 @pytest.mark.parametrize("in_a_file", [True, False])
-def test_a_plan_is_loaded(made: list[Emulated], tmp_path: Path, in_a_file: bool) -> None:
+def test_loads_a_fault_plan(made: list[Emulated], tmp_path: Path, in_a_file: bool) -> None:
     path = tmp_path / "plan.toml"
     path.write_text(PLAN, "utf-8")
     Opener(device("cubestar"))(None, seed=0, faults=path if in_a_file else load_plan(path))
     assert [len(plan.faults) for plan in made[0].plans] == [1]
 
 
-def test_a_plan_that_makes_no_sense_leaves_nothing_open(
+def test_invalid_plan_closes_the_device(
     made: list[Emulated], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "plan.toml"
@@ -111,9 +99,7 @@ def test_a_plan_that_makes_no_sense_leaves_nothing_open(
 
 
 @pytest.mark.parametrize("error", [ValueError, OSError])
-def test_who_can_not_look_at_it_leaves_nothing_open(
-    made: list[Emulated], error: type[Exception]
-) -> None:
+def test_failing_callback_closes_the_device(made: list[Emulated], error: type[Exception]) -> None:
     def look(_emulated: object) -> None:
         raise error("no file")
 

@@ -1,5 +1,3 @@
-"""Experiments of two functions: results, table and summary."""
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -34,7 +32,7 @@ def experiment(columns: tuple[str, ...] = COLUMNS) -> SceneExperiment:
     return SceneExperiment(__doc__, lambda _rng, _options: next(scenes), measure, columns)
 
 
-def test_each_frame_has_a_scene_of_its_own() -> None:
+def test_each_frame_has_its_own_scene() -> None:
     results = list(experiment().run(Opened(), MeasureOptions(frames=3)))
     assert [result.as_dict() for result in results] == [
         {"found_deg": 0.5, "error_deg": -0.5, "right": True},

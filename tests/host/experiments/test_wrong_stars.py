@@ -1,5 +1,3 @@
-"""Identified stars beside the truth: those that are elsewhere are counted, where it is known."""
-
 from itertools import cycle
 from types import SimpleNamespace
 from typing import Any
@@ -44,13 +42,11 @@ def cubestar(*off_deg: float, unnamed: int = 1) -> Any:
     ("off_deg", "wrong"),
     [((0.0, 0.0, 0.0), 0), ((0.19, 0.0, 0.0), 0), ((0.22, 0.0, 0.0), 1), ((5.0, 0.1, 3.0), 2)],
 )
-def test_stars_further_than_a_fifth_of_a_degree_are_others(
-    off_deg: tuple[float, ...], wrong: int
-) -> None:
+def test_stars_more_than_0_2_deg_away_are_wrong(off_deg: tuple[float, ...], wrong: int) -> None:
     assert count_wrong(cubestar(*off_deg), TRUTH) == wrong
 
 
-def test_without_a_truth_nothing_is_known() -> None:
+def test_without_truth_wrong_stars_are_unknown() -> None:
     assert count_wrong(cubestar(0.0, 0.0, 9.0), None) is None
     emulated: Any = SimpleNamespace(board=SimpleNamespace(camera=SimpleNamespace(scene=object())))
     assert _count_wrong(emulated, [], None) is None

@@ -1,5 +1,3 @@
-"""Catalogues as C arrays, read back by a C compiler."""
-
 import shutil
 import subprocess
 from pathlib import Path
@@ -27,7 +25,7 @@ int main(void)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_the_compiled_catalogue_is_the_one_in_flash(run: Run, tmp_path: Path) -> None:
+def test_compiled_arrays_equal_the_onboard_catalogue(run: Run, tmp_path: Path) -> None:
     catalogue = tmp_path / "catalogue.c"
     code, _, err = run("catalogue", "cubestar", "--pair-limit", "42.1", "--c", str(catalogue))
     assert (code, err) == (0, "")
@@ -40,7 +38,7 @@ def test_the_compiled_catalogue_is_the_one_in_flash(run: Run, tmp_path: Path) ->
     assert catalogue.read_text().count("const ") == 7
 
 
-def test_what_can_not_be_written(run: Run) -> None:
+def test_rejects_other_arrays_and_unwritable_files(run: Run) -> None:
     for array, wrong in ((np.zeros(3), " of u2, i2, u4, f4, not float64"), (np.eye(2), "")):
         with pytest.raises(ValueError, match=f"x must be one row{wrong}"):
             c_arrays("p", {"x": array}, "about")

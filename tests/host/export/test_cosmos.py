@@ -1,4 +1,4 @@
-"""COSMOS definitions, read by their documented grammar and as COSMOS would take bits by them."""
+"""Oracle: a reader of COSMOS's documented grammar and bit order."""
 
 import shlex
 import struct
@@ -75,7 +75,7 @@ def parse(text: str) -> Packets:
 
 
 @EACH
-def test_every_telemetry_frame_is_taken_as_our_client_does(interface: Interface) -> None:
+def test_telemetry_values_match_the_client(interface: Interface) -> None:
     packets = parse(cosmos(interface))
     for message in messages(interface, MessageKind.TELEMETRY):
         items = packets["TELEMETRY", message.name.upper()]
@@ -90,7 +90,7 @@ def test_every_telemetry_frame_is_taken_as_our_client_does(interface: Interface)
 
 
 @EACH
-def test_commands_carry_what_the_node_reads(interface: Interface) -> None:
+def test_command_values_match_the_node(interface: Interface) -> None:
     packets = parse(cosmos(interface))
     assert len(packets) == len(interface.messages) + len(messages(interface, MessageKind.TELEMETRY))
     for message in interface.messages:

@@ -109,7 +109,7 @@ def test_c_header_defines_every_name_once_and_has_every_message(interface: Inter
 
 
 @DEVICES
-def test_the_document_is_the_generated_one(interface: Interface) -> None:
+def test_register_page_is_up_to_date(interface: Interface) -> None:
     device = interface.name.lower()
     text = (DOCUMENTS / f"registers-{device}.md").read_text(encoding="utf-8")
     assert text == render(interface, "markdown"), (
@@ -126,7 +126,7 @@ def test_every_format_names_every_message_and_field(interface: Interface, form: 
         assert {message.name, *(field.name for field in message.fields)} <= words
 
 
-def test_json_carries_the_whole_declaration() -> None:
+def test_json_has_the_whole_declaration() -> None:
     content = json.loads(render(INTERFACE, "json"))
     assert (content["name"], content["i2c_address"], content["baud"]) == ("CubeStar", 0x1A, 57_600)
     messages = {(entry["kind"], entry["id"]): entry for entry in content["messages"]}
@@ -139,7 +139,7 @@ def test_json_carries_the_whole_declaration() -> None:
     assert messages["telecommand", 100]["extension"] is True
 
 
-def test_json_carries_registers_and_letters_where_there_are_any() -> None:
+def test_json_has_registers_and_bench_letters() -> None:
     content = json.loads(render(CUBESENSE, "json"))
     registers = {entry["field"]["name"]: entry for entry in content["registers"]["registers"]}
     assert content["registers"]["i2c_address"] == 0x1C
@@ -154,7 +154,7 @@ def test_json_carries_registers_and_letters_where_there_are_any() -> None:
 
 
 @pytest.mark.parametrize("form", ["table", "markdown"])
-def test_readers_find_registers_letters_and_what_is_ours(form: str) -> None:
+def test_listing_marks_assumed_and_extended_parts(form: str) -> None:
     text = render(CUBESENSE, form)
     assert "the registers and their addresses are assumed" in text
     assert "0x48" in text
@@ -164,12 +164,14 @@ def test_readers_find_registers_letters_and_what_is_ours(form: str) -> None:
 
 @DEVICES
 @pytest.mark.parametrize("form", FORMATS)
-def test_the_command_lists_a_device(interface: Interface, form: str, run: Run) -> None:
+def test_command_prints_every_format(interface: Interface, form: str, run: Run) -> None:
     outcome = run("registers", interface.name.lower(), "--format", form)
     assert outcome == (0, render(interface, form), "")
 
 
-def test_table_tells_ranges_resets_and_flags() -> None:
+def test_table_shows_ranges_resets_and_flags() -> None:
+    with pytest.raises(ValueError, match="no format 'xml'; known: table, markdown, json"):
+        render(INTERFACE, "xml")
     for text in (
         "declination of the boresight [rad]; -1.5708 to 1.5708; else DeclinationSetError",
         "focal length [mm]; 5 to 7; reset 6.28 mm; else FocalLengthRangeError",
@@ -177,8 +179,3 @@ def test_table_tells_ranges_resets_and_flags() -> None:
         "an extension",
     ):
         assert text in render(INTERFACE, "table")
-
-
-def test_an_unknown_format_is_told() -> None:
-    with pytest.raises(ValueError, match="no format 'xml'; known: table, markdown, json"):
-        render(INTERFACE, "xml")

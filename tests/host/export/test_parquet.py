@@ -1,4 +1,4 @@
-"""Tables as Parquet files, read back by the library that others use."""
+"""Oracle: pyarrow."""
 
 import sys
 from io import BytesIO
@@ -19,27 +19,21 @@ def test_each_column_has_one_type() -> None:
     }
     table = pyarrow.parquet.read_table(BytesIO(parquet_file(columns)))
     assert table.to_pydict() == columns | {"mixed": ["1", "x", "True"]}
-    assert [str(one.type) for one in table.schema] == [
-        "double",
-        "bool",
-        "string",
-        "string",
-        "string",
-    ]
+    assert [str(one.type) for one in table.schema] == ["double", "bool", *["string"] * 3]
 
 
-def test_named_columns_are_numbers_whatever_is_in_them() -> None:
+def test_number_columns_may_be_empty() -> None:
     made = parquet_file({"value": [None], "text": [None]}, numbers=("value",))
     schema = pyarrow.parquet.read_schema(BytesIO(made))
     assert [str(one.type) for one in schema] == ["double", "string"]
 
 
-def test_columns_of_several_lengths_are_refused() -> None:
+def test_rejects_columns_of_different_lengths() -> None:
     with pytest.raises(ValueError, match="of one length"):
         parquet_file({"a": [1], "b": []})
 
 
-def test_what_must_be_installed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_pyarrow_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     assert missing() == ""
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert missing() == "Parquet needs pyarrow: pip install pyarrow"

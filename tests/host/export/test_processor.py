@@ -1,5 +1,3 @@
-"""Listings of a processor's registers."""
-
 import json
 import re
 import shutil
@@ -33,7 +31,7 @@ def test_every_register_is_listed_at_its_address(format_name: str) -> None:
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
-def test_the_c_header_compiles_and_has_the_pins(tmp_path: Path) -> None:
+def test_c_header_compiles(tmp_path: Path) -> None:
     (tmp_path / "processor.h").write_text(processor_header(PROCESSOR), encoding="utf-8")
     source = '#include "processor.h"\n_Static_assert(FPGA_DATA % 16 == 0, "a byte");\n'
     source += "unsigned baud(void) { return SATELLITE_UART->CLKDIV & USART_CLKDIV_DIV; }\n"
@@ -42,8 +40,7 @@ def test_the_c_header_compiles_and_has_the_pins(tmp_path: Path) -> None:
     subprocess.run(["cc", *flags, "-fsyntax-only", "main.c"], cwd=tmp_path, check=True)
 
 
-def test_the_c_header_has_all_that_the_reference_program_uses() -> None:
-    """Board names of its sources, each beside a device name; and some of them by number."""
+def test_c_header_defines_the_names_of_the_reference_firmware() -> None:
     defined = dict(re.findall(r"^#define (\w+) (\S+)", processor_header(PROCESSOR), re.MULTILINE))
     text = "".join(
         path.read_text("utf-8") for path in (ROOT / "firmware_model/reference").rglob("*.[ch]")
@@ -61,6 +58,6 @@ def test_the_c_header_has_all_that_the_reference_program_uses() -> None:
         assert defined[name] == f"{16 * (ord(pin[1]) - ord('A')) + int(pin[2:])}u", name
 
 
-def test_a_device_without_firmware_of_one_s_own_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rejects_a_device_without_custom_firmware(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["registers", "aramis", "--processor"]) != 0
     assert "aramis runs no firmware of your own" in capsys.readouterr().err

@@ -1,5 +1,3 @@
-"""The exported module runs alone, and codes as this project does."""
-
 import json
 import subprocess
 import sys
@@ -25,7 +23,7 @@ def module(interface: Interface) -> Any:
     return made
 
 
-def test_it_needs_nothing_but_python(tmp_path: Path) -> None:
+def test_module_needs_only_the_standard_library(tmp_path: Path) -> None:
     for interface in INTERFACES:
         (tmp_path / "exported.py").write_text(python_module(interface))
         call = [sys.executable, "-I", "-S", "-W", "error", str(tmp_path / "exported.py")]
@@ -33,7 +31,7 @@ def test_it_needs_nothing_but_python(tmp_path: Path) -> None:
 
 
 @EACH
-def test_every_message_both_ways(interface: Interface) -> None:
+def test_every_message_round_trips(interface: Interface) -> None:
     exported = module(interface)
     for message in interface.messages:
         prefix = "Tlm" if message.kind is MessageKind.TELEMETRY else "Tc"
@@ -52,7 +50,7 @@ def test_every_message_both_ways(interface: Interface) -> None:
 
 
 @EACH
-def test_frames_are_those_of_the_line(interface: Interface) -> None:
+def test_frames_match_the_codec(interface: Interface) -> None:
     exported = module(interface)
     for message in interface.messages:
         for data, _ in frames(message, 3):
@@ -68,7 +66,7 @@ def test_frames_are_those_of_the_line(interface: Interface) -> None:
         assert exported.payload(request)[0] == message.id
 
 
-def test_what_does_not_fit_is_named() -> None:
+def test_rejects_values_that_do_not_fit() -> None:
     exported = module(CUBESTAR)
     for value in (-1, 1 << 16):
         with pytest.raises(ValueError, match=rf"^exposure: {value} does not fit$"):
@@ -77,7 +75,7 @@ def test_what_does_not_fit_is_named() -> None:
         exported.payload(b"\0")
 
 
-def test_named_numbers_have_their_names() -> None:
+def test_choices_have_names() -> None:
     exported = module(CUBESTAR)
     message = next(one for one in CUBESTAR.messages if any(f.choices for f in one.fields))
     named = next(one for one in message.fields if one.choices)

@@ -1,4 +1,4 @@
-"""The SVD, as its schema has it and as a parser of others reads it."""
+"""Oracles: the CMSIS schema and the parser cmsis_svd."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ EACH = pytest.mark.parametrize("tables", TABLES, ids=lambda tables: tables.name)
 
 
 @EACH
-def test_it_is_what_the_schema_asks_for(tables) -> None:
+def test_svd_is_valid(tables) -> None:
     folder = Path(cmsis_svd.__file__).parent / "schemas"
     schema = etree.XMLSchema(etree.parse(str(folder / "CMSIS-SVD_1_3_9.xsd")))
     document = etree.fromstring(svd(tables).encode())
@@ -23,7 +23,7 @@ def test_it_is_what_the_schema_asks_for(tables) -> None:
 
 
 @EACH
-def test_a_parser_finds_every_register_where_it_is(tables, tmp_path: Path) -> None:
+def test_parser_finds_every_register(tables, tmp_path: Path) -> None:
     path = tmp_path / "part.svd"
     path.write_text(svd(tables))
     device = SVDParser.for_xml_file(str(path)).get_device()
@@ -57,7 +57,7 @@ def test_a_parser_finds_every_register_where_it_is(tables, tmp_path: Path) -> No
 
 
 @EACH
-def test_a_parser_knows_the_part_and_who_may_access_what(tables, tmp_path: Path) -> None:
+def test_parser_finds_part_and_access_rights(tables, tmp_path: Path) -> None:
     path = tmp_path / "part.svd"
     path.write_text(svd(tables))
     device = SVDParser.for_xml_file(str(path)).get_device()

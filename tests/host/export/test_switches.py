@@ -14,14 +14,14 @@ WITH_SWITCHES = [name for name in device_names() if device(name).switches.declar
 
 
 @pytest.mark.parametrize("name", WITH_SWITCHES)
-def test_the_page_has_the_generated_table(name: str) -> None:
+def test_page_table_is_up_to_date(name: str) -> None:
     table = render_switches(device(name).title, device(name).switches, "markdown")
     hint = f"paste `cubestack registers {name} --switches --format markdown` into docs/switches.md"
     assert table in PAGE.read_text(encoding="utf-8"), hint
 
 
 @pytest.mark.parametrize("name", WITH_SWITCHES)
-def test_each_format_says_all_of_each_switch(name: str, run: Run) -> None:
+def test_each_format_describes_each_switch(name: str, run: Run) -> None:
     declared = device(name).switches.declared()
     listed = json.loads(run("registers", name, "--switches", "--format", "json").out)
     assert list(listed) == list(declared)
@@ -33,5 +33,5 @@ def test_each_format_says_all_of_each_switch(name: str, run: Run) -> None:
             assert part in text
 
 
-def test_what_has_no_switches_says_so() -> None:
+def test_device_without_switches() -> None:
     assert render_switches("Glow", Switches, "table") == "Glow has no switches\n"

@@ -1,4 +1,4 @@
-"""The dissector, run by Lua with a Wireshark that only notes what it is told."""
+"""The dissector runs in Lua against a stub of the Wireshark API."""
 
 import random
 import struct
@@ -86,8 +86,6 @@ end
 
 
 class Dissector:
-    """One run of Wireshark with the exported script."""
-
     def __init__(self, interface: Interface) -> None:
         self.lua = lupa.LuaRuntime()
         self.lua.execute(WIRESHARK)
@@ -104,7 +102,6 @@ class Dissector:
         return list(items.values()), pinfo
 
     def fields(self, data: bytes, **options: Any) -> dict[str, Any]:
-        """Field's abbreviation to its item."""
         items, _ = self.dissect(data, **options)
         return {
             item.field.abbreviation: item
@@ -127,7 +124,7 @@ def shown(item: Any) -> Any:
 
 
 @EACH
-def test_every_message_is_shown_as_our_client_reads_it(interface: Interface) -> None:
+def test_message_values_match_the_client(interface: Interface) -> None:
     dissector, prefix = Dissector(interface), interface.name.lower()
     for message in interface.messages:
         telemetry = message.kind is MessageKind.TELEMETRY
@@ -150,7 +147,7 @@ def test_every_message_is_shown_as_our_client_reads_it(interface: Interface) -> 
                     assert text == pytest.approx(values[field.name], rel=1e-6)
 
 
-def test_an_acknowledge_a_wrong_length_and_what_nobody_asked_for() -> None:
+def test_acknowledge_and_wrong_length() -> None:
     interface = INTERFACES[0]
     dissector, prefix = Dissector(interface), interface.name.lower()
     ack = dissector.fields(encode_frame(b"\3"), to_device=False)[f"{prefix}.ack"]
@@ -161,7 +158,7 @@ def test_an_acknowledge_a_wrong_length_and_what_nobody_asked_for() -> None:
     assert items[f"{prefix}.wrong"].text == f"{first.length + 1} bytes, not {first.length}"
 
 
-def test_an_answer_stays_that_to_its_request_when_it_is_looked_at_again() -> None:
+def test_second_pass_keeps_the_request_of_an_answer() -> None:
     interface = INTERFACES[0]
     dissector, prefix = Dissector(interface), interface.name.lower()
     first, second = messages(interface, MessageKind.TELEMETRY)[:2]
@@ -173,7 +170,7 @@ def test_an_answer_stays_that_to_its_request_when_it_is_looked_at_again() -> Non
     assert dissector.fields(answer, to_device=False, number=100)[name].text == first.name
 
 
-def test_a_frame_in_two_segments_and_two_in_one() -> None:
+def test_reassembles_split_and_joined_frames() -> None:
     interface = INTERFACES[0]
     dissector = Dissector(interface)
     request = encode_frame(bytes([messages(interface, MessageKind.TELEMETRY)[0].id]))
@@ -186,7 +183,7 @@ def test_a_frame_in_two_segments_and_two_in_one() -> None:
     assert names.count(f"{interface.name.lower()}.request") == 2
 
 
-def test_no_bytes_break_it() -> None:
+def test_random_bytes_raise_no_error() -> None:
     dissector, rng = Dissector(INTERFACES[0]), random.Random(0)
     for _ in range(500):
         data = bytes(rng.choice([0x1F, 0x7F, 0xFF, 0x83, 0]) for _ in range(rng.randrange(20)))

@@ -1,4 +1,4 @@
-"""XTCE, as its schema has it and as a parser of others reads it."""
+"""Oracles: the XTCE schema and the parser space_packet_parser."""
 
 import io
 from pathlib import Path
@@ -24,8 +24,6 @@ XML = """
 
 
 class Offline(etree.Resolver):
-    """The one thing that the schema would fetch."""
-
     def resolve(self, url: str, public: Any, context: Any) -> Any:
         return self.resolve_string(XML, context) if url.endswith("/xml.xsd") else None
 
@@ -38,16 +36,14 @@ def schema() -> Any:
 
 
 @EACH
-def test_it_is_what_the_schema_asks_for(interface: Interface, schema: Any) -> None:
+def test_xtce_is_valid(interface: Interface, schema: Any) -> None:
     document = etree.fromstring(xtce(interface).encode())
     assert schema.validate(document), schema.error_log.filter_from_errors()[:3]
 
 
 @COUNTS
 @EACH
-def test_a_parser_reads_every_telemetry_frame_as_our_client_does(
-    interface: Interface, count: int
-) -> None:
+def test_telemetry_values_match_the_client(interface: Interface, count: int) -> None:
     definition = XtcePacketDefinition.from_xtce(io.BytesIO(xtce(interface).encode()))
     for message in messages(interface, MessageKind.TELEMETRY):
         for data, values in frames(message, count):
@@ -61,8 +57,7 @@ def test_a_parser_reads_every_telemetry_frame_as_our_client_does(
 
 
 @EACH
-def test_every_telecommand_has_its_bytes(interface: Interface) -> None:
-    """Widths and IDs of the entries, which make up the message."""
+def test_telecommand_entries_add_up_to_the_message(interface: Interface) -> None:
     root = etree.fromstring(xtce(interface).encode())
     names = {"x": NAMESPACE}
     bits = {

@@ -11,12 +11,12 @@ from typing import Any
 SOON_MS = 30_000
 
 STARTED_MS = 120_000
-"""Until devices have started, which takes long where much else runs."""
+"""Starting all devices takes long on a busy machine."""
 
 
 @contextmanager
 def station(*words: str, environment: dict[str, str] | None = None) -> Iterator[str]:
-    """Address of the page of `cubestack ground` with ``words``."""
+    """Runs `cubestack ground` with ``words``; yields the address of its page."""
     call = [sys.executable, "-m", "cubestack", "ground", *words, "--json"]
     pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
     with subprocess.Popen(call, stdout=pipe, stderr=nothing, env=environment) as process:
@@ -29,7 +29,7 @@ def station(*words: str, environment: dict[str, str] | None = None) -> Iterator[
 
 @contextmanager
 def shown(chromium: Any, address: str, **options: Any) -> Iterator[Any]:
-    """The page at ``address``; nothing in it may go wrong or ask another machine."""
+    """Opens ``address``; fails on script errors and on requests to other machines."""
     page = chromium.new_context(**options).new_page()
     page.set_default_timeout(SOON_MS)
     wrong = list[str]()
@@ -43,7 +43,6 @@ def shown(chromium: Any, address: str, **options: Any) -> Iterator[Any]:
 
 
 def await_devices(chromium: Any, address: str) -> None:
-    """Until all devices of a page have started."""
     page = chromium.new_context().new_page()
     page.goto(address)
     page.wait_for_selector("#line", timeout=STARTED_MS)
@@ -55,7 +54,7 @@ def local(url: str) -> bool:
 
 
 def look(page: Any, device: str, *, emulated: bool = True) -> None:
-    """Look at another target, until it is there; if it is ``emulated`` until its time is told."""
+    """Selects a target and waits until it is shown, with its time if it is ``emulated``."""
     page.click(f"nav >> text={device}")
     page.wait_for_function(
         "([device, emulated]) => document.title.startsWith(device) &&"
@@ -65,7 +64,7 @@ def look(page: Any, device: str, *, emulated: bool = True) -> None:
 
 
 def line(page: Any, words: str) -> str:
-    """Do a line of the shell; what the page tells of it."""
+    """Runs a shell line; returns the answer on the page."""
     before = page.locator("#lines li").count()
     page.fill("#line", words)
     page.press("#line", "Enter")

@@ -1,4 +1,4 @@
-"""A serial line between two terminals, and who answers at its far end."""
+"""A serial line between two pseudo-terminals, with a node at its far end."""
 
 import os
 import subprocess
@@ -26,7 +26,7 @@ BAUD = 57600
 
 @contextmanager
 def cable(ours: Path, theirs: Path, uart: Any) -> Iterator[None]:
-    """Two terminals, and at the far end a node that hears and is heard at its own rate only."""
+    """Connects two pseudo-terminals; the node at the far end uses its own baud rate only."""
     ends = [f"pty,raw,echo=0,link={end}" for end in (ours, theirs)]
     with subprocess.Popen(["socat", "-d", "-d", *ends], stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
@@ -55,7 +55,7 @@ def cable(ours: Path, theirs: Path, uart: Any) -> Iterator[None]:
 
 
 def carried(data: bytes, sender: LineFormat, receiver: LineFormat) -> bytes:
-    """What the receiver of bytes makes of them: a terminal's bits have no length."""
+    """The bytes as sampled by the receiver; the bits of a pseudo-terminal have no length."""
     line = LineSampler(receiver)
     for index, byte in enumerate(data):
         line.put(byte, index * sender.character_ps, sender)
@@ -64,7 +64,7 @@ def carried(data: bytes, sender: LineFormat, receiver: LineFormat) -> bytes:
 
 
 class RecordedNode:
-    """Answers telemetry as a recording has it, in any order, and nothing else."""
+    """Answers telemetry from a recording, in any order, and nothing else."""
 
     def __init__(self, path: Path, interface: Interface) -> None:
         self.interface = interface
@@ -82,7 +82,7 @@ class RecordedNode:
 
 
 def recorded_uart(device: str, folder: Path) -> UartLink:
-    """The line of a device whose telemetry was read once, and recorded."""
+    """A line with the recorded telemetry of a device."""
     path = folder / f"{device}.rec"
     target = open_target(f"emulated:{device}", record=path)
     Shell(target).execute("dump")

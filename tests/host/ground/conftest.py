@@ -1,9 +1,11 @@
-"""An emulation that is served, and steered by its control port; the page at all sensors."""
+"""A served emulation with its control port, and the page with all sensors."""
 
 import http.client
 import json
 import threading
 from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,18 +21,45 @@ from cubestack.host.emulation.history import History
 from cubestack.host.ground.control_api import control_app
 from cubestack.host.ground.emulation import Emulation
 from cubestack.host.ground.guard import Guard
-from cubestack.host.ground.serving import Serving
+from cubestack.host.ground.page_app import page_app
+from cubestack.host.ground.serving import LOOPBACK, Serving
+from cubestack.host.ground.session import TargetSession
 from cubestack.host.recording.setups import emulated_setup
 
 from .browser import look, shown, station
 
 TOKEN = "the token of the tests"
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
 SOON_S = 30.0
+
+
+def request(
+    serving: Serving,
+    method: str,
+    path: str,
+    body: object = None,
+    headers: dict[str, str] | None = None,
+) -> tuple[http.client.HTTPResponse, bytes]:
+    """The answer to a request, by default with the token, and its content."""
+    text = body if isinstance(body, bytes) else None if body is None else json.dumps(body)
+    with closing(http.client.HTTPConnection(*serving.address, timeout=SOON_S)) as connection:
+        connection.request(method, path, text, BEARER if headers is None else headers)
+        answer = connection.getresponse()
+        return answer, answer.read()
+
+
+@contextmanager
+def serving_pages(session: TargetSession) -> Iterator[Serving]:
+    opened = Future[TargetSession]()
+    opened.set_result(session)
+    serving = Serving(Guard(page_app([opened]), TOKEN), LOOPBACK, 0)
+    with serving.running():
+        yield serving
 
 
 @dataclass
 class Controlled:
-    """A control port that is served, and what is behind it."""
+    """A served control port with its emulation."""
 
     serving: Serving
     devices: list[AnyEmulated]
@@ -46,26 +75,16 @@ class Controlled:
         *,
         as_text: bool = False,
     ) -> tuple[int, Any]:
-        """Status and answer of a request with the token; as JSON, unless ``as_text``."""
-        text = body if isinstance(body, bytes) else None if body is None else json.dumps(body)
-        own = {"Authorization": f"Bearer {TOKEN}"} if headers is None else headers
-        connection = http.client.HTTPConnection(*self.serving.address, timeout=SOON_S)
-        try:
-            connection.request(method, path, text, own)
-            answer = connection.getresponse()
-            content = answer.read().decode()
-            return answer.status, content if as_text else json.loads(content or "null")
-        finally:
-            connection.close()
+        """Status and answer of a request, as JSON unless ``as_text``."""
+        answer, content = request(self.serving, method, path, body, headers)
+        return answer.status, content.decode() if as_text else json.loads(content or b"null")
 
     @property
     def emulated(self) -> AnyEmulated:
-        """The device as it is now."""
         return self.devices[0]
 
     @property
     def events(self) -> str:
-        """Address of the WebSocket."""
         return self.serving.url.replace("http:", "ws:") + "/events"
 
 
@@ -96,7 +115,7 @@ def controlled(tmp_path: Path) -> Iterator[Controlled]:
 
 @pytest.fixture(scope="module")
 def address(chromium: Any) -> Iterator[str]:
-    """Of a page with all sensors; for modules that are one xdist group, so that they start once."""
+    """Address of a page with all sensors; its modules are one xdist group, so it starts once."""
     targets = [f"emulated:{name}" for name in device_names()]
     with station(*targets, "--seed", "5") as opened:
         yield opened
@@ -104,7 +123,6 @@ def address(chromium: Any) -> Iterator[str]:
 
 @pytest.fixture
 def page(chromium: Any, address: str) -> Iterator[Any]:
-    """A tab that looks at a CubeStar."""
     with shown(chromium, address) as opened:
         look(opened, "CubeStar")
         yield opened

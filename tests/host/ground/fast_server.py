@@ -1,7 +1,7 @@
-"""A page's server whose device tells something new as often as it is asked: hours in minutes.
+"""A page server whose device changes at each request, to simulate hours in minutes.
 
-A node of the tests answers, and a control port in the same process has a second more each time that
-it is asked, a line of a fault log, other words and, now and then, another picture.
+Each request to its control port advances time by one second and adds a line to the fault log; every
+`PICTURE_EVERY` seconds the picture changes.
 """
 
 import sys
@@ -24,17 +24,14 @@ from cubestack.host.pictures.images import png
 from cubestack.host.targets import Target
 from tests.host.conftest import FakeCubeStar, UartLink
 
-PICTURE_EVERY = 10
-"""Seconds from one picture to the next."""
-
-MOST_LINES = 100
-"""Of the log that one answer has."""
+PICTURE_EVERY = 10  # s
+MOST_LINES = 100  # of the log in one answer
 
 TASKS = [int(one) for one in INTERFACE.telemetry("TaskStatus").fields[0].choices or ()]
 
 
 class Hurried:
-    """A control port whose time goes on by a second whenever it is asked."""
+    """A control port whose time advances by one second per request."""
 
     def __init__(self) -> None:
         self._seconds = count(1)
@@ -67,8 +64,6 @@ class Hurried:
 
 
 class Changing(FakeCubeStar):
-    """Its telemetry differs from answer to answer."""
-
     def __init__(self) -> None:
         super().__init__()
         self._number = count()
@@ -84,7 +79,7 @@ class Changing(FakeCubeStar):
 
 
 def main() -> None:
-    """Tell the page's address, and serve until the input ends."""
+    """Prints the address of the page and serves until standard input ends."""
     page_app.EVERY_S = page_app.SHORTEST_S = 0.0  # type: ignore[misc]
     hurried = Hurried()
     node = Changing()

@@ -1,18 +1,18 @@
-"""Script text in place of every text that a device, a file or a program tells."""
+"""Script text in every text that a device, file or program sends."""
 
 from typing import Any
 
 HOSTILE = "<img src=x onerror=document.hacked=1>"
 
 ASKED_WITH = ("type", "frame", "field", "access", "what")
-"""Members whose text the page understands, and does not show."""
+"""Members that the page interprets and does not show."""
 
 NAMED = ("currents_ma", "probes", "snapshots", "pictures", "bits")
-"""Members that have names of the device for keys."""
+"""Members whose keys are names of the device."""
 
 
 def hostile(value: Any) -> Any:
-    """The same with script text behind every text, names among them."""
+    """``value`` with script text appended to every text and name."""
     if isinstance(value, dict):
         return {
             key: one

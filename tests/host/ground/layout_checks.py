@@ -1,4 +1,4 @@
-"""What can be wrong with how a page looks, as functions of the browser's language."""
+"""JavaScript functions that find layout and contrast faults of a page."""
 
 LOOKS = [("dark", 390), ("dark", 1280), ("light", 1280), ("light", 390)]
 """Colour schemes, and widths in pixels of a telephone and of a screen."""
@@ -27,7 +27,7 @@ COVERED = """() => {
   }));
   return found;
 }"""
-"""What lies on something else."""
+"""Lists elements that overlap."""
 
 PALE = """() => {
   const numbers = (colour) => colour.match(/[0-9.]+/g).map(Number);
@@ -47,4 +47,4 @@ PALE = """() => {
     .filter(([, a, b]) => Math.max(a, b) / Math.min(a, b) < 4.5)
     .map(([one]) => one.outerHTML.slice(0, 80));
 }"""
-"""Text with less contrast than WCAG 2.2, 1.4.3, asks for."""
+"""Lists text with less contrast than WCAG 2.2, 1.4.3, requires."""

@@ -1,4 +1,4 @@
-"""What stands between a browser and a server, and can be cut."""
+"""A TCP relay between browser and server that can be interrupted."""
 
 import socket
 import threading
@@ -6,7 +6,7 @@ from contextlib import suppress
 
 
 class Relay:
-    """Passes connections at ``port`` on to another port of this machine, while it is ``up``."""
+    """Forwards connections at ``port`` to another local port while it is ``up``."""
 
     def __init__(self, to_port: int) -> None:
         self.to_port = to_port
@@ -18,7 +18,7 @@ class Relay:
         self._threads[0].start()
 
     def cut(self) -> None:
-        """Break all connections; new ones are broken at once."""
+        """Closes all connections and rejects new ones."""
         self.up = False
         for one in self._open:
             with suppress(OSError):

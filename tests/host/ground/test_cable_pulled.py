@@ -1,5 +1,3 @@
-"""A page's serial line between two terminals: pulled, and put back."""
-
 import shutil
 from pathlib import Path
 from typing import Any
@@ -16,7 +14,9 @@ from .conftest import SOON_S
 
 @pytest.mark.skipif(shutil.which("socat") is None, reason="no socat")
 @pytest.mark.parametrize("reopens", [True, False])
-def test_a_cable_is_pulled_and_put_back(tmp_path: Path, uart: Any, reopens: bool) -> None:
+def test_serial_line_recovers_from_an_unplugged_cable(
+    tmp_path: Path, uart: Any, reopens: bool
+) -> None:
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
     with cable(ours, theirs, uart):
         target = open_target(str(ours), "cubestar")

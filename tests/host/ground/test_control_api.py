@@ -1,5 +1,3 @@
-"""The control port: a program pauses, steps, disturbs a running emulation, and sees it."""
-
 import json
 from pathlib import Path
 from typing import Any
@@ -9,26 +7,24 @@ from websockets.sync.client import connect
 
 from cubestack.host.ground.control_api import CALLS
 
-from .conftest import SOON_S, TOKEN, Controlled
-
-BEARER = {"Authorization": f"Bearer {TOKEN}"}
+from .conftest import BEARER, SOON_S, Controlled
 
 
-def test_it_tells_all_that_it_can(controlled: Controlled) -> None:
+def test_root_lists_all_calls(controlled: Controlled) -> None:
     status, told = controlled.ask("GET", "/")
     assert status == 200
     assert [call["path"] for call in told["calls"]] == [call.path for call in CALLS]
     assert told["devices"] == ["cubestar"]
 
 
-def test_the_page_has_every_call() -> None:
+def test_document_describes_every_call() -> None:
     page = (Path(__file__).parents[3] / "docs" / "control-api.md").read_text("utf-8")
     for call in CALLS:
         assert f"`{call.method} {call.path.replace('{device}', 'NAME')}`" in page
         assert all(f"`{name}`" in page for name in call.takes)
 
 
-def test_time_is_held_stepped_and_sent_on(controlled: Controlled) -> None:
+def test_pause_step_run_and_resume(controlled: Controlled) -> None:
     controlled.ask("POST", "/run", {"to_s": 20.0})  # it has booted
     _, held = controlled.ask("POST", "/pause")
     assert held["held"]
@@ -44,7 +40,7 @@ def test_time_is_held_stepped_and_sent_on(controlled: Controlled) -> None:
     assert (paced["pace"], paced["speed"]) == ("real", 4)
 
 
-def test_what_the_shell_does_is_done(controlled: Controlled) -> None:
+def test_act_executes_shell_commands(controlled: Controlled) -> None:
     act = "/devices/cubestar/act"
     before = controlled.ask("GET", "/state")[1]["devices"]["cubestar"]["currents_ma"]["total"]
     _, state = controlled.ask("POST", act, {"words": ["power", "imager", "off"]})
@@ -61,7 +57,7 @@ def test_what_the_shell_does_is_done(controlled: Controlled) -> None:
     assert controlled.ask("GET", "/state")[1]["devices"]["cubestar"]["probes"]["resets"] == 1
 
 
-def test_a_scene_is_sent_as_its_text(controlled: Controlled) -> None:
+def test_scene_is_sent_as_text(controlled: Controlled) -> None:
     act = "/devices/cubestar/act"
     before = controlled.emulated.scene
     text = 'kind = "sky"\nra_deg = 12.0\ndec_deg = 3.0\nroll_deg = 0.0\n'
@@ -100,7 +96,7 @@ def test_a_scene_is_sent_as_its_text(controlled: Controlled) -> None:
         ("POST", "/devices/cubestar/act", {"words": ["fault", "flod"]}, 400, "flod"),
     ],
 )
-def test_what_makes_no_sense_is_told(
+def test_rejects_invalid_requests(
     controlled: Controlled, method: str, path: str, body: Any, status: int, error: str
 ) -> None:
     found, told = controlled.ask(method, path, body)
@@ -109,7 +105,7 @@ def test_what_makes_no_sense_is_told(
     assert controlled.ask("GET", "/state")[0] == 200
 
 
-def test_events_tell_how_it_is(controlled: Controlled) -> None:
+def test_events_report_state_and_log(controlled: Controlled) -> None:
     with connect(
         f"{controlled.events}?every_s=0.05", additional_headers=BEARER, open_timeout=SOON_S
     ) as socket:
@@ -126,13 +122,13 @@ def test_events_tell_how_it_is(controlled: Controlled) -> None:
             pass
 
 
-def test_the_emulation_goes_on_when_its_watchers_are_gone(controlled: Controlled) -> None:
+def test_emulation_continues_after_clients_disconnect(controlled: Controlled) -> None:
     for _ in range(5):
         connect(controlled.events, additional_headers=BEARER, open_timeout=SOON_S).socket.close()
     assert controlled.ask("GET", "/state")[0] == 200
 
 
-def test_it_goes_back_to_a_time_and_to_a_snapshot(controlled: Controlled) -> None:
+def test_back_returns_to_a_time_or_snapshot(controlled: Controlled) -> None:
     act = "/devices/cubestar/act"
     controlled.ask("POST", "/run", {"to_s": 20})
     at_rest = controlled.ask("GET", "/state")[1]["devices"]
@@ -154,7 +150,7 @@ def test_it_goes_back_to_a_time_and_to_a_snapshot(controlled: Controlled) -> Non
     assert controlled.ask("POST", "/back", {"to": 0})[1]["time_s"] == 0
 
 
-def test_the_recording_is_whole_at_any_time(controlled: Controlled) -> None:
+def test_recording_is_complete_at_any_time(controlled: Controlled) -> None:
     controlled.ask("POST", "/run", {"to_s": 20})
     controlled.ask("POST", "/devices/cubestar/act", {"words": ["power", "imager", "off"]})
     status, text = controlled.ask("GET", "/devices/cubestar/recording", as_text=True)
@@ -164,7 +160,7 @@ def test_the_recording_is_whole_at_any_time(controlled: Controlled) -> None:
     assert lines[-1]["ps"] == 20 * 10**12
 
 
-def test_without_a_record_there_is_no_way_back(controlled: Controlled) -> None:
+def test_back_needs_a_recording(controlled: Controlled) -> None:
     controlled.emulation.past = "--gdb goes forward only"
     for method, path, body in (
         ("POST", "/back", {"to": 0}),

@@ -1,10 +1,6 @@
-"""An emulation that a page started is started again otherwise, with the same scene and seed."""
-
 import base64
-import http.client
 import json
 from collections.abc import Iterator
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +9,11 @@ import pytest
 from cubestack.firmware_model.reference.image import reference_image
 from cubestack.host.errors import PortOpenError, TargetError
 from cubestack.host.ground.emulators import Emulator, UploadedFile, words
-from cubestack.host.ground.guard import Guard
-from cubestack.host.ground.page_app import page_app
 from cubestack.host.ground.scenes import text_of
 from cubestack.host.ground.serving import Serving
 from cubestack.host.ground.session import TargetSession
 
-from .conftest import SOON_S, TOKEN
+from .conftest import TOKEN, request, serving_pages
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +26,7 @@ def session() -> Iterator[TargetSession]:
 
 @pytest.fixture
 def served(session: TargetSession) -> Iterator[Serving]:
-    opened = Future[TargetSession]()
-    opened.set_result(session)
-    serving = Serving(Guard(page_app([opened]), TOKEN), "127.0.0.1", 0)
-    with serving.running():
+    with serving_pages(session) as serving:
         yield serving
 
 
@@ -45,17 +36,12 @@ def scene(session: TargetSession) -> Any:
 
 
 def restart(served: Serving, body: object, token: str = TOKEN) -> tuple[int, Any]:
-    connection = http.client.HTTPConnection(*served.address, timeout=SOON_S)
-    try:
-        headers = {"Authorization": f"Bearer {token}"}
-        connection.request("POST", "/targets/0/restart", json.dumps(body), headers)
-        answer = connection.getresponse()
-        return answer.status, json.loads(answer.read())
-    finally:
-        connection.close()
+    headers = {"Authorization": f"Bearer {token}"}
+    answer, content = request(served, "POST", "/targets/0/restart", body, headers)
+    return answer.status, json.loads(content)
 
 
-def test_a_profile_is_chosen_and_scene_and_seed_stay(
+def test_restart_changes_the_profile_and_keeps_scene_and_seed(
     session: TargetSession, served: Serving
 ) -> None:
     assert session.controls is not None
@@ -75,7 +61,7 @@ def test_a_profile_is_chosen_and_scene_and_seed_stay(
     assert values["NodeType"] > 0
 
 
-def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> None:
+def test_restart_runs_uploaded_firmware(session: TargetSession, served: Serving) -> None:
     content = base64.b64encode(reference_image().read_bytes()).decode()
     own = {"name": "../../my <own>.elf", "content": content}
     status, told = restart(served, {"files": {"firmware": own}})
@@ -112,7 +98,7 @@ def test_firmware_is_sent_and_runs(session: TargetSession, served: Serving) -> N
         ({"files": {"firmware": {"name": "a.elf", "content": "AAAA"}}}, 502, "is not an ELF file"),
     ],
 )
-def test_what_can_not_be_started_is_one_line_and_the_old_one_runs(
+def test_failed_restart_keeps_the_old_emulation(
     session: TargetSession, served: Serving, body: object, status: int, error: str
 ) -> None:
     begun = session.restarts
@@ -123,25 +109,25 @@ def test_what_can_not_be_started_is_one_line_and_the_old_one_runs(
     assert session.execute("read Identification").result()["data"]["values"]["NodeType"] > 0
 
 
-def test_only_who_may_starts_it_again(session: TargetSession, served: Serving) -> None:
+def test_restart_needs_the_token(session: TargetSession, served: Serving) -> None:
     begun = session.restarts
     assert restart(served, {}, "guess")[0] == 401
     assert session.restarts == begun
 
 
-def test_one_that_does_not_start_is_told() -> None:
+def test_emulation_that_does_not_start_is_reported() -> None:
     emulator = Emulator("cubestar", {"scene": "/none.toml"})
     with pytest.raises(PortOpenError, match=r"/none\.toml"):
         emulator.start()
     emulator.close()
 
 
-def test_options_are_words_of_the_command_line() -> None:
+def test_options_become_command_line_words() -> None:
     given = {"seed": 0, "set": "", "mcu_addressing": True, "semihosting": False, "scene": None}
     assert words(given) == ["--seed", "0", "--mcu-addressing"]
 
 
-def test_a_sent_file_stays_in_its_folder(tmp_path: Path) -> None:
+def test_uploaded_file_stays_in_its_folder(tmp_path: Path) -> None:
     for name in ("..", "/etc/passwd", "a/../../b", "", "\0", "é.bin"):
         path = Path(UploadedFile(name, b"x", "@0x10").save(tmp_path).removesuffix("@0x10"))
         assert path.parent == tmp_path

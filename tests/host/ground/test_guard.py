@@ -1,5 +1,3 @@
-"""What a hostile page or program can do at a port on loopback: nothing."""
-
 import http.client
 import json
 import resource
@@ -17,7 +15,7 @@ from tests.tiers import quick
 
 from .conftest import SOON_S, TOKEN, Controlled
 
-BEARER = f"Bearer {TOKEN}"
+ALLOWED = {"Authorization": f"Bearer {TOKEN}"}
 
 
 @pytest.mark.parametrize(
@@ -28,16 +26,16 @@ BEARER = f"Bearer {TOKEN}"
         ({"Authorization": "Bearer wrong"}, 401),
         ({"Authorization": f"Basic {TOKEN}"}, 401),
         ({"Cookie": "cubestack=wrong"}, 401),
-        ({"Authorization": BEARER}, 200),
-        ({"Authorization": BEARER, "Origin": "http://evil.example"}, 403),
-        ({"Authorization": BEARER, "Origin": "null"}, 403),
-        ({"Authorization": BEARER, "Host": "evil.example"}, 421),
-        ({"Authorization": BEARER, "Host": "evil.example:8700"}, 421),
-        ({"Authorization": BEARER, "Host": "localhost:1"}, 200),
-        ({"Authorization": BEARER, "Host": "[::1]"}, 200),
+        (ALLOWED, 200),
+        (ALLOWED | {"Origin": "http://evil.example"}, 403),
+        (ALLOWED | {"Origin": "null"}, 403),
+        (ALLOWED | {"Host": "evil.example"}, 421),
+        (ALLOWED | {"Host": "evil.example:8700"}, 421),
+        (ALLOWED | {"Host": "localhost:1"}, 200),
+        (ALLOWED | {"Host": "[::1]"}, 200),
     ],
 )
-def test_only_who_may_is_answered(
+def test_requests_need_token_origin_and_host(
     controlled: Controlled, headers: dict[str, str], status: int
 ) -> None:
     held = controlled.ask("GET", "/state")[1]["held"]
@@ -45,7 +43,7 @@ def test_only_who_may_is_answered(
     assert controlled.ask("GET", "/state")[1]["held"] == (held or status == 200)
 
 
-def test_a_page_s_address_with_the_token_gives_a_cookie(controlled: Controlled) -> None:
+def test_address_with_token_sets_a_cookie(controlled: Controlled) -> None:
     connection = http.client.HTTPConnection(*controlled.serving.address, timeout=SOON_S)
     connection.request("GET", f"/?token={TOKEN.replace(' ', '%20')}")
     answer = connection.getresponse()
@@ -60,17 +58,14 @@ def test_a_page_s_address_with_the_token_gives_a_cookie(controlled: Controlled) 
     connection.close()
 
 
-@pytest.mark.parametrize(
-    "headers", [{}, {"Authorization": BEARER, "Origin": "http://evil.example"}]
-)
-def test_a_websocket_is_guarded_too(controlled: Controlled, headers: dict[str, str]) -> None:
+@pytest.mark.parametrize("headers", [{}, ALLOWED | {"Origin": "http://evil.example"}])
+def test_websocket_needs_token_and_origin(controlled: Controlled, headers: dict[str, str]) -> None:
     with pytest.raises(InvalidStatus, match="403"):
         connect(controlled.events, additional_headers=headers, open_timeout=SOON_S)
 
 
-def test_a_message_of_a_mebibyte_is_the_longest_that_is_taken(controlled: Controlled) -> None:
-    allowed = {"Authorization": BEARER}
-    with connect(controlled.events, additional_headers=allowed, open_timeout=SOON_S) as opened:
+def test_websocket_rejects_messages_above_1_mib(controlled: Controlled) -> None:
+    with connect(controlled.events, additional_headers=ALLOWED, open_timeout=SOON_S) as opened:
         opened.send(bytes(1 << 20))
         assert opened.ping().wait(SOON_S)
         opened.send(bytes((1 << 20) + 1))
@@ -79,10 +74,10 @@ def test_a_message_of_a_mebibyte_is_the_longest_that_is_taken(controlled: Contro
     assert controlled.ask("GET", "/state")[0] == 200
 
 
-def test_a_huge_body_is_refused(controlled: Controlled) -> None:
+def test_rejects_a_huge_body(controlled: Controlled) -> None:
     with socket.create_connection(controlled.serving.address, SOON_S) as raw:
         raw.sendall(
-            f"POST /step HTTP/1.1\r\nHost: localhost\r\nAuthorization: {BEARER}\r\n"
+            f"POST /step HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {TOKEN}\r\n"
             f"Content-Length: {100 * LARGEST_BODY}\r\n\r\n".encode()
         )
         try:
@@ -93,7 +88,7 @@ def test_a_huge_body_is_refused(controlled: Controlled) -> None:
     assert controlled.ask("GET", "/state")[0] == 200
 
 
-def test_noise_is_no_request(controlled: Controlled) -> None:
+def test_survives_noise(controlled: Controlled) -> None:
     for noise in (b"\0" * 100_000, b"GET / HTTP/9\r\n\r\n", b"GET /" + b"a" * 1_000_000):
         with socket.create_connection(controlled.serving.address, SOON_S) as raw:
             try:
@@ -116,13 +111,10 @@ def many_files() -> Iterator[None]:
 
 @pytest.mark.usefixtures("many_files")
 @pytest.mark.parametrize("count", quick([1_000, 10_000], 1))
-def test_many_connections_do_not_stop_the_emulation(controlled: Controlled, count: int) -> None:
+def test_many_connections_do_not_block_the_emulation(controlled: Controlled, count: int) -> None:
     kept = []
-    with connect(
-        f"{controlled.events}?every_s=0.05",
-        additional_headers={"Authorization": BEARER},
-        open_timeout=SOON_S,
-    ) as watching:
+    events = f"{controlled.events}?every_s=0.05"
+    with connect(events, additional_headers=ALLOWED, open_timeout=SOON_S) as watching:
         begun_s = json.loads(watching.recv(SOON_S))["state"]["time_s"]
         for number in range(count):
             raw = socket.create_connection(controlled.serving.address, SOON_S)
@@ -144,7 +136,6 @@ def test_many_connections_do_not_stop_the_emulation(controlled: Controlled, coun
 
 
 def answered(controlled: Controlled) -> bool:
-    """Whether there is room for one more connection."""
     try:
         return bool(controlled.ask("GET", "/state")[0] == 200)
     except ConnectionError:
@@ -162,12 +153,12 @@ def closed(raw: socket.socket) -> bool:
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "192.0.2.1"])
-def test_other_machines_are_kept_out(address: str) -> None:
+def test_rejects_addresses_of_other_machines(address: str) -> None:
     with pytest.raises(PortOpenError, match=f"{address} can be reached .* --allow-remote"):
         Serving(None, address, 0)  # type: ignore[arg-type]
 
 
-def test_a_port_that_is_taken_is_told(controlled: Controlled) -> None:
+def test_port_in_use_is_reported(controlled: Controlled) -> None:
     host, port = controlled.serving.address
     with pytest.raises(PortOpenError, match=f"can not listen on {host}:{port}: Address already"):
         Serving(None, host, port)  # type: ignore[arg-type]
@@ -177,5 +168,5 @@ def test_a_port_that_is_taken_is_told(controlled: Controlled) -> None:
     ("name", "own"),
     [("localhost", True), ("127.8.9.1", True), ("::1", True), ("", False), ("a", False)],
 )
-def test_names_of_this_machine(name: str, own: bool) -> None:
+def test_loopback_names(name: str, own: bool) -> None:
     assert loopback_name(name) == own

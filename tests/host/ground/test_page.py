@@ -1,5 +1,3 @@
-"""The page in a real browser, at emulations of all sensors: what is commanded, and told."""
-
 import subprocess
 import sys
 from pathlib import Path
@@ -33,8 +31,7 @@ def test_attitude_words_and_flags_are_shown(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_any_word_of_telemetry_is_a_band(page: Any) -> None:
-    """Chosen and removed by keys; what it is now, and what its colours mean, are in words."""
+def test_telemetry_word_is_shown_as_a_band(page: Any) -> None:
     fields = page.locator("#band option").all_inner_texts()
     assert len(fields) > 3
     page.select_option("#band", "AttitudeQuaternion.Mode")
@@ -53,7 +50,7 @@ def test_any_word_of_telemetry_is_a_band(page: Any) -> None:
     assert page.locator("#band option").all_inner_texts() != fields
 
 
-def test_a_command_has_its_effect(page: Any) -> None:
+def test_command_changes_the_device(page: Any) -> None:
     page.select_option("#frame", "DetectionThresholdValues")
     page.select_option("#command", "setDetectionThresholds")
     page.fill("[name=DetectionThreshold]", "33")
@@ -64,7 +61,7 @@ def test_a_command_has_its_effect(page: Any) -> None:
     page.wait_for_selector("#plot canvas")
 
 
-def test_mistakes_are_told_as_text(page: Any) -> None:
+def test_errors_are_shown_as_text(page: Any) -> None:
     told = line(page, "read <img/src=x/onerror=document.hacked=1>")
     assert "<img" in told
     assert page.locator("#lines li.bad").count() == 1
@@ -72,11 +69,11 @@ def test_mistakes_are_told_as_text(page: Any) -> None:
     assert page.locator("#lines img").count() == 0
 
 
-def test_it_tells_what_was_chosen(page: Any) -> None:
+def test_chosen_options_are_shown(page: Any) -> None:
     assert "seed 5" in page.inner_text("#chosen")
 
 
-def test_time_is_paused_stepped_and_goes_on(page: Any) -> None:
+def test_time_is_paused_stepped_and_resumed(page: Any) -> None:
     page.click("#pause")
     page.wait_for_selector("#pause[aria-pressed=true]")
     page.click("#step")
@@ -88,8 +85,7 @@ def test_time_is_paused_stepped_and_goes_on(page: Any) -> None:
     page.wait_for_selector("#pause[aria-pressed=false]")
 
 
-def test_it_goes_back_to_a_snapshot(page: Any) -> None:
-    """What was commanded after it is undone, and the line stays open."""
+def test_back_returns_to_a_snapshot(page: Any) -> None:
     look(page, "CubeSense")
     line(page, "write DetectionThreshold1 7")
     page.click("#pause")
@@ -111,7 +107,7 @@ def test_it_goes_back_to_a_snapshot(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_the_recording_can_be_saved_and_replayed(page: Any, tmp_path: Path) -> None:
+def test_saved_recording_replays(page: Any, tmp_path: Path) -> None:
     look(page, "CubeSense")
     line(page, "read Identification")
     with page.expect_download() as saving:
@@ -123,7 +119,7 @@ def test_the_recording_can_be_saved_and_replayed(page: Any, tmp_path: Path) -> N
     assert subprocess.run(call, stdout=subprocess.DEVNULL).returncode == 0
 
 
-def test_a_fault_is_injected_and_seen(page: Any) -> None:
+def test_fault_is_injected_and_logged(page: Any) -> None:
     faults = page.locator("#fault option").all_inner_texts()
     reset = next(fault for fault in faults if fault.startswith("processor-reset "))
     page.select_option("#fault", reset)

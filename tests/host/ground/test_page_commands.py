@@ -1,5 +1,3 @@
-"""What a page commands, in a real browser: settings and registers, kept lines, waveforms."""
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,7 +25,7 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
         yield opened
 
 
-def test_a_setting_that_differs_is_marked(page: Any) -> None:
+def test_changed_setting_is_marked(page: Any) -> None:
     look(page, "CubeSense")
     line(page, "write DetectionThreshold1 77")
     page.click("#read-settings")
@@ -54,7 +52,7 @@ def test_registers_of_the_image_sensor_have_names(page: Any) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
+def test_waveform_of_the_pins_is_drawn(page: Any, tmp_path: Path) -> None:
     look(page, "CubeStar")
     line(page, "write CaptureAndProcess")
     page.click("#pause")
@@ -87,7 +85,7 @@ def test_the_pins_of_a_handshake_are_drawn(page: Any, tmp_path: Path) -> None:
     page.wait_for_selector("#pause[aria-pressed=false]")
 
 
-def test_lines_are_kept_by_the_browser_for_a_device(page: Any) -> None:
+def test_saved_lines_are_kept_per_device(page: Any) -> None:
     look(page, "CubeSense")
     page.fill("#line", "read Identification RuntimeSeconds")
     page.click("#save-line")
@@ -111,7 +109,7 @@ def test_lines_are_kept_by_the_browser_for_a_device(page: Any) -> None:
     assert page.locator("#saved-lines li").count() == 0
 
 
-def test_a_recording_is_played(chromium: Any, tmp_path: Path) -> None:
+def test_recording_is_played(chromium: Any, tmp_path: Path) -> None:
     path = tmp_path / "run.rec"
     target = open_target("emulated:cubesense", record=path)
     target.node.telemetry("Configuration")

@@ -1,5 +1,3 @@
-"""No text that comes to the page is markup, by whichever way it comes."""
-
 import json
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -38,7 +36,7 @@ def lives(page: Any, change: Change) -> None:
 
 
 @pytest.mark.parametrize("missing", [True, False])
-def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: bool) -> None:
+def test_device_texts_are_escaped(chromium: Any, address: str, missing: bool) -> None:
     with shown(chromium, address) as page:
 
         def told(route: Any) -> None:
@@ -62,8 +60,7 @@ def test_no_text_of_a_device_is_markup(chromium: Any, address: str, missing: boo
         nothing_ran(page)
 
 
-def test_no_text_of_a_live_device_is_markup(chromium: Any, address: str) -> None:
-    """Results, names of snapshots, memories, supplies and probes, and what faults did."""
+def test_live_texts_are_escaped(chromium: Any, address: str) -> None:
 
     def change(told: dict[str, Any]) -> dict[str, Any]:
         made = hostile(told) | {"log": [HOSTILE]}
@@ -85,7 +82,7 @@ def test_no_text_of_a_live_device_is_markup(chromium: Any, address: str) -> None
         nothing_ran(page)
 
 
-def test_no_live_failure_is_markup(chromium: Any, address: str) -> None:
+def test_live_errors_are_escaped(chromium: Any, address: str) -> None:
     def change(told: dict[str, Any]) -> dict[str, Any]:
         carried = {"what": HOSTILE, "done": 1, "total": 2, "held": False, "ended": HOSTILE}
         return {
@@ -105,8 +102,7 @@ def test_no_live_failure_is_markup(chromium: Any, address: str) -> None:
         nothing_ran(page)
 
 
-def test_no_answer_is_markup(chromium: Any, address: str) -> None:
-    """Of a register of the image sensor, of stars, and of whatever is refused."""
+def test_answers_are_escaped(chromium: Any, address: str) -> None:
     with shown(chromium, address) as page:
         look(page, "CubeStar")
         answer = {"value": HOSTILE, "bits": {HOSTILE: HOSTILE}}
@@ -135,8 +131,7 @@ def test_no_answer_is_markup(chromium: Any, address: str) -> None:
         nothing_ran(page)
 
 
-def test_a_scene_s_name_and_a_snapshot_s_are_text(chromium: Any, address: str) -> None:
-    """What a user writes comes back from the emulation, in a refusal and in a list."""
+def test_scene_and_snapshot_names_are_escaped(chromium: Any, address: str) -> None:
     with shown(chromium, address) as page:
         page.click("#scene summary >> text=scene file")
         page.fill("#scene-text", f"kind = '{HOSTILE}'")

@@ -1,5 +1,3 @@
-"""An I2C bus in the page: a target without a serial line, registers behind a pointer."""
-
 import os
 import re
 from collections.abc import Iterator
@@ -40,7 +38,7 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
         yield opened
 
 
-def test_telemetry_and_commands_go_over_the_bus(page: Any) -> None:
+def test_telemetry_and_commands_use_the_bus(page: Any) -> None:
     page.wait_for_selector(f"#link >> text=i2c:{BUS}:0x1b")
     line(page, "write DetectionThreshold1 77")
     page.select_option("#frame", "Configuration")
@@ -52,8 +50,7 @@ def test_telemetry_and_commands_go_over_the_bus(page: Any) -> None:
     assert page.locator("#read-registers").is_disabled()
 
 
-def test_registers_behind_a_pointer_are_read_and_written(page: Any) -> None:
-    """Those of one number; what was written differs from its default, and is marked."""
+def test_registers_are_read_and_written(page: Any) -> None:
     assert REGISTERS is not None
     named = {one.name: one for one in REGISTERS}
     page.click("#settings summary >> text=/[0-9]+ registers/")

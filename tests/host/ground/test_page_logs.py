@@ -1,5 +1,3 @@
-"""What a page saves, read back: recordings, and tables of all that was said and of results."""
-
 import csv
 import os
 import re
@@ -39,8 +37,7 @@ def same(cell: Any, text: str) -> bool:
     return float(text) == cell if isinstance(cell, float) else str(cell) == text
 
 
-def test_tables_are_the_same_in_both_forms(chromium: Any, tmp_path: Path) -> None:
-    """Of results, of all that was said, and what `cubestack decode` makes of the recording."""
+def test_csv_and_parquet_tables_are_equal(chromium: Any, tmp_path: Path) -> None:
     with station("emulated:cubestar", "--seed", "5") as address, shown(chromium, address) as page:
         line(page, "write setDetectionThresholds 33 34")
         line(page, "write CaptureAndProcess")
@@ -67,8 +64,7 @@ def test_tables_are_the_same_in_both_forms(chromium: Any, tmp_path: Path) -> Non
     assert rows_of(tmp_path / "by-command.csv")[: len(said)] == said
 
 
-def test_a_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
-    """With a device that is emulated elsewhere, as with a real one."""
+def test_saved_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
     kept = tmp_path / "session.rec"
     with emulating(["cubesense", "--tcp", "0"]) as said:
         port = next(found[1] for one in said if (found := SERVES.search(one)))
@@ -87,8 +83,7 @@ def test_a_session_is_opened_later(chromium: Any, tmp_path: Path) -> None:
     assert "DetectionThreshold1" in {row["message"] for row in rows}
 
 
-def test_what_can_not_be_saved_is_greyed(chromium: Any, tmp_path: Path) -> None:
-    """Without a recording, and without the library that writes such files."""
+def test_unavailable_downloads_are_disabled(chromium: Any, tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['pyarrow'] = None\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     with emulating(["cubesense", "--tcp", "0"]) as said:

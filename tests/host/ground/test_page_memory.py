@@ -1,7 +1,7 @@
-"""Eight hours of a page: neither it nor its server needs more memory from one to the next.
+"""Memory of the page and of its server during eight simulated hours.
 
-What a second brings is told as fast as it is taken: to programs by the server, to the page by
-a WebSocket in its own browser, as both together wait for each other most of the time.
+Each is tested alone, because both together mostly wait for each other: the server sends to
+programs, and the page receives from a WebSocket in its own browser.
 """
 
 import json
@@ -59,14 +59,12 @@ SECONDS = """async ([told, from, to, tasks]) => {
   }
   await new Promise(requestAnimationFrame);
 }"""
-"""What comes in so many seconds."""
+"""Sends the messages of the given seconds."""
 
 AT_ONCE = 50
 
 
 class Page(NamedTuple):
-    """Attributes: bytes of its heap; elements and listeners."""
-
     heap: int
     nodes: int
     listeners: int
@@ -89,7 +87,7 @@ def live(address: str) -> Any:
 
 
 def told(address: str, until_s: int) -> dict[str, Any]:
-    """What a tab is told when so many seconds are over."""
+    """The first message to a tab at or after ``until_s``."""
     with live(address) as socket:
         socket.send(json.dumps({"show": FRAMES, "results": True, "every_s": 0}))
         while True:
@@ -104,8 +102,7 @@ def resident(process: Any) -> int:
 
 
 @HOURS
-def test_the_server_s_memory_stays(server: Any, begin_s: int, end_s: int) -> None:
-    """Of tabs that are told results, telemetry and what happened."""
+def test_server_memory_does_not_grow(server: Any, begin_s: int, end_s: int) -> None:
     address = server.stdout.readline().strip()
     with ThreadPoolExecutor(TABS) as pool:
         [*pool.map(lambda _tab: told(address, begin_s), range(TABS))]
@@ -130,8 +127,7 @@ def measured(page: Any) -> Page:
 
 
 @HOURS
-def test_the_page_s_memory_stays(chromium: Any, server: Any, begin_s: int, end_s: int) -> None:
-    """With results, a plot, bands, lamps, lines of a log and pictures."""
+def test_page_memory_does_not_grow(chromium: Any, server: Any, begin_s: int, end_s: int) -> None:
     address = server.stdout.readline().strip()
     message = told(address, 1)
     with shown(chromium, address) as page:

@@ -1,7 +1,4 @@
-"""Every telecommand and telemetry frame of every device is used from the page.
-
-Of a device that another distribution brings as well: no line of the page knows any.
-"""
+"""Every message of every device is used from the page, plug-in devices included."""
 
 import os
 from collections.abc import Iterator
@@ -21,11 +18,8 @@ pytestmark = [pytest.mark.xdist_group("page messages"), pytest.mark.slow]
 
 PLUGGED_IN = {"sunslit": ROOT / "examples" / "linear_sun_sensor"}
 
-STREAMS = "StreamDownImage"
-"""Answered by a picture, which the page fetches in another way."""
-
-NONE = "\N{EN DASH}"
-"""In place of a value that has not come."""
+STREAMS = "StreamDownImage"  # answered by a picture, which the page downloads in another way
+NONE = "\N{EN DASH}"  # shown for a missing value
 
 ENDED = "#lines li.good, #lines li.bad"
 
@@ -39,7 +33,6 @@ class Opened(NamedTuple):
 def opened(
     request: pytest.FixtureRequest, chromium: Any, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Opened]:
-    """The page of an emulation that hurries."""
     name = request.param
     project = PLUGGED_IN.get(name)
     site = tmp_path_factory.mktemp("site")
@@ -55,7 +48,6 @@ def opened(
 
 
 def fill(page: Any, message: Message, values: Any) -> None:
-    """Write values into the form of a telecommand."""
     for field in message.fields:
         control = page.locator(f"#commands form [name='{field.name}']")
         value = values[field.name]
@@ -79,7 +71,7 @@ def sent(page: Any, message: Message, values: Any) -> str:
     return str(page.locator("#lines li").first.inner_text())
 
 
-def test_every_telecommand_is_sent_by_its_form(opened: Opened) -> None:
+def test_every_telecommand_is_sent_from_its_form(opened: Opened) -> None:
     """With the last values of the tables that it takes in the state that it is in."""
     page, interface = opened
     offered = page.locator("#command option").all_inner_texts()

@@ -1,5 +1,3 @@
-"""Pictures in the page, in a real browser, at emulations of all sensors."""
-
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +15,12 @@ GREEN = (
     "let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 1] > d[i] + 60) n++;"
     "return n }"
 )
-"""Pixels of what is drawn over the picture that are green."""
+"""Counts the green pixels drawn over the picture."""
 
 pytestmark = pytest.mark.xdist_group("page")  # beside others: one browser
 
 
-def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
+def test_captured_picture_is_shown(page: Any) -> None:
     page.select_option("#command", "CaptureAndProcess")
     page.click("#send")
     # At power-up a memory holds noise; the picture is a dark sky with stars.
@@ -40,7 +38,7 @@ def test_a_picture_is_seen_when_it_is_taken(page: Any) -> None:
     )
 
 
-def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
+def test_found_edges_are_drawn(page: Any) -> None:
     look(page, "CubeSense")
     page.wait_for_selector("#attitude-status >> text=CubeSense reports no attitude")
     page.check("#detections")
@@ -51,8 +49,7 @@ def test_what_it_found_is_drawn_and_enlarged(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
-    """By keys alone, by the wheel once it is chosen, and by the pointer."""
+def test_picture_is_zoomed_and_moved(page: Any) -> None:
     picture = page.locator("#zoom-frame")
     wide = "document.querySelector('#canvas').clientWidth"
     shifted = "document.querySelector('#zoom-frame').scrollLeft"
@@ -82,7 +79,7 @@ def test_a_picture_is_enlarged_and_moved(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
+def test_magnitudes_are_drawn(page: Any) -> None:
     page.check("#detections")
     line(page, "write CaptureAndProcess")
     page.wait_for_selector("#picture >> text=/detected, .* identified/")
@@ -94,7 +91,7 @@ def test_stars_are_told_with_their_magnitudes(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> None:
+def test_picture_is_uploaded_and_downloaded(page: Any, tmp_path: Path) -> None:
     picture = np.random.default_rng(1).integers(0, 2, (512, 1024), np.uint8) * 200
     picture[40:] = 0  # black blocks are not sent
     sent = tmp_path / "sent.png"
@@ -124,8 +121,7 @@ def test_a_picture_goes_over_the_wire_both_ways(page: Any, tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_pictures_come_as_often_as_one_likes(page: Any) -> None:
-    """Up to five a second."""
+def test_picture_rate_is_selectable(page: Any) -> None:
     page.evaluate(
         "() => { window.asked = []; const send = WebSocket.prototype.send;"
         "WebSocket.prototype.send = function (text) {"

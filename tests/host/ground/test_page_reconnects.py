@@ -1,5 +1,3 @@
-"""The page and the program behind it lose each other."""
-
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
@@ -23,8 +21,7 @@ def relayed() -> Iterator[tuple[Relay, str]]:
         relay.close()
 
 
-def test_a_connection_is_lost_and_comes_back(chromium: Any, relayed: tuple[Relay, str]) -> None:
-    """The page tells, goes on without a reload, and still shows what was chosen."""
+def test_page_reconnects(chromium: Any, relayed: tuple[Relay, str]) -> None:
     relay, address = relayed
     with shown(chromium, address) as page:
         page.evaluate("window.here = true")
@@ -43,8 +40,9 @@ def test_a_connection_is_lost_and_comes_back(chromium: Any, relayed: tuple[Relay
 
 
 @pytest.mark.slow
-def test_another_program_in_its_place_is_told(chromium: Any, relayed: tuple[Relay, str]) -> None:
-    """Its token is another one: who does not open its address waits for ever."""
+def test_page_reports_another_program_at_its_address(
+    chromium: Any, relayed: tuple[Relay, str]
+) -> None:
     relay, address = relayed
     with station("emulated:cubesense") as other, shown(chromium, address) as page:
         page.wait_for_selector("#link >> text=emulated:cubesense")
@@ -55,8 +53,8 @@ def test_another_program_in_its_place_is_told(chromium: Any, relayed: tuple[Rela
 
 
 @pytest.mark.slow
-def test_two_pages_in_one_browser_know_their_programs(chromium: Any) -> None:
-    """A browser has one set of cookies for all ports."""
+def test_two_pages_in_one_browser_are_independent(chromium: Any) -> None:
+    """A browser shares its cookies between all ports of a host."""
     with (
         station("emulated:cubesense") as one,
         station("emulated:cubesense") as other,

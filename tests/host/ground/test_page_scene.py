@@ -1,5 +1,3 @@
-"""The page's scene in a real browser: map, form, and what comes of them."""
-
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -22,7 +20,7 @@ INK = (
     "for (let i = 0; i < d.length; i += 4) n.add(d[i] << 16 | d[i + 1] << 8 | d[i + 2]);"
     "return n.size }"
 )
-"""How many colours the map has."""
+"""Counts the colours of the map."""
 
 VALUE = "label:has-text('{}') input.scene-value"
 
@@ -42,7 +40,7 @@ def page(chromium: Any, address: str) -> Iterator[Any]:
 
 
 def stage(page: Any, device: str) -> None:
-    """Look at a device, and wait for its scene; that of its power-up."""
+    """Shows a device and waits for its scene."""
     look(page, device)
     page.wait_for_selector("#scene-status >> text=/camera/")
 
@@ -60,14 +58,14 @@ def told(page: Any, text: str) -> None:
 
 
 def place(page: Any, right: float, down: float) -> dict[str, float]:
-    """In the map, by shares of half of its width and height."""
+    """A position on the map, in shares of half its width and height."""
     box = page.locator("#sky-map").bounding_box()
     half = (box["width"] - 16) / 2
     return {"x": box["width"] / 2 + right * half, "y": box["height"] / 2 + down * half / 2}
 
 
 def click(page: Any, right: float, down: float) -> None:
-    """On the map; again where what came in above it moved it meanwhile."""
+    """Clicks on the map; repeats the click if the map moved meanwhile."""
     sky_map = page.locator("#sky-map")
     sky_map.scroll_into_view_if_needed()
     before = None
@@ -80,7 +78,7 @@ def point(page: Any, right: float, down: float) -> None:
     page.hover("#sky-map", position=place(page, right, down))
 
 
-def test_a_click_and_a_drag_put_the_pointing(page: Any) -> None:
+def test_click_and_drag_set_the_pointing(page: Any) -> None:
     click(page, 0, 0)
     told(page, "/camera (0.0|360.0)° -?0.0°/")
     assert min(value(page, "ra_deg"), 360 - value(page, "ra_deg")) < 0.5
@@ -99,7 +97,7 @@ def test_a_click_and_a_drag_put_the_pointing(page: Any) -> None:
     assert value(page, "ra_deg") == before
 
 
-def test_keys_alone_put_the_pointing_and_the_emulation_sees_it(page: Any) -> None:
+def test_keys_set_the_pointing_of_the_emulation(page: Any) -> None:
     fill(page, "ra_deg", "100")
     fill(page, "dec_deg", "10")
     told(page, "/camera 100.0° 10.0°/")
@@ -116,7 +114,7 @@ def test_keys_alone_put_the_pointing_and_the_emulation_sees_it(page: Any) -> Non
 
 
 @pytest.mark.slow
-def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
+def test_rejected_value_is_shown_at_its_field(page: Any) -> None:
     fill(page, "ra_deg", "400")
     told(page, "scene: ra_deg must be -360 to 360 deg, not 400")
     field = page.locator(f"#scene-keys {VALUE.format('ra_deg')}").first
@@ -129,8 +127,7 @@ def test_what_is_refused_is_told_with_its_key(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_fields_are_those_of_the_readers(page: Any) -> None:
-    """Limits, defaults and meanings; none of them is in the page's scripts."""
+def test_form_fields_match_the_scene_keys(page: Any) -> None:
     epoch = page.locator(f"#scene-keys {VALUE.format('epoch')}")
     assert (epoch.get_attribute("min"), epoch.get_attribute("max")) == ("1800", "2200")
     assert epoch.get_attribute("placeholder") == "2026"
@@ -144,7 +141,7 @@ def test_fields_are_those_of_the_readers(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
+def test_hazard_is_added_moved_and_removed(page: Any) -> None:
     page.click("#scene-keys summary >> text=hazards")
     page.select_option("[aria-label='kind of hazards']", "moon")
     page.click("[aria-label='add to hazards']")
@@ -165,7 +162,7 @@ def test_a_hazard_is_added_put_by_the_map_and_removed(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_whole_file_is_shown(page: Any) -> None:
+def test_scene_file_text_is_applied(page: Any) -> None:
     page.click("#scene summary >> text=scene file")
     page.fill("#scene-text", 'kind = "sky"\nra_deg = 200.0\ndec_deg = -40.0\n')
     page.click("#apply-file")
@@ -177,7 +174,7 @@ def test_a_whole_file_is_shown(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
+def test_earth_and_moon_are_placed_on_the_map(page: Any) -> None:
     stage(page, "CubeSense")
     assert page.locator("#scene-what option").all_inner_texts() == ["nadir", "sun", "moon"]
     click(page, 0, 0)  # +z, where the nadir camera looks
@@ -192,17 +189,15 @@ def test_earth_and_sun_stand_where_they_are_put(page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_directions_are_answered_beside_the_truth(page: Any) -> None:
-    """Of the limb's and the Sun's measurement; the error is the angle between the vectors."""
+def test_directions_are_compared_with_the_truth(page: Any) -> None:
     stage(page, "CubeSense")
     row = page.locator("#results tr.direction", has_text="nadir direction")
     for camera, memory in (("NADIR", "SRAM2"), ("SUN", "SRAM1")):
         page.fill("#line", f"write CaptureAndDetect Camera={camera} Sram={memory}")
         page.press("#line", "Enter")
         page.wait_for_selector(f"#results tr:has-text('{camera.lower()}_detect') >> text=SUCCESS")
-        page.wait_for_selector(
-            f"#results tr.direction:has-text('{camera.lower()}') >> text=/^0[.]/"
-        )
+        direction = f"#results tr.direction:has-text('{camera.lower()}')"
+        page.wait_for_selector(f"{direction} >> text=/^0[.]/")
     cells = row.locator("td").all_inner_texts()
     answer, truth = (np.array([float(part) for part in cell.split()]) for cell in cells[:2])
     angle = math.degrees(float(np.linalg.norm(answer - truth)))
@@ -215,7 +210,7 @@ def test_directions_are_answered_beside_the_truth(page: Any) -> None:
 
 
 @pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 1))
-def test_it_is_seen_whole(chromium: Any, address: str, scheme: str, width: int) -> None:
+def test_scene_form_fits_the_screen(chromium: Any, address: str, scheme: str, width: int) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
         for device in ("CubeStar", "CubeSense"):
@@ -230,19 +225,15 @@ def test_it_is_seen_whole(chromium: Any, address: str, scheme: str, width: int) 
 
 
 @pytest.mark.slow
-def test_no_key_is_markup(chromium: Any, address: str) -> None:
+def test_scene_keys_are_escaped(chromium: Any, address: str) -> None:
     with shown(chromium, address) as page:
 
         def evil(route: Any) -> None:
             kinds = route.fetch().json()["kinds"]
             for key in kinds["sky"].values():
                 key["meaning"], key["unit"] = HOSTILE, HOSTILE
-            kinds["sky"][HOSTILE] = {
-                "type": "number",
-                "default": HOSTILE,
-                "meaning": "",
-                "unit": "",
-            }
+            number = {"type": "number", "meaning": "", "unit": ""}
+            kinds["sky"][HOSTILE] = number | {"default": HOSTILE}
             route.fulfill(json={"kinds": kinds})
 
         page.route("**/scene/keys", evil)
@@ -259,7 +250,7 @@ def test_no_key_is_markup(chromium: Any, address: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_not_emulated_has_no_scene(chromium: Any, tmp_path: Any) -> None:
+def test_recording_has_no_scene(chromium: Any, tmp_path: Any) -> None:
     path = tmp_path / "run.rec"
     target = open_target("emulated:cubesense", record=path)
     target.node.telemetry("Configuration")

@@ -1,5 +1,3 @@
-"""A serial port in the page: no emulation is known of, a cable hangs between two terminals."""
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -38,7 +36,7 @@ def cell(page: Any, field: str) -> Any:
     return page.locator("#telemetry tr", has=page.locator(f"th >> text=/^{field}$/")).locator("td")
 
 
-def test_live_values_come_over_the_line(chromium: Any, tmp_path: Path, recorded: Any) -> None:
+def test_live_values_are_read_over_the_line(chromium: Any, tmp_path: Path, recorded: Any) -> None:
     with (
         cable(tmp_path / "ours", tmp_path / "theirs", recorded),
         opened(chromium, tmp_path / "ours") as page,
@@ -57,7 +55,7 @@ def test_live_values_come_over_the_line(chromium: Any, tmp_path: Path, recorded:
 
 
 @pytest.mark.slow
-def test_a_wrong_baud_rate_is_told(chromium: Any, tmp_path: Path, recorded: Any) -> None:
+def test_wrong_baud_rate_is_reported(chromium: Any, tmp_path: Path, recorded: Any) -> None:
     with (
         cable(tmp_path / "ours", tmp_path / "theirs", recorded),
         opened(chromium, tmp_path / "ours", "--baud", "19200") as page,
@@ -67,8 +65,9 @@ def test_a_wrong_baud_rate_is_told(chromium: Any, tmp_path: Path, recorded: Any)
         assert told in line(page, "read Configuration")
 
 
-def test_a_cable_is_pulled_and_put_back(chromium: Any, tmp_path: Path, recorded: Any) -> None:
-    """The page tells, and goes on by itself: what it shows then is new."""
+def test_page_recovers_from_an_unplugged_cable(
+    chromium: Any, tmp_path: Path, recorded: Any
+) -> None:
     ends = tmp_path / "ours", tmp_path / "theirs"
     with cable(*ends, recorded):
         opening = opened(chromium, ends[0])

@@ -1,5 +1,3 @@
-"""Profile and firmware are chosen in a real browser."""
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -25,7 +23,7 @@ def runs(page: Any, text: str) -> None:
 
 
 @pytest.mark.slow
-def test_profile_and_firmware_are_chosen(chromium: Any, address: str, tmp_path: Any) -> None:
+def test_profile_and_firmware_are_selected(chromium: Any, address: str, tmp_path: Any) -> None:
     with shown(chromium, address) as page, shown(chromium, address) as other:
         runs(page, "running: seed 5, profile published")
         fill(page, "ra_deg", "120")

@@ -1,5 +1,3 @@
-"""Pictures that a page sent and fetched are those that any other host has, byte for byte."""
-
 import re
 from collections.abc import Iterator
 from contextlib import closing
@@ -41,8 +39,7 @@ def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
 
 
 @pytest.mark.parametrize("port", ["cubestar"], indirect=True)
-def test_what_is_uploaded_is_downloaded(chromium: Any, tmp_path: Path, port: str) -> None:
-    """By the page and by a plain client, each to the other."""
+def test_uploaded_picture_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
     sent = np.zeros((2, 512, 1024), np.uint8)
     sent[:, 100:130] = np.random.default_rng(4).integers(0, 256, (2, 30, 1024), np.uint8)
     save_picture(sent[0], tmp_path / "sent.png")
@@ -58,7 +55,7 @@ def test_what_is_uploaded_is_downloaded(chromium: Any, tmp_path: Path, port: str
 
 @pytest.mark.slow
 @pytest.mark.parametrize("port", ["cubesense"], indirect=True)
-def test_what_was_taken_is_downloaded(chromium: Any, tmp_path: Path, port: str) -> None:
+def test_captured_picture_is_downloaded_unchanged(chromium: Any, tmp_path: Path, port: str) -> None:
     with station(port, "--device", "cubesense") as address, shown(chromium, address) as page:
         line(page, "write CaptureAndDetect Camera=NADIR Sram=SRAM2")
         page.wait_for_selector("#lines li.good >> text=CaptureAndDetect: done")

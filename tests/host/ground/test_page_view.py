@@ -1,5 +1,3 @@
-"""The page in a real browser: by keys, in several tabs, narrow and dark."""
-
 from typing import Any
 
 import pytest
@@ -12,7 +10,7 @@ from .layout_checks import COVERED, LOOKS, PALE
 pytestmark = pytest.mark.xdist_group("page")  # beside others: one browser
 
 
-def test_two_tabs_see_the_same(chromium: Any, address: str, page: Any) -> None:
+def test_two_tabs_share_the_state(chromium: Any, address: str, page: Any) -> None:
     with shown(chromium, address) as other:
         page.click("#pause")
         other.wait_for_selector("#pause[aria-pressed=true]")
@@ -20,7 +18,7 @@ def test_two_tabs_see_the_same(chromium: Any, address: str, page: Any) -> None:
         page.wait_for_selector("#pause[aria-pressed=false]")
 
 
-def test_two_tabs_look_at_what_they_like(chromium: Any, address: str, page: Any) -> None:
+def test_two_tabs_show_different_targets(chromium: Any, address: str, page: Any) -> None:
     with shown(chromium, address) as other:
         look(other, "CubeSense")
         page.select_option("#band", "IDMode.Mode")
@@ -33,8 +31,7 @@ def test_two_tabs_look_at_what_they_like(chromium: Any, address: str, page: Any)
         assert other.locator("#supplies li").count() > page.locator("#supplies li").count()
 
 
-def test_the_view_can_be_reached_by_tab(page: Any) -> None:
-    """Every control of the live view, in the order of the page, and none holds the focus."""
+def test_tab_key_reaches_every_control_in_order(page: Any) -> None:
     page.wait_for_selector("#sphere:visible")
     page.focus("#picture-name")
     reached = list[str]()
@@ -46,7 +43,7 @@ def test_the_view_can_be_reached_by_tab(page: Any) -> None:
     assert at == sorted(at)
 
 
-def test_the_keyboard_is_enough(page: Any) -> None:
+def test_page_works_with_the_keyboard_only(page: Any) -> None:
     page.focus("#newest")
     for _ in range(150):
         page.keyboard.press("Tab")
@@ -59,9 +56,7 @@ def test_the_keyboard_is_enough(page: Any) -> None:
 
 
 @pytest.mark.parametrize(("scheme", "width"), quick(LOOKS, 2))
-def test_nothing_is_cut_off_covered_or_pale(
-    chromium: Any, address: str, scheme: str, width: int
-) -> None:
+def test_layout_and_contrast(chromium: Any, address: str, scheme: str, width: int) -> None:
     size = {"width": width, "height": 850}
     with shown(chromium, address, viewport=size, color_scheme=scheme) as page:
         for device in ("AraMiS", "CubeSense", "CubeStar"):

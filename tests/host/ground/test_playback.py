@@ -1,5 +1,3 @@
-"""A recording as a target of a page."""
-
 from pathlib import Path
 
 import pytest
@@ -29,7 +27,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
+def test_telemetry_is_that_of_the_played_time(made: Path) -> None:
     clock = [100.0]
     client = PlaybackClient(load_recording(made), INTERFACE, lambda: clock[0])
     with pytest.raises(NoAnswerError, match=r"before 0\.000 s"):
@@ -51,7 +49,7 @@ def test_telemetry_is_as_it_was_by_then(made: Path) -> None:
             client.play(nonsense, runs=True)
 
 
-def test_a_page_has_it_as_a_target(made: Path) -> None:
+def test_recording_is_a_target_of_the_page(made: Path) -> None:
     assert is_recording(str(made))
     assert not is_recording("/dev/ttyUSB0")
     session = TargetSession(open_recording(str(made)))
@@ -69,7 +67,7 @@ def test_a_page_has_it_as_a_target(made: Path) -> None:
     session.close()
 
 
-def test_what_is_not_recorded_says_how_it_would_be() -> None:
+def test_unrecorded_target_explains_how_to_record() -> None:
     session = TargetSession(Target("fake", INTERFACE, NodeClient(LetterLine(), INTERFACE)))
     with pytest.raises(ValueError, match="fake is not recorded: start with --record FILE"):
         recording(session)

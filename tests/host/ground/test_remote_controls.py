@@ -1,12 +1,11 @@
-"""The shell's controls reach a device that another process emulates."""
-
 from pathlib import Path
 
 import pytest
 
 from cubestack.host.emulation.controls import Controls, EmulatedControls
 from cubestack.host.emulation.remote_controls import TOKEN as VARIABLE
-from cubestack.host.emulation.remote_controls import ControlClient, RemoteControls, controlled
+from cubestack.host.emulation.remote_controls import ControlClient, RemoteControls
+from cubestack.host.emulation.remote_controls import controlled as controlled_at
 from cubestack.host.errors import PortOpenError, TargetError
 
 from .conftest import TOKEN, Controlled
@@ -17,7 +16,7 @@ def remote(controlled: Controlled) -> RemoteControls:
     return RemoteControls(ControlClient(controlled.serving.url, TOKEN), "cubestar")
 
 
-def test_they_offer_what_a_device_in_this_process_does(
+def test_remote_controls_match_local_controls(
     controlled: Controlled, remote: RemoteControls
 ) -> None:
     own: Controls = EmulatedControls(controlled.emulated)
@@ -28,7 +27,7 @@ def test_they_offer_what_a_device_in_this_process_does(
     assert remote.time_s() == pytest.approx(own.time_s())
 
 
-def test_they_do_what_is_asked(
+def test_remote_controls_act_on_the_device(
     controlled: Controlled, remote: RemoteControls, tmp_path: Path
 ) -> None:
     controlled.ask("POST", "/pause")
@@ -51,33 +50,25 @@ def test_they_do_what_is_asked(
         remote.peek("CMU")
 
 
-def test_time_goes_on_if_it_did(controlled: Controlled, remote: RemoteControls) -> None:
+def test_advance_keeps_time_running(controlled: Controlled, remote: RemoteControls) -> None:
     remote.advance(100.0)
     assert not controlled.ask("GET", "/state")[1]["held"]
 
 
-def test_the_token_is_that_of_the_environment(
+def test_token_is_read_from_the_environment(
     controlled: Controlled, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found_at = controlled.serving.url
     monkeypatch.setenv(VARIABLE, TOKEN)
-    assert controlled_device(found_at) == "cubestar"
+    assert controlled_at(controlled.serving.url).device == "cubestar"
     monkeypatch.setenv(VARIABLE, "another")
     with pytest.raises(PortOpenError, match=f"requires its token in .{VARIABLE}"):
-        controlled_device(found_at)
+        controlled_at(controlled.serving.url)
 
 
-def controlled_device(url: str) -> str:
-    return controlled(url).device
-
-
-@pytest.mark.parametrize("url", ["nonsense", "http://127.0.0.1", "http://127.0.0.1:99999", ""])
-def test_what_is_no_address_is_told(url: str) -> None:
-    with pytest.raises(TargetError, match="is not the address of a control port"):
-        ControlClient(url, "")
-
-
-def test_nobody_there_is_told(controlled: Controlled) -> None:
+def test_rejects_invalid_and_unreachable_urls(controlled: Controlled) -> None:
+    for url in ("nonsense", "http://127.0.0.1", "http://127.0.0.1:99999", ""):
+        with pytest.raises(TargetError, match="is not the address of a control port"):
+            ControlClient(url, "")
     host, port = controlled.serving.address
     with pytest.raises(PortOpenError, match="no control port answers"):
         ControlClient(f"http://{host}:{port ^ 1}", TOKEN).ask("GET", "/")

@@ -1,5 +1,3 @@
-"""The log of results that a page's server keeps."""
-
 import csv
 from collections.abc import Iterator
 from io import BytesIO, StringIO
@@ -22,7 +20,7 @@ def lines(log: ResultLog) -> list[dict[str, str]]:
     return list(csv.DictReader(StringIO(log.csv().decode())))
 
 
-def test_lines_have_all_columns_that_came_up(log: ResultLog) -> None:
+def test_lines_have_every_column(log: ResultLog) -> None:
     log.add({"ra_deg": 359.5, "task": "IDLE"}, {"ra_deg": 0.25, "dec_deg": 1.0})
     log.add({"ra_deg": None, "task": "a,b\n", "stars": 4}, {})
     first, second = lines(log)
@@ -35,7 +33,7 @@ def test_lines_have_all_columns_that_came_up(log: ResultLog) -> None:
     assert table["utc"] == [first["utc"], second["utc"]]
 
 
-def test_a_direction_has_one_error(log: ResultLog) -> None:
+def test_direction_has_one_error_angle(log: ResultLog) -> None:
     truth = {"sun_alpha_deg": 3.0, "sun_beta_deg": 4.0}
     log.add({"sun_alpha_deg": 0.0, "sun_beta_deg": 0.0}, truth)
     log.add({"sun_alpha_deg": -3.0, "sun_beta_deg": -4.0}, truth)
@@ -46,14 +44,14 @@ def test_a_direction_has_one_error(log: ResultLog) -> None:
     assert [one["sun_beta_error_deg"] for one in lines(log)] == ["-4.0", "-8.0", ""]
 
 
-def test_failures_are_no_lines(log: ResultLog) -> None:
+def test_failures_add_no_lines(log: ResultLog) -> None:
     log.add({"error": "no answer"}, {})
     log.add({}, {})
     assert (log.count, lines(log)) == (0, [])
     assert pyarrow.parquet.read_table(BytesIO(log.parquet())).num_rows == 0
 
 
-def test_more_than_is_read_at_once_and_less_than_the_most(
+def test_log_is_read_in_chunks_up_to_its_maximum(
     log: ResultLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(results, "MOST", 3000)

@@ -1,5 +1,3 @@
-"""What the control port tells of scenes: keys, the present one, and where it is on the sky."""
-
 import json
 from dataclasses import replace
 from typing import Any
@@ -23,7 +21,7 @@ def show(controlled: Controlled, table: dict[str, Any]) -> tuple[int, Any]:
     return controlled.ask("POST", "/devices/cubestar/act", body)
 
 
-def test_the_keys_of_scene_files_are_told(controlled: Controlled) -> None:
+def test_scene_keys(controlled: Controlled) -> None:
     status, told = controlled.ask("GET", f"{SCENE}/keys")
     assert status == 200
     assert list(told["kinds"]) == ["sky", "picture"]
@@ -31,7 +29,7 @@ def test_the_keys_of_scene_files_are_told(controlled: Controlled) -> None:
     assert (epoch["type"], epoch["low"], epoch["high"]) == ("number", 1800, 2200)
 
 
-def test_the_present_scene_is_one_that_can_be_shown_again(controlled: Controlled) -> None:
+def test_present_scene_round_trips(controlled: Controlled) -> None:
     table = controlled.ask("GET", SCENE)[1]["table"]
     assert (table["kind"], table["ra_deg"], table["mag_limit"]) == ("sky", 84.0, 3.8)
     other = table | {"ra_deg": 120.0, "hazards": {"moon": [{"direction": [120.0, 10.0]}]}}
@@ -40,16 +38,13 @@ def test_the_present_scene_is_one_that_can_be_shown_again(controlled: Controlled
     assert (status, told["table"]["ra_deg"]) == (200, 120.0)
     assert [one["name"] for one in told["sight"]["bodies"]] == ["Moon"]
     assert show(controlled, told["table"])[0] == 200
-    assert controlled.ask("GET", SCENE)[1]["table"] == told["table"]
-
-
-def test_what_moves_a_scene_is_told(controlled: Controlled) -> None:
-    assert controlled.ask("GET", SCENE)[1]["follows"] == ""
+    again = controlled.ask("GET", SCENE)[1]
+    assert (again["table"], again["follows"]) == (told["table"], "")
     controlled.emulated.follows = "an orbit"
     assert controlled.ask("GET", SCENE)[1]["follows"] == "an orbit"
 
 
-def test_another_scene_is_looked_at_and_not_shown(controlled: Controlled) -> None:
+def test_look_does_not_change_the_scene(controlled: Controlled) -> None:
     before = controlled.emulated.scene
     table = {"kind": "sky", "ra_deg": 10.0, "dec_deg": 20.0, "roll_deg": 30.0}
     status, told = controlled.ask("POST", f"{SCENE}/look", {"table": table})
@@ -75,7 +70,7 @@ def test_another_scene_is_looked_at_and_not_shown(controlled: Controlled) -> Non
         ),
     ],
 )
-def test_what_is_no_scene_is_told_in_one_line(
+def test_invalid_scene_is_rejected_in_one_line(
     controlled: Controlled, table: dict[str, Any], error: str
 ) -> None:
     status, told = controlled.ask("POST", f"{SCENE}/look", {"table": table})
@@ -84,13 +79,13 @@ def test_what_is_no_scene_is_told_in_one_line(
     assert "\n" not in told["error"]
 
 
-def test_only_who_may_is_told_of_scenes(controlled: Controlled) -> None:
+def test_scene_calls_need_the_token(controlled: Controlled) -> None:
     for method, path in (("GET", SCENE), ("GET", f"{SCENE}/keys"), ("GET", "/stars")):
         assert controlled.ask(method, path, headers={})[0] == 401
     assert controlled.ask("POST", f"{SCENE}/look", {"table": {}}, headers={})[0] == 401
 
 
-def test_stars_are_those_of_the_catalogue(controlled: Controlled) -> None:
+def test_stars_match_the_catalogue(controlled: Controlled) -> None:
     status, told = controlled.ask("GET", "/stars?mag_limit=2")
     stars = told["stars"]
     assert status == 200
@@ -107,7 +102,7 @@ def test_stars_are_those_of_the_catalogue(controlled: Controlled) -> None:
 
 
 @pytest.mark.parametrize("name", device_names())
-def test_the_default_scene_of_every_device_is_told(name: str) -> None:
+def test_default_scene_of_every_device_round_trips(name: str) -> None:
     with open_device(name) as emulated:
         told = scenes.present(emulated)
         json.dumps(told | scenes.keys(emulated.device), allow_nan=False)
@@ -117,7 +112,7 @@ def test_the_default_scene_of_every_device_is_told(name: str) -> None:
         np.testing.assert_allclose(one["axes"], other["axes"], atol=1e-5)
 
 
-def test_a_device_without_a_form_says_so() -> None:
+def test_rejects_a_device_without_scene_form() -> None:
     none = replace(device("cubestar"), scene_form=None)
     with pytest.raises(TargetError, match="CubeStar declares no scene keys"):
         scenes.keys(none)

@@ -1,5 +1,3 @@
-"""What pages learn of the link: an answer that is a refusal is an answer."""
-
 from collections.abc import Iterator
 
 import pytest
@@ -30,14 +28,14 @@ def behind() -> Iterator[Behind]:
     one.session.close()
 
 
-def test_a_refusal_is_told_and_the_link_is_whole(behind: Behind) -> None:
+def test_refusal_does_not_break_the_link(behind: Behind) -> None:
     behind.node.refusals.append(AckError.BAD_PARAMETER)
     with pytest.raises(CommandRefusedError, match="CaptureAndProcess refused: BAD_PARAMETER"):
         behind.session.execute("write CaptureAndProcess").result()
     assert behind.session.link == LinkState()
 
 
-def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) -> None:
+def test_silent_node_breaks_the_link_until_it_answers(behind: Behind) -> None:
     behind.node.lost = 100
     with pytest.raises(NoAnswerError):
         behind.session.execute("read TaskStatus").result()
@@ -49,7 +47,7 @@ def test_a_node_that_is_silent_breaks_the_link_until_it_answers(behind: Behind) 
 
 
 @pytest.mark.parametrize("client", ["cubestar", None])
-def test_what_can_not_be_asked_is_told_with_the_reason(client: str | None) -> None:
+def test_missing_features_depend_on_the_device(client: str | None) -> None:
     line = UartLink(FakeCubeStar())
     known = None if client is None else device(client)
     session = TargetSession(

@@ -1,5 +1,3 @@
-"""Defaults of settings and registers of image sensors, at emulated devices."""
-
 from collections.abc import Iterator
 
 import pytest
@@ -24,7 +22,7 @@ def shown(session: TargetSession, row: dict[str, object]) -> object:
     ]
 
 
-def test_after_power_up_settings_have_their_defaults(session: TargetSession) -> None:
+def test_settings_have_their_defaults_after_power_up(session: TargetSession) -> None:
     rows = session.about["settings"]
     assert len(rows) >= 9
     assert SELECTED not in {row["frame"] for row in rows}
@@ -37,7 +35,7 @@ def test_after_power_up_settings_have_their_defaults(session: TargetSession) -> 
     assert differing.keys() <= {"SetProfile.Profile", "Exposure.exposure"}
 
 
-def test_a_setting_that_was_changed_differs() -> None:
+def test_changed_setting_is_shown() -> None:
     session = TargetSession(open_target("emulated:cubesense"))
     rows = {(one["frame"], one["field"]): one for one in setting_rows(device("cubesense"))}
     row = rows["Masks1", "YMax3"]
@@ -47,7 +45,7 @@ def test_a_setting_that_was_changed_differs() -> None:
     session.close()
 
 
-def test_registers_of_the_image_sensor_are_read_by_name(session: TargetSession) -> None:
+def test_sensor_registers_are_read_by_name(session: TargetSession) -> None:
     rows = session.about["sensor_registers"]
     if not rows:
         assert "single register" in session.about["missing"]["sensor_registers"]
@@ -61,7 +59,7 @@ def test_registers_of_the_image_sensor_are_read_by_name(session: TargetSession) 
         session.sensor_register("NONE").result()
 
 
-def test_a_register_of_several_bytes_has_its_highest_first() -> None:
+def test_sensor_registers_are_big_endian() -> None:
     session = TargetSession(open_target("emulated:cubestar"))
     (row,) = [one for one in sensor_rows(device("cubestar")) if one["name"] == "CLOCKS_PER_SECOND"]
     session.execute(f"write WriteCameraRegister {row['address']} 0x12").result()

@@ -1,5 +1,3 @@
-"""Pictures over the wire, held and given up."""
-
 import threading
 
 import numpy as np
@@ -13,7 +11,7 @@ SOON_S = 30.0
 
 
 class Sender:
-    """Sends a picture in blocks, each when it is let; and says which are sent."""
+    """Sends a picture in blocks, each released by ``let``; ``sent`` signals each block."""
 
     def __init__(self) -> None:
         self.let, self.sent = threading.Semaphore(0), threading.Semaphore(0)
@@ -35,7 +33,7 @@ def started(transfer: Transfer) -> threading.Thread:
     return thread
 
 
-def test_it_tells_how_far_it_is_and_gives_the_picture() -> None:
+def test_transfer_reports_progress_and_result() -> None:
     sender = Sender()
     transfer = Transfer("download", sender)
     assert (transfer.state["done"], transfer.state["ended"]) == (0, "")
@@ -50,7 +48,7 @@ def test_it_tells_how_far_it_is_and_gives_the_picture() -> None:
     assert np.array_equal(grey_values(transfer.picture), sender.picture)
 
 
-def test_held_it_asks_for_nothing_more() -> None:
+def test_held_transfer_pauses() -> None:
     sender = Sender()
     transfer = Transfer("download", sender)
     transfer.pause()
@@ -64,7 +62,7 @@ def test_held_it_asks_for_nothing_more() -> None:
 
 
 @pytest.mark.parametrize("held", [False, True])
-def test_given_up_it_ends_after_a_block(held: bool) -> None:
+def test_cancelled_transfer_ends_after_a_block(held: bool) -> None:
     sender = Sender()
     transfer = Transfer("download", sender)
     thread = started(transfer)
@@ -80,7 +78,7 @@ def test_given_up_it_ends_after_a_block(held: bool) -> None:
     assert sender.count < 3
 
 
-def test_what_is_no_picture() -> None:
+def test_rejects_data_that_is_no_picture() -> None:
     with pytest.raises(ValueError, match="not an image file"):
         grey_values(b"GIF89a and no more")
     assert np.array_equal(grey_values(png(np.eye(3, dtype=np.uint8))), np.eye(3))

@@ -1,5 +1,3 @@
-"""Files of other projects on the page are those that their packages contain."""
-
 import hashlib
 import tomllib
 
@@ -8,7 +6,7 @@ from cubestack.host.ground.page_app import PAGE
 VENDOR = PAGE / "vendor"
 
 
-def test_vendored_files_are_unchanged_and_listed_with_version_and_licence() -> None:
+def test_vendored_files_match_their_listed_sources() -> None:
     sources = tomllib.loads((VENDOR / "sources.toml").read_text(encoding="utf-8"))
     sums = {name: one for source in sources.values() for name, one in source["sha256"].items()}
     found = {path.name: path.read_bytes() for path in VENDOR.iterdir()}

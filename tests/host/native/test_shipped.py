@@ -1,5 +1,3 @@
-"""The libraries of the shipped devices, and how they are compiled ahead."""
-
 import threading
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ from cubestack.emulator.native.compiler import Compiler
 from cubestack.host.native import shipped
 
 
-def test_every_choice_of_every_device_is_listed_once() -> None:
+def test_every_option_of_every_device_is_listed_once() -> None:
     found = [(name, *options.items()) for name, options in shipped.choices()]
     assert len(set(found)) == len(found)
     assert ("cubestar",) in found
@@ -38,7 +36,7 @@ def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("compiler")
-def test_missing_libraries_are_compiled_once_each_and_the_reader_is_informed(capfd: Any) -> None:
+def test_missing_libraries_are_compiled_once(capfd: Any) -> None:
     built, lock = list[str](), threading.Lock()
 
     def recipe(name: str) -> cache.Recipe:
@@ -61,7 +59,7 @@ def test_missing_libraries_are_compiled_once_each_and_the_reader_is_informed(cap
     assert len(built) == 3
 
 
-def test_nothing_is_compiled_where_there_is_no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_compiled_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shipped, "find_compiler", lambda: None)
     monkeypatch.setattr(shipped, "library_of", lambda _: pytest.fail("compiled"))
     shipped.compile_missing([cache.recipe("a", "a", [], lambda *_: Path())])

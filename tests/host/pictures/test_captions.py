@@ -1,5 +1,3 @@
-"""What a star tracker left out, and why, as captions tell it."""
-
 import pytest
 
 import cubestack
@@ -17,7 +15,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
         ("extended", "all but the 10 brightest"),
     ],
 )
-def test_the_limit_of_the_list_is_told_when_it_is_reached(profile: str, told: str) -> None:
+def test_caption_names_a_reached_limit(profile: str, told: str) -> None:
     with cubestack.open_device("cubestar", SkyScene.pointing(84, -1, 20), profile=profile) as one:
         values = {"GridSize": 5, "MaxStars": 5, "MaxInvalidStars": 50, "MaxNoise": 255}
         one.client.configure({"setDetectionVariables": values})
@@ -25,7 +23,7 @@ def test_the_limit_of_the_list_is_told_when_it_is_reached(profile: str, told: st
         assert left_out_by(one.client)[-1] == told
 
 
-def test_no_limit_is_told_where_none_is_reached() -> None:
+def test_caption_without_a_reached_limit() -> None:
     scene = SkyScene(SkyScene.pointing(84, -1, 20).quaternion, mag_limit=2.0)
     with cubestack.open_device("cubestar", scene, profile="extended") as one:
         one.client.capture_and_process()

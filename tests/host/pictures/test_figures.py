@@ -1,5 +1,3 @@
-"""Figures by matplotlib: each value is drawn where it is, told apart, with its limits and names."""
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -35,13 +33,11 @@ def legend_of(panel: Any) -> list[str]:
 
 
 def bars_of(container: Any) -> list[list[float]]:
-    """Both ends of each error bar, rising."""
     (collection,) = container.lines[2]
     return [sorted(segment[:, 1]) for segment in collection.get_segments()]
 
 
 def look(line: Any) -> tuple[object, ...]:
-    """What tells a line from others without colour."""
     return line.get_linestyle(), line.get_marker(), line.get_linewidth()
 
 
@@ -54,9 +50,7 @@ RATES = {
 
 
 @pytest.mark.parametrize("places", [[3, 90.5], ["few", "many"], [1, "many"]])
-def test_rates_stand_over_their_places_with_their_limits(
-    places: Sequence[Any], figures: list[Any]
-) -> None:
+def test_rate_curves_have_error_bars(places: Sequence[Any], figures: list[Any]) -> None:
     rate_curves("false_stars", places, RATES)
     panel = panel_of(figures)
     assert legend_of(panel) == list(RATES)
@@ -77,7 +71,7 @@ def test_rates_stand_over_their_places_with_their_limits(
     assert -10 < low < 0 < 100 < high < 110
 
 
-def test_each_error_is_a_step_and_the_band_is_that_of_the_whole_curve(figures: list[Any]) -> None:
+def test_error_curves_are_distributions_with_confidence_bands(figures: list[Any]) -> None:
     sizes = {f"point {n}": [0.5 * n + 0.01 * k for k in range(50 + n)] for n in range(6)}
     error_curves("error_cross_deg", sizes, [(0.02, "published"), (0.3, "other")])
     panel = panel_of(figures)
@@ -114,7 +108,7 @@ PLACES = [
 ]
 
 
-def test_the_sky_has_each_result_in_the_cell_where_it_was(figures: list[Any]) -> None:
+def test_sky_map_counts_results_per_cell(figures: list[Any]) -> None:
     asked = list[tuple[int, int]]()
 
     def limits(count: int, of: int) -> tuple[float, float]:
@@ -136,7 +130,7 @@ def test_the_sky_has_each_result_in_the_cell_where_it_was(figures: list[Any]) ->
         middle = (int(x) + 0.5) * 360 / columns, (int(y) + 0.5) * 2 / rows - 1
         (text,) = (one for at, one in of.items() if at == pytest.approx(middle))
         assert text.get_text() == f"{len(places)}\n{50 * share:.0f}-100"
-        assert text.get_color() == ("white" if share < 0.5 else "black")
+        assert text.get_color() == ("white" if share < 0.5 else "black")  # readable
     assert sorted(asked) == [(0, 1), (1, 3), (2, 2), (2, 3)]
     assert np.ma.count(rates) == 4
     assert sum(text.get_text() != "" for text in panel.texts) == 4
@@ -147,15 +141,13 @@ def test_the_sky_has_each_result_in_the_cell_where_it_was(figures: list[Any]) ->
     assert image.get_clim() == (0, 100)
     wide, high = figures[0].get_size_inches()
     assert wide / high == pytest.approx(360 / 180, rel=0.05)
-
-
-def test_half_right_is_told_in_ink_that_can_be_read(figures: list[Any]) -> None:
-    sky_map([(10, 0, "right"), (10, 0, "wrong")], lambda count, of: (count / of, 1.0))
+    figures.clear()
+    sky_map([(10, 0, "right"), (10, 0, "wrong")], limits)
     (text,) = (one for one in panel_of(figures).texts if one.get_text())
     assert text.get_color() == "black"
 
 
-def test_effects_of_each_part_fill_its_bar(figures: list[Any]) -> None:
+def test_effects_of_each_part_add_up_to_its_bar(figures: list[Any]) -> None:
     counts = {f"effect {n}": [n + 1, 0 if n else 19] for n in range(8)} | {"never": [0, 0]}
     parts = [("writer", 36), ("bank", 19)]
     effects(parts, counts, [(0.1, 0.3), (0.0, 0.2)], "upsets")
@@ -187,7 +179,7 @@ def test_effects_of_each_part_fill_its_bar(figures: list[Any]) -> None:
 
 
 @pytest.mark.parametrize("shown", range(1, 9))
-def test_effects_go_from_white_to_black(shown: int, figures: list[Any]) -> None:
+def test_effects_are_shaded_from_white_to_black(shown: int, figures: list[Any]) -> None:
     effects([("a", shown)], {str(n): [1] for n in range(shown)}, [(0, 1)], "upsets")
     bars = [one for one in panel_of(figures).containers if hasattr(one, "patches")]
     greys = [one.patches[0].get_facecolor()[0] for one in bars]
@@ -198,8 +190,6 @@ def test_effects_go_from_white_to_black(shown: int, figures: list[Any]) -> None:
 
 @dataclass(frozen=True)
 class Counts:
-    """A point of a curve."""
-
     strength: float
     right: int
     refused: int
@@ -216,7 +206,7 @@ CURVES = {
 }
 
 
-def test_each_device_has_a_panel_with_its_three_curves(figures: list[Any]) -> None:
+def test_each_device_has_a_panel_with_three_curves(figures: list[Any]) -> None:
     def limits(count: int, of: int) -> tuple[float, float]:
         return count / of / 2, (1 + count / of) / 2
 
@@ -250,7 +240,7 @@ def test_each_device_has_a_panel_with_its_three_curves(figures: list[Any]) -> No
     assert figures[1].get_figwidth() == pytest.approx(1.5 * wide)
 
 
-def test_figures_are_files_of_pixels(tmp_path: Path) -> None:
+def test_figures_are_png_files(tmp_path: Path) -> None:
     save_curves(CURVES, "phase", "A moon", lambda count, of: (0, 1), tmp_path / "curves.png")
     figure = figure_module.Figure(figsize=(6, 3.4))
     with Image.open(BytesIO(png(figure))) as image, Image.open(tmp_path / "curves.png") as curves:
@@ -259,7 +249,7 @@ def test_figures_are_files_of_pixels(tmp_path: Path) -> None:
         assert 80 < image.width / 6 < 200  # dots per inch
 
 
-def test_a_sample_keeps_its_shape_and_has_its_light_where_it_was() -> None:
+def test_sample_keeps_its_shape_and_brightness() -> None:
     picture = np.full((200, 300), 20, np.uint8)
     picture[50:80, 30:60] = 200
     file = BytesIO()

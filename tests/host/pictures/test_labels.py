@@ -1,5 +1,3 @@
-"""Labels: never over one another, over a mark, or beyond the picture, whatever the star field."""
-
 from itertools import combinations
 
 import numpy as np
@@ -25,7 +23,7 @@ def field(seed: int) -> tuple[list[Wanted], list[Box]]:
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_no_label_is_over_another_or_over_a_mark_or_outside(seed: int) -> None:
+def test_labels_do_not_overlap_and_stay_inside(seed: int) -> None:
     wanted, marks = field(seed)
     boxes = place(wanted, FRAME, marks)
     assert len(boxes) == len(wanted)
@@ -40,7 +38,7 @@ def test_no_label_is_over_another_or_over_a_mark_or_outside(seed: int) -> None:
             assert near < 60  # beside its own mark
 
 
-def test_stars_far_from_one_another_all_get_their_labels_at_the_right() -> None:
+def test_labels_of_distant_stars_are_at_the_right() -> None:
     wanted = [Wanted(200.0 * i + 50, 100, 10, 80, 18) for i in range(4)]
     boxes = place(wanted, FRAME)
     assert all(
@@ -48,7 +46,7 @@ def test_stars_far_from_one_another_all_get_their_labels_at_the_right() -> None:
     )
 
 
-def test_a_label_is_nearest_to_its_own_mark_where_it_can_be() -> None:
+def test_label_is_nearest_to_its_own_mark() -> None:
     pair = [Wanted(100, 100, 10, 70, 18), Wanted(124, 104, 10, 70, 18)]
     marks = [Box(w.x - 10, w.y - 10, w.x + 10, w.y + 10) for w in pair]
     beside = Box(0, 85, 88, 115)  # so that the first free place is right above the other mark
@@ -58,7 +56,7 @@ def test_a_label_is_nearest_to_its_own_mark_where_it_can_be() -> None:
         assert distances[number] == min(distances)
 
 
-def test_a_label_without_room_is_left_out_and_the_first_ones_stay() -> None:
+def test_labels_without_room_are_omitted() -> None:
     crowded = [Wanted(50, 50, 10, 80, 18)] * 40
     boxes = place(crowded, FRAME)
     assert boxes[0] is not None
@@ -66,8 +64,20 @@ def test_a_label_without_room_is_left_out_and_the_first_ones_stay() -> None:
 
 
 @pytest.mark.parametrize("beside", [(10, 0), (-10, 0), (0, 10), (0, -10)])
-def test_boxes_that_touch_do_not_overlap(beside: tuple[int, int]) -> None:
+def test_touching_boxes_do_not_overlap(beside: tuple[int, int]) -> None:
     across, down = beside
     assert not Box(0, 0, 10, 10).overlaps(Box(across, down, across + 10, down + 10))
     across, down = 0.9 * across, 0.9 * down
     assert Box(0, 0, 10, 10).overlaps(Box(across, down, across + 10, down + 10))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "away"),
+    [
+        *((25, 25, 0), (10, 20, 0), (40, 30, 0), (9, 25, 1), (41, 25, 1), (25, 19, 1)),
+        *((25, 31, 1), (7, 16, 5), (43, 34, 5), (7, 34, 5), (43, 16, 5), (40.5, 25, 0.5)),
+    ],
+)
+def test_distance_is_measured_to_the_nearest_edge(x: float, y: float, away: float) -> None:
+    found = distance(Box(10, 20, 40, 30), Wanted(x, y, 1.0, 30.0, 10.0))
+    assert found == pytest.approx(away)

@@ -1,5 +1,3 @@
-"""Pictures of found stars, of the Earth and of the Sun, of residuals: measured in their pixels."""
-
 from io import BytesIO
 from pathlib import Path
 
@@ -8,6 +6,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.host.clients.cubesense.client import direction
@@ -31,7 +30,7 @@ from cubestack.host.pictures.images import (
 )
 from cubestack.host.pictures.residuals import ARROW, save_residuals
 from cubestack.host.pictures.sheet import GRID, TRUTH, Colour
-from cubestack.host.pictures.star_names import star_name
+from cubestack.host.pictures.star_names import _NAMES, star_name
 from cubestack.host.pictures.stretch import stretched
 from tests.host.pictures.test_images import CAMERA, SHAPE, Found
 
@@ -39,7 +38,7 @@ SENSE = np.full((480, 640), 34, np.uint8)
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def captions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """All texts, in the order in which they are written."""
     seen = list[str]()
     whole = ImageDraw.ImageDraw.text
@@ -63,7 +62,7 @@ def opened(path: Path) -> NDArray[np.uint8]:
         return np.asarray(image)
 
 
-def test_grey_values_are_written_unchanged(tmp_path: Path) -> None:
+def test_save_picture_keeps_grey_values(tmp_path: Path) -> None:
     picture = np.random.default_rng(2).integers(0, 256, (30, 50)).astype(np.uint8)
     save_picture(picture, tmp_path / "picture.png")
     assert np.array_equal(opened(tmp_path / "picture.png"), picture)
@@ -72,7 +71,7 @@ def test_grey_values_are_written_unchanged(tmp_path: Path) -> None:
         assert np.array_equal(np.asarray(image), picture)
 
 
-def test_what_is_annotated_is_the_sheet(tmp_path: Path) -> None:
+def test_annotate_writes_the_sheet(tmp_path: Path) -> None:
     arguments = (np.zeros(SHAPE, np.uint8), [Found(100, 80, 32349)])
     annotate(*arguments, tmp_path / "sheet.png", "sky", ["a"], None, [TrueStar(1, 9, 9)])
     other = star_sheet(*arguments, "sky", ["a"], None, [TrueStar(1, 9, 9)])
@@ -80,39 +79,35 @@ def test_what_is_annotated_is_the_sheet(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("known", "unknown"), [(0, 0), (0, 2), (2, 0), (2, 1)])
-def test_the_legend_explains_the_marks_that_there_are(
-    known: int, unknown: int, told: list[str]
-) -> None:
+def test_legend_explains_the_drawn_marks(known: int, unknown: int, captions: list[str]) -> None:
     stars = [Found(100, 80, 32349)] * known + [Found(300, 200, None)] * unknown
     image = star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky")
     for colour, number, text in (
         (IDENTIFIED, known, "identified by the device"),
         (UNKNOWN, unknown, "found, not identified"),
     ):
-        assert bool(len(ink(image, colour, SHAPE[0]))) == (text in told) == (number > 0)
-    assert f"{known + unknown} stars found, {known} of them identified" in told
-    assert ("Sirius" in told) == (known > 0)
-    assert not any("boresight" in text or "true" in text for text in told)
-
-
-def test_a_lens_is_explained(told: list[str]) -> None:
-    star_sheet(np.zeros(SHAPE, np.uint8), [], "sky", (), CAMERA.directions)
-    assert "boresight, angles from it" in told
+        assert bool(len(ink(image, colour, SHAPE[0]))) == (text in captions) == (number > 0)
+    assert f"{known + unknown} stars found, {known} of them identified" in captions
+    assert ("Sirius" in captions) == (known > 0)
+    assert not any("boresight" in text or "true" in text for text in captions)
+    captions.clear()
+    star_sheet(np.zeros(SHAPE, np.uint8), stars, "sky", (), CAMERA.directions)
+    assert "boresight, angles from it" in captions
 
 
 @pytest.mark.parametrize(("away", "found"), [(2.9, 1), (3.1, 0)])
 @pytest.mark.parametrize("turned", [0, 0.8, 1.57, 4])
-def test_a_star_counts_as_found_within_three_pixels(
-    away: float, found: int, turned: float, told: list[str]
+def test_star_counts_as_found_within_3_px(
+    away: float, found: int, turned: float, captions: list[str]
 ) -> None:
     truth = TrueStar(1, 100 + away * np.cos(turned), 80 + away * np.sin(turned))
     star_sheet(
         np.zeros(SHAPE, np.uint8), [Found(9, 9, 1), Found(100, 80, None)], "", (), None, [truth]
     )
-    assert f"{found} of the 1 bright stars in the field found" in " ".join(told)
+    assert f"{found} of the 1 bright stars in the field found" in " ".join(captions)
 
 
-def test_true_places_are_marked_wider_than_what_was_found() -> None:
+def test_truth_marks_are_wider_than_found_marks() -> None:
     image = star_sheet(
         np.zeros(SHAPE, np.uint8), [Found(100, 80, 1)], "", (), None, [TrueStar(1, 100, 80)]
     )
@@ -121,37 +116,32 @@ def test_true_places_are_marked_wider_than_what_was_found() -> None:
     assert np.abs(ticks - (100, 80)).max(axis=1).min() > 4
 
 
-def test_the_widest_angle_has_its_ring_just_outside() -> None:
-    for f_px in (100.0, 300.0, 5000.0):
-        lens = type(CAMERA)(f_px=f_px, cx_px=255.5, cy_px=127.5).directions
-        corner = np.degrees(np.arctan2(np.hypot(255.5, 127.5), f_px))
-        assert corner - 0.1 <= widest_deg(lens, SHAPE) <= max(corner + 0.6, 0.5)
+@pytest.mark.parametrize("f_px", [100.0, 300.0, 600.0, 5000.0])
+@pytest.mark.parametrize("centre", [(255.5, 127.5), (100.0, 200.0)])
+def test_widest_angle_is_that_of_the_farthest_corner(
+    f_px: float, centre: tuple[float, float]
+) -> None:
+    lens = type(CAMERA)(f_px, *centre).directions
+    across, down = (max(at, size - 1 - at) for at, size in zip(centre, SHAPE[::-1], strict=True))
+    corner = np.degrees(np.arctan2(np.hypot(across, down), f_px))
+    assert corner - 0.1 <= widest_deg(lens, SHAPE) <= max(corner + 0.6, 0.5)
 
 
-def test_the_widest_angle_ends_before_the_side() -> None:
+def test_widest_angle_is_at_most_89_5_deg() -> None:
     assert widest_deg(lambda vectors: 50 + 0 * vectors[:, :2], (100, 100)) == 89.5
 
 
-def test_the_corner_that_counts_is_the_farthest() -> None:
-    lens = type(CAMERA)(f_px=600, cx_px=100.0, cy_px=200.0).directions
-    corner = np.degrees(np.arctan2(np.hypot(411, 200), 600))
-    assert widest_deg(lens, SHAPE) == pytest.approx(corner, abs=0.6)
+def test_star_has_its_name_or_its_number() -> None:
+    assert [star_name(number) for number in (24436, 91262, 7)] == ["Rigel", "Vega", "HIP 7"]
 
 
-@pytest.mark.parametrize(("number", "name"), [(24436, "Rigel"), (91262, "Vega"), (7, "HIP 7")])
-def test_a_star_has_its_name_or_its_number(number: int, name: str) -> None:
-    assert star_name(number) == name
-
-
-def test_names_are_of_bright_stars() -> None:
-    from cubestack.emulator.scene.hipparcos import load_sky
-    from cubestack.host.pictures.star_names import _NAMES
+def test_names_belong_to_bright_stars() -> None:
 
     assert set(_NAMES) <= set(load_sky(mag_limit=3.0).hip.tolist())
     assert len(set(_NAMES.values())) == len(_NAMES)
 
 
-def test_grey_goes_from_the_darkest_to_the_brightest() -> None:
+def test_stretch_uses_the_full_range() -> None:
     picture = np.linspace(0, 200, 100 * 100).reshape(100, 100).astype(np.uint8)
     grey = stretched(picture, gamma=1.0)
     assert grey.min() == 0
@@ -163,7 +153,7 @@ def test_grey_goes_from_the_darkest_to_the_brightest() -> None:
 
 
 @pytest.mark.parametrize(("above", "brightness"), [(6, 0.25), (12, 0.5), (23, 23 / 24)])
-def test_a_faint_picture_is_stretched_to_24_counts_only(above: int, brightness: float) -> None:
+def test_stretch_of_a_faint_picture_is_limited(above: int, brightness: float) -> None:
     picture = np.full((50, 50), 10, np.uint8)
     picture[:20] = 10 + above
     assert stretched(picture, gamma=1.0).max() == pytest.approx(255 * brightness, abs=1)
@@ -174,13 +164,13 @@ def test_a_faint_picture_is_stretched_to_24_counts_only(above: int, brightness: 
 
 @pytest.mark.parametrize(("size", "scale"), [(1.0, "20"), (0.5, "50"), (0.004, "10000")])
 @pytest.mark.parametrize("turned", [0.3, 2.0, 4.5])
-def test_an_arrow_begins_at_its_place_and_is_magnified_as_told(
-    size: float, scale: str, turned: float, tmp_path: Path, told: list[str]
+def test_residual_arrow_starts_at_its_place_and_is_magnified(
+    size: float, scale: str, turned: float, tmp_path: Path, captions: list[str]
 ) -> None:
     places = np.array([[100.0, 50.0], [300.0, 200.0]])
     along = np.array([np.cos(turned), np.sin(turned)])
     save_residuals(places, np.array([size * along, -size * along]), tmp_path / "residuals.png")
-    assert f"magnified {scale} times" in told[0]
+    assert f"magnified {scale} times" in captions[0]
     image = opened(tmp_path / "residuals.png")
     assert image.shape[:2] == (200 + 80, 300 + 80)
     arrows = ink(image, ARROW, image.shape[0])
@@ -195,7 +185,7 @@ def test_an_arrow_begins_at_its_place_and_is_magnified_as_told(
         assert (x.mean() - 5, y.mean() - 5) == pytest.approx((0, 0), abs=1.5)
 
 
-def test_residuals_have_a_frame_around_all_places(tmp_path: Path) -> None:
+def test_residuals_are_framed(tmp_path: Path) -> None:
     save_residuals(np.array([[0.0, 0], [99.2, 49.5]]), np.zeros((2, 2)), tmp_path / "r.png")
     image = opened(tmp_path / "r.png")
     frame = ink(image, (190, 190, 190), image.shape[0])
@@ -213,26 +203,26 @@ def middle(image: NDArray[np.uint8], colour: Colour) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def test_the_nadir_is_told_and_marked_where_it_is(tmp_path: Path, told: list[str]) -> None:
+def test_nadir_is_marked_and_captioned(tmp_path: Path, captions: list[str]) -> None:
     fitted, truth = (10.0, -5.0, 0.0), (-20.0, 15.0)
     annotate_nadir(SENSE, np.array([[50.0, 70.0]]), fitted, tmp_path / "n.png", "Earth", truth)
     image = opened(tmp_path / "n.png")
     for colour, angles in ((FITTED, fitted[:2]), (TRUTH, truth)):
         place = pixel(Camera.NADIR, direction(*angles)[None])[0]
         assert middle(image, colour) == pytest.approx(place, abs=1)
-    text = " ".join(told)
+    text = " ".join(captions)
     assert "Earth 1 edges found; centre at alpha +10.00°, beta -5.00° (this program" in text
     assert "truth alpha -20.00°, beta +15.00°" in text
     assert {"edge found on a scanned line", "centre found", "truth (unknown to the device)"} <= {
-        *told
+        *captions
     }
-    assert "limb fitted" not in told
+    assert "limb fitted" not in captions
     sizes = [np.ptp(ink(image, colour, 960), axis=0).max() / 2 for colour in (EDGE, FITTED, TRUTH)]
     assert sizes == sorted(sizes)
     assert 3 < sizes[0] < sizes[2] < 40
 
 
-def test_the_limb_is_drawn_where_it_is_and_told(tmp_path: Path, told: list[str]) -> None:
+def test_limb_is_drawn_and_captioned(tmp_path: Path, captions: list[str]) -> None:
     annotate_nadir(SENSE, np.zeros((0, 2)), (4.0, -3.0, 50.0), tmp_path / "n.png")
     green = ink(opened(tmp_path / "n.png"), FITTED, 960)
     rim = 2 * (limb(4.0, -3.0, 50.0) + 0.5)
@@ -241,12 +231,12 @@ def test_the_limb_is_drawn_where_it_is_and_told(tmp_path: Path, told: list[str])
     off = np.hypot(*(green - centre).T) > 30
     assert apart[off].min(axis=1).max() < 8
     assert apart.min(axis=0).max() < 4
-    assert "radius 50.00°" in " ".join(told)
-    assert "limb fitted" in told
-    assert "this program tells no radius" not in " ".join(told)
+    assert "radius 50.00°" in " ".join(captions)
+    assert "limb fitted" in captions
+    assert "this program tells no radius" not in " ".join(captions)
 
 
-def test_the_limb_has_its_angle_from_the_axis_on_all_sides() -> None:
+def test_limb_points_have_the_same_angle_from_the_axis() -> None:
     for alpha, beta in ((0.0, 0.0), (30.0, 5.0), (3.0, -25.0)):
         rim = limb(alpha, beta, 20.0)
         around = np.radians(np.arange(0, 360, 7))
@@ -263,17 +253,17 @@ def test_the_limb_has_its_angle_from_the_axis_on_all_sides() -> None:
         assert len(np.unique(rim.round(6), axis=0)) == len(rim) >= 90
 
 
-def test_no_earth_is_told(tmp_path: Path, told: list[str]) -> None:
+def test_missing_earth_is_captioned(tmp_path: Path, captions: list[str]) -> None:
     annotate_nadir(SENSE, np.zeros((0, 2)), None, tmp_path / "n.png")
-    assert "nadir camera" in told
-    assert "0 edges found; no Earth found" in told
-    assert "centre found" not in told
-    assert "boresight, angles from it" in told
+    assert "nadir camera" in captions
+    assert "0 edges found; no Earth found" in captions
+    assert "centre found" not in captions
+    assert "boresight, angles from it" in captions
 
 
 @pytest.mark.parametrize("first", [(100, 90), (500, 90), (100, 400), (500, 400)])
-def test_the_sun_has_its_window_and_an_enlarged_one_far_away(
-    first: tuple[int, int], tmp_path: Path, told: list[str]
+def test_sun_window_is_enlarged_in_the_farthest_corner(
+    first: tuple[int, int], tmp_path: Path, captions: list[str]
 ) -> None:
     origin = np.array(FULL_SIZE.window_origin(*first))
     side = FULL_SIZE.window
@@ -303,11 +293,11 @@ def test_the_sun_has_its_window_and_an_enlarged_one_far_away(
     y = 0 if first[1] > 240 else 960 - border
     assert np.all(image[y, x : x + border] == GRID)
     assert np.all(image[y : y + border, x + border - 1] == GRID)
-    assert "Sun at alpha +0.00°, beta +0.00°; truth alpha +1.00°, beta +2.00°" in told
-    assert {"window that is read, enlarged in the corner", "centroid found"} <= {*told}
+    assert "Sun at alpha +0.00°, beta +0.00°; truth alpha +1.00°, beta +2.00°" in captions
+    assert {"window that is read, enlarged in the corner", "centroid found"} <= {*captions}
 
 
-def test_found_and_true_sun_are_marked_in_the_enlarged_window_too(tmp_path: Path) -> None:
+def test_enlarged_window_marks_found_and_true_sun(tmp_path: Path) -> None:
     angles, truth = (20.0, 10.0), (20.5, 9.5)
     found, true = (pixel(Camera.SUN, direction(*each)[None])[0] for each in (angles, truth))
     first = int(found[0]), int(found[1] - 3)
@@ -325,7 +315,7 @@ def test_found_and_true_sun_are_marked_in_the_enlarged_window_too(tmp_path: Path
 
 
 @pytest.mark.parametrize("first", [(0, 0), (639, 479), (0, 479), (639, 0)])
-def test_a_window_at_the_border_is_enlarged_as_well(first: tuple[int, int], tmp_path: Path) -> None:
+def test_window_at_the_border_is_enlarged(first: tuple[int, int], tmp_path: Path) -> None:
     picture = SENSE.copy()
     picture[first[1], first[0]] = 255
     annotate_sun(picture, first, (0.0, 0.0), tmp_path / "s.png")
@@ -334,9 +324,11 @@ def test_a_window_at_the_border_is_enlarged_as_well(first: tuple[int, int], tmp_
     assert 100 < far.sum() <= 256
 
 
-def test_no_sun_is_told(tmp_path: Path, told: list[str]) -> None:
+def test_missing_sun_is_captioned(tmp_path: Path, captions: list[str]) -> None:
     annotate_sun(SENSE, (0x3FF, 0x1FF), None, tmp_path / "s.png")
-    assert "no Sun found" in told
-    assert "sun camera" in told
-    assert "centroid found" not in told
-    assert "boresight, angles from it" in told
+    image = opened(tmp_path / "s.png")
+    assert not len(ink(image, EDGE, 960)) + len(ink(image, FITTED, 960))
+    assert "no Sun found" in captions
+    assert "sun camera" in captions
+    assert "centroid found" not in captions
+    assert "boresight, angles from it" in captions

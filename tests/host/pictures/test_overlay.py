@@ -1,5 +1,3 @@
-"""What is drawn over a picture, of devices that are emulated."""
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,7 @@ from cubestack.host.pictures.overlay import star_overlay
 
 
 @pytest.mark.parametrize(("profile", "limbs"), [("published", 0), ("extended", 1)])
-def test_nadir_edges_and_the_limb_where_it_is_told(profile: str, limbs: int) -> None:
+def test_overlay_has_nadir_edges_and_limb(profile: str, limbs: int) -> None:
     with open_device("cubesense", profile=profile) as emulated:
         emulated.client.client.command("CaptureAndDetect", Camera="NADIR", Sram="SRAM2")
         emulated.client.client.wait_processed(10)
@@ -25,7 +23,7 @@ def test_nadir_edges_and_the_limb_where_it_is_told(profile: str, limbs: int) -> 
         assert np.linalg.norm(line.mean(axis=0) - (centre.x_px, centre.y_px)) < 30
 
 
-def test_stars_have_name_and_number_where_they_are_known() -> None:
+def test_overlay_names_identified_stars() -> None:
     with open_device("cubestar") as emulated:
         emulated.client.client.command("CaptureAndProcess")
         emulated.client.client.wait_processed(10)

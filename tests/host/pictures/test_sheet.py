@@ -1,5 +1,3 @@
-"""A sheet as it is seen: what is drawn where, how large, in which colour, and what stands below."""
-
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -53,20 +51,19 @@ def drawn(image: object, colour: Colour) -> NDArray[np.float64]:
 
 
 def edges(places: NDArray[np.float64]) -> list[float]:
-    """Left, top, right, bottom."""
     return [*places.min(axis=0), *places.max(axis=0)]
 
 
 @pytest.mark.parametrize(
     ("columns", "scale", "em"), [(200, 1, 11), (620, 2, 20), (1240, 1, 20), (682, 1, 11)]
 )
-def test_text_grows_with_the_picture_and_stays_readable(columns: int, scale: int, em: int) -> None:
+def test_text_size_follows_the_picture_within_limits(columns: int, scale: int, em: int) -> None:
     sheet = Sheet(np.zeros((60, columns), np.uint8), scale)
     assert sheet.em == em
     assert sheet.image.size == (scale * columns, scale * 60)
 
 
-def test_a_scaled_picture_has_each_value_in_a_square_of_its_own() -> None:
+def test_scaled_picture_repeats_each_pixel() -> None:
     picture = np.arange(12, dtype=np.uint8).reshape(3, 4) * 20
     image = np.asarray(Sheet(picture, 5).image)
     assert np.array_equal(image[..., 1], np.kron(picture, np.ones((5, 5), np.uint8)))
@@ -74,7 +71,7 @@ def test_a_scaled_picture_has_each_value_in_a_square_of_its_own() -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("scale", [1, 2])
-def test_a_mark_is_around_its_place_and_as_large_as_asked(shape: Shape, scale: int) -> None:
+def test_mark_has_its_centre_and_radius(shape: Shape, scale: int) -> None:
     sheet = black(scale)
     sheet.mark(shape, np.array([150.0, 90.0]), RED, 2.0)
     ink, x, y, radius = drawn(sheet.image, RED), scale * 150.5, scale * 90.5, 2.0 * sheet.em
@@ -92,7 +89,7 @@ def test_a_mark_is_around_its_place_and_as_large_as_asked(shape: Shape, scale: i
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_mark_stands_out_of_a_white_picture(shape: Shape) -> None:
+def test_mark_has_a_dark_outline(shape: Shape) -> None:
     sheet = Sheet(np.full((ROWS, COLUMNS), 255, np.uint8))
     sheet.mark(shape, np.array([150.0, 90.0]), RED, 2.0)
     dark = drawn(sheet.image, PLATE)
@@ -101,7 +98,7 @@ def test_a_mark_stands_out_of_a_white_picture(shape: Shape) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_labels_keep_off_all_ink_of_a_mark_and_off_little_else(shape: Shape) -> None:
+def test_mark_blocks_labels_over_its_ink_only(shape: Shape) -> None:
     sheet = black()
     sheet.mark(shape, np.array([150.0, 90.0]), RED, 2.0)
     ink = drawn(sheet.image, RED) + 0.5
@@ -121,21 +118,17 @@ def test_labels_keep_off_all_ink_of_a_mark_and_off_little_else(shape: Shape) -> 
 @pytest.mark.parametrize(
     ("place", "seen"),
     [
-        ((-0.5, -0.5), True),
-        ((799.5, 399.5), True),
-        ((-0.6, 9), False),
-        ((9, -0.6), False),
-        ((799.6, 9), False),
-        ((9, 399.6), False),
+        *(((-0.5, -0.5), True), ((799.5, 399.5), True), ((-0.6, 9), False)),
+        *(((9, -0.6), False), ((799.6, 9), False), ((9, 399.6), False)),
     ],
 )
-def test_only_marks_in_the_picture_are_drawn(place: tuple[float, float], seen: bool) -> None:
+def test_marks_outside_the_picture_are_omitted(place: tuple[float, float], seen: bool) -> None:
     sheet = black()
     sheet.mark("circle", np.array(place), RED, 1.0, "name")
     assert bool(len(drawn(sheet.image, RED))) == bool(sheet.blocked) == seen
 
 
-def test_an_outline_is_closed() -> None:
+def test_outline_is_closed() -> None:
     sheet = black(2)
     corners = np.array([[20.0, 30.0], [120.0, 30.0], [120.0, 80.0], [20.0, 80.0]])
     sheet.outline(corners, RED)
@@ -146,7 +139,7 @@ def test_an_outline_is_closed() -> None:
 
 
 @pytest.mark.parametrize(("widest", "rings"), [(4.0, [1, 2, 3]), (4.1, [2, 4]), (31, [10, 20, 30])])
-def test_rings_are_where_the_lens_sees_their_angles(widest: float, rings: list[int]) -> None:
+def test_rings_have_the_radius_of_their_angle(widest: float, rings: list[int]) -> None:
     sheet = black()
     sheet.grid(LENS.directions, widest)
     ink = drawn(sheet.image, GRID) - (LENS.cx_px + 0.5, LENS.cy_px + 0.5)
@@ -164,7 +157,7 @@ def test_rings_are_where_the_lens_sees_their_angles(widest: float, rings: list[i
     assert edges(middle) == pytest.approx([x - arm, y - arm, x + arm, y + arm], abs=1.5)
 
 
-def test_angles_are_told_beside_their_rings(written: list[Text]) -> None:
+def test_rings_are_labelled(written: list[Text]) -> None:
     sheet = black()
     sheet.grid(LENS.directions, CORNER_DEG)
     sheet.finished("title", "", [])
@@ -182,9 +175,7 @@ def test_angles_are_told_beside_their_rings(written: list[Text]) -> None:
 
 
 @pytest.mark.parametrize("f_px", [130.0, 300.0, 700.0, 1500.0, 4000.0, 20000.0])
-def test_the_bar_of_degrees_is_as_long_as_that_angle_in_the_picture(
-    f_px: float, written: list[Text]
-) -> None:
+def test_scale_bar_has_the_length_of_its_angle(f_px: float, written: list[Text]) -> None:
     camera, sheet = Camera(f_px=f_px, cx_px=390.0, cy_px=210.0), black()
     sheet.grid(camera.directions, min(CORNER_DEG * 700 / f_px, 89.5))
     below = np.asarray(sheet.finished("", "", []))[ROWS:]
@@ -218,7 +209,7 @@ def longest_run(ink: NDArray[np.bool_]) -> tuple[list[int], int, int]:
     return [row for row, found in best.items() if found == (length, end)], length, end
 
 
-def test_names_stand_beside_their_marks_and_on_a_plate(written: list[Text]) -> None:
+def test_names_are_beside_their_marks_on_a_plate(written: list[Text]) -> None:
     sheet = Sheet(np.full((ROWS, COLUMNS), 255, np.uint8))
     places = {"Rigel": (100.0, 100.0), "Vega": (500.0, 300.0), "Mira": (790.0, 200.0)}
     for name, place in places.items():
@@ -246,15 +237,18 @@ def test_names_without_room_are_counted(written: list[Text]) -> None:
     assert below == f"title told; names without room: {40 - names}"
 
 
-def test_angles_without_room_are_not_missed(written: list[Text]) -> None:
+def test_ring_labels_without_room_are_omitted(written: list[Text]) -> None:
     sheet = black()
     sheet.grid(LENS.directions, CORNER_DEG)
     sheet.blocked.append(Box(0, 0, COLUMNS, ROWS))
     sheet.finished("title", "told", [])
     assert [one.text for one in written][:2] == ["title", "told"]
+    written.clear()
+    black().finished("title", "told", [])  # no grid, no scale bar
+    assert [one.text for one in written] == ["title", "told"]
 
 
-def test_names_keep_off_marks_and_ticks(written: list[Text]) -> None:
+def test_names_do_not_cover_marks(written: list[Text]) -> None:
     sheet = black()
     sheet.mark("ticks", np.array([150.0, 100.0]), RED, 2.0)
     sheet.mark("circle", np.array([120.0, 100.0]), (0, 255, 0), 0.5, "a longer name")
@@ -268,7 +262,7 @@ def test_names_keep_off_marks_and_ticks(written: list[Text]) -> None:
 LONG = " ".join(f"word{number}" for number in range(60))
 
 
-def test_all_that_is_told_is_written_below_in_lines_that_fit(written: list[Text]) -> None:
+def test_caption_and_legend_fit_below_the_picture(written: list[Text]) -> None:
     sheet = black()
     sheet.grid(LENS.directions, CORNER_DEG)
     legend = [Entry("circle", RED, f"entry {number} of the legend") for number in range(9)]
@@ -288,7 +282,7 @@ def test_all_that_is_told_is_written_below_in_lines_that_fit(written: list[Text]
     assert image.getpixel((0, ROWS)) == PAPER
 
 
-def test_each_text_of_the_legend_has_its_mark_left_of_it(written: list[Text]) -> None:
+def test_legend_texts_have_their_mark_at_the_left(written: list[Text]) -> None:
     sheet = black()
     sheet.grid(LENS.directions, CORNER_DEG)
     colours = [(250, 10 * number, 0) for number in range(10)]
@@ -306,7 +300,7 @@ def test_each_text_of_the_legend_has_its_mark_left_of_it(written: list[Text]) ->
     assert ImageFont.load_default(sheet.em).getlength("what 9 is") < len(bar)
 
 
-def test_what_is_saved_is_the_whole_sheet(tmp_path: Path) -> None:
+def test_save_writes_the_whole_sheet(tmp_path: Path) -> None:
     sheet, legend = black(), [Entry("circle", RED, "what it is")]
     sheet.mark("circle", np.array([100.0, 100.0]), RED)
     sheet.save(tmp_path / "sheet.png", "title", "told", legend)
@@ -314,9 +308,3 @@ def test_what_is_saved_is_the_whole_sheet(tmp_path: Path) -> None:
         assert np.array_equal(
             np.asarray(image), np.asarray(sheet.finished("title", "told", legend))
         )
-
-
-def test_without_a_grid_there_is_no_bar(written: list[Text]) -> None:
-    sheet = black()
-    sheet.finished("title", "told", [])
-    assert [one.text for one in written] == ["title", "told"]

@@ -1,5 +1,3 @@
-"""A session on tape is a recording that the same session runs on."""
-
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path

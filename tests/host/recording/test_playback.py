@@ -1,5 +1,3 @@
-"""A recording as a target: it answers what it has, and names what differs."""
-
 import pytest
 from smbus2 import i2c_msg
 
@@ -28,14 +26,14 @@ def client(recording: Recording) -> NodeClient:
     return NodeClient(RecordedTransport(recording, INTERFACE), INTERFACE, retries=0)
 
 
-def test_host_program_runs_on_a_recording():
+def test_node_client_runs_on_a_recording():
     node = client(line((b"\x80", IDENTIFICATION), (b"\x28\x09", b"\0"), (b"\x80", IDENTIFICATION)))
     assert node.telemetry("Identification")["FirmwareVersionMajor"] == 3
     node.command("DetectionThreshold1", Threshold=9)
     assert node.telemetry("Identification")["FirmwareVersionMinor"] == 9
 
 
-def test_other_parameter_and_end_of_the_recording_are_named():
+def test_different_parameter_and_end_of_recording_are_named():
     node = client(line((b"\x80", IDENTIFICATION), (b"\x28\x09", b"\0")))
     node.telemetry("Identification")
     with pytest.raises(
@@ -54,7 +52,7 @@ def test_recorded_silence_is_silence():
         client(line((b"\x80", b""), (b"\x80", IDENTIFICATION))).telemetry("Identification")
 
 
-def test_port_that_was_not_recorded():
+def test_rejects_a_port_that_was_not_recorded():
     with pytest.raises(RecordingMismatchError, match=r"has no line 'bench_uart'; it has: uart"):
         RecordedTransport(line(), INTERFACE, "bench_uart")
 
@@ -82,12 +80,12 @@ def test_i2c_client_runs_on_a_recording():
         ([i2c_msg.write(0x1C, [0x80]), i2c_msg.read(0x1B, 8)], "write at 0x1c, recorded a write"),
     ],
 )
-def test_other_transfer_is_named(messages, text):
+def test_different_transfer_is_named(messages, text):
     with pytest.raises(RecordingMismatchError, match=text):
         bus((b"\x80", IDENTIFICATION, 0)).i2c_rdwr(*messages)
 
 
-def test_the_first_byte_that_differs_in_a_transfer_is_named():
+def test_first_different_byte_of_a_transfer_is_named():
     recorded = BusTransfer(0, "i2c", 0, (BusMessage(0x1B, b"\x28\x09", False),), 0)
     target = RecordedI2c(Recording("a.rec", "cubesense", {}, (recorded,)), INTERFACE)
     with pytest.raises(

@@ -1,5 +1,3 @@
-"""Rows of a table of all that was said: a number, its name where it has one, its unit."""
-
 from typing import Any
 
 import pytest
@@ -27,9 +25,7 @@ def told(interface: Interface, *transfers: BusTransfer) -> list[TranscriptEntry]
 
 
 @pytest.mark.parametrize(("interface", "message"), MESSAGES)
-def test_each_field_has_a_number_and_what_a_reader_calls_it(
-    interface: Interface, message: Message
-) -> None:
+def test_each_field_has_a_number_or_text_and_a_unit(interface: Interface, message: Message) -> None:
     reset = message.reset_values()
     asked = (bytes([message.id]), False), (message.pack(**reset), True)
     (one,) = told(interface, transfer(interface, *asked))
@@ -50,25 +46,20 @@ def test_each_field_has_a_number_and_what_a_reader_calls_it(
                 assert row["text"] == field.label(value)
 
 
-def test_what_has_no_values_has_one_row() -> None:
+def test_message_without_values_has_one_row() -> None:
     (row,) = TranscriptEntry(1.5, "uart", "unknown", "77", error="not in the tables").rows()
-    assert row == dict.fromkeys(COLUMNS) | {
-        "time_s": 1.5,
-        "port": "uart",
-        "kind": "unknown",
-        "message": "77",
-        "error": "not in the tables",
-    }
+    values = {"time_s": 1.5, "port": "uart", "kind": "unknown", "message": "77"}
+    assert row == dict.fromkeys(COLUMNS) | values | {"error": "not in the tables"}
 
 
-def test_a_read_without_a_request_says_nothing() -> None:
+def test_read_without_a_request_is_ignored() -> None:
     interface = device("cubestar").interface
     assert told(interface, transfer(interface, (b"abc", True))) == []
     (one,) = told(interface, transfer(interface, (b"\x7e", False)))
     assert (one.kind, one.name, one.error) == ("unknown", "126", "not in the tables")
 
 
-def test_a_telecommand_on_the_bus_has_what_was_written() -> None:
+def test_telecommand_on_the_bus_has_its_parameters() -> None:
     interface = device("cubestar").interface
     message = interface.telecommand("setIDMode")
     data = bytes([message.id]) + message.pack(**message.reset_values())

@@ -1,5 +1,3 @@
-"""What was said in a recording, beside what the clients that said it got."""
-
 import csv
 import json
 from pathlib import Path
@@ -38,7 +36,7 @@ def on_the_line(*frames: tuple[str, bytes]) -> list[TranscriptEntry]:
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.parametrize("name", device_names())
-def test_all_that_clients_got_is_there(name: str, tmp_path: Path) -> None:
+def test_transcript_has_all_answers_of_the_clients(name: str, tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     with open_device(name, seed=2) as opened, path.open("w") as stream:
         recorder = start_recorder(opened, stream)
@@ -53,7 +51,7 @@ def test_all_that_clients_got_is_there(name: str, tmp_path: Path) -> None:
     assert {one.port for one in found} == {"uart", "i2c"}
 
 
-def test_a_telecommand_has_its_parameters_and_its_acknowledge() -> None:
+def test_telecommand_has_parameters_and_acknowledge() -> None:
     request = bytes([THRESHOLD.id]) + THRESHOLD.pack(Threshold=9)
     code = next(iter(INTERFACE.ack_errors))
     good, bad = on_the_line(
@@ -78,19 +76,19 @@ def test_a_telecommand_has_its_parameters_and_its_acknowledge() -> None:
         ([("host", b"")], "not in the tables"),
     ],
 )
-def test_what_is_wrong_is_told(frames: list[tuple[str, bytes]], error: str) -> None:
+def test_errors_are_named(frames: list[tuple[str, bytes]], error: str) -> None:
     (one,) = on_the_line(*frames)
     assert one.error.startswith(error)
 
 
-def test_an_answer_belongs_to_the_request_before_it() -> None:
+def test_answer_belongs_to_the_previous_request() -> None:
     answer = ("device", bytes(CONFIGURATION.length))
     ask = ("host", bytes([CONFIGURATION.id]))
     lost, late = on_the_line(answer, ask, ask, answer, answer)
     assert (lost.error, late.error) == ("no answer", "")
 
 
-def test_other_devices_of_the_bus_are_left_out() -> None:
+def test_other_devices_on_the_bus_are_ignored() -> None:
     def transfer(address: int, errno: int) -> BusTransfer:
         ask = BusMessage(address, bytes([CONFIGURATION.id]), read=False)
         answer = BusMessage(address, b"" if errno else bytes(CONFIGURATION.length), read=True)
@@ -121,7 +119,7 @@ def recording(tmp_path: Path) -> Path:
     return path
 
 
-def test_tables_have_a_row_for_each_field(recording: Path, tmp_path: Path) -> None:
+def test_decode_writes_one_row_per_field(recording: Path, tmp_path: Path) -> None:
     arrow = pytest.importorskip("pyarrow.parquet")
     for end in ("csv", "parquet"):
         assert main(["decode", str(recording), "--out", str(tmp_path / f"a.{end}")]) == 0
@@ -136,9 +134,7 @@ def test_tables_have_a_row_for_each_field(recording: Path, tmp_path: Path) -> No
         assert (table[-1]["error"], float(table[-1]["value"])) == ("no acknowledge", 9.0)
 
 
-def test_lines_for_readers_and_for_programs(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_decode_prints_text_and_json(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["decode", str(recording)]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert "telemetry Configuration: " in first
@@ -148,6 +144,8 @@ def test_lines_for_readers_and_for_programs(
     assert objects[1]["values"] == {"Threshold": 9}
 
 
-def test_another_table_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_decode_rejects_other_file_types(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["decode", str(recording), "--out", "a.xls"]) != 0
     assert "a.xls: a table is .csv or .parquet" in capsys.readouterr().err

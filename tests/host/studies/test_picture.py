@@ -1,5 +1,3 @@
-"""`cubestack picture`: the sky at a known attitude, for the uploads of a device."""
-
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +11,7 @@ from tests.conftest import Run
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_an_uploaded_picture_gives_the_attitude_that_it_was_made_for(
-    run: Run, tmp_path: Path
-) -> None:
+def test_uploaded_picture_gives_its_attitude(run: Run, tmp_path: Path) -> None:
     path, scene = tmp_path / "orion.png", tmp_path / "dark.toml"
     scene.write_text('kind = "sky"\nra_deg = 1\ndec_deg = 2\nmag_limit = 3.8\n')
     pose = ("--ra", "83.8", "--dec", "-5.4", "--roll", "30")
@@ -34,7 +30,7 @@ def test_an_uploaded_picture_gives_the_attitude_that_it_was_made_for(
     assert abs(roll) < 0.02
 
 
-def test_the_other_star_tracker(run: Run, tmp_path: Path) -> None:
+def test_picture_of_aramis(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "sky.png"
     code, out, err = run("picture", "aramis", "--ra", "10", "--dec", "20", "--out", str(path))
     with Image.open(path) as picture:
@@ -43,7 +39,7 @@ def test_the_other_star_tracker(run: Run, tmp_path: Path) -> None:
     assert "1280 x 1024 pixels" in err
 
 
-def test_stretched_lifts_faint_stars_and_without_it_values_stay(run: Run, tmp_path: Path) -> None:
+def test_stretched_brightens_faint_stars(run: Run, tmp_path: Path) -> None:
     pictures = []
     for words in ((), ("--stretched",)):
         path = tmp_path / "sky.png"
@@ -70,7 +66,7 @@ def test_stretched_lifts_faint_stars_and_without_it_values_stay(run: Run, tmp_pa
         (("cubestar", "--ra", "1", "--dec", "2", "--out", "x.jpg"), "--out must end in .png"),
     ],
 )
-def test_wrong_calls(run: Run, arguments: tuple[str, ...], error: str) -> None:
+def test_rejects_wrong_arguments(run: Run, arguments: tuple[str, ...], error: str) -> None:
     code, out, err = run("picture", "--out", "x.png", *arguments)
     assert (code, out) == (2, "")
     assert error in err

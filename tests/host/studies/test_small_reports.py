@@ -1,6 +1,7 @@
 """Memory, settings before a measurement, sections and worst cases: what they say and send."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.experiment import Section
 from cubestack.host.experiments.aramis import measure as aramis
 from cubestack.host.studies.campaign import report
+from cubestack.host.studies.campaign import worst as module
 from cubestack.host.studies.campaign.folder import Folder
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
@@ -24,19 +26,13 @@ from tests.host.studies.campaign.conftest import failing, plan
 __all__ = ["failing", "plan"]
 
 USE = MemoryUse(
-    flash=262_144,
-    flash_size=1 << 20,
-    ram_size=1 << 17,
-    static=1 << 15,
-    heap=1 << 10,
-    stack=None,
-    process_stack=0x2000_1F00,
-    free=96,
+    **{"flash": 262_144, "flash_size": 1 << 20, "ram_size": 1 << 17, "static": 1 << 15},
+    **{"heap": 1 << 10, "stack": None, "process_stack": 0x2000_1F00, "free": 96},
 )
 
 
 class Observed:
-    """A device with firmware of one's own, that notes what is asked of it."""
+    """A device with custom firmware that logs its calls."""
 
     def __init__(self) -> None:
         self.done = list[object]()
@@ -52,18 +48,15 @@ class Observed:
         self.done.append(seconds)
 
 
-@pytest.mark.parametrize(("capture", "done"), [(False, [1.5, "closed"]),
-                                               (True, [1.5, "capture", "closed"])])  # fmt: skip
-def test_memory_is_told_after_a_run(
-    monkeypatch: pytest.MonkeyPatch, capture: bool, done: list[object]
-) -> None:
+@pytest.mark.parametrize("capture", [False, True])
+def test_memory_is_reported_after_a_run(monkeypatch: pytest.MonkeyPatch, capture: bool) -> None:
     one = Observed()
     monkeypatch.setattr(memory, "own_firmware", lambda *_words: SimpleNamespace(observer=None))
     monkeypatch.setattr(memory, "memory_use", lambda _observer: USE)
     options = memory.MemoryOptions(seconds=1.5, capture=capture)
     opened: Any = lambda _scene, *, seed: one  # noqa: E731
     (facts,) = memory.EXPERIMENT.run(opened, options)
-    assert one.done == done
+    assert one.done == [1.5, *["capture"] * capture, "closed"]
     assert facts.as_dict()["heap"] == 1024
     lines = list(memory._lines(USE))
     assert [line.split() for line in lines] == [
@@ -74,13 +67,7 @@ def test_memory_is_told_after_a_run(
         ["process", "stack", "down", "to", "20001f00"],
         ["never", "touched", "96", "bytes,", "0.1", "%"],
     ]
-    # Names and numbers are below each other.
-    assert len({line.index(" bytes") for line in lines if " bytes" in line}) == 1
-
-
-def test_a_program_without_a_process_has_no_stack_of_it() -> None:
-    from dataclasses import replace
-
+    assert len({line.index(" bytes") for line in lines if " bytes" in line}) == 1  # aligned
     assert len(list(memory._lines(replace(USE, process_stack=None)))) == 5
 
 
@@ -88,7 +75,6 @@ def test_a_program_without_a_process_has_no_stack_of_it() -> None:
 
 
 def sent(**options: Any) -> list[tuple[str, dict[str, Any]]]:
-    """Telecommands before a measurement with these options."""
     said = list[tuple[str, dict[str, Any]]]()
     client = SimpleNamespace(
         command=lambda name, **values: said.append((name, values)),
@@ -99,7 +85,7 @@ def sent(**options: Any) -> list[tuple[str, dict[str, Any]]]:
     return said
 
 
-def test_only_what_differs_is_sent() -> None:
+def test_only_changed_settings_are_sent() -> None:
     (field, values), wait = sent()
     assert (field, values["FieldOfView"]) == ("SetField", pytest.approx(21.534639))
     assert wait[0] == "wait"
@@ -110,7 +96,7 @@ def test_only_what_differs_is_sent() -> None:
 
 
 @pytest.mark.parametrize("exposure_ms", [0.001, 1.0, 20.0, 200.0])
-def test_an_exposure_is_the_nearest_number_of_rows(exposure_ms: float) -> None:
+def test_exposure_is_rounded_to_rows(exposure_ms: float) -> None:
     rows = sent(exposure=exposure_ms)[1][1]["Rows"]
     row_ms = 1000 * (1280 + 244) / 48e6
     assert abs(rows * aramis.ROW_S * 1000 - exposure_ms) <= max(aramis.ROW_S * 500, row_ms) * 1.001
@@ -121,12 +107,12 @@ FALSE_MAGS = aramis.AramisOptions.declared()["false_mags"]
 
 
 @pytest.mark.parametrize("given", ["4.5,6", (4.5, 6), ("4.5", "6")])
-def test_magnitudes_are_typed_or_given(given: object) -> None:
+def test_magnitudes_accept_text_and_pairs(given: object) -> None:
     assert FALSE_MAGS.take(given) == (4.5, 6.0)
 
 
 @pytest.mark.parametrize("given", ["6,4.5", "4.5", "a,b", (6, 4.5)])
-def test_magnitudes_that_are_none(given: object) -> None:
+def test_magnitudes_reject_other_orders(given: object) -> None:
     with pytest.raises(ValueError, match=r"must (be|have) "):
         FALSE_MAGS.take(given)
     assert FALSE_MAGS.take("5,5") == (5.0, 5.0)
@@ -136,7 +122,7 @@ def test_magnitudes_that_are_none(given: object) -> None:
 
 
 @pytest.mark.usefixtures("failing")
-def test_a_page_has_the_tables_and_figures_of_its_experiment(
+def test_report_has_the_sections_of_the_experiment(
     plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("matplotlib")
@@ -145,8 +131,6 @@ def test_a_page_has_the_tables_and_figures_of_its_experiment(
     seen = list[Any]()
 
     class Tested:
-        """An experiment with two sections."""
-
         marks = ()
 
         def sections(self, results: Iterator[Any]) -> Iterator[Section]:
@@ -166,12 +150,9 @@ def test_a_page_has_the_tables_and_figures_of_its_experiment(
     assert len(seen) == len(list(folder.rows()))
 
 
-def test_of_one_outcome_the_largest_error_comes_first(
+def test_worst_case_has_the_largest_error(
     plan: CampaignPlan, tmp_path: Path, failing: set[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from dataclasses import replace
-
-    from cubestack.host.studies.campaign import worst as module
 
     failing.add(0.9)
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
@@ -188,7 +169,7 @@ def test_of_one_outcome_the_largest_error_comes_first(
     assert "false_stars = 0" in cases[0].text
 
 
-def test_what_fails_again_is_told_and_what_did_not_fail_raises(
+def test_worst_replays_failures_and_raises_new_ones(
     plan: CampaignPlan, tmp_path: Path, failing: set[float]
 ) -> None:
     failing.add(0.5)
@@ -207,7 +188,7 @@ def test_what_fails_again_is_told_and_what_did_not_fail_raises(
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_a_ball_is_seen_where_the_stage_has_turned_it() -> None:
+def test_ball_is_seen_where_the_stage_moved_it() -> None:
     found = perform(Job("cubesense", "ball", "published", 1, 1.0))
     for direction in ("right", "left", "down", "up"):
         assert 0 < found[direction] < 0.5

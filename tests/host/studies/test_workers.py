@@ -1,5 +1,3 @@
-"""Jobs on processes and on a cluster; workers that die."""
-
 import os
 import signal
 from collections.abc import Iterator
@@ -53,7 +51,7 @@ def test_one_worker_is_this_process() -> None:
     assert {pid for _, pid in performed(own_process, range(3), 1)} == {os.getpid()}
 
 
-def test_jobs_are_asked_for_when_a_worker_is_free() -> None:
+def test_jobs_are_drawn_as_workers_become_free() -> None:
     asked: list[int] = []
 
     def jobs() -> Iterator[int]:
@@ -65,37 +63,37 @@ def test_jobs_are_asked_for_when_a_worker_is_free() -> None:
         assert len(asked) <= done + 2 * AHEAD
 
 
-def test_an_error_is_that_of_the_job() -> None:
+def test_error_of_a_job_is_raised() -> None:
     with pytest.raises(ValueError, match=r"not \d"):
         list(performed(fail, range(4), 2))
 
 
-def test_what_was_under_way_when_a_worker_died_begins_anew(tmp_path: Path) -> None:
+def test_job_of_a_killed_worker_is_repeated(tmp_path: Path) -> None:
     jobs = [(tmp_path / "died", number) for number in range(9)]
     assert sorted(done for _, done in performed(die_once, jobs, 2)) == list(range(9))
     assert (tmp_path / "died").exists()
 
 
-def test_workers_that_die_again_are_told() -> None:
+def test_repeated_deaths_of_workers_are_reported() -> None:
     with pytest.raises(WorkersError, match="workers went away: "):
         list(performed(die, range(9), 2))
 
 
-def test_a_cluster_does_the_same(scheduler: str) -> None:
+def test_jobs_run_on_a_cluster(scheduler: str) -> None:
     done = sorted(performed(square, range(20), 1, scheduler))
     assert done == [(n, n * n) for n in range(20)]
     pids = {pid for _, pid in performed(own_process, range(8), 1, scheduler)}
     assert os.getpid() not in pids
 
 
-def test_no_scheduler_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_scheduler_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("cubestack.host.studies.workers.CONNECT", "100ms")
     with pytest.raises(WorkersError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         list(performed(square, range(2), 1, "tcp://127.0.0.1:1"))
 
 
-def test_a_scheduler_that_goes_away_is_told() -> None:
+def test_lost_scheduler_is_reported() -> None:
     with dask_cluster(1) as cluster, pytest.raises(WorkersError):  # noqa: PT012 - in between
         for number, _ in performed(square, range(1000), 1, cluster.scheduler_address):
             if number == 5:

@@ -1,5 +1,3 @@
-"""An emulated bus whose process goes away, and which of several is meant."""
-
 import os
 import socket
 import stat
@@ -10,13 +8,12 @@ from pathlib import Path
 import pytest
 
 from cubestack.firmware_model.formats import linux_i2c
-from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.errors import PortClosedError
 from cubestack.host.transport.smbus import CubeSMBus, _find_socket
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[socket.socket]:
-    """Somebody who serves a bus."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening:
         listening.bind(str(tmp_path / "bus"))
         listening.listen()
@@ -24,7 +21,7 @@ def server(tmp_path: Path) -> Iterator[socket.socket]:
 
 
 @pytest.mark.parametrize("reply", [b"", b"\x01", b"\x10\x00\x00\x00abc"])
-def test_an_emulation_that_ends_within_an_answer(
+def test_emulation_that_ends_during_an_answer(
     server: socket.socket, tmp_path: Path, reply: bytes
 ) -> None:
     def answer() -> None:
@@ -41,7 +38,7 @@ def test_an_emulation_that_ends_within_an_answer(
     serving.join()
 
 
-def test_an_open_bus_has_a_descriptor_as_smbus2_s(server: socket.socket, tmp_path: Path) -> None:
+def test_open_bus_has_a_file_descriptor(server: socket.socket, tmp_path: Path) -> None:
     def answer() -> None:
         with server.accept()[0] as connection:
             connection.recv(1 << 12)
@@ -57,16 +54,11 @@ def test_an_open_bus_has_a_descriptor_as_smbus2_s(server: socket.socket, tmp_pat
     assert bus.fd is None
 
 
-def test_a_bus_that_nobody_serves(tmp_path: Path) -> None:
-    with pytest.raises(PortOpenError, match=r"no emulation serves .*bus \(No such file"):
-        CubeSMBus(str(tmp_path / "bus"))
-
-
 @pytest.mark.parametrize(
     ("around", "number", "own"),
     [("7", "7", True), ("7", "8", False), (None, "7", False), ("7", None, False)],
 )
-def test_a_program_below_run_has_the_bus_around_it(
+def test_program_under_run_uses_its_bus(
     monkeypatch: pytest.MonkeyPatch, around: str | None, number: str | None, own: bool
 ) -> None:
     for name, value in (("BUS", around), ("SOCKET", "/the/socket" if number else None)):

@@ -1,5 +1,3 @@
-"""A line that goes away is told by its name, and comes back where that is wanted."""
-
 import os
 import tty
 from collections.abc import Iterator
@@ -8,19 +6,12 @@ from typing import Any
 import pytest
 import serial
 
-from cubestack.host.errors import PortClosedError, PortOpenError
+from cubestack.host.errors import PortClosedError
 from cubestack.host.transport.streams import SerialTransport, open_transport, read_answer
 
 
 class Port:
-    """What pyserial opens, that can be pulled out.
-
-    Attributes:
-        out: whether it is.
-        opened: how often it was opened again.
-        said: what was written.
-        timeouts: how often one was set.
-    """
+    """A pyserial port that can be unplugged (``out``); counts reopenings and timeout settings."""
 
     baudrates = (9600, 57_600)
 
@@ -97,7 +88,7 @@ ACTS: list[Any] = [
 
 
 @pytest.mark.parametrize("act", ACTS)
-def test_a_port_that_was_pulled_out_is_told(port: Port, line: SerialTransport, act: Any) -> None:
+def test_unplugged_port_is_reported(port: Port, line: SerialTransport, act: Any) -> None:
     port.out = True
     with pytest.raises(PortClosedError, match="/dev/x: device disconnected"):
         act(line)
@@ -105,7 +96,7 @@ def test_a_port_that_was_pulled_out_is_told(port: Port, line: SerialTransport, a
 
 @pytest.mark.parametrize("act", ACTS[:2])
 @pytest.mark.parametrize("reopens", [False, True])
-def test_it_is_opened_again_only_where_that_is_wanted(
+def test_port_is_reopened_only_if_requested(
     port: Port, line: SerialTransport, act: Any, reopens: bool
 ) -> None:
     line.reopens = reopens
@@ -121,12 +112,12 @@ def test_it_is_opened_again_only_where_that_is_wanted(
     assert port.opened == int(reopens)
 
 
-def test_a_rate_is_taken_or_not(port: Port, line: SerialTransport) -> None:
+def test_set_baud_reports_unsupported_rates(port: Port, line: SerialTransport) -> None:
     assert (line.set_baud(9600), line.baud, port.baudrate) == (True, 9600, 9600)
     assert (line.set_baud(7), line.baud) == (False, 9600)
 
 
-def test_all_that_has_come_is_read_at_once(port: Port, line: SerialTransport) -> None:
+def test_read_returns_pending_bytes(port: Port, line: SerialTransport) -> None:
     port.pending = b"abcdef"
     assert line.read(4, 0.5) == b"abcd"
     assert line.read(4, 0.5) == b"ef"
@@ -135,9 +126,7 @@ def test_all_that_has_come_is_read_at_once(port: Port, line: SerialTransport) ->
     assert (port.timeout, port.timeouts) == (0.5, 1)  # setting it touches the port
 
 
-def test_an_answer_is_as_long_as_it_should_be_or_what_came(
-    port: Port, line: SerialTransport
-) -> None:
+def test_read_answer_stops_at_its_length_or_timeout(port: Port, line: SerialTransport) -> None:
     port.pending = b"abcd"
     assert read_answer(line, 4, 0.1) == b"abcd"
     port.pending = b"ef"
@@ -153,16 +142,10 @@ def terminal() -> Iterator[tuple[str, int]]:
     os.close(slave)
 
 
-def test_a_terminal_whose_other_end_closes(terminal: tuple[str, int]) -> None:
+def test_pty_whose_other_end_closes(terminal: tuple[str, int]) -> None:
     name, master = terminal
     line = open_transport(name, 57_600)
     os.close(master)
     with pytest.raises(PortClosedError, match=name):
         line.write(b"x")
     line.close()
-
-
-def test_a_port_that_there_is_not() -> None:
-    for text in ("/dev/nothing", "tcp://127.0.0.1:1"):
-        with pytest.raises(PortOpenError, match=f"can not open {text}: "):
-            open_transport(text, 57_600)

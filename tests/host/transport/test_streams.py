@@ -42,7 +42,7 @@ def line(request: pytest.FixtureRequest) -> Ends:
     return request.getfixturevalue(request.param)
 
 
-def test_bytes_go_both_ways_unchanged(line: Ends) -> None:
+def test_bytes_pass_unchanged_in_both_directions(line: Ends) -> None:
     transport, peer = line
     data = bytes(range(256))
     transport.write(data)
@@ -51,7 +51,7 @@ def test_bytes_go_both_ways_unchanged(line: Ends) -> None:
     assert transport.read(1000, 5.0) == data
 
 
-def test_a_read_takes_no_more_than_asked_for_and_silence_is_empty(line: Ends) -> None:
+def test_read_has_a_maximum_and_a_timeout(line: Ends) -> None:
     transport, peer = line
     peer.write(b"abcdef")
     assert transport.read(4, 5.0) == b"abcd"
@@ -60,21 +60,14 @@ def test_a_read_takes_no_more_than_asked_for_and_silence_is_empty(line: Ends) ->
     assert transport.read(10, 0.001) == b""
 
 
-def test_a_closed_connection_is_told(tcp_line: Ends) -> None:
-    transport, peer = tcp_line
-    peer.close()
-    with pytest.raises(PortClosedError, match=r"tcp://127.0.0.1:\d+: the other side closed"):
-        transport.read(10, 5.0)
-
-
 @pytest.mark.parametrize("reopens", [True, False])
-def test_a_server_that_is_started_again_is_found_again(tcp_line: Ends, reopens: bool) -> None:
+def test_reconnects_to_a_restarted_server(tcp_line: Ends, reopens: bool) -> None:
     transport, peer = tcp_line
     assert isinstance(transport, streams.TcpTransport)
     transport.reopens = reopens
     port = int(transport.name.rpartition(":")[2])
     peer.close()
-    with pytest.raises(PortClosedError, match="the other side closed"):
+    with pytest.raises(PortClosedError, match=r"tcp://127.0.0.1:\d+: the other side closed"):
         transport.read(10, 5.0)
     for _ in range(2):
         with pytest.raises(PortClosedError, match="refused" if reopens else transport.name):
@@ -91,8 +84,8 @@ def test_a_server_that_is_started_again_is_found_again(tcp_line: Ends, reopens: 
             assert transport.read(10, 5.0) == b"again"
 
 
-def test_the_old_connection_ends_before_a_new_one_is_tried(tcp_line: Ends) -> None:
-    """Or a server that takes one client at a time would never take the next."""
+def test_old_connection_is_closed_before_reconnecting(tcp_line: Ends) -> None:
+    """A server for one client at a time would otherwise never accept the new connection."""
     transport, peer = tcp_line
     assert isinstance(transport, streams.TcpTransport)
     transport.reopens = True
@@ -116,7 +109,7 @@ def test_the_old_connection_ends_before_a_new_one_is_tried(tcp_line: Ends) -> No
         ("usb://1", "usb://1: no transport usb://; known: tcp://, rfc2217:// or a port's path"),
     ],
 )
-def test_a_target_without_sense_is_a_wrong_call(target: str, message: str) -> None:
+def test_rejects_invalid_targets(target: str, message: str) -> None:
     with pytest.raises(TargetError, match=message):
         open_transport(target, 57_600)
     assert issubclass(TargetError, ValueError)

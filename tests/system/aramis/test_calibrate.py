@@ -1,5 +1,3 @@
-"""`cubestack calibrate aramis`: focal length and principal point of a unit, from pictures."""
-
 import json
 from pathlib import Path
 
@@ -19,7 +17,7 @@ cy = 505.0
 
 
 @pytest.mark.slow
-def test_an_emulated_unit_s_lens_is_found(
+def test_finds_the_lens_of_an_emulated_unit(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     scene = tmp_path / "unit.toml"

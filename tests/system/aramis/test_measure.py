@@ -1,5 +1,3 @@
-"""`cubestack measure aramis` with the whole catalogue: rates, accuracy, motion, upsets."""
-
 import pytest
 
 from tests.system.conftest import Measure
@@ -24,7 +22,7 @@ def test_lost_in_space(measure: Measure, options: tuple[object, ...]) -> None:
         assert frame["error_cross_deg"] < GOAL_DEG
 
 
-def test_near_a_rough_direction_filters_leave_nothing_wrong(measure: Measure) -> None:
+def test_filtered_aided_mode_gives_no_wrong_attitude(measure: Measure) -> None:
     near = ("--mode", "assisted", "--hint-error", 2, "--set", "aided=filtered")
     frames = measure("--frames", 8, "--seed", 22, *near, "--profile", "published")
     assert sum(frame["right"] for frame in frames) >= 6
@@ -34,14 +32,14 @@ def test_near_a_rough_direction_filters_leave_nothing_wrong(measure: Measure) ->
             assert frame["error_cross_deg"] < GOAL_DEG
 
 
-def test_the_published_profile_believes_a_unique_triangle_after_a_pivot(measure: Measure) -> None:
+def test_published_profile_accepts_a_unique_triangle_after_a_pivot(measure: Measure) -> None:
     near = ("--frames", 4, "--seed", 21, "--mode", "assisted", "--profile", "published")
     found = {(frame["reason"], frame["pivots"], frame["matched"]) for frame in measure(*near)}
     assert found == {("unique", 1, 3)}
 
 
 @pytest.mark.slow
-def test_a_fast_roll_is_right_and_a_fast_turn_is_smear(measure: Measure) -> None:
+def test_fast_roll_is_solved_and_fast_slew_smears(measure: Measure) -> None:
     for frame in measure("--frames", 2, "--seed", 23, "--roll-rate", 10, *EXTENDED):
         assert frame["right"]
         assert frame["error_cross_deg"] < 0.1

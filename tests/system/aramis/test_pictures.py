@@ -1,7 +1,7 @@
-"""Pictures that a star camera took in orbit, as the light on the emulated sensor.
+"""Pictures that a star camera took in orbit, shown to the emulated sensor.
 
-752 x 290, rows doubled; a CCD with pixels of 8.6 by 8.3 um behind 20 mm. They are drawn anew in
-square pixels, as the lens with a field of 18 deg would have; what it sees beyond them stays dark.
+The source is a CCD of 752 x 290 pixels of 8.6 x 8.3 um (rows doubled) behind a 20 mm lens. The
+pictures are resampled to square pixels for a field of 18 deg; the margin stays dark.
 """
 
 import json
@@ -39,7 +39,7 @@ def drawn_anew(path: Path, folder: Path) -> Path:
     return folder / path.name
 
 
-def test_each_is_solved(measure: Measure, tmp_path: Path) -> None:
+def test_every_picture_is_solved(measure: Measure, tmp_path: Path) -> None:
     truths = json.loads((FOLDER / "truth.json").read_text())["images"]
     for path in PICTURES:
         picture = drawn_anew(path, tmp_path)

@@ -1,5 +1,3 @@
-"""AraMiS' ports as unmodified programs use them: terminal, I2C bus; and the demonstration."""
-
 import struct
 import time
 from collections.abc import Iterator
@@ -32,7 +30,7 @@ def served(emulate: Emulate, tmp_path: Path) -> Iterator[Path]:
     assert emulator.process.returncode == 0
 
 
-def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
+def test_attitude_over_plain_pyserial(served: Path) -> None:
     with serial.Serial(str(served), 57_600, timeout=30) as port:
 
         def command(*payload: int) -> None:
@@ -55,7 +53,7 @@ def test_an_attitude_with_nothing_but_pyserial(served: Path) -> None:
     assert abs(roll) < 0.05
 
 
-def test_the_same_over_i2c(session: Open) -> None:
+def test_attitude_over_i2c(session: Open) -> None:
     with session(SkyScene(TRUTH)) as opened:
         bus = opened.board.i2c()
         bus.wait(0.1)

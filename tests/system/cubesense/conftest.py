@@ -28,13 +28,13 @@ def device_name() -> str:
 
 @pytest.fixture
 def session(device_name: str, profile: str) -> Open:
-    """Opens the device, whose lenses are as its firmware has them: it shows what it looks at."""
+    """Opens the device with the lenses of the firmware's tables."""
     return partial(open_device, device_name, profile=profile, set="lens=nominal")
 
 
 @pytest.fixture
 def ready(session: Open) -> Open:
-    """Opens the device, looking at a scene, and waits until its cameras are set up."""
+    """Opens the device with a scene and waits until its cameras are set up."""
 
     def start(scene: Any = FACING, **options: Any) -> AnyEmulated:
         opened = session(scene, **options)
@@ -52,7 +52,7 @@ def check_right(found: Measurement, expected: tuple[float, float] | None = None)
 
 
 def sent(opened: AnyEmulated, camera: Camera) -> np.ndarray:
-    """The picture (480, 640) that a camera sent while one was stored last, rendered anew."""
+    """The picture (480, 640) that a camera sent during the latest store, rendered again."""
     shutter = opened.board.stored_frame(camera)
     segment = opened.board.cameras[camera].segment_at(shutter.readout_ps + 1)
     found: np.ndarray = segment.pixels()

@@ -1,5 +1,3 @@
-"""The nadir sensor before the ball of its bench, with the stage as the truth."""
-
 import json
 
 import pytest

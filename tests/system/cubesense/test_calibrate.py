@@ -1,5 +1,3 @@
-"""`cubestack calibrate cubesense`: a unit's own lenses are found, and it errs less with them."""
-
 import json
 from pathlib import Path
 
@@ -22,7 +20,7 @@ def calibrate(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
 
 
 @pytest.mark.slow
-def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[str]) -> None:
+def test_calibration_reduces_the_error(capsys: pytest.CaptureFixture[str]) -> None:
     which = ("--sensor", "nadir", "--seed", 2, "--emulated", 20, "--check-poses", 8)
     found = calibrate(capsys, *which, "--profile", "extended", "--set", "lens=residuals")
     assert found["error_after_deg"] < 0.06 < 0.2 < found["error_before_deg"]
@@ -31,7 +29,7 @@ def test_a_unit_errs_less_once_it_is_calibrated(capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.slow
-def test_a_lens_of_a_scene_is_found(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_finds_the_lens_of_a_scene(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     scene, out = tmp_path / "unit.toml", tmp_path / "unit.json"
     scene.write_text('kind = "earth-sun"\n' + LENS.format("sun"), encoding="utf-8")
     which = ("--sensor", "sun", "--scene", scene, "--emulated", 24, "--check-poses", 6)
@@ -41,7 +39,7 @@ def test_a_lens_of_a_scene_is_found(capsys: pytest.CaptureFixture[str], tmp_path
     assert json.loads(out.read_text(encoding="utf-8"))["sun"].items() <= found.items()
 
 
-def test_pictures_of_a_light_give_the_lens(
+def test_finds_the_lens_from_pictures_of_lights(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     lens = lens_of(CameraTarget.NADIR, LensError((0.8, -0.5), ((40.0, 0.2), (75.0, 0.6))))
@@ -59,22 +57,8 @@ def test_pictures_of_a_light_give_the_lens(
     found = calibrate(capsys, *given)
     np.testing.assert_allclose(found["boresight_px"], (371.8, 235.5), atol=0.1)
     assert found["after_px"] < 0.3 < 1 < found["before_px"]
-    for text, complaint in [
-        ("file,alpha_deg\n0.png,1", "line 2: must be file,alpha_deg,beta_deg"),
-        ("\n".join(lines[:5]), "needs 8 places at least; 4 were found"),
-        (f"{lines[0]}\nnone.png,1,2", "none.png can not be read"),
-        (f"{lines[0]}\nblack.png,1,2", "black.png shows no light"),
-    ]:
-        Image.new("L", (640, 480)).save(tmp_path / "black.png")
-        csv.write_text(text, encoding="utf-8")
-        assert main(["calibrate", "cubesense", *map(str, given)]) == 2
-        said = capsys.readouterr().err
-        assert complaint in said
-        assert said.count("\n") == 1
-
-
-def test_pictures_need_their_angles(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["calibrate", "cubesense", "--images", "x"]) == 2
-    assert "--images and --angles are needed together" in capsys.readouterr().err
-    assert main(["calibrate", "cubesense", "--images", "x", "--angles", "y"]) == 2
-    assert "--sensor sun or nadir" in capsys.readouterr().err
+    csv.write_text("\n".join(lines[:5]), encoding="utf-8")
+    assert main(["calibrate", "cubesense", *map(str, given)]) == 2
+    said = capsys.readouterr().err
+    assert "needs 8 places at least; 4 were found" in said
+    assert said.count("\n") == 1

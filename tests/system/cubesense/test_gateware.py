@@ -1,5 +1,3 @@
-"""Gateware as flown, and FPGAs with one search each, under the whole firmware."""
-
 import pytest
 
 from cubestack.emulator.scene.earth_sun import EarthSunScene
@@ -13,7 +11,7 @@ DARK = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
 
 
 @pytest.mark.parametrize("gateware", ["as-flown", "corrected"])
-def test_coordinates_when_the_sun_has_gone(ready: Open, gateware: str) -> None:
+def test_coordinates_after_the_sun_disappears(ready: Open, gateware: str) -> None:
     with ready(FACING, profile="published", set=f"gateware={gateware}") as opened:
         assert opened.client.capture_and_detect(Camera.SUN).detected
         seen = opened.board.program.state.results[Camera.SUN].first
@@ -26,7 +24,7 @@ def test_coordinates_when_the_sun_has_gone(ready: Open, gateware: str) -> None:
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_a_picture_over_the_link_is_as_good_as_edge_data(ready: Open, camera: Camera) -> None:
+def test_single_search_gateware_gives_the_same_direction(ready: Open, camera: Camera) -> None:
     other, found, took_s = Sram(1 - camera), {}, {}
     for gateware in ("one-search", "corrected"):
         switches = f"lens=nominal,gateware={gateware}"

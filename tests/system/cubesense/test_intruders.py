@@ -1,5 +1,3 @@
-"""False lights beside the Sun and the Earth, and what the published search makes of them."""
-
 from dataclasses import replace
 from typing import Any
 
@@ -23,23 +21,22 @@ def measure(ready: Open, scene: Any, camera: Camera) -> Measurement:
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(30.0, -40.0), (17.0, 9.0), (-80.0, 20.0)])
-def test_the_moon_is_too_faint_for_the_sun_sensor(ready: Open, alpha: float, beta: float) -> None:
+def test_moon_does_not_disturb_the_sun_sensor(ready: Open, alpha: float, beta: float) -> None:
     moon = FACING.sun_camera.matrix.T @ vector_from_angles(alpha, beta)
     check_right(measure(ready, replace(FACING, moon=moon), Camera.SUN))
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_hot_pixels_do_not_move_a_direction(ready: Open, camera: Camera) -> None:
+def test_hot_pixels_do_not_change_a_direction(ready: Open, camera: Camera) -> None:
     view = EarthSunView(FACING, FisheyeCondition(hot_pixels=200, hot_pairs=50))
     check_right(measure(ready, view, camera))
 
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize(("radius_px", "edges"), [(9.0, 0), (25.0, 2)])
-def test_a_light_beside_the_earth_is_dropped_from_its_limb(
+def test_light_beside_the_earth_is_left_out_of_the_limb(
     ready: Open, radius_px: float, edges: int
 ) -> None:
-    """A disc on a sample of a scanned row: small ones make no edges, the fit leaves others out."""
     (sample,) = LENSES[CameraTarget.NADIR].unproject([(511, 79)])
     light = Reflection(
         CameraTarget.NADIR, *angles_from_vector(sample), radius_px=radius_px, level=200.0
@@ -61,7 +58,7 @@ def test_a_light_beside_the_earth_is_dropped_from_its_limb(
         (-30.0, 221.0, (0.0, -30.0)),  # earlier: it is taken for the Sun
     ],
 )
-def test_the_first_bright_light_of_the_picture_is_the_sun(
+def test_first_bright_light_in_the_picture_is_taken_for_the_sun(
     ready: Open, beta: float, level: float, expected: tuple[float, float]
 ) -> None:
     light = Reflection(CameraTarget.SUN, 0.0, beta, radius_px=5.0, level=level)

@@ -1,5 +1,3 @@
-"""Lenses that differ from the firmware's tables: what the sensors then measure."""
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from tests.system.conftest import Measure, Open
 OUTWARDS = ((30.0, 0.0), (60.0, 1.0))
 
 
-def test_the_sun_is_measured_where_the_lens_puts_it(ready: Open) -> None:
+def test_lens_error_shifts_the_measured_sun(ready: Open) -> None:
     condition = FisheyeCondition(noise=False, sun_lens=LensError(radial_deg=OUTWARDS))
     with ready(None, profile="extended") as opened:
         for theta, expected in OUTWARDS:
@@ -25,7 +23,7 @@ def test_the_sun_is_measured_where_the_lens_puts_it(ready: Open) -> None:
                 assert error == pytest.approx(expected, abs=0.1)
 
 
-def test_an_axis_beside_the_boresight_moves_the_earth(ready: Open) -> None:
+def test_axis_offset_shifts_the_measured_earth(ready: Open) -> None:
     """By 1 px, which at the limb, 63.5 deg away, is 0.45 deg, on the axis 0.34."""
     measured = []
     for lens in (NOMINAL, LensError((1.0, 0.0))):
@@ -39,7 +37,7 @@ def test_an_axis_beside_the_boresight_moves_the_earth(ready: Open) -> None:
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_a_unit_has_the_lenses_of_its_seed(ready: Open, profile: str) -> None:
+def test_seed_determines_the_lenses_of_a_unit(ready: Open, profile: str) -> None:
     with ready(None, profile=profile, set="", seed=5) as opened:
         for camera, target in zip(Camera, CameraTarget, strict=True):
             drawn = draw_lens(target, 5)

@@ -1,5 +1,3 @@
-"""Both sensors once a second, by results that schedule the next measurement; satellite turning."""
-
 import time
 from dataclasses import replace
 
@@ -21,7 +19,7 @@ TURNING = replace(FACING, rate_deg_s=(0.5, -1.0, 2.0))
 
 
 def loop(opened: AnyEmulated, turns: int = TURNS) -> list[dict[Camera, Measurement]]:
-    """Read both results every second; the memories change places from turn to turn."""
+    """Reads both results every second; the memories alternate from turn to turn."""
     cubesense, kernel = opened.client, opened.board.kernel
     cubesense.client.pause(0.3)
     found = []
@@ -33,7 +31,7 @@ def loop(opened: AnyEmulated, turns: int = TURNS) -> list[dict[Camera, Measureme
     return found[1:]
 
 
-def test_every_turn_measures_a_second_further_on(session: Open) -> None:
+def test_every_turn_measures_the_current_second(session: Open) -> None:
     with session(TURNING) as opened:
         turns = loop(opened)
     for number, turn in enumerate(turns):
@@ -48,8 +46,7 @@ def test_every_turn_measures_a_second_further_on(session: Open) -> None:
 
 
 @pytest.mark.parametrize("scene", [EarthSunScene(), TURNING], ids=["still", "turning"])
-def test_one_core_is_faster_than_real_time(session: Open, scene: EarthSunScene) -> None:
-    """Processor time, which other programs on the machine do not lengthen much."""
+def test_emulation_is_faster_than_real_time(session: Open, scene: EarthSunScene) -> None:
     with session(scene) as opened:
         loop(opened, 1)
         before_s, before_ps = time.process_time(), opened.board.kernel.now

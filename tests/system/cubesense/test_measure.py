@@ -28,7 +28,7 @@ def sun(measure: Measure) -> Frames:
     return measure(*SUN, "--frames", 60, "--seed", 3, *EXTENDED)
 
 
-def test_a_frame_gives_one_result_of_each_sensor(measure: Measure) -> None:
+def test_frame_has_one_result_per_sensor(measure: Measure) -> None:
     frames = measure("--frames", 2)
     assert [frame["sensor"] for frame in frames] == ["sun", "nadir"] * 2
     assert all(frame.keys() >= KEYS for frame in frames)
@@ -67,11 +67,11 @@ def test_sun_sensor_with_other_blooms(measure: Measure, bloom: float) -> None:
 
 
 @pytest.mark.slow
-def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
-    """The nadir sensor's time is a prediction; published are 245 ms, for the published program.
+def test_times_match_the_published_times(nadir: Frames, sun: Frames) -> None:
+    """The nadir time is a prediction; the published program takes 245 ms.
 
-    The spread is that of the wait for a frame, which is uniform over a frame's time: 33.4 ms
-    divided by the root of 12 is 9.6 ms; published are 11 ms.
+    The wait for a frame is uniform over 33.4 ms, so its sigma is 33.4 / sqrt(12) = 9.6 ms; the
+    published value is 11 ms.
     """
     total = np.array([frame["phase_ms"]["total"] for frame in nadir])
     assert total.mean() == pytest.approx(359, abs=15)
@@ -82,7 +82,7 @@ def test_times_beside_the_published_ones(nadir: Frames, sun: Frames) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", [NADIR, SUN], ids=lambda which: which[1])
-def test_the_published_profile_is_quicker_and_worse(
+def test_published_profile_is_faster_and_less_accurate(
     measure: Measure, nadir: Frames, sun: Frames, which: tuple[str, str]
 ) -> None:
     printed = measure(
@@ -96,14 +96,14 @@ def test_the_published_profile_is_quicker_and_worse(
         assert one["phase_ms"]["centroid"] < other["phase_ms"]["centroid"]
 
 
-def test_the_same_seed_gives_the_same_results(measure: Measure) -> None:
+def test_same_seed_gives_the_same_results(measure: Measure) -> None:
     first, second = (measure("--frames", 1, "--seed", 8) for _ in range(2))
     for frame in (*first, *second):
         del frame["wall_ms"]
     assert first == second
 
 
-def test_memory_of_the_other_half_gives_the_same_directions(measure: Measure) -> None:
+def test_other_memory_gives_the_same_directions(measure: Measure) -> None:
     own, other = (measure("--memory", memory, "--seed", 4) for memory in ("own", "other"))
     for one, another in zip(own, other, strict=True):
         assert another["capture"] == "stored_other_sram"
@@ -111,7 +111,7 @@ def test_memory_of_the_other_half_gives_the_same_directions(measure: Measure) ->
         assert another["error_deg"] == pytest.approx(one["error_deg"], abs=0.04)
 
 
-def test_search_around_samples_looks_at_far_fewer_pixels(measure: Measure) -> None:
+def test_sample_search_reads_fewer_pixels(measure: Measure) -> None:
     ways = ("lines", "samples", "stepping")
     lines, halves, stepping = (measure(*NADIR, *NOMINAL, "--search", way) for way in ways)
     for line, half, step in zip(lines, halves, stepping, strict=True):

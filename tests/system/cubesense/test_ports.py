@@ -1,5 +1,3 @@
-"""CubeSense's ports as unmodified programs use them: pseudo-terminals, and the I2C bus."""
-
 import re
 import time
 from collections.abc import Iterator
@@ -25,7 +23,7 @@ from .conftest import NADIR_DEG, SUN_DEG, check_right, sent
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """An emulator process; the path of its node port. Its settings stay as tests leave them."""
+    """Path of the node port of an emulator process; tests share its settings."""
     folder = tmp_path_factory.mktemp("served")
     (folder / "scene.toml").write_text(
         f'kind = "earth-sun"\nsun_deg = {list(SUN_DEG)}\nnadir_deg = {list(NADIR_DEG)}\n'
@@ -36,7 +34,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     assert emulator.process.returncode == 0
 
 
-def test_the_bench_client_of_the_document_gets_the_nadir_picture(
+def test_bench_client_of_the_document_downloads_the_nadir_picture(
     served: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (ROOT / "docs" / "protocols-cubesense.md").read_text(encoding="utf-8")
@@ -54,8 +52,8 @@ def test_the_bench_client_of_the_document_gets_the_nadir_picture(
     assert picture[5, 5] < 50
 
 
-def test_node_protocol_on_the_same_device_and_its_escapes(served: Path) -> None:
-    """The escapes: an exposure of 0x1F1F, and a frame number that the selected size lacks."""
+def test_node_protocol_and_escaped_bytes(served: Path) -> None:
+    """Escaped bytes occur in an exposure of 0x1F1F."""
     with serial.Serial(str(served), 57_600, timeout=60) as port:
         port.write(bytes.fromhex("1F7F 80 1FFF"))
         answer = port.read_until(b"\x1f\xff")
@@ -83,7 +81,6 @@ def test_node_protocol_on_the_same_device_and_its_escapes(served: Path) -> None:
 
 @pytest.mark.slow
 def test_registers_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
-    """Plain pyserial, then the client."""
     tty = tmp_path / "tty"
     with emulate("--uart", "registers", "--pty", "tty", "--pace", "fast"):
         with serial.Serial(str(tty), 115_200, timeout=60) as port:
@@ -113,7 +110,7 @@ def test_registers_on_the_backup_uart(emulate: Emulate, tmp_path: Path) -> None:
     assert picture[5, 5] < 50
 
 
-def test_what_reaches_a_device_whose_uart_has_registers(ready: Open) -> None:
+def test_register_uart_leaves_the_node_protocol_to_i2c(ready: Open) -> None:
     with ready(uart="registers") as opened:  # the client's node protocol is on I2C then
         assert opened.client.capture_and_detect(Camera.SUN).detected
     target = open_target("emulated:cubesense", options={"uart": "registers"})
@@ -127,7 +124,7 @@ def test_what_reaches_a_device_whose_uart_has_registers(ready: Open) -> None:
     target.close()
 
 
-def test_pictures_over_the_bench_are_what_the_camera_sent(ready: Open) -> None:
+def test_bench_download_equals_the_camera_picture(ready: Open) -> None:
     with ready() as opened:
         line = opened.board.serial("bench_uart")
         read = line.read

@@ -1,5 +1,3 @@
-"""A CubeSense on record: played back it says the same, and programs run on it."""
-
 import io
 from contextlib import closing
 
@@ -41,13 +39,13 @@ def recorded(session, tmp_path) -> Recording:
     return load_recording(path)
 
 
-def test_same_version_says_the_same(recorded, session):
+def test_replay_gives_the_same_answers(recorded, session):
     with session(FACING, seed=1) as opened:
         board = opened.board
         assert Replay(recorded, board.kernel, board.uarts, board.i2c_bus).run(INTERFACE) == []
 
 
-def test_host_programs_run_on_the_recording(recorded):
+def test_clients_run_on_the_recording(recorded):
     cubesense = CubeSense(NodeClient(RecordedTransport(recorded, INTERFACE), INTERFACE))
     assert cubesense.capture_and_detect(Camera.SUN).detected
     ServicePortClient(RecordedTransport(recorded, INTERFACE, "bench_uart")).take(Camera.NADIR)

@@ -1,4 +1,4 @@
-"""What still measures when parts fail.
+"""Measurements with failed parts.
 
 CubeSense thesis, section 3.3 and figures 3.10 and 3.11: one memory failed; one camera and the
 opposite memory failed.
@@ -32,15 +32,12 @@ def check(found: Measurement, capture: CaptureResult) -> None:
 
 
 def latch_up(opened: Any, memory: Sram) -> None:
-    """For good."""
     opened.faults.inject("latch-up", target=memory.name, lasting=True)
     opened.client.client.pause(0.1)
 
 
 @pytest.mark.parametrize("failed", Sram)
-def test_with_one_memory_failed_both_cameras_measure_in_the_other(
-    opened: Any, failed: Sram
-) -> None:
+def test_both_cameras_measure_with_one_memory_failed(opened: Any, failed: Sram) -> None:
     latch_up(opened, failed)
     assert opened.client.power().over_current[failed]
     good = Sram(1 - failed)
@@ -53,10 +50,10 @@ def test_with_one_memory_failed_both_cameras_measure_in_the_other(
 
 
 @pytest.mark.parametrize("dead", Camera)
-def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
+def test_camera_measures_with_the_other_camera_and_its_own_memory_failed(
     opened: Any, dead: Camera
 ) -> None:
-    """The dead camera gives no clock, yet its half's memory is written and read."""
+    """The failed camera sends no clock, but the memory of its half still works."""
     alive = Camera(1 - dead)
     opened.faults.inject("camera-dead", target=HALVES[dead])
     latch_up(opened, Sram(alive))
@@ -67,7 +64,7 @@ def test_with_a_camera_and_the_opposite_memory_failed_the_other_camera_measures(
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_picture_in_the_other_memory_is_what_the_camera_sent(opened: Any, camera: Camera) -> None:
+def test_picture_in_the_other_memory_equals_the_camera_picture(opened: Any, camera: Camera) -> None:
     other = Sram(1 - camera)
     opened.client.capture(camera, other)
     stored = held(opened.board, Camera(other))

@@ -1,5 +1,3 @@
-"""Every result code but that of a latch-up, each from a scene that causes it."""
-
 import numpy as np
 import pytest
 
@@ -20,7 +18,7 @@ TERMINATOR = EarthSunScene(sun=(1, 0, -0.3))
 DARK = EarthSunScene(nadir=(1, 0, 0), sun=(0, 0, 1))
 
 
-def test_on_the_way_to_a_result(ready: Open) -> None:
+def test_result_codes_before_a_measurement(ready: Open) -> None:
     with ready(NOON) as opened:
         cubesense = opened.client
         for camera in Camera:
@@ -74,7 +72,7 @@ def test_result_of_a_scene(ready: Open, name: str) -> None:
         assert opened.client.capture_and_detect(camera).detect.name == expected
 
 
-def test_a_terminator_makes_a_wrong_direction_as_printed(ready: Open) -> None:
+def test_terminator_misleads_the_published_search(ready: Open) -> None:
     with ready(TERMINATOR, profile="published") as opened:
         found = opened.client.capture_and_detect(Camera.NADIR)
         truth = opened.board.truth(Camera.NADIR)
@@ -83,7 +81,7 @@ def test_a_terminator_makes_a_wrong_direction_as_printed(ready: Open) -> None:
 
 
 @pytest.mark.parametrize("profile", ["extended"])
-def test_a_terminator_leaves_the_limb_that_is_lit(ready: Open) -> None:
+def test_terminator_is_excluded_from_the_limb(ready: Open) -> None:
     with ready(TERMINATOR) as opened:
         found = opened.client.capture_and_detect(Camera.NADIR)
         quality = opened.client.quality(Camera.NADIR)

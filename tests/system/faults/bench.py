@@ -1,4 +1,4 @@
-"""A device on the bench: powered up, with a client, and with a look at both ends of its lines."""
+"""A powered device with a client and access to both ends of its lines."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -40,14 +40,14 @@ ORION_DEG = (84.0, -1.0)
 
 
 class Wire(Ear):
-    """A serial line between a host and a device's end, which is watched."""
+    """A watched serial line between host and device."""
 
     def __init__(self, line: Any, uart: Uart) -> None:
         super().__init__(uart)
         self._line = line
 
     def ask(self, payload: bytes, timeout_s: float = 0.1) -> bytes:
-        """Send a frame with ``payload``; all bytes that come back before a silence."""
+        """Sends ``payload`` in a frame; returns all bytes until the line is silent."""
         self.sent.clear()
         self.heard.clear()
         self._line.write(encode_frame(payload))
@@ -55,20 +55,18 @@ class Wire(Ear):
 
     @property
     def answered(self) -> bytes:
-        """Bytes that the device sent."""
         return b"".join(data for data, _, _ in self.sent)
 
     @property
     def asked(self) -> bytes:
-        """Bytes that the device received."""
         return bytes(byte for byte, _ in self.heard)
 
 
 class Spy:
-    """A target on an I2C bus that is watched.
+    """A watched target on an I2C bus.
 
     Attributes:
-        seen: what it got: "S w" or "S r" for a start, bytes in hexadecimal, "P" for a stop.
+        seen: "S w" or "S r" for a start, bytes in hexadecimal, "P" for a stop.
     """
 
     def __init__(self, target: Any) -> None:
@@ -90,15 +88,7 @@ class Spy:
 
 
 class Bench:
-    """One device with a client on its serial line.
-
-    Attributes:
-        scene: what it is made for.
-        flags_in: telemetry with its error flags.
-        board: the emulated board.
-        faults: the board's.
-        device: host's view.
-    """
+    """One device with a client on its serial line; ``flags_in`` is telemetry with error flags."""
 
     scene: ClassVar[Any]
     flags_in = "ErrorFlags"
@@ -121,17 +111,17 @@ class Bench:
         return float(self.board.kernel.now / PS_PER_S)
 
     def wire(self) -> Wire:
-        """Plug a bare line in instead of the client."""
+        """Replaces the client by a bare line."""
         return Wire(self.board.serial(), self.board.uart)
 
     def plug_in(self, *, timeout_s: float = 0.1, retries: int = 0) -> NodeClient:
-        """A new client, which does not wait as long."""
+        """Replaces the client by one with a shorter time-out."""
         line = self.board.serial()
         self.device.client = NodeClient(line, self.interface, timeout_s=timeout_s, retries=retries)
         return self.client
 
     def spy(self) -> Spy:
-        """Watch the node's end of the I2C bus."""
+
         bus, address = self.board.i2c_bus, self.interface.i2c_address
         spy = bus._targets[address] = Spy(bus.targets[address])
         return spy
@@ -144,96 +134,90 @@ class Bench:
         return bytes(answer)
 
     def inject(self, kind: str, *, after_s: float = 0.0, **options: Any) -> Injection:
-        """Inject a fault, ``after_s`` from now."""
+
         at_s = self.now_s + after_s if after_s else None
         injection: Injection = self.faults.inject(kind, at_s=at_s, **options)
         return injection
 
     def during(self, kind: str, act: Callable[[], Any], **options: Any) -> Any:
-        """What ``act`` returns with a fault, which is cleared then."""
+        """The result of ``act`` during a fault, which is then cleared."""
         self.inject(kind, **options)
         result = act()
         self.faults.clear()
         return result
 
     def said(self) -> list[str]:
-        """What the faults did, without their times."""
         return [str(event).split(": ", 1)[1] for event in self.faults.log]
 
     def telemetry(self, name: str) -> dict[str, Any]:
         return dict(self.client.telemetry(name))
 
     def flags(self) -> set[str]:
-        """Error flags that are up, but for those of the sky that these tests look at."""
+        """Set error flags, except those caused by the sky of these tests."""
         values = self.telemetry(self.flags_in)
         up = {flag for flag, up in values.items() if up and not flag.endswith("Count")}
         return up - {"MaxStarsDetection"}
 
 
 STORING_S, READING_S = 0.42, 0.6
-"""Within a CubeStar's first capture after power-up, which stores one frame."""
+"""Times within CubeStar's first capture after power-up, which stores one frame."""
 
 ONE_FRAME_MS, TWO_FRAMES_MS = 384.0, 770.0
-"""How long a first capture stores, when the FPGA keeps the first whole frame, or the second."""
+"""Store times of a first capture that keeps the first or the second whole frame."""
 
-GOOD = ("CALCULATED", set[str]())
+GOOD = ("CALCULATED", set[str]())  # task status and error flags after a capture
 FAILED = ("CAPTURE_FAILED", {"ImageCaptureError"})
-"""Of a capture: how far it and its processing came, and the flags."""
 
 
 class Star(Bench):
-    """A CubeStar."""
-
     board: CubeStarBoard
     scene = replace(SkyScene.pointing(*ORION_DEG), mag_limit=3.8)
 
     @property
     def stored(self) -> np.ndarray:
-        """What the FPGA wrote into its memory, (512, 1024)."""
+        """The FPGA's memory, (512, 1024)."""
         memory: np.ndarray = self.board.engine.sram[: 512 * 1024]
         return memory.reshape(512, 1024).copy()
 
     @property
     def transferred(self) -> np.ndarray:
-        """What the processor read of it, (512, 1024)."""
+        """The picture in the processor's memory, (512, 1024)."""
         memory: np.ndarray = self.board.program._capture.pictures.image
         return memory.copy()
 
     @property
     def stored_for_ms(self) -> float:
-        """How long the FPGA stored in the latest capture."""
+        """Store time of the latest capture."""
         return float(self.device.phase_times()["capture"])
 
     def block(self, number: int) -> np.ndarray:
-        """128 bytes of the picture as the host gets them."""
+        """128 bytes of the picture, as downloaded by the host."""
         size = ImageBlockSize.BYTES_128
         self.client.command("ImageBlockSet", BlockNumber=number, BlockSize=size)
         self.client.wait_processed(1.0)
         return np.frombuffer(self.telemetry("ImageBlock")["Block"], np.uint8)
 
     def measure(self) -> str:
-        """How far a capture and its processing came."""
         return str(self.device.capture_and_process().name)
 
     def capture(self) -> tuple[str, set[str]]:
-        """The same, and the flags."""
         return self.measure(), self.flags()
 
     def capture_with(self, kind: str, **options: Any) -> tuple[str, set[str]]:
-        """The same with a fault, which is cleared then."""
+
         status, flags = self.during(kind, self.capture, **options)
         return status, flags
 
 
 WAIT_S, REQUEST_S = 0.015, 0.003
-"""From a request made after ``await_frame`` to its frame; and what it takes at least: the bytes
-on the line, and the gap before a frame that the FPGA has to see."""
+"""Time from a request after ``await_frame`` to its frame, and its minimum: the bytes on the line
+and the gap before a frame that the FPGA must see."""
 
 TIMED_OUT = (CaptureResult.CAMERA_TIMEOUT, DetectResult.NONE_SCHEDULED)
 
 
 class Sense(Bench):
-    """A CubeSense; of its halves it is the nadir camera's if nothing else is said."""
+    """A CubeSense; the default half is the nadir camera's."""
 
     board: CubeSenseBoard
     scene = FACING
@@ -244,21 +228,19 @@ class Sense(Bench):
         return found
 
     def measure_with(self, kind: str, **options: Any) -> Measurement:
-        """A measurement with a fault, which is cleared then."""
+
         found: Measurement = self.during(kind, self.measure, **{"target": "nadir"} | options)
         return found
 
     def outcome(self, camera: Camera = Camera.NADIR) -> tuple[CaptureResult, DetectResult]:
-        """How far a measurement comes."""
         found = self.measure(camera)
         return found.capture, found.detect
 
     def check(self, camera: Camera = Camera.NADIR) -> None:
-        """A measurement is right."""
         check_right(self.measure(camera))
 
     def await_frame(self) -> RollingShutter:
-        """Wait until a request would wait for ``WAIT_S``; the frame that it would store."""
+        """Waits until the next frame is ``WAIT_S`` away; returns that frame."""
         kernel = self.board.kernel
         wanted_ps = kernel.now + round(WAIT_S * PS_PER_S)
         frame: RollingShutter = self.board.cameras[Camera.NADIR].frame_from(wanted_ps)
@@ -267,11 +249,10 @@ class Sense(Bench):
         return frame
 
     def picture(self, camera: Camera = Camera.NADIR) -> np.ndarray:
-        """What the memory of a camera's half holds, (480, 640)."""
+        """The memory of a camera's half, (480, 640)."""
         return held(self.board, camera)
 
     def host_pixel(self, x: int, y: int) -> int:
-        """A pixel as the host gets it."""
         size = codes.ImageSize.SIDE_1024
         column = x + (size.side - FULL_SIZE.columns) // 2
         row = y + (size.side - FULL_SIZE.rows) // 2
@@ -292,8 +273,6 @@ def line_s(frame: RollingShutter, line: float) -> float:
 
 
 class Tracker(Bench):
-    """An AraMiS star tracker."""
-
     board: AramisBoard
     scene = SkyScene.pointing(*ORION_DEG, 20.0)
 
@@ -302,7 +281,6 @@ class Tracker(Bench):
         return found
 
     def check(self) -> None:
-        """A measurement gives the truth's attitude."""
         found = self.measure()
         assert found.valid
         assert attitude_error_deg(found.quaternion, self.board.truth(found.frame))[0] < 0.01
@@ -310,7 +288,7 @@ class Tracker(Bench):
 
 @lru_cache(maxsize=1)
 def small_catalogue() -> Database:
-    """Stars and triangles of which the test's sky has enough."""
+    """A catalogue that suffices for the sky of these tests."""
     return build_database(CatalogueParameters(step_deg=10, stars_per_field=5))
 
 
@@ -319,7 +297,7 @@ BENCHES: dict[str, type[Bench]] = {"cubestar": Star, "cubesense": Sense, "aramis
 
 @contextmanager
 def powered(name: str, profile: str = DEFAULT_PROFILE) -> Iterator[Any]:
-    """A device that sees what it is made for."""
+    """Powers up a device with its scene."""
     lenses = {"set": "lens=nominal"} if name == "cubesense" else {}
     own = {"catalogue": small_catalogue()} if name == "aramis" else lenses
     scene = BENCHES[name].scene

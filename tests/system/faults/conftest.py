@@ -1,8 +1,8 @@
-"""Devices to break, and the marker that says which faults a test shows.
+"""Devices for the fault tests, and the marker ``fault``.
 
-``@pytest.mark.fault(KIND ...)`` stands on every test that shows what a fault does and what the
-firmware makes of it; without kinds, it is that of the test's parameter ``kind``. Which device it is
-says the fixture. A marked test whose faults did nothing fails.
+``@pytest.mark.fault(KIND ...)`` marks every test of the effects of a fault; without kinds, the
+test's parameter ``kind`` is used. The fixture determines the device. A marked test fails if its
+faults had no effect.
 """
 
 from collections.abc import Iterator
@@ -23,7 +23,6 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def one_of(*names: str) -> Any:
-    """A fixture that is each of these devices."""
 
     @pytest.fixture(params=names)
     def powered_up(request: pytest.FixtureRequest, profile: str) -> Iterator[Any]:

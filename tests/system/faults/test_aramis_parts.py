@@ -1,5 +1,3 @@
-"""AraMiS: faults of the memories and of the camera's supply."""
-
 import numpy as np
 import pytest
 
@@ -14,12 +12,11 @@ WORD = 4321
 
 
 def current_ma(tracker: Tracker) -> float:
-    """The camera unit's supply current as the host sees it."""
+
     return float(tracker.telemetry("SupplyStatus")["Current"])
 
 
 def switch(tracker: Tracker, step: LatchUpStep) -> None:
-    """Switch the camera unit."""
     tracker.client.command("LatchUpAction", Step=step)
     tracker.client.wait_processed(1)
 
@@ -34,7 +31,7 @@ def active(tracker: Tracker) -> Tracker:
 @pytest.mark.parametrize(
     ("bits", "state"), [((7,), CatalogueState.GOOD), ((7, 50), CatalogueState.DAMAGED)]
 )
-def test_one_flipped_bit_of_a_word_in_flash_is_corrected_and_two_are_reported(
+def test_one_flipped_flash_bit_is_corrected_and_two_are_reported(
     tracker: Tracker, bits: tuple[int, ...], state: CatalogueState
 ) -> None:
     flash = tracker.board.catalogue_flash
@@ -57,7 +54,7 @@ def test_one_flipped_bit_of_a_word_in_flash_is_corrected_and_two_are_reported(
 
 
 @pytest.mark.fault("memory-flip")
-def test_a_flipped_bit_of_the_catalogue_in_ram_is_found_and_reloaded(active: Tracker) -> None:
+def test_flipped_catalogue_bit_in_ram_is_found_and_reloaded(active: Tracker) -> None:
     address = CATALOGUE_AT + DATA_BYTES * WORD
     before = active.board.sdram[address]
     active.inject("memory-flip", target="sdram", address=address, bit=3)
@@ -69,7 +66,7 @@ def test_a_flipped_bit_of_the_catalogue_in_ram_is_found_and_reloaded(active: Tra
 
 
 @pytest.mark.fault("memory-flip")
-def test_a_flipped_bit_of_the_picture_is_one_bit(active: Tracker) -> None:
+def test_flipped_picture_bit_changes_one_bit(active: Tracker) -> None:
     active.check()
     place = PICTURES_AT[active.board.program._camera.latest]
     number = 77
@@ -84,7 +81,7 @@ def test_a_flipped_bit_of_the_picture_is_one_bit(active: Tracker) -> None:
 
 
 @pytest.mark.fault("memory-upsets")
-def test_upsets_of_the_flash_are_corrected_as_it_is_reloaded(active: Tracker) -> None:
+def test_flash_upsets_are_corrected_at_reload(active: Tracker) -> None:
     before = active.board.catalogue_flash.copy()
     active.client.command("SetReloadPeriod", Period=2)
     active.inject("memory-upsets", target="flash", rate=1e-7)
@@ -100,7 +97,7 @@ def test_upsets_of_the_flash_are_corrected_as_it_is_reloaded(active: Tracker) ->
 
 
 @pytest.mark.fault("memory-upsets")
-def test_upsets_of_the_ram_are_found_before_the_catalogue_is_used(active: Tracker) -> None:
+def test_ram_upsets_are_found_before_the_catalogue_is_used(active: Tracker) -> None:
     active.inject("memory-upsets", target="sdram", rate=1e-6)
     active.client.pause(2)
     active.faults.clear()
@@ -111,8 +108,9 @@ def test_upsets_of_the_ram_are_found_before_the_catalogue_is_used(active: Tracke
 
 @pytest.mark.parametrize("lasting", [False, True])
 @pytest.mark.fault("latch-up")
-def test_a_latched_camera_draws_on_until_the_host_acts(active: Tracker, lasting: bool) -> None:
-    """A lasting latch-up comes back with each switching on."""
+def test_latched_up_camera_draws_current_until_the_host_acts(
+    active: Tracker, lasting: bool
+) -> None:
     usual_ma = current_ma(active)
     active.inject("latch-up", lasting=lasting, extra_ma=300.0)
     assert current_ma(active) == pytest.approx(usual_ma + 300, abs=1)
@@ -126,6 +124,6 @@ def test_a_latched_camera_draws_on_until_the_host_acts(active: Tracker, lasting:
     active.check()
 
 
-def test_a_bit_of_its_memories_can_not_stick(tracker: Tracker) -> None:
+def test_memory_stuck_is_rejected_without_fpga(tracker: Tracker) -> None:
     with pytest.raises(FaultError, match="only a memory of a device with an FPGA"):
         tracker.inject("memory-stuck")

@@ -1,5 +1,3 @@
-"""CubeSense: faults of the cameras and of their pixel lines."""
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ X, Y = 20, 100
 
 @pytest.mark.parametrize(("kind", "moved"), [("clock-lost", 1), ("clock-extra", -1)])
 @pytest.mark.fault
-def test_a_wrong_clock_moves_the_rest_of_one_line(quiet: Sense, kind: str, moved: int) -> None:
+def test_wrong_pixel_clock_shifts_the_rest_of_a_line(quiet: Sense, kind: str, moved: int) -> None:
     clean = quiet.picture()
     check_right(quiet.measure_with(kind, row=Y, column=X))
     line, before = quiet.picture()[Y], clean[Y]
@@ -35,7 +33,7 @@ def test_a_wrong_clock_moves_the_rest_of_one_line(quiet: Sense, kind: str, moved
     ],
 )
 @pytest.mark.fault
-def test_bad_pixels_are_where_they_are_and_do_not_fit(
+def test_bad_pixels_do_not_disturb_the_fit(
     quiet: Sense, kind: str, place: dict[str, int], value: int
 ) -> None:
     expected = quiet.picture()
@@ -48,7 +46,7 @@ def test_bad_pixels_are_where_they_are_and_do_not_fit(
 
 
 @pytest.mark.fault("pixel-hot")
-def test_one_hot_pixel_is_not_taken_for_the_sun_but_three_in_a_row_are(sense: Sense) -> None:
+def test_three_hot_pixels_in_a_row_are_taken_for_the_sun(sense: Sense) -> None:
     sense.inject("pixel-hot", target="sun", x=10, y=10)
     sense.check(Camera.SUN)
     assert sense.picture(Camera.SUN)[10, 10] == 255
@@ -61,7 +59,7 @@ def test_one_hot_pixel_is_not_taken_for_the_sun_but_three_in_a_row_are(sense: Se
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("blooming")
-def test_blooming_spoils_the_limb(quiet: Sense) -> None:
+def test_blooming_gives_a_bad_fit(quiet: Sense) -> None:
     clean = quiet.picture()
     assert quiet.measure_with("blooming", threshold=150, length=20).detect is DetectResult.BAD_FIT
     expected = clean.copy()
@@ -74,7 +72,7 @@ def test_blooming_spoils_the_limb(quiet: Sense) -> None:
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("kind", ["line-missing", "camera-dead"])
 @pytest.mark.fault
-def test_a_camera_that_sends_no_frame_times_out_and_is_set_up_again(
+def test_camera_without_frames_times_out_and_recovers(
     sense: Sense, camera: Camera, kind: str
 ) -> None:
     sense.check(camera)
@@ -89,7 +87,7 @@ def test_a_camera_that_sends_no_frame_times_out_and_is_set_up_again(
 
 
 @pytest.mark.fault("camera-dead")
-def test_a_camera_that_was_dead_between_two_pictures_has_its_reset_exposure(sense: Sense) -> None:
+def test_camera_restarts_with_its_reset_exposure(sense: Sense) -> None:
     sense.check()
     usual = sense.picture().mean()
     sense.inject("camera-dead", target="nadir", for_s=0.05)

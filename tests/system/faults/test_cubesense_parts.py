@@ -1,5 +1,3 @@
-"""CubeSense: faults of memories, FPGA registers and supplies, and of the bench line."""
-
 from typing import Any
 
 import numpy as np
@@ -16,17 +14,14 @@ from .bench import Sense, line_s
 X, Y = 320, 300
 ADDRESS = 1024 * Y + X
 
-UNTOUCHED = 1
-"""A value that no pixel of the scene has."""
-
-MONITOR_MA = 200.0
-"""The current monitors' full scale."""
+UNTOUCHED = 1  # a value that no pixel of the scene has
+MONITOR_MA = 200.0  # full scale of the current monitors
 
 CUT = (CaptureResult.SRAM_OVER_CURRENT, DetectResult.NONE_SCHEDULED)
 
 
 @pytest.mark.fault("memory-flip")
-def test_a_flipped_bit_is_one_bit(quiet: Sense) -> None:
+def test_memory_flip_changes_one_bit(quiet: Sense) -> None:
     before = quiet.host_pixel(X, Y)
     quiet.inject("memory-flip", target="nadir", address=ADDRESS, bit=5)
     for _ in range(2):
@@ -37,7 +32,7 @@ def test_a_flipped_bit_is_one_bit(quiet: Sense) -> None:
 
 
 @pytest.mark.fault("memory-upsets")
-def test_upsets_come_at_their_rate_and_the_fit_bears_them(quiet: Sense) -> None:
+def test_memory_upsets_have_their_rate_and_keep_the_fit(quiet: Sense) -> None:
     clean = quiet.picture()
     quiet.inject("memory-upsets", target="nadir", rate=1e-2)
     began_s = quiet.now_s
@@ -50,7 +45,7 @@ def test_upsets_come_at_their_rate_and_the_fit_bears_them(quiet: Sense) -> None:
 
 
 @pytest.mark.fault("memory-stuck")
-def test_a_stuck_bit_is_the_same_in_every_picture(quiet: Sense) -> None:
+def test_stuck_bit_is_in_every_picture(quiet: Sense) -> None:
     before = quiet.host_pixel(X, Y)
     level = 1 - (before >> 5 & 1)
     quiet.inject("memory-stuck", target="nadir", address=ADDRESS, bit=5, level=level)
@@ -63,7 +58,7 @@ def test_a_stuck_bit_is_the_same_in_every_picture(quiet: Sense) -> None:
 
 
 @pytest.mark.fault("register-flip")
-def test_a_row_counter_that_flips_puts_the_rest_elsewhere(quiet: Sense) -> None:
+def test_flipped_row_counter_shifts_the_following_rows(quiet: Sense) -> None:
     clean = quiet.picture()
     quiet.board.engine.memories["nadir"][:] = UNTOUCHED
     register = "nadir.pix_writer.counter.row"
@@ -81,7 +76,7 @@ def test_a_row_counter_that_flips_puts_the_rest_elsewhere(quiet: Sense) -> None:
 
 
 @pytest.mark.fault("register-flip")
-def test_registers_of_an_idle_fpga_do_not_flip(quiet: Sense) -> None:
+def test_register_flips_of_an_idle_fpga_have_no_effect(quiet: Sense) -> None:
     clean = quiet.picture()
     for number in range(20):
         quiet.inject("register-flip", after_s=0.001 + number * 1e-5)
@@ -94,7 +89,7 @@ def test_registers_of_an_idle_fpga_do_not_flip(quiet: Sense) -> None:
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("register-upsets")
-def test_register_upsets_cost_a_measurement(quiet: Sense) -> None:
+def test_register_upsets_spoil_a_measurement(quiet: Sense) -> None:
     found = quiet.measure_with("register-upsets", target="fpga", rate=10)
     assert found.detect is DetectResult.BAD_FIT
     assert quiet.board.engine.violation_counts
@@ -106,7 +101,7 @@ def test_register_upsets_cost_a_measurement(quiet: Sense) -> None:
 
 
 @pytest.mark.fault("latch-up")
-def test_a_latched_memory_is_cut_until_a_telecommand(sense: Sense) -> None:
+def test_latched_up_memory_is_off_until_cleared(sense: Sense) -> None:
     sense.check()
     sense.inject("latch-up", target="SRAM2")
     assert sense.board.power.current_ma("SRAM2") > 300
@@ -128,7 +123,7 @@ def test_a_latched_memory_is_cut_until_a_telecommand(sense: Sense) -> None:
 
 @pytest.mark.parametrize("line", [-50, 240, 1500])  # awaited, stored, searched in
 @pytest.mark.fault("latch-up")
-def test_a_latch_up_in_a_measurement_ends_it(sense: Sense, line: int) -> None:
+def test_latch_up_during_a_measurement_ends_it(sense: Sense, line: int) -> None:
     sense.check()
     sense.faults.inject("latch-up", target="SRAM2", at_s=line_s(sense.await_frame(), line))
     assert sense.outcome() == CUT
@@ -138,7 +133,7 @@ def test_a_latch_up_in_a_measurement_ends_it(sense: Sense, line: int) -> None:
 
 
 @pytest.mark.fault("latch-up")
-def test_a_lasting_latch_up_is_cut_again_each_time(sense: Sense) -> None:
+def test_lasting_latch_up_switches_off_each_time(sense: Sense) -> None:
     sense.check()
     sense.inject("latch-up", target="SRAM2", lasting=True)
     for _ in range(2):
@@ -153,7 +148,7 @@ def test_a_lasting_latch_up_is_cut_again_each_time(sense: Sense) -> None:
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.fault("latch-up")
-def test_a_latched_camera_draws_on_until_it_is_reset(sense: Sense, camera: Camera) -> None:
+def test_latched_up_camera_draws_current_until_reset(sense: Sense, camera: Camera) -> None:
     sense.check(camera)
     usual_ma = sense.device.power().current_5v_ma
     sense.inject("latch-up", target=("sun_camera", "nadir_camera")[camera])
@@ -173,7 +168,7 @@ def test_a_latched_camera_draws_on_until_it_is_reset(sense: Sense, camera: Camer
 
 @pytest.mark.fault
 @pytest.mark.parametrize("kind", ["uart-drop", "uart-corrupt", "uart-delay"])
-def test_the_bench_line_has_faults_of_its_own(sense: Sense, kind: str) -> None:
+def test_faults_of_the_bench_line(sense: Sense, kind: str) -> None:
     bench = ServicePortClient(sense.board.serial("bench_uart"), timeout_s=0.5)
     options: dict[str, Any] = {"delay_ms": 1000} if kind == "uart-delay" else {}
     sense.inject(kind, target="bench", direction="to-device", **options)

@@ -1,5 +1,3 @@
-"""CubeSense: faults of the acknowledges, and glitches on the pins that command the FPGAs."""
-
 from typing import Any
 
 import numpy as np
@@ -21,18 +19,14 @@ ACK = {Camera.SUN: "SUNACK", Camera.NADIR: "NADACK"}
 ENABLES = {Camera.SUN: "SUNEN", Camera.NADIR: "NADEN"}
 PINS = (*ENABLES.values(), "RNW", "EDGE", "SHIFT")
 
-BEFORE = -110
-"""Lines from the frame: the FPGA has yet to see the gap before it."""
-
-SEARCHING_S = {Camera.SUN: 0.0005, Camera.NADIR: 0.05}
-"""From the command on: the middle of the edge data."""
+BEFORE = -110  # lines before the frame, before the gap that starts it
+SEARCHING_S = {Camera.SUN: 0.0005, Camera.NADIR: 0.05}  # after the command: amid the edge data
 
 STORED = CaptureResult.STORED_OWN_SRAM
 
 
 @pytest.fixture
 def ready(sense: Sense) -> Sense:
-    """Cameras are set up, and both have measured."""
     for camera in Camera:
         sense.check(camera)
     return sense
@@ -45,7 +39,7 @@ def capture_ms(ready: Sense, camera: Camera) -> float:
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.fault("ack-late")
-def test_a_late_acknowledge_only_delays(ready: Sense, camera: Camera) -> None:
+def test_late_acknowledge_delays_the_measurement(ready: Sense, camera: Camera) -> None:
     ready.inject("ack-late", target=ACK[camera], delay_us=10_000)
     ready.check(camera)
     assert ready.said()[-1] == "rises"
@@ -60,7 +54,7 @@ def test_a_late_acknowledge_only_delays(ready: Sense, camera: Camera) -> None:
     [("ack-lost", {}), ("ack-late", {"delay_us": 80_000}), ("ack-stuck", {"level": 0})],
 )
 @pytest.mark.fault
-def test_without_acknowledge_the_camera_times_out(
+def test_missing_acknowledge_times_out(
     ready: Sense, camera: Camera, kind: str, options: dict[str, Any]
 ) -> None:
     before = ready.picture(camera)
@@ -74,7 +68,7 @@ def test_without_acknowledge_the_camera_times_out(
 
 
 @pytest.mark.fault("ack-stuck")
-def test_with_an_acknowledge_that_is_always_there_the_old_earth_is_measured(ready: Sense) -> None:
+def test_stuck_acknowledge_measures_the_old_earth(ready: Sense) -> None:
     before = ready.picture()
     ready.board.scene = EarthSunScene.facing(nadir_deg=(5, 5))
     check_right(ready.measure_with("ack-stuck", target="NADACK"))
@@ -89,10 +83,10 @@ def test_with_an_acknowledge_that_is_always_there_the_old_earth_is_measured(read
     [("published", DetectResult.SUCCESS), ("extended", DetectResult.SUN_NOT_FOUND)],
 )
 @pytest.mark.fault("ack-stuck")
-def test_with_an_acknowledge_that_is_always_there_the_sun_is_an_old_one_or_none(
+def test_stuck_acknowledge_measures_the_old_sun_or_none(
     ready: Sense, detected: DetectResult
 ) -> None:
-    """Its first pixel is forgotten as soon as the FPGA begins to store; as flown it stays."""
+    """The FPGA clears the first Sun pixel when it starts to store; the flown gateware keeps it."""
     before = ready.picture(Camera.SUN)
     ready.inject("ack-stuck", target="SUNACK")
     assert ready.outcome(Camera.SUN) == (STORED, detected)
@@ -104,7 +98,7 @@ def test_with_an_acknowledge_that_is_always_there_the_sun_is_an_old_one_or_none(
 @pytest.mark.parametrize("pin", PINS)
 @pytest.mark.parametrize("line", quick([240, BEFORE], 1))
 @pytest.mark.fault("control-glitch")
-def test_a_glitch_while_storing_costs_the_frame(ready: Sense, line: int, pin: str) -> None:
+def test_glitch_during_store_loses_the_frame(ready: Sense, line: int, pin: str) -> None:
     ready.faults.inject("control-glitch", target=pin, at_s=line_s(ready.await_frame(), line))
     if line == BEFORE or pin == "SUNEN":  # of the other half
         ready.check()
@@ -126,8 +120,8 @@ def glitch_while_reading(ready: Sense, camera: Camera, pin: str) -> Any:
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("pin", PINS)
 @pytest.mark.fault("control-glitch")
-def test_a_glitch_while_scanning_spoils_the_earth(ready: Sense, pin: str) -> None:
-    """The FPGA begins its scan anew, so the program takes the wrong lines for its own."""
+def test_glitch_during_scan_spoils_the_earth(ready: Sense, pin: str) -> None:
+    """The FPGA restarts its scan, so the program attributes edges to the wrong lines."""
     ready.board.kernel.process(glitch_while_reading(ready, Camera.NADIR, pin))
     assert ready.outcome() == (STORED, DetectResult.BAD_FIT)
     assert ready.device.details(Camera.NADIR)["PixelsRead"] == 9920  # as without
@@ -137,8 +131,8 @@ def test_a_glitch_while_scanning_spoils_the_earth(ready: Sense, pin: str) -> Non
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize("pin", PINS)
 @pytest.mark.fault("control-glitch")
-def test_a_glitch_while_the_window_is_read_tears_the_sun(ready: Sense, pin: str) -> None:
-    """The rest of the window begins with the coordinates and the first rows."""
+def test_glitch_during_window_read_spoils_the_sun(ready: Sense, pin: str) -> None:
+    """The remaining bytes restart at the coordinates and the first rows."""
     ready.board.kernel.process(glitch_while_reading(ready, Camera.SUN, pin))
     found = ready.measure(Camera.SUN)
     assert (found.capture, found.detect) == (STORED, DetectResult.SUN_NOT_FOUND)

@@ -1,5 +1,3 @@
-"""CubeStar: faults of the camera and of its pixel lines, in the FPGA's memory and for the host."""
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,9 @@ BLOCK = (1024 * Y + X) // 128
 
 @pytest.mark.parametrize("kind", ["clock-lost", "clock-extra"])
 @pytest.mark.fault
-def test_a_wrong_clock_moves_the_rest_of_one_line(star: Star, good: np.ndarray, kind: str) -> None:
+def test_wrong_pixel_clock_shifts_the_rest_of_a_line(
+    star: Star, good: np.ndarray, kind: str
+) -> None:
     assert star.capture_with(kind, row=Y, column=X) == GOOD
     expected = good.copy()
     if kind == "clock-lost":
@@ -25,16 +25,14 @@ def test_a_wrong_clock_moves_the_rest_of_one_line(star: Star, good: np.ndarray, 
 
 
 @pytest.mark.fault("line-missing")
-def test_a_line_that_is_missing_in_all_frames_leaves_the_fpga_waiting(star: Star) -> None:
+def test_line_missing_in_all_frames_times_out(star: Star) -> None:
     assert star.capture_with("line-missing", row=100) == FAILED
     assert star.stored_for_ms == pytest.approx(2000, abs=10)
     assert star.measure() == "CALCULATED"
 
 
 @pytest.mark.fault("line-missing")
-def test_a_line_that_is_missing_in_one_frame_costs_a_second_one(
-    star: Star, good: np.ndarray
-) -> None:
+def test_line_missing_in_one_frame_stores_the_next_frame(star: Star, good: np.ndarray) -> None:
     assert star.capture_with("line-missing", row=100, for_s=0.5) == GOOD
     assert star.stored_for_ms == pytest.approx(TWO_FRAMES_MS, abs=1)
     assert (star.stored != good).mean() < 0.1  # the noise of another frame
@@ -44,9 +42,7 @@ def test_a_line_that_is_missing_in_one_frame_costs_a_second_one(
     ("kind", "value"), [("pixel-hot", 255), ("pixel-dead", 0), ("column-defect", 200)]
 )
 @pytest.mark.fault
-def test_bad_pixels_are_where_they_are_and_no_stars(
-    star: Star, good: np.ndarray, kind: str, value: int
-) -> None:
+def test_bad_pixels_are_no_stars(star: Star, good: np.ndarray, kind: str, value: int) -> None:
     brightest = divmod(int(good.argmax()), 1024)
     y, x = brightest if kind == "pixel-dead" else (Y, X)
     assert abs(int(good[y, x]) - value) > 50
@@ -63,7 +59,7 @@ def test_bad_pixels_are_where_they_are_and_no_stars(
 
 
 @pytest.mark.fault("column-defect")
-def test_a_defect_for_a_while_hits_the_lines_of_that_time(star: Star) -> None:
+def test_temporary_defect_affects_the_lines_of_its_time(star: Star) -> None:
     star.faults.inject("column-defect", x=3, at_s=STORING_S, for_s=0.01)
     star.capture()
     lines = np.flatnonzero(star.stored[:, 3] == 255)
@@ -72,7 +68,7 @@ def test_a_defect_for_a_while_hits_the_lines_of_that_time(star: Star) -> None:
 
 
 @pytest.mark.fault("blooming")
-def test_blooming_spoils_the_brightest_stars(star: Star, good: np.ndarray) -> None:
+def test_blooming_prevents_identification(star: Star, good: np.ndarray) -> None:
     outcome = star.capture_with("blooming", threshold=40, length=20)
     assert outcome == ("IDENTIFICATION_FAILED", {"LessThanThreeStarsID"})
     expected = good.copy()
@@ -83,7 +79,7 @@ def test_blooming_spoils_the_brightest_stars(star: Star, good: np.ndarray) -> No
 
 
 @pytest.mark.fault("camera-dead")
-def test_a_dead_camera_is_noticed_at_its_control_bus(star: Star, good: np.ndarray) -> None:
+def test_dead_camera_is_noticed_on_its_control_bus(star: Star, good: np.ndarray) -> None:
     began_s = star.now_s
     assert star.capture_with("camera-dead") == ("CAPTURE_FAILED", {"ISSetupError"})
     assert star.now_s - began_s < 0.1
@@ -92,7 +88,7 @@ def test_a_dead_camera_is_noticed_at_its_control_bus(star: Star, good: np.ndarra
 
 
 @pytest.mark.fault("camera-dead")
-def test_of_two_deaths_the_longer_one_counts(star: Star) -> None:
+def test_overlapping_camera_faults_last_as_long_as_the_longer(star: Star) -> None:
     star.inject("camera-dead", for_s=1.0)
     star.inject("camera-dead", for_s=0.1)
     star.client.pause(0.5)
@@ -103,7 +99,7 @@ def test_of_two_deaths_the_longer_one_counts(star: Star) -> None:
 
 
 @pytest.mark.fault("camera-dead")
-def test_a_camera_that_dies_while_storing_is_set_up_again(star: Star) -> None:
+def test_camera_that_dies_during_store_is_set_up_again(star: Star) -> None:
     star.faults.inject("camera-dead", at_s=STORING_S)
     assert star.capture() == ("CAPTURE_FAILED", {"ImageCaptureError", "ISDisableError"})
     assert star.stored_for_ms == pytest.approx(2000, abs=10)
@@ -117,7 +113,7 @@ def test_a_camera_that_dies_while_storing_is_set_up_again(star: Star) -> None:
 
 
 @pytest.mark.fault("camera-dead")
-def test_a_camera_that_was_dead_between_two_pictures_has_its_reset_exposure(star: Star) -> None:
+def test_camera_restarts_with_its_reset_exposure(star: Star) -> None:
     assert star.capture() == GOOD
     usual_ms, usual_light = star.stored_for_ms, light(star)
     star.inject("camera-dead", for_s=0.05)
@@ -135,5 +131,4 @@ def test_a_camera_that_was_dead_between_two_pictures_has_its_reset_exposure(star
 
 
 def light(star: Star) -> float:
-    """Of all stars, as the host sees it."""
     return float(sum(found.intensity for found in star.device.stars()))

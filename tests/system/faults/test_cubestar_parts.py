@@ -1,5 +1,3 @@
-"""CubeStar: faults of the memories, of the FPGA's registers and of the supplies."""
-
 import numpy as np
 import pytest
 
@@ -8,8 +6,7 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import CRYSTAL_HZ, LINE
 from .bench import GOOD, ONE_FRAME_MS, READING_S, STORING_S, Star
 
 ADDRESS = 70_000
-STORED_S = 0.47
-"""Between the FPGA's last write and the processor's first read of the first capture."""
+STORED_S = 0.47  # between the FPGA's last write and the processor's first read
 
 
 def check_flipped(star: Star, good: np.ndarray, mask: int) -> None:
@@ -22,14 +19,14 @@ def check_flipped(star: Star, good: np.ndarray, mask: int) -> None:
 
 
 @pytest.mark.fault("memory-flip")
-def test_a_flipped_bit_of_the_fpga_s_memory_is_one_bit(star: Star, good: np.ndarray) -> None:
+def test_memory_flip_of_the_fpga_changes_one_bit(star: Star, good: np.ndarray) -> None:
     star.faults.inject("memory-flip", address=ADDRESS, bit=7, at_s=STORED_S)
     assert star.capture() == GOOD
     check_flipped(star, good, 0x80)
 
 
 @pytest.mark.fault("memory-flip")
-def test_a_flipped_bit_of_the_processor_s_memory_is_one_bit(star: Star, good: np.ndarray) -> None:
+def test_memory_flip_of_the_processor_changes_one_bit(star: Star, good: np.ndarray) -> None:
     assert star.capture() == GOOD
     star.inject("memory-flip", target="external", address=ADDRESS, bit=5)
     check_flipped(star, good, 0x20)
@@ -39,7 +36,7 @@ def test_a_flipped_bit_of_the_processor_s_memory_is_one_bit(star: Star, good: np
 
 @pytest.mark.parametrize("target", ["SRAM", "external"])
 @pytest.mark.fault("memory-upsets")
-def test_upsets_at_random_places_are_not_noticed(star: Star, good: np.ndarray, target: str) -> None:
+def test_memory_upsets_set_no_flag(star: Star, good: np.ndarray, target: str) -> None:
     star.inject("memory-upsets", target=target, rate=1e-3)
     assert star.capture()[0] == "CALCULATED"
     star.faults.clear()
@@ -49,7 +46,7 @@ def test_upsets_at_random_places_are_not_noticed(star: Star, good: np.ndarray, t
 
 
 @pytest.mark.fault("memory-upsets")
-def test_upsets_come_at_their_rate(star: Star) -> None:
+def test_memory_upsets_have_their_rate(star: Star) -> None:
     memory = star.board.engine.sram
     before, began_s = memory.copy(), star.now_s
     star.inject("memory-upsets", rate=1e-4)
@@ -61,9 +58,7 @@ def test_upsets_come_at_their_rate(star: Star) -> None:
 
 @pytest.mark.parametrize("target", ["SRAM", "external"])
 @pytest.mark.fault("memory-stuck")
-def test_a_stuck_bit_is_the_same_in_every_picture(
-    star: Star, good: np.ndarray, target: str
-) -> None:
+def test_stuck_bit_is_in_every_picture(star: Star, good: np.ndarray, target: str) -> None:
     star.inject("memory-stuck", target=target, address=ADDRESS, bit=7)
     assert star.capture() == GOOD
     check_flipped(star, good, 0x80)
@@ -75,7 +70,7 @@ def test_a_stuck_bit_is_the_same_in_every_picture(
 
 
 @pytest.mark.fault("register-flip")
-def test_a_row_counter_that_flips_puts_the_rest_elsewhere(star: Star, good: np.ndarray) -> None:
+def test_flipped_row_counter_shifts_the_following_rows(star: Star, good: np.ndarray) -> None:
     star.faults.inject("register-flip", register="writer.counter.row", bit=8, at_s=STORING_S)
     status, flags = star.capture()
     assert status != "CAPTURE_FAILED"
@@ -93,7 +88,7 @@ def test_a_row_counter_that_flips_puts_the_rest_elsewhere(star: Star, good: np.n
 
 
 @pytest.mark.fault("register-flip")
-def test_registers_of_an_idle_fpga_do_not_flip(star: Star, good: np.ndarray) -> None:
+def test_register_flips_of_an_idle_fpga_have_no_effect(star: Star, good: np.ndarray) -> None:
     for number in range(20):
         star.faults.inject("register-flip", at_s=0.01 + number * 1e-5)
     assert star.capture() == GOOD
@@ -103,7 +98,7 @@ def test_registers_of_an_idle_fpga_do_not_flip(star: Star, good: np.ndarray) -> 
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("register-upsets")
-def test_register_upsets_cost_a_picture(star: Star, good: np.ndarray) -> None:
+def test_register_upsets_spoil_a_picture(star: Star, good: np.ndarray) -> None:
     status, flags = star.capture_with("register-upsets", rate=10)
     assert len(star.faults.log) > 100
     assert status in ("IDENTIFICATION_FAILED", "DETECTION_FAILED")
@@ -118,7 +113,7 @@ def test_register_upsets_cost_a_picture(star: Star, good: np.ndarray) -> None:
 
 @pytest.mark.parametrize("channel", ["imager", "memory"])
 @pytest.mark.fault("latch-up")
-def test_a_latch_up_is_cut_and_restored(star: Star, channel: str) -> None:
+def test_latch_up_is_switched_off_and_restored(star: Star, channel: str) -> None:
     power, currents = star.board.power, []
     switched = power.on_switch
 
@@ -142,7 +137,7 @@ def test_a_latch_up_is_cut_and_restored(star: Star, channel: str) -> None:
 @pytest.mark.parametrize("at_s", [STORING_S, READING_S])
 @pytest.mark.parametrize("channel", ["imager", "memory"])
 @pytest.mark.fault("latch-up")
-def test_a_latch_up_in_a_capture_costs_the_picture(star: Star, channel: str, at_s: float) -> None:
+def test_latch_up_during_a_capture_loses_the_picture(star: Star, channel: str, at_s: float) -> None:
     star.faults.inject("latch-up", target=channel, at_s=at_s)
     silent = (channel, at_s) == ("imager", STORING_S)  # ACK is waited for in vain
     more = {"ISDisableError"} if silent else set()

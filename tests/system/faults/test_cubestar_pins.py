@@ -1,5 +1,3 @@
-"""CubeStar: faults of the acknowledge, and glitches on the pins that command the FPGA."""
-
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,7 @@ from .bench import FAILED, GOOD, ONE_FRAME_MS, READING_S, STORING_S, TWO_FRAMES_
 
 
 def watch_ack(star: Star) -> list[tuple[int, int]]:
-    """ACK as the processor sees it and as the FPGA drives it, at each look from now on."""
+    """ACK as read by the processor and as driven by the FPGA, at each read from now on."""
     seen: list[tuple[int, int]] = []
     engine, real = star.board.processor.fpga, star.board.engine
     see = engine.get_pin
@@ -28,7 +26,7 @@ def watch_ack(star: Star) -> list[tuple[int, int]]:
 
 
 @pytest.mark.fault("ack-late")
-def test_a_late_acknowledge_only_delays(star: Star, good: np.ndarray) -> None:
+def test_late_acknowledge_delays_the_capture(star: Star, good: np.ndarray) -> None:
     star.inject("ack-late", delay_us=300_000)
     seen = watch_ack(star)
     assert star.capture() == GOOD
@@ -43,9 +41,7 @@ def test_a_late_acknowledge_only_delays(star: Star, good: np.ndarray) -> None:
     [("ack-late", {"delay_us": 3e6}), ("ack-lost", {}), ("ack-stuck", {"level": 0})],
 )
 @pytest.mark.fault
-def test_without_acknowledge_the_capture_fails_in_time(
-    star: Star, kind: str, options: dict[str, Any]
-) -> None:
+def test_missing_acknowledge_times_out(star: Star, kind: str, options: dict[str, Any]) -> None:
     star.inject(kind, **options)
     seen = watch_ack(star)
     assert star.capture() == FAILED
@@ -57,9 +53,7 @@ def test_without_acknowledge_the_capture_fails_in_time(
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("ack-stuck")
-def test_with_an_acknowledge_that_is_always_there_noise_is_the_first_picture(
-    star: Star, good: np.ndarray
-) -> None:
+def test_stuck_acknowledge_reads_noise_as_the_first_picture(star: Star, good: np.ndarray) -> None:
     star.inject("ack-stuck", level=1)
     seen = watch_ack(star)
     status, flags = star.capture()
@@ -72,7 +66,7 @@ def test_with_an_acknowledge_that_is_always_there_noise_is_the_first_picture(
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.fault("ack-stuck")
-def test_with_an_acknowledge_that_is_always_there_the_old_picture_is_new(star: Star) -> None:
+def test_stuck_acknowledge_reads_the_old_picture_again(star: Star) -> None:
     assert star.capture() == GOOD
     before = star.device.attitude()
     star.board.camera.scene = SkyScene.pointing(90, -1)
@@ -88,7 +82,7 @@ def test_with_an_acknowledge_that_is_always_there_the_old_picture_is_new(star: S
 
 @pytest.mark.parametrize("pin", ["ENABLE", "RNW"])
 @pytest.mark.fault("control-glitch")
-def test_a_glitch_while_storing_costs_a_frame(star: Star, good: np.ndarray, pin: str) -> None:
+def test_glitch_during_store_loses_a_frame(star: Star, good: np.ndarray, pin: str) -> None:
     star.faults.inject("control-glitch", target=pin, at_s=STORING_S)
     star.board.kernel.process(look_at(star, pin, STORING_S, levels := []))
     assert star.capture() == GOOD
@@ -109,7 +103,7 @@ def look_at(star: Star, pin: str, at_s: float, levels: list[int]) -> Any:
 
 @pytest.mark.parametrize("pin", ["ENABLE", "RNW"])
 @pytest.mark.fault("control-glitch")
-def test_a_glitch_while_reading_starts_over(star: Star, good: np.ndarray, pin: str) -> None:
+def test_glitch_during_read_restarts_the_picture(star: Star, good: np.ndarray, pin: str) -> None:
     star.faults.inject("control-glitch", target=pin, at_s=READING_S)
     status, flags = star.capture()
     assert status != "CAPTURE_FAILED"

@@ -1,5 +1,3 @@
-"""A test shows every kind on every device that has it; docs/fault-kinds.md says what follows."""
-
 from itertools import product
 from pathlib import Path
 
@@ -18,7 +16,7 @@ Pair = tuple[str, str]
 
 @pytest.fixture(scope="module")
 def supported() -> dict[Pair, bool]:
-    """(kind, device) of all that has a target, and whether it can be injected."""
+    """Whether a kind can be injected, for each (kind, device) with a target."""
     pairs = {}
     for device in BENCHES:
         with powered(device) as bench:
@@ -29,7 +27,7 @@ def supported() -> dict[Pair, bool]:
 
 
 class Shown:
-    """(kind, device) that collected tests are marked to show."""
+    """Collects the (kind, device) pairs of marked tests."""
 
     def __init__(self) -> None:
         self.pairs: set[Pair] = set()
@@ -42,16 +40,14 @@ class Shown:
                 self.pairs |= {*product(marker.args or [values["kind"]], devices)}
 
 
-def test_a_test_shows_every_kind_on_every_device_that_has_it(supported: dict[Pair, bool]) -> None:
+def test_every_kind_is_tested_on_every_device(supported: dict[Pair, bool]) -> None:
     shown = Shown()
     arguments = ["--collect-only", "-q", "-p", "no:cacheprovider"]
     assert pytest.main([*arguments, str(HERE)], plugins=[shown]) is pytest.ExitCode.OK
     assert shown.pairs == {pair for pair, injected in supported.items() if injected}
 
 
-def test_the_document_says_what_happens_to_every_kind_on_every_device(
-    supported: dict[Pair, bool],
-) -> None:
+def test_document_describes_every_kind_on_every_device(supported: dict[Pair, bool]) -> None:
     part = DOCUMENT.read_text(encoding="utf-8").split("## What the firmware does about it\n")[1]
     lines = [line for line in part.split("\n## ")[0].splitlines() if line.startswith("|")]
     head, _, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in lines)

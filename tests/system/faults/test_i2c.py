@@ -1,5 +1,3 @@
-"""Faults of the satellite's I2C bus: what the node's end sees, and what the host gets."""
-
 import errno
 from collections.abc import Set
 
@@ -15,19 +13,17 @@ from .test_serial import SETTINGS
 BIT_S = 1e-5
 BYTE_S, ADDRESS_S = 9 * BIT_S, 10 * BIT_S
 
-WHOLE = ["S w", "80", "S r", "P"]
-"""What the node's end sees of a whole request."""
+WHOLE = ["S w", "80", "S r", "P"]  # a complete request at the node's end
 
 
 def usual_s(bench: Bench) -> float:
-    """How long a request takes."""
     began_s = bench.now_s
     bench.ask_i2c()
     return bench.now_s - began_s
 
 
 def check_refused(bench: Bench, number: int, message: str) -> list[str]:
-    """A request fails; what the node's end saw of it."""
+    """Checks that a request fails; returns what the node's end saw."""
     spy = bench.spy()
     with pytest.raises(OSError, match=message) as failure:
         bench.ask_i2c()
@@ -36,14 +32,13 @@ def check_refused(bench: Bench, number: int, message: str) -> list[str]:
 
 
 def check_works(bench: Bench, flags: Set[str] = frozenset()) -> None:
-    """Without the fault."""
     bench.faults.clear()
     assert bench.ask_i2c()[0] == bench.telemetry("Identification")["NodeType"]
     assert bench.flags() == flags
 
 
 @pytest.mark.fault("i2c-nack")
-def test_an_address_without_acknowledge_is_not_noticed(bench: Bench) -> None:
+def test_address_without_acknowledge_is_not_seen_by_the_node(bench: Bench) -> None:
     bench.inject("i2c-nack")
     assert check_refused(bench, errno.ENXIO, "no I2C device answers") == []
     assert bench.said() == ["address not acknowledged"]
@@ -51,7 +46,7 @@ def test_an_address_without_acknowledge_is_not_noticed(bench: Bench) -> None:
 
 
 @pytest.mark.fault("i2c-nack")
-def test_a_client_asks_again_where_some_addresses_are_not_acknowledged(bench: Bench) -> None:
+def test_client_retries_addresses_without_acknowledge(bench: Bench) -> None:
     bus = bench.board.i2c()
     client = I2cClient(bus, bench.interface, wait=bus.wait, retries=9)
     bench.inject("i2c-nack", rate=0.4)
@@ -62,7 +57,7 @@ def test_a_client_asks_again_where_some_addresses_are_not_acknowledged(bench: Be
 
 
 @pytest.mark.fault("i2c-nack")
-def test_a_byte_without_acknowledge_cuts_a_telecommand_short(bench: Bench) -> None:
+def test_byte_without_acknowledge_truncates_a_telecommand(bench: Bench) -> None:
     command, parameters, frame, field, _ = SETTINGS[bench.name]
     message = bench.interface.telecommand(command)
     before = bench.telemetry(frame)[field]
@@ -81,7 +76,7 @@ def test_a_byte_without_acknowledge_cuts_a_telecommand_short(bench: Bench) -> No
 
 
 @pytest.mark.fault("i2c-stretch")
-def test_a_stretched_clock_only_takes_time(bench: Bench) -> None:
+def test_stretched_clock_delays_the_transfer(bench: Bench) -> None:
     lasted_s = usual_s(bench)
     spy, began_s = bench.spy(), bench.now_s
     bench.inject("i2c-stretch", stretch_us=700)
@@ -94,7 +89,7 @@ def test_a_stretched_clock_only_takes_time(bench: Bench) -> None:
 
 
 @pytest.mark.fault("i2c-stretch")
-def test_a_clock_that_is_stretched_for_over_a_second_ends_the_transfer(bench: Bench) -> None:
+def test_clock_stretched_over_1_s_times_out(bench: Bench) -> None:
     began_s = bench.now_s
     bench.inject("i2c-stretch", stretch_us=2e6)
     assert check_refused(bench, errno.ETIMEDOUT, "clock low")[-1] == "P"
@@ -104,7 +99,7 @@ def test_a_clock_that_is_stretched_for_over_a_second_ends_the_transfer(bench: Be
 
 @pytest.mark.fault("i2c-stuck")
 @pytest.mark.parametrize("line", ["SDA", "SCL"])
-def test_a_stuck_line_blocks_the_bus_until_it_is_free(bench: Bench, line: str) -> None:
+def test_stuck_line_blocks_the_bus(bench: Bench, line: str) -> None:
     bench.inject("i2c-stuck", line=line, for_s=1.3)
     assert check_refused(bench, errno.EBUSY, f"{line} was low for over 1 s") == []
     began_s = bench.now_s
@@ -115,7 +110,7 @@ def test_a_stuck_line_blocks_the_bus_until_it_is_free(bench: Bench, line: str) -
 
 @pytest.mark.fault("i2c-stuck")
 @pytest.mark.parametrize(("line", "number"), [("SDA", errno.EAGAIN), ("SCL", errno.ETIMEDOUT)])
-def test_a_line_that_sticks_in_a_transfer_breaks_it(bench: Bench, line: str, number: int) -> None:
+def test_line_stuck_during_a_transfer_aborts_it(bench: Bench, line: str, number: int) -> None:
     bench.inject("i2c-stuck", line=line, after_s=ADDRESS_S + BYTE_S / 2)
     assert check_refused(bench, number, "low") == ["S w", "P"]
     assert bench.said()[0] == f"{line} is low in a transfer"
@@ -123,7 +118,7 @@ def test_a_line_that_sticks_in_a_transfer_breaks_it(bench: Bench, line: str, num
 
 
 @pytest.mark.fault("i2c-stuck")
-def test_a_clock_that_sticks_for_less_than_a_second_only_takes_time(bench: Bench) -> None:
+def test_clock_stuck_below_1_s_delays_the_transfer(bench: Bench) -> None:
     lasted_s = usual_s(bench)
     spy, began_s = bench.spy(), bench.now_s
     bench.inject("i2c-stuck", line="SCL", after_s=ADDRESS_S + BYTE_S / 2, for_s=0.5)

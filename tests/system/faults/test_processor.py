@@ -1,5 +1,3 @@
-"""CubeStar's processor: every published reset cause by what brings it about, and what is kept."""
-
 from functools import partial
 from typing import Any
 
@@ -32,7 +30,6 @@ def node(star: Star) -> dict[str, Any]:
 
 
 def wait_for_resets(star: Star, count: int) -> None:
-    """Until so many resets have begun."""
     until_s = star.now_s + 3
     while star.board.processor.resets < count and star.now_s < until_s:
         star.client.pause(IN_BOOT_S / 2)
@@ -43,8 +40,7 @@ def test_every_published_cause_has_its_number() -> None:
 
 
 @pytest.mark.parametrize("cause", CAUSES, ids=lambda cause: cause.name)
-def test_reset_cause_comes_of_what_happened(star: Star, cause: ResetCause) -> None:
-    """Two causes at once are two resets of which the second comes before the program runs."""
+def test_reset_cause_of_each_fault(star: Star, cause: ResetCause) -> None:
     telecommand, faults = CAUSES[cause]
     star.client.pause(0.05)  # else the power-on would hide the rest
     if telecommand:
@@ -61,7 +57,7 @@ def test_reset_cause_comes_of_what_happened(star: Star, cause: ResetCause) -> No
 
 
 @pytest.mark.fault("processor-reset")
-def test_a_program_that_hangs_answers_until_the_watchdog_comes(star: Star) -> None:
+def test_hanging_program_answers_until_the_watchdog_reset(star: Star) -> None:
     star.client.pause(0.1)
     star.inject("processor-reset", target="hang")
     star.client.command("Exposure", exposure=7)  # is queued, and lost
@@ -76,7 +72,7 @@ def test_a_program_that_hangs_answers_until_the_watchdog_comes(star: Star) -> No
 @pytest.mark.parametrize("at_s", [STORING_S, READING_S])
 @pytest.mark.parametrize("target", ["brown-out", "lock-up"])
 @pytest.mark.fault("processor-reset")
-def test_a_reset_within_a_capture_costs_the_picture(star: Star, target: str, at_s: float) -> None:
+def test_reset_during_a_capture_loses_the_picture(star: Star, target: str, at_s: float) -> None:
     star.faults.inject("processor-reset", target=target, at_s=at_s)
     star.client.command("CaptureImage")
     star.client.wait_processed(5.0)
@@ -88,7 +84,7 @@ def test_a_reset_within_a_capture_costs_the_picture(star: Star, target: str, at_
 
 
 @pytest.mark.fault("processor-reset")
-def test_the_loop_goes_on_after_a_reset(star: Star) -> None:
+def test_loop_continues_after_a_reset(star: Star) -> None:
     start = partial(star.telemetry, "LoopStatus")
     star.client.command("Trigger")
     star.client.pause(1.5)

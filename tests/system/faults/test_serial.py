@@ -1,5 +1,3 @@
-"""Faults of the serial line: what comes out of its ends, and what the node makes of it."""
-
 from collections.abc import Set
 from typing import Any
 
@@ -12,11 +10,8 @@ from cubestack.host.errors import NoAnswerError
 from .bench import Bench
 
 #: What the node's flags say of a stray byte, and besides of a frame that never ended.
-STRAY = {
-    "cubestar": {"UART_ProtocolError"},
-    "cubesense": {"UartProtocolError"},
-    "aramis": {"UartProtocolError"},
-}
+STRAY = {name: {"UartProtocolError"} for name in ("cubesense", "aramis")}
+STRAY |= {"cubestar": {"UART_ProtocolError"}}
 ENDLESS = {
     "cubestar": {"UART_MsgIncomplete", "UART_RXTimeout"},
     "cubesense": {"UartMsgIncomplete"},
@@ -30,12 +25,10 @@ SETTINGS: dict[str, tuple[str, dict[str, Any], str, str, float]] = {
     "aramis": ("SetReloadPeriod", {"Period": 16}, "ReloadSettings", "Period", 20),
 }
 
-ASK = b"\x80"
-"""For telemetry Identification."""
+ASK = b"\x80"  # requests telemetry Identification
 
 
 def check_answers(bench: Bench, flags: Set[str] = frozenset()) -> None:
-    """Without the fault."""
     bench.faults.clear()
     bench.plug_in()
     assert bench.telemetry("Identification")["InterfaceVersion"] == bench.interface.version
@@ -43,7 +36,7 @@ def check_answers(bench: Bench, flags: Set[str] = frozenset()) -> None:
 
 
 @pytest.mark.fault("uart-drop")
-def test_a_lost_byte_to_the_device_is_half_a_message(bench: Bench) -> None:
+def test_byte_lost_to_the_device_is_a_protocol_error(bench: Bench) -> None:
     wire = bench.wire()
     bench.inject("uart-drop", direction="to-device", for_s=bench.byte_s / 2)
     assert wire.ask(ASK) == b""
@@ -53,7 +46,7 @@ def test_a_lost_byte_to_the_device_is_half_a_message(bench: Bench) -> None:
 
 
 @pytest.mark.fault("uart-drop")
-def test_a_lost_byte_to_the_host_is_not_noticed_and_asked_for_again(bench: Bench) -> None:
+def test_byte_lost_to_the_host_is_retried(bench: Bench) -> None:
     wire = bench.wire()
     bench.inject("uart-drop", direction="to-host", rate=0.2)
     answers = [wire.ask(ASK) for _ in range(5)]
@@ -68,7 +61,7 @@ def test_a_lost_byte_to_the_host_is_not_noticed_and_asked_for_again(bench: Bench
 
 
 @pytest.mark.fault("uart-corrupt")
-def test_a_changed_byte_to_the_host_arrives_changed(bench: Bench) -> None:
+def test_corrupted_byte_to_the_host(bench: Bench) -> None:
     wire = bench.wire()
     bench.inject("uart-corrupt", direction="to-host", mask=0x80)
     assert bytes(byte ^ 0x80 for byte in wire.ask(ASK)) == wire.answered
@@ -76,7 +69,7 @@ def test_a_changed_byte_to_the_host_arrives_changed(bench: Bench) -> None:
 
 
 @pytest.mark.fault("uart-corrupt")
-def test_a_changed_byte_to_the_device_is_refused(bench: Bench) -> None:
+def test_corrupted_byte_to_the_device_is_rejected(bench: Bench) -> None:
     wire = bench.wire()
     bench.inject("uart-corrupt", direction="to-device", mask=0xFF)
     assert wire.ask(ASK) == b""
@@ -85,7 +78,7 @@ def test_a_changed_byte_to_the_device_is_refused(bench: Bench) -> None:
 
 
 @pytest.mark.fault("uart-corrupt")
-def test_a_changed_parameter_in_its_range_is_believed(bench: Bench) -> None:
+def test_corrupted_parameter_within_limits_is_accepted(bench: Bench) -> None:
     command, parameters, frame, field, changed = SETTINGS[bench.name]
     client = bench.plug_in()
     fourth = {"after_s": 2.5 * bench.byte_s, "for_s": bench.byte_s}  # byte: the parameter
@@ -99,7 +92,7 @@ def test_a_changed_parameter_in_its_range_is_believed(bench: Bench) -> None:
 
 
 @pytest.mark.fault("uart-delay")
-def test_a_late_byte_makes_the_answer_late(bench: Bench) -> None:
+def test_delayed_byte_delays_the_answer(bench: Bench) -> None:
     lasted = []
     for delay_ms in (0.0, 5.0, 12.0):
         wire = bench.wire()
@@ -112,7 +105,7 @@ def test_a_late_byte_makes_the_answer_late(bench: Bench) -> None:
 
 
 @pytest.mark.fault("uart-delay")
-def test_a_message_held_up_in_the_middle_is_given_up(bench: Bench) -> None:
+def test_message_delayed_in_the_middle_times_out(bench: Bench) -> None:
     client = bench.plug_in()
     in_it = {"after_s": 2.5 * bench.byte_s, "for_s": 0.05}
     bench.inject("uart-delay", direction="to-device", delay_ms=60, **in_it)

@@ -1,5 +1,3 @@
-"""CubeStar's task states that only a fault brings about, as a host sees them."""
-
 from typing import Any
 
 import pytest
@@ -14,7 +12,7 @@ def status(star: Star) -> TaskStatus:
 
 
 def after(star: Star, *names: str, **parameters: Any) -> TaskStatus:
-    """Where the node is when the telecommands, the last one with ``parameters``, are done."""
+    """The task status after the telecommands; the last one has ``parameters``."""
     for name in names:
         star.client.command(name, **(parameters if name == names[-1] else {}))
         star.client.wait_processed(10.0)
@@ -22,7 +20,7 @@ def after(star: Star, *names: str, **parameters: Any) -> TaskStatus:
 
 
 @pytest.mark.fault("camera-dead")
-def test_a_dead_camera_fails_to_start_to_be_exposed_and_to_capture(star: Star) -> None:
+def test_task_states_of_a_dead_camera(star: Star) -> None:
     star.inject("camera-dead")
     assert after(star, "TogglePowerSW", "TogglePowerSW") is TaskStatus.CAMERA_FAILED
     assert after(star, "Exposure", exposure=100) is TaskStatus.EXPOSURE_FAILED
@@ -41,7 +39,7 @@ def test_a_dead_camera_fails_to_start_to_be_exposed_and_to_capture(star: Star) -
     ],
 )
 @pytest.mark.fault("latch-up")
-def test_a_memory_that_is_cut_while_it_is_written_fails(
+def test_memory_switched_off_during_a_write_fails(
     star: Star, name: str, parameters: dict[str, Any], failed: TaskStatus
 ) -> None:
     star.client.pause(0.05)
@@ -52,7 +50,7 @@ def test_a_memory_that_is_cut_while_it_is_written_fails(
 
 
 @pytest.mark.fault("latch-up")
-def test_a_memory_that_is_cut_while_it_is_tested_does_not_pass(star: Star) -> None:
+def test_memory_switched_off_during_its_test_fails(star: Star) -> None:
     star.client.pause(0.05)
     star.inject("latch-up", target="memory", after_s=0.05)
     star.client.command("TestSRAM")

@@ -1,5 +1,3 @@
-"""Every kind from the shell, from a plan and from a test; logged; the same again from its seed."""
-
 import json
 import math
 from collections.abc import Iterator
@@ -23,7 +21,7 @@ from .bench import BENCHES, Bench, Star, Tracker, powered
 
 
 def given(kind: str, board: Board) -> dict[str, Any]:
-    """A value for each parameter of a fault; the rates are those that no run takes notice of."""
+    """A value for each parameter of a fault; rates are too low to have an effect."""
     fault = FAULTS[kind]
     values = {name: getattr(fault(), name) for name in fault.declared()}
     for name in (name for name, default in values.items() if default is None):
@@ -45,7 +43,7 @@ def shell(request: pytest.FixtureRequest) -> Iterator[Shell]:
     target.close()
 
 
-def test_the_shell_completes_and_takes_every_kind(shell: Shell) -> None:
+def test_shell_completes_and_injects_every_kind(shell: Shell) -> None:
     board: Board = shell.target.controls._board  # type: ignore[union-attr]
     kinds = board.faults.kinds()
     completed = set(shell.complete("fault "))
@@ -67,7 +65,7 @@ def test_the_shell_completes_and_takes_every_kind(shell: Shell) -> None:
 
 
 @pytest.mark.parametrize("device", BENCHES)
-def test_the_command_line_takes_every_kind(device: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_line_injects_every_kind(device: str, capsys: pytest.CaptureFixture[str]) -> None:
     with powered(device) as bench:
         faults = [f"{kind} {targets[-1]}" for kind, targets in bench.faults.kinds().items()]
     commands = "; ".join(f"fault {fault}; fault clear" for fault in faults)
@@ -80,14 +78,13 @@ def test_the_command_line_takes_every_kind(device: str, capsys: pytest.CaptureFi
 
 
 def plan(seed: int, entries: list[dict[str, Any]]) -> str:
-    """The text of a plan."""
     lines = [f"seed = {seed}"]
     for entry in entries:
         lines += ["[[fault]]", *(f"{key} = {json.dumps(value)}" for key, value in entry.items())]
     return "\n".join(lines)
 
 
-def test_a_plan_takes_every_kind(bench: Bench) -> None:
+def test_plan_injects_every_kind(bench: Bench) -> None:
     entries = [
         {"kind": kind, "target": target, "at_s": 0.5}
         | ({} if FAULTS[kind].momentary else {"for": 0.25})
@@ -108,25 +105,15 @@ def test_a_plan_takes_every_kind(bench: Bench) -> None:
 
 # --- from the seed --------------------------------------------------------------------------------
 
-STEP_S = {"cubestar": 2.0, "cubesense": 0.4, "aramis": 0.6}
-"""Longer than a picture takes."""
+STEP_S = {"cubestar": 2.0, "cubesense": 0.4, "aramis": 0.6}  # longer than a picture takes
+NADIR_HALF = ("nadir", "NADACK", "NADEN", "SRAM2")  # targets of the half that measures
 
-NADIR_HALF = ("nadir", "NADACK", "NADEN", "SRAM2")
-"""Targets of the half that measures."""
-
-RATES = {
-    "uart-drop": 0.003,
-    "uart-corrupt": 0.003,
-    "uart-delay": 0.003,
-    "i2c-nack": 0.2,
-    "i2c-stretch": 0.2,
-    "memory-upsets": 1e-6,
-    "register-upsets": 0.5,
-}
+RATES = dict.fromkeys(("uart-drop", "uart-corrupt", "uart-delay"), 0.003)
+RATES |= {"i2c-nack": 0.2, "i2c-stretch": 0.2, "memory-upsets": 1e-6, "register-upsets": 0.5}
 
 
 def all_kinds(bench: Bench) -> tuple[list[dict[str, Any]], float]:
-    """A plan of every kind, and its end: those of memories and wires all the time, else in turn."""
+    """A plan of every kind and its end: memory and wire faults throughout, others in turn."""
     entries, at_s = [], 0.2
     for kind, targets in bench.faults.kinds().items():
         target = next((name for name in NADIR_HALF if name in targets), targets[0])
@@ -161,7 +148,7 @@ def played(device: str, seed: int, until_s: float = math.inf) -> tuple[Any, list
 
 
 @pytest.mark.parametrize("device", quick(BENCHES, 1))
-def test_a_plan_of_every_kind_repeats_to_the_byte(device: str) -> None:
+def test_plan_of_every_kind_is_reproducible(device: str) -> None:
     first = played(device, 8)
     _, log, kinds = first
     assert {line.split()[2] for line in log} == kinds
@@ -175,7 +162,7 @@ def test_a_plan_of_every_kind_repeats_to_the_byte(device: str) -> None:
 # --- what makes no sense --------------------------------------------------------------------------
 
 
-def test_refusals_name_what_would_be_right(star: Star) -> None:
+def test_rejected_faults_name_the_accepted_values(star: Star) -> None:
     cases: list[tuple[dict[str, Any], str]] = [
         ({"fault": "pixel-hat"}, "unknown fault 'pixel-hat'; known: uart-drop"),
         ({"fault": "pixel-hot", "target": "sun"}, "unknown camera 'sun'; known: imager"),
@@ -193,7 +180,7 @@ def test_refusals_name_what_would_be_right(star: Star) -> None:
     assert star.faults.events == 0
 
 
-def test_the_simulator_s_registers_can_not_be_hit() -> None:
+def test_register_faults_need_the_compiled_engine() -> None:
     with open_device("cubestar", SkyScene.pointing(84, -1), engine="python") as session:
         kinds = session.board.faults.kinds()
         own_firmware = {"core-flip", "core-upsets"}
@@ -202,7 +189,7 @@ def test_the_simulator_s_registers_can_not_be_hit() -> None:
             session.board.faults.inject("register-upsets")
 
 
-def test_what_a_device_does_not_have_can_not_be_hit(tracker: Tracker) -> None:
+def test_faults_without_a_target_are_rejected(tracker: Tracker) -> None:
     missing = set(FAULTS) - set(tracker.faults.kinds())
     assert len(missing) > 10
     for kind in missing:

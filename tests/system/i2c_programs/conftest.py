@@ -24,8 +24,7 @@ ENVIRONMENT = os.environ | {"PATH": f"{os.environ['PATH']}:/usr/sbin:/sbin"}
 TIMEOUT_S = 120
 ROUTES = ("seccomp", "preload")
 
-LATCH = 0x50
-"""Where the served bus has a device that listens to the general call, beside the sensor."""
+LATCH = 0x50  # address of a second device on the bus, which accepts the general call
 
 needs_tools = pytest.mark.skipif(
     shutil.which("i2ctransfer", path=ENVIRONMENT["PATH"]) is None, reason="no i2c-tools here"
@@ -43,8 +42,6 @@ Run = Callable[..., Outcome]
 
 
 class Latch:
-    """Keeps the last byte that was written."""
-
     def __init__(self) -> None:
         self._byte = 0
 
@@ -62,7 +59,7 @@ class Latch:
 
 @pytest.fixture(scope="session")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The socket of an emulation that runs in this process."""
+    """The bus socket of an emulation in this process."""
     path = tmp_path_factory.mktemp("private", numbered=True) / "bus"
     with open_device("cubestar") as opened:
         board = opened.board
@@ -83,7 +80,6 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="session", params=quick(ROUTES, 1))
 def route(request: pytest.FixtureRequest, served: Path) -> str:
-    """A route that works here."""
     name = str(request.param)
     found = start("--route", name, "--attach", served, "--", "true")
     if found.code:
@@ -94,7 +90,7 @@ def route(request: pytest.FixtureRequest, served: Path) -> str:
 
 @pytest.fixture
 def run(route: str, served: Path) -> Run:
-    """Runs a program with the route, on the served bus or with options of its own."""
+    """Runs a program with the route, by default on the served bus."""
 
     def call(*program: object, options: tuple[object, ...] = ("--attach", served)) -> Outcome:
         return start("--quiet", "--route", route, *options, "--", *program)

@@ -1,5 +1,3 @@
-"""The command around the program: options of the bus, streams, signals and the end."""
-
 import errno
 import subprocess
 import sys
@@ -28,7 +26,7 @@ def test_exit_codes_and_streams(route: str, served: Path) -> None:
     assert outcome == (7, "out in\n", "err\n")
 
 
-def test_a_program_that_a_signal_ends(run: Run) -> None:
+def test_exit_status_of_a_program_ended_by_a_signal(run: Run) -> None:
     assert run("sh", "-c", "kill -TERM $$").code == 128 + 15
 
 
@@ -43,7 +41,7 @@ MOVES = ("cubestarr=0x2a", "0x1a", "0x1a=", "cubestar=x", "0x1a=0x2a=3")
         *((f"--i2c-addr {move} -- true", 2, "is not NAME=0xNN, as in") for move in MOVES),
     ],
 )
-def test_what_can_not_run(
+def test_rejects_programs_and_buses_that_do_not_exist(
     arguments: str, code: int, text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit, match=str(code)):
@@ -51,8 +49,8 @@ def test_what_can_not_run(
     assert text in capsys.readouterr().err
 
 
-def test_preload_takes_over_where_seccomp_is_refused(route: str, served: Path) -> None:
-    """A process under a listener gets no second one, as in a container that refuses it."""
+def test_preload_is_used_where_seccomp_is_unavailable(route: str, served: Path) -> None:
+    """A process under a seccomp listener gets no second one, as in some containers."""
     if route != "seccomp":
         pytest.skip("needs a filter around it")
     inner = [*COMMAND, "--bus", "8", "--attach", str(served), "--", "cat", "/proc/bus/i2c"]
@@ -62,8 +60,10 @@ def test_preload_takes_over_where_seccomp_is_refused(route: str, served: Path) -
     assert "is served by preload, as seccomp is not available: the kernel refuses" in outcome.err
 
 
-def test_processes_left_behind_are_served(run: Run, route: str, tmp_path: Path) -> None:
-    """Under a filter they would fail without their supervisor."""
+def test_child_processes_are_served_after_the_program_ends(
+    run: Run, route: str, tmp_path: Path
+) -> None:
+    """Without their supervisor, filtered system calls would fail."""
     result = tmp_path / "result"
     script = (
         "import os, smbus2\n"
@@ -78,7 +78,7 @@ def test_processes_left_behind_are_served(run: Run, route: str, tmp_path: Path) 
         assert result.read_text() == "1"
 
 
-def test_a_signal_to_the_command_goes_to_the_program(route: str, served: Path) -> None:
+def test_signal_is_forwarded_to_the_program(route: str, served: Path) -> None:
     script = "trap 'exit 33' TERM; echo ready; read line"
     options = ("--quiet", "--route", route, "--attach", str(served))
     with subprocess.Popen(

@@ -1,5 +1,3 @@
-"""smbus2 and C programs on the bus, as they would be on Linux's own."""
-
 import subprocess
 import sys
 from pathlib import Path
@@ -52,7 +50,7 @@ def test_smbus2(run: Run) -> None:
     assert run(sys.executable, "-c", PYTHON_CLIENT) == (0, "done\n", "")
 
 
-def test_cube_smbus_finds_the_bus_around_it(run: Run, served: Path) -> None:
+def test_cube_smbus_finds_the_bus_of_its_environment(run: Run, served: Path) -> None:
     script = (
         "from cubestack.host.transport.smbus import CubeSMBus as B; "
         "print(B(3).read_byte_data(26, 131))"
@@ -63,7 +61,7 @@ def test_cube_smbus_finds_the_bus_around_it(run: Run, served: Path) -> None:
 
 @needs_c
 @pytest.mark.parametrize("link", ["-static", "-dynamic"])
-def test_a_c_program(run: Run, route: str, tmp_path: Path, link: str) -> None:
+def test_c_program(run: Run, route: str, tmp_path: Path, link: str) -> None:
     program = tmp_path / "client"
     compiler = find_c_compiler()
     assert compiler is not None
@@ -100,7 +98,7 @@ with SMBus(7) as bus:
 """
 
 
-def test_no_pointers_harm_the_supervisor(run: Run, route: str) -> None:
+def test_random_pointers_do_not_crash_the_supervisor(run: Run, route: str) -> None:
     if route != "seccomp":
         pytest.skip("a library follows the pointers of its program, and dies with it")
     assert run(sys.executable, "-c", FUZZING_CLIENT, options=("--pace", "fast")).out == "True\n"

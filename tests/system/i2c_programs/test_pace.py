@@ -1,7 +1,7 @@
-"""Paced programs: a transfer takes its time on the wire, by the wall clock.
+"""Paced transfers take their wire time by the wall clock.
 
-How near to it single bytes come depends on the machine: `cubestack bench` measures that, and
-`tests/emulator/i2cdev/test_scheduler.py` holds the rules in a made-up time.
+The accuracy of single bytes depends on the machine; `cubestack bench` measures it, and
+`tests/emulator/i2cdev/test_scheduler.py` tests the rules in virtual time.
 """
 
 import sys
@@ -32,14 +32,9 @@ CASES = [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYT
 
 
 @pytest.mark.parametrize(
-    ("hz", "calls", "bits"),
-    quick(
-        [(100_000, BYTES, BYTES_BITS), (400_000, LONG, LONG_BITS), (400_000, BYTES, BYTES_BITS)], 1
-    ),
-    ids=["bytes-100k", "long-400k", "bytes-400k"],
+    ("hz", "calls", "bits"), quick(CASES, 1), ids=["bytes-100k", "long-400k", "bytes-400k"]
 )
-def test_transfers_take_the_time_of_the_wire(run: Run, hz: int, calls: str, bits: int) -> None:
-    """All together take no less, but for what was late before them."""
+def test_transfers_take_their_wire_time(run: Run, hz: int, calls: str, bits: int) -> None:
     outcome = run(sys.executable, "-c", CLIENT.format(calls), options=("--hz", hz))
     assert outcome.code == 0, outcome.err
     times = sorted(map(float, outcome.out.split()))

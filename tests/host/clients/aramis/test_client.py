@@ -1,5 +1,3 @@
-"""The client against a node in memory that the tables drive."""
-
 from typing import Any
 from zlib import crc32
 
@@ -15,25 +13,16 @@ from cubestack.host.errors import BadAnswerError, StepFailedError
 from ...conftest import FakeNode, UartLink
 
 SOLVED = {
-    "Q0": 0.5,
-    "Q1": -0.5,
-    "Q2": 0.5,
-    "Q3": 0.5,
-    "JulianDay": 2_461_366,
-    "Millisecond": 21_600_000,
-    "ImageUptime": 12_345,
-    "FrameCounter": 7,
+    **{"Q0": 0.5, "Q1": -0.5, "Q2": 0.5, "Q3": 0.5, "Valid": 1, "Matched": 9, "Detected": 12},
+    **{"JulianDay": 2_461_366, "Millisecond": 21_600_000, "ImageUptime": 12_345, "FrameCounter": 7},
     "Outcome": codes.MeasurementOutcome.CONCLUSIVE,
     "Reason": codes.Reason.CONFIRMED,
     "Mode": codes.MeasurementMode.AIDED,
-    "Valid": 1,
-    "Matched": 9,
-    "Detected": 12,
 }
 
 
 class FakeAramis(FakeNode):
-    """Keeps the catalogue that is loaded in ``memory``."""
+    """Stores the loaded catalogue in ``memory``."""
 
     def __init__(self) -> None:
         super().__init__(INTERFACE)
@@ -87,7 +76,7 @@ def test_quality(node: FakeAramis, aramis: Aramis) -> None:
     assert (found.matched, found.expected, found.spikes, found.rejected) == (9, 11, 70_000, 3)
 
 
-def test_activation_returns_the_catalogue_s_state(node: FakeAramis, aramis: Aramis) -> None:
+def test_activate_returns_the_catalogue_state(node: FakeAramis, aramis: Aramis) -> None:
     node.busy = 3
     assert aramis.activate() is CatalogueState.GOOD
     node.execute = lambda name, values: None  # type: ignore[method-assign]
@@ -96,7 +85,7 @@ def test_activation_returns_the_catalogue_s_state(node: FakeAramis, aramis: Aram
         aramis.activate()
 
 
-def test_an_attitude_with_everything(node: FakeAramis, aramis: Aramis) -> None:
+def test_attitude(node: FakeAramis, aramis: Aramis) -> None:
     node.values["Attitude"] = dict(SOLVED)
     found = aramis.attitude()
     assert found.quaternion is not None
@@ -107,7 +96,7 @@ def test_an_attitude_with_everything(node: FakeAramis, aramis: Aramis) -> None:
     assert (found.image_uptime_s, found.julian_date) == (12.345, 2_461_366.25)
 
 
-def test_no_attitude_and_no_time(aramis: Aramis) -> None:
+def test_unset_attitude_and_time_are_none(aramis: Aramis) -> None:
     found = aramis.attitude()
     assert (found.quaternion, found.valid, found.julian_date) == (None, False, None)
     assert found.reason is codes.Reason.NOT_MEASURED
@@ -124,7 +113,7 @@ def test_no_attitude_and_no_time(aramis: Aramis) -> None:
          {"RightAscension": 1.5, "Declination": -0.5}),
     ],
 )  # fmt: skip
-def test_measuring_sends_what_is_known(
+def test_measure_sends_the_known_direction(
     node: FakeAramis, aramis: Aramis, arguments: Any, command: str, parameters: dict[str, float]
 ) -> None:
     node.values["Attitude"] = dict(SOLVED)
@@ -150,7 +139,7 @@ def test_the_latch_up_action_is_off_then_on(node: FakeAramis, aramis: Aramis) ->
     assert [values["Step"] for name, values in node.log] == [0, 1]
 
 
-def test_a_catalogue_arrives_whole(node: FakeAramis, aramis: Aramis) -> None:
+def test_load_catalogue_sends_every_block(node: FakeAramis, aramis: Aramis) -> None:
     image = bytes(range(256)) + b"tail"
     node.values["CatalogueStatus"]["State"] = CatalogueState.GOOD
     seen: list[tuple[int, int]] = []
@@ -160,7 +149,9 @@ def test_a_catalogue_arrives_whole(node: FakeAramis, aramis: Aramis) -> None:
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
-def test_a_refused_or_incomplete_catalogue(node: FakeAramis, aramis: Aramis) -> None:
+def test_load_catalogue_reports_rejected_and_incomplete_uploads(
+    node: FakeAramis, aramis: Aramis
+) -> None:
     node.values["ErrorFlags"]["UploadError"] = True
     with pytest.raises(StepFailedError, match="rejected"):
         aramis.load_catalogue(b"x" * 10)
@@ -169,7 +160,9 @@ def test_a_refused_or_incomplete_catalogue(node: FakeAramis, aramis: Aramis) -> 
         aramis.load_catalogue(b"x" * 300)
 
 
-def test_stars_by_number_and_a_list_that_is_not_whole(node: FakeAramis, aramis: Aramis) -> None:
+def test_stars_are_ordered_and_an_incomplete_list_is_rejected(
+    node: FakeAramis, aramis: Aramis
+) -> None:
     node.values["DetectionSummary"] = {"Detected": 2}
     first = {"StarNumber": 0, "X": 1.0, "Y": 2.0, "Brightness": 99.0}
     second = {"StarNumber": 1, "X": 3.5, "Y": 4.0, "Brightness": 50.0}
@@ -187,7 +180,7 @@ def test_phase_times_in_ms(node: FakeAramis, aramis: Aramis) -> None:
     assert (times["spikes"], times["total"], times["faces"]) == (355.388, 519.668, 0)
 
 
-def test_the_line_of_a_log(aramis: Aramis, node: Any) -> None:
+def test_latest_is_a_log_line(aramis: Aramis, node: Any) -> None:
     node.values["Attitude"] = dict(SOLVED)
     line = aramis.latest()
     assert (line["valid"], line["q1"], line["matched"]) == (True, -0.5, 9)

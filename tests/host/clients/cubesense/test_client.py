@@ -50,7 +50,7 @@ NEXT_FRAME = ("1F7F 41 1F1F 00 1FFF", "1F7F 00 1FFF")
         ([NEXT_FRAME], lambda c: c.client.command("NextImageFrame", Frame=31), None),
     ],
 )
-def test_published_bytes(
+def test_exchanges_have_the_published_bytes(
     exchanges: list[tuple[str, str]], call: Callable[[CubeSense], Any], expected: Any
 ) -> None:
     wire = {bytes.fromhex(request): bytes.fromhex(answer) for request, answer in exchanges}
@@ -60,7 +60,7 @@ def test_published_bytes(
 
 
 @given(st.floats(0, 99), st.floats(-np.pi, np.pi))
-def test_direction_is_the_optical_axis_turned_by_the_field_angle(theta: float, phi: float) -> None:
+def test_direction_is_the_optical_axis_rotated_by_the_field_angle(theta: float, phi: float) -> None:
     tilt = Rotation.from_rotvec(np.deg2rad(theta) * np.array([-np.sin(phi), np.cos(phi), 0.0]))
     vector = direction(theta * np.cos(phi), theta * np.sin(phi))
     np.testing.assert_allclose(vector, tilt.apply([0.0, 0.0, 1.0]), atol=1e-12)
@@ -68,7 +68,9 @@ def test_direction_is_the_optical_axis_turned_by_the_field_angle(theta: float, p
 
 @pytest.mark.parametrize("camera", Camera)
 @pytest.mark.parametrize("sram", [None, *Sram])
-def test_a_measurement(cubesense: CubeSense, node: Any, camera: Camera, sram: Sram | None) -> None:
+def test_capture_and_detect(
+    cubesense: CubeSense, node: Any, camera: Camera, sram: Sram | None
+) -> None:
     node.outcomes[camera] = FOUND
     node.capturing, node.detecting = 3, 5
     found = cubesense.capture_and_detect(camera, sram)
@@ -81,7 +83,7 @@ def test_a_measurement(cubesense: CubeSense, node: Any, camera: Camera, sram: Sr
 
 
 @pytest.mark.parametrize("detect", [3, 4, 5, 6])
-def test_a_failed_detection_is_a_result(cubesense: CubeSense, node: Any, detect: int) -> None:
+def test_failed_detection_is_returned(cubesense: CubeSense, node: Any, detect: int) -> None:
     node.outcomes[Camera.NADIR] = {"Capture": 3, "Detect": detect}
     found = cubesense.capture_and_detect(Camera.NADIR, Sram.SRAM1)
     assert found.detect is codes.DetectResult(detect)
@@ -89,14 +91,14 @@ def test_a_failed_detection_is_a_result(cubesense: CubeSense, node: Any, detect:
     assert found.capture.stored
 
 
-def test_a_capture_alone(cubesense: CubeSense, node: Any) -> None:
+def test_capture_without_detection(cubesense: CubeSense, node: Any) -> None:
     node.outcomes[Camera.SUN] = {"Capture": 4, "Detect": 1}
     node.capturing = 2
     assert cubesense.capture(Camera.SUN, Sram.SRAM2) is CaptureResult.CAMERA_TIMEOUT
     assert node.log == [("CaptureOnly", {"Camera": 0, "Sram": 1, "Location": 0})]
 
 
-def test_what_stays_pending_is_told(uart: Any, node: Any) -> None:
+def test_pending_measurement_times_out(uart: Any, node: Any) -> None:
     cubesense = CubeSense(NodeClient(uart, INTERFACE))
     node.outcomes[Camera.SUN] = {"Capture": 1, "Detect": 2}
     with pytest.raises(NoAnswerError, match="capture of the SUN camera still pending after 3 s"):
@@ -121,14 +123,10 @@ def test_a_result_schedules_the_next_measurement(
     assert name == f"Result{camera + 1}ThenSram{sram + 1}"
 
 
-def test_an_unknown_result_is_told(cubesense: CubeSense, node: Any) -> None:
-    node.outcomes[Camera.SUN] = {"Capture": 9}
-    with pytest.raises(BadAnswerError, match="telemetry Result1: 9 is not a valid CaptureResult"):
-        cubesense.capture_and_detect(Camera.SUN)
-
-
 @pytest.mark.parametrize("camera", Camera)
-def test_settings_go_to_their_camera(cubesense: CubeSense, node: Any, camera: Camera) -> None:
+def test_settings_are_sent_for_their_camera(
+    cubesense: CubeSense, node: Any, camera: Camera
+) -> None:
     number = camera + 1
     cubesense.set_threshold(camera, 99)
     cubesense.set_auto_adjust(camera, True)
@@ -199,7 +197,7 @@ def test_power(cubesense: CubeSense, node: Any) -> None:
     ]
 
 
-def test_who_it_is(cubesense: CubeSense, node: Any) -> None:
+def test_serial_number_and_uptime(cubesense: CubeSense, node: Any) -> None:
     node.values["SerialNumber"] = {"SerialNumber": b"CS01\0\0"}
     assert cubesense.serial_number() == "CS01"
     node.values["SerialNumber"] = {"SerialNumber": b"\xff" * 6}
@@ -209,7 +207,7 @@ def test_who_it_is(cubesense: CubeSense, node: Any) -> None:
     assert cubesense.uptime_s() == 7.25
 
 
-def test_times_and_details(cubesense: CubeSense, node: Any) -> None:
+def test_phase_times_and_details(cubesense: CubeSense, node: Any) -> None:
     node.values["PhaseTimes2"] = {"Store": 33_367, "Total": 245_000}
     times = cubesense.phase_times(Camera.NADIR)
     assert list(times) == ["wait", "store", "search", "centroid", "total"]
@@ -219,7 +217,7 @@ def test_times_and_details(cubesense: CubeSense, node: Any) -> None:
     assert (details["X"], details["Points"]) == (-1.25, 49)
 
 
-def test_edges_are_columns_and_rows_from_both_frames(cubesense: CubeSense, node: Any) -> None:
+def test_edges_come_from_both_frames(cubesense: CubeSense, node: Any) -> None:
     assert cubesense.edges().shape == (0, 2)
     node.values["NadirEdges1"] = {"Count": 21, "X1": 12.5, "Y1": 47.0, "X20": 3.25}
     node.values["NadirEdges2"] = {"Count": 21, "X21": 639.0, "Y21": 15.0, "X22": 1.0}
@@ -227,5 +225,38 @@ def test_edges_are_columns_and_rows_from_both_frames(cubesense: CubeSense, node:
     assert edges.shape == (21, 2)
     assert edges[[0, 19, 20]].tolist() == [[12.5, 47], [3.25, 0], [639, 15]]
     node.values["NadirEdges1"] = {"Count": 41}
-    with pytest.raises(BadAnswerError, match="41 edges, where 40 have room"):
+    with pytest.raises(BadAnswerError, match="NadirEdges1: 41 edges, where 40 have room"):
         cubesense.edges()
+
+
+@pytest.mark.parametrize("camera", Camera)
+@pytest.mark.parametrize("field", ["Capture", "Detect"])
+def test_rejects_a_result_with_an_unknown_code(
+    cubesense: CubeSense, node: Any, camera: Camera, field: str
+) -> None:
+    cubesense.capture_and_detect(camera)
+    node.outcomes[camera] = {field: 200}
+    node._start(camera, detect=True)
+    with pytest.raises(BadAnswerError, match=rf"telemetry Result{camera + 1}.*: 200 is not a val"):
+        cubesense.result(camera)
+
+
+@pytest.mark.parametrize("camera", Camera)
+def test_quality_rejects_an_unknown_reason(cubesense: CubeSense, node: Any, camera: Camera) -> None:
+    values = {"SigmaAlpha": 0.25, "SigmaBeta": 0.5, "Rms": 1.5, "Found": 17, "Reason": 1}
+    node.values[f"Quality{camera + 1}"] = values
+    found = cubesense.quality(camera)
+    assert found.sigma_deg == pytest.approx((0.25, 0.5), rel=0.02)
+    assert found.rms_px == pytest.approx(1.5, rel=0.02)
+    assert (found.found, found.reason) == (17, codes.Reason(1))
+    unknown = max(codes.Reason) + 1
+    values["Reason"] = unknown
+    with pytest.raises(BadAnswerError, match=f"telemetry Quality{camera + 1}: {unknown}"):
+        cubesense.quality(camera)
+
+
+def test_default_camera_settings_are_those_after_power_up() -> None:
+    usual = CameraSettings(exposure=100)
+    reset = INTERFACE.telecommand("CameraSettings1").reset_values()
+    gains = {"Gain": usual.gain, "BlueGain": usual.blue_gain, "RedGain": usual.red_gain}
+    assert gains.items() <= reset.items()

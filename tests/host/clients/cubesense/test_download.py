@@ -22,7 +22,7 @@ def pictures(node: Any) -> None:
 
 
 @pytest.mark.parametrize("size", ImageSize)
-def test_every_size_gives_the_pixels_that_it_has(
+def test_every_size_returns_its_subsampled_pixels(
     client: NodeClient, node: Any, size: ImageSize
 ) -> None:
     seen: list[tuple[int, int]] = []
@@ -62,7 +62,7 @@ def test_a_damaged_frame_is_read_again(client: NodeClient, node: Any) -> None:
         download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
 
 
-def test_a_lost_acknowledge_asks_for_the_frame_again(
+def test_lost_acknowledge_requests_the_frame_again(
     client: NodeClient, node: Any, uart: Any
 ) -> None:
     requests = count()  # the first two of the second frame are lost
@@ -72,7 +72,9 @@ def test_a_lost_acknowledge_asks_for_the_frame_again(
     assert [values.get("Frame", 0) for _, values in node.log] == [0, 1, 1, *range(1, 32)]
 
 
-def test_acknowledges_that_stay_away_are_told(client: NodeClient, node: Any, uart: Any) -> None:
+def test_reports_missing_acknowledges_after_3_attempts(
+    client: NodeClient, node: Any, uart: Any
+) -> None:
     requests = count()
     uart.mangle = lambda data: data if next(requests) < 3 else b""
     with pytest.raises(NoAnswerError, match="no acknowledge of telecommand NextImageFrame"):
@@ -80,12 +82,12 @@ def test_acknowledges_that_stay_away_are_told(client: NodeClient, node: Any, uar
     assert [name for name, _ in node.log].count("NextImageFrame") == 3
 
 
-def test_a_refusal_is_not_repeated(client: NodeClient, node: Any) -> None:
+def test_refused_download_is_not_retried(client: NodeClient, node: Any) -> None:
     node.refusals.append(4)
     with pytest.raises(CommandRefusedError, match="StartImageDownload refused: BUFFER_FULL"):
         download_image(client, Sram.SRAM1, ImageSize.SIDE_64)
 
 
-def test_only_squares_of_a_download_hold_a_picture() -> None:
+def test_picture_of_rejects_other_shapes() -> None:
     with pytest.raises(ValueError, match=r"side of 1024, 512, 256, 128, 64, not .* \(480, 640\)"):
         picture_of(np.zeros((480, 640), np.uint8))

@@ -11,7 +11,7 @@ PICTURE = np.random.default_rng(4).integers(0, 256, (480, 640), np.uint8)
 
 
 @pytest.mark.parametrize(("camera", "letters"), [(Camera.NADIR, "as"), (Camera.SUN, "qw")])
-def test_taking_and_downloading_a_picture(camera: Camera, letters: str) -> None:
+def test_takes_and_downloads_a_picture(camera: Camera, letters: str) -> None:
     take, send = letters
     line = LetterLine(**{take: b"Y", send: PICTURE.tobytes()})
     ServicePortClient(line).take(camera)
@@ -23,13 +23,13 @@ def test_taking_and_downloading_a_picture(camera: Camera, letters: str) -> None:
     assert (seen[0], seen[-1]) == ((1000, 307_200), (307_200, 307_200))
 
 
-def test_what_came_before_is_dropped() -> None:
+def test_discards_earlier_bytes() -> None:
     line = LetterLine(s=PICTURE.tobytes())
     line.pending += b"Y" * 5000
     np.testing.assert_array_equal(ServicePortClient(line).download(Camera.NADIR), PICTURE)
 
 
-def test_nothing_beyond_the_answer_is_taken() -> None:
+def test_reads_nothing_after_the_answer() -> None:
     line = LetterLine(s=PICTURE.tobytes() + b"more")
     line.chunk = 10**6
     ServicePortClient(line).download(Camera.NADIR)
@@ -39,7 +39,7 @@ def test_nothing_beyond_the_answer_is_taken() -> None:
     assert line.pending == b"es"
 
 
-def test_silence_and_wrong_answers_are_told() -> None:
+def test_reports_silence_and_wrong_answers() -> None:
     line = LetterLine(a=b"N", s=bytes(307_199))
     with pytest.raises(NoAnswerError, match=r"bench letter 'q': 0 bytes of 1 came, .* for 3 s"):
         ServicePortClient(line, timeout_s=3.0).take(Camera.SUN)

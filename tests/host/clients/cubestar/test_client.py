@@ -27,7 +27,7 @@ def cubestar(either_client: NodeClient | I2cClient) -> CubeStar:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_boresight_is_the_camera_axis_seen_from_the_sky(seed: int) -> None:
+def test_boresight_is_the_camera_axis_in_the_sky(seed: int) -> None:
     rotation = Rotation.random(rng=np.random.default_rng(seed))
     attitude = Attitude(rotation.as_quat(), True, 5, MatchMode.TRACKING, 1, 0.0)
     expected = rotation.inv().as_matrix() @ [0.0, 0.0, 1.0]
@@ -39,13 +39,13 @@ def test_boresight_is_the_camera_axis_seen_from_the_sky(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_pointing_is_that_of_the_scenes(seed: int) -> None:
+def test_pointing_matches_the_scenes(seed: int) -> None:
     rotation = Rotation.random(rng=np.random.default_rng(seed))
     expected = pointing_from_matrix(rotation.as_matrix())
     np.testing.assert_allclose(pointing_deg(rotation.as_quat()), expected, atol=1e-6)
 
 
-def test_the_line_of_a_log(cubestar: CubeStar, node: Any) -> None:
+def test_latest_is_a_log_line(cubestar: CubeStar, node: Any) -> None:
     values = {"Q0": 0.0, "Q1": 0.0, "Q2": 0.0, "Q3": 1.0, "ImageTime": 1500, "Matched": 9}
     node.values["AttitudeQuaternion"] = {**values, "Mode": MatchMode.TRACKING, "Valid": 1}
     line = cubestar.latest()
@@ -121,7 +121,7 @@ def test_upload_waits_for_a_full_buffer(uart: Any, node: Any) -> None:
     assert node.memory.all()
 
 
-def test_upload_counts_the_blocks(cubestar: CubeStar, node: Any) -> None:
+def test_upload_reports_missing_blocks(cubestar: CubeStar, node: Any) -> None:
     class Forgetful(dict[str, Any]):
         def __setitem__(self, key: str, value: Any) -> None:
             super().__setitem__(key, 0)
@@ -134,7 +134,7 @@ def test_upload_counts_the_blocks(cubestar: CubeStar, node: Any) -> None:
 
 
 @pytest.mark.parametrize("shape", [(512, 1023), (1024, 512), (512, 1024, 1)])
-def test_upload_refuses_another_picture(cubestar: CubeStar, shape: tuple[int, ...]) -> None:
+def test_upload_rejects_other_shapes_and_types(cubestar: CubeStar, shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match=r"is uint8 \(512, 1024\), not uint8"):
         cubestar.upload_image(np.zeros(shape, np.uint8))
     with pytest.raises(ValueError, match="not float64"):
@@ -149,7 +149,7 @@ def star(number: int) -> dict[str, Any]:
     return {**place, "StarNumber": number, "Size": 9, "Intensity": 400}
 
 
-def test_stars_wherever_the_stepping_begins(cubestar: CubeStar, node: Any) -> None:
+def test_stars_are_ordered_wherever_stepping_begins(cubestar: CubeStar, node: Any) -> None:
     node.values["DetectionSummary"] = {"NumStarsDetected": 4}
     node.values["NumIdStars"] = {"numIdStars": 2}
     node.records["StarPositions"] = [star(number) for number in (2, 3, 0, 1)]
@@ -173,7 +173,7 @@ def test_stars_survive_a_lost_answer_but_not_a_missing_star(cubestar: CubeStar, 
         cubestar.stars()
 
 
-def test_capture_tells_a_failure(cubestar: CubeStar, node: Any) -> None:
+def test_capture_reports_a_failure(cubestar: CubeStar, node: Any) -> None:
     node.values["TaskStatus"] = {"taskStatus": TaskStatus.CAPTURED}
     cubestar.capture()
     node.values["TaskStatus"] = {"taskStatus": TaskStatus.CAPTURE_FAILED}
@@ -184,7 +184,7 @@ def test_capture_tells_a_failure(cubestar: CubeStar, node: Any) -> None:
         cubestar.capture()
 
 
-def test_processing_returns_how_far_it_came(cubestar: CubeStar, node: Any) -> None:
+def test_processing_returns_the_task_status(cubestar: CubeStar, node: Any) -> None:
     node.busy = 3
     node.values["TaskStatus"] = {"taskStatus": TaskStatus.IDENTIFICATION_FAILED}
     assert cubestar.capture_and_process() is TaskStatus.IDENTIFICATION_FAILED

@@ -1,5 +1,3 @@
-"""What an operator does by hand: the threshold that is found, and that it is set."""
-
 from collections.abc import Mapping
 from itertools import pairwise
 from types import SimpleNamespace
@@ -12,12 +10,11 @@ from cubestack.host.studies.cubestar.night import choose_threshold
 
 
 class Sky:
-    """A CubeStar before a sky: at each threshold so many stars, so many matched, so many votes.
+    """A CubeStar with fixed results for each threshold.
 
     Attributes:
         seen: (centroids, matched, most votes) by threshold; others give no attitude.
         tried: thresholds that a picture was processed with.
-        captured: pictures taken.
     """
 
     def __init__(self, seen: Mapping[int, tuple[int, int, int]], full: int = 0) -> None:
@@ -59,14 +56,14 @@ class Sky:
         return SimpleNamespace(valid=found is not None, matched=found[1] if found else 99)
 
 
-def test_thresholds_rise_by_about_a_quarter_up_to_what_a_byte_holds() -> None:
+def test_thresholds_rise_by_about_a_quarter_up_to_255() -> None:
     assert LADDER[0] == 1
     assert 150 < LADDER[-1] <= 255
     for low, high in pairwise(LADDER):
         assert high - low == 1 or 1.2 <= high / low <= 1.34
 
 
-def test_the_best_confirms_most_stars_and_is_set() -> None:
+def test_sets_the_threshold_that_confirms_most_stars() -> None:
     sky: Any = Sky({6: (12, 9, 4), 10: (9, 8, 9), 20: (5, 5, 7), 40: (3, 3, 1)})
     assert find_threshold(sky) == 10
     assert sky.thresholds == (10, 10)
@@ -75,7 +72,7 @@ def test_the_best_confirms_most_stars_and_is_set() -> None:
     assert len(sky.modes) == len(LADDER)
 
 
-def test_a_vote_less_than_stars_is_no_loss_and_the_higher_one_wins_a_tie() -> None:
+def test_tie_goes_to_the_threshold_with_more_votes() -> None:
     # Of n stars, each has at most n - 1 others that vote for it.
     sky: Any = Sky({6: (9, 5, 4), 25: (9, 5, 9), 32: (9, 6, 3)})
     assert find_threshold(sky) == 25
@@ -83,7 +80,7 @@ def test_a_vote_less_than_stars_is_no_loss_and_the_higher_one_wins_a_tie() -> No
     assert find_threshold(sky) == 6
 
 
-def test_several_views_are_added_up() -> None:
+def test_matches_of_several_views_are_added() -> None:
     skies = [{6: (9, 6, 9)}, {10: (9, 5, 9)}, {10: (9, 4, 9)}]
     sky: Any = Sky({})
 
@@ -96,13 +93,13 @@ def test_several_views_are_added_up() -> None:
     assert sky.captured == 3
 
 
-def test_without_an_attitude_it_is_as_before() -> None:
+def test_without_an_attitude_the_threshold_does_not_change() -> None:
     sky: Any = Sky({})
     assert find_threshold(sky) is None
     assert sky.thresholds == (7, 9)
 
 
-def test_a_night_s_threshold_leaves_few_stars_most_of_them_matched() -> None:
+def test_night_threshold_finds_few_stars_mostly_matched() -> None:
     sky: Any = Sky(
         {50: (5, 5, 0), 40: (9, 8, 0), 32: (14, 10, 0), 25: (16, 12, 0), 20: (17, 17, 0)}
     )
@@ -113,12 +110,12 @@ def test_a_night_s_threshold_leaves_few_stars_most_of_them_matched() -> None:
 
 
 @pytest.mark.parametrize(("more", "chosen"), [((10, 8), 40), ((10, 9), 32), ((9, 8), 32)])
-def test_what_is_not_matched_counts_against_it(more: tuple[int, int], chosen: int) -> None:
+def test_night_threshold_penalises_unmatched_stars(more: tuple[int, int], chosen: int) -> None:
     sky: Any = Sky({40: (6, 6, 0), 32: (*more, 0), 25: (99, 50, 0)})
     assert choose_threshold(sky) == chosen
 
 
-def test_without_matches_the_highest_of_all_is_kept() -> None:
+def test_night_threshold_without_matches_is_the_highest() -> None:
     sky: Any = Sky({}, full=4)
     assert choose_threshold(sky) == LADDER[-1]
     assert sky.thresholds == (LADDER[-1],) * 2

@@ -1,5 +1,3 @@
-"""Measuring with AraMiS from a program, with a small catalogue."""
-
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path

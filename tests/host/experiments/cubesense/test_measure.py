@@ -1,5 +1,3 @@
-"""One measurement beside the truth: what is told of each sensor."""
-
 import pytest
 
 from cubestack.host.experiments.measure import measure

@@ -1,5 +1,3 @@
-"""Frames of random skies, beside what their device did."""
-
 import json
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +22,6 @@ def test_what_crosses_a_later_frame_is_there_while_it_is_exposed() -> None:
 
 
 def camera_file(folder: Path, quaternion: list[float]) -> Path:
-    """One that knows the attitude of sky.png."""
     path = folder / "camera.json"
     known = {"sky.png": {"quaternion_xyzw_inertial_to_camera": quaternion}}
     path.write_text(json.dumps({"images": known}), encoding="utf-8")

@@ -1,5 +1,3 @@
-"""What a star tracker is told of a fitted lens."""
-
 from unittest.mock import Mock, call
 
 import pytest
@@ -10,7 +8,7 @@ from cubestack.host.calibration.camera import Camera
 from cubestack.host.studies.aramis.calibrate import EXPERIMENT
 
 
-def test_the_field_is_set_before_the_catalogue_is_made_for_it() -> None:
+def test_load_sets_the_field_before_it_activates_the_catalogue() -> None:
     """A focal length of half the picture's height has it 90 degrees high."""
     aramis = Mock()
     EXPERIMENT.load(aramis, Camera(ROWS / 2, 640.0, 512.0), None)

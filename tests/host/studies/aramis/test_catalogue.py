@@ -1,5 +1,3 @@
-"""`cubestack catalogue aramis`: its facts, its image, and options that have no effect."""
-
 import json
 from pathlib import Path
 
@@ -31,7 +29,7 @@ def test_facts_and_image(tmp_path: Path, run: Run) -> None:
     assert len(list((tmp_path / "cache" / "cubestack").iterdir())) == 1
 
 
-def test_for_people(run: Run) -> None:
+def test_text_output(run: Run) -> None:
     code, out, err = run("catalogue", "aramis", *SMALL)
     assert (code, err) == (0, "")
     assert "published triangles  265292" in out
@@ -48,13 +46,13 @@ def test_for_people(run: Run) -> None:
         (("aramis", "--fov", "1", "--mag-limit", "1"), "stars form no triangle"),
     ],
 )
-def test_wrong_calls(run: Run, arguments: tuple[str, ...], words: str) -> None:
+def test_rejects_options_without_effect(run: Run, arguments: tuple[str, ...], words: str) -> None:
     outcome = run("catalogue", *arguments)
     assert outcome.code == 2
     assert outcome.line.startswith("cubestack catalogue: ")
     assert words in outcome.line
 
 
-def test_an_image_that_can_not_be_written(tmp_path: Path, run: Run) -> None:
+def test_names_an_output_that_cannot_be_written(tmp_path: Path, run: Run) -> None:
     outcome = run("catalogue", "aramis", *SMALL, "--output", tmp_path / "no" / "x")
     assert (outcome.code, str(tmp_path / "no" / "x") in outcome.line) == (1, True)

@@ -1,5 +1,3 @@
-"""The demonstration, with a star tracker that answers as told: what it asks for and tells."""
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,16 +25,8 @@ from cubestack.host.studies.aramis import demo
 ORION = quaternion_from_pointing(84.0, -1.0, 20.0)
 OFF = quaternion_from_pointing(84.0, -0.99, 20.0)  # 36 arcsec
 FOUND = Attitude(
-    quaternion=ORION,
-    valid=True,
-    outcome=MeasurementOutcome.CONCLUSIVE,
-    reason=Reason.CONFIRMED,
-    mode=MeasurementMode.LOST_IN_SPACE,
-    matched=7,
-    detected=9,
-    frame=1,
-    image_uptime_s=1.0,
-    julian_date=None,
+    *(ORION, True, MeasurementOutcome.CONCLUSIVE, Reason.CONFIRMED, MeasurementMode.LOST_IN_SPACE),
+    **{"matched": 7, "detected": 9, "frame": 1, "image_uptime_s": 1.0, "julian_date": None},
 )
 
 
@@ -79,7 +69,7 @@ def show(monkeypatch: pytest.MonkeyPatch, folder: Path, tracker: Tracker) -> boo
     return demo.show(device, folder, 1, None, [])
 
 
-def test_it_measures_lost_in_space_and_near_a_direction(
+def test_demo_measures_lost_in_space_and_near_a_direction(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tracker = Tracker(FOUND, replace(FOUND, quaternion=OFF, matched=8))
@@ -121,7 +111,7 @@ def test_a_refused_attitude_has_no_error(
         (None, []),
     ],
 )
-def test_the_picture_tells_that_only_a_triangle_has_names(
+def test_caption_says_that_only_a_triangle_is_named(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, switches: Switches | None, left_out: list[str]
 ) -> None:
     told = list[Any]()

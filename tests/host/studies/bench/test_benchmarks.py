@@ -1,6 +1,7 @@
 """Benchmarks on a clock of their own: what a figure is, and what is measured for it."""
 
 import json
+import sys
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import replace
@@ -40,10 +41,10 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 class Device:
-    """An emulated device: virtual time passes while its host waits, four times as fast.
+    """An emulated device whose virtual time passes four times as fast as wall time.
 
     Attributes:
-        said: what it was told, and its time then.
+        said: commands, each with its virtual time.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -76,12 +77,12 @@ def powered(one: Device, asked: list[dict[str, Any]]) -> Callable[..., Any]:
 
 
 def built(wiring: Wiring, seconds: float) -> float:
-    """As `cold_build_s`, of a design that is used, as Amaranth wants it."""
+    """Stands in for `cold_build_s`; Amaranth warns of a design that is never elaborated."""
     Fragment.get(wiring.component, None)
     return seconds
 
 
-def test_a_ratio_is_virtual_seconds_by_wall_seconds(clock: Clock) -> None:
+def test_ratio_is_virtual_time_per_wall_time(clock: Clock) -> None:
     one: Any = Device(clock)
     assert benchmark.simulated_ratio(one, lambda: one.pause(3.0)) == 4.0
 
@@ -92,7 +93,7 @@ def test_a_ratio_is_virtual_seconds_by_wall_seconds(clock: Clock) -> None:
     assert benchmark.simulated_ratio(one, slower) == 1.71
 
 
-def test_of_something_short_the_best_of_some_counts(clock: Clock) -> None:
+def test_best_ms_is_the_shortest_of_5_runs(clock: Clock) -> None:
     times = iter([0.5, 0.0312345, 0.2, 0.04, 0.7, 0.0])
 
     def run() -> None:
@@ -102,7 +103,7 @@ def test_of_something_short_the_best_of_some_counts(clock: Clock) -> None:
     assert next(times) == 0.0  # five were measured
 
 
-def test_the_firmware_is_measured_over_a_running_loop(
+def test_firmware_ratio_is_measured_over_the_loop(
     clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one, asked = Device(clock), list[dict[str, Any]]()
@@ -115,7 +116,9 @@ def test_the_firmware_is_measured_over_a_running_loop(
     assert one.time_s >= begun_s + benchmark.LOOP_S + 0.9
 
 
-def test_both_sensors_are_read_once_a_second(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_sensors_are_read_once_per_second(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
     one, asked = Device(clock), list[dict[str, Any]]()
     monkeypatch.setattr(cubesense, "power_up", powered(one, asked))
     assert cubesense._loop_ratio(device("cubesense")) == 4.0
@@ -126,7 +129,7 @@ def test_both_sensors_are_read_once_a_second(clock: Clock, monkeypatch: pytest.M
     assert len({camera for camera, _ in one.said}) == 2
 
 
-def test_a_capture_and_its_transfer_are_timed_apart(clock: Clock) -> None:
+def test_capture_and_transfer_are_timed_separately(clock: Clock) -> None:
     turns = iter([(0.5, 0.2), (0.25, 0.3), (0.4, 0.125), (0.9, 0.9), (0.9, 0.9)])
 
     class Engine:
@@ -151,7 +154,7 @@ def test_a_capture_and_its_transfer_are_timed_apart(clock: Clock) -> None:
     assert engine.strobe_read.__func__ is Engine.strobe_read  # type: ignore[attr-defined]
 
 
-def test_rates_on_the_bus_are_of_each_route_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_i2c_rates_are_measured_on_each_working_route(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = list[list[str]]()
 
     def run(command: list[str], **_options: Any) -> SimpleNamespace:
@@ -165,11 +168,9 @@ def test_rates_on_the_bus_are_of_each_route_that_works(monkeypatch: pytest.Monke
     assert all(command[command.index("--hz") + 1] == "400000" for command in asked)
 
 
-def test_the_program_on_the_bus_tells_the_median_rate(
+def test_i2c_client_prints_the_median_rate(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    import sys
-
     now_s = 0.0
 
     def read_byte_data(address: int, register: int) -> int:
@@ -185,14 +186,13 @@ def test_the_program_on_the_bus_tells_the_median_rate(
     assert float(capsys.readouterr().out) == pytest.approx(1000, rel=0.01)
 
 
-def test_all_of_cubestar_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cubestar_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
 
     one, asked = Device(clock), list[dict[str, Any]]()
     monkeypatch.setattr(cubestar, "power_up", powered(one, asked))
-    monkeypatch.setattr(cubestar, "rtl_clocks_per_s", lambda: 1000.4)
-    monkeypatch.setattr(cubestar, "strides_per_s", lambda: 2000.6)
-    monkeypatch.setattr(cubestar, "strobes_per_s", lambda: 3000.2)
-    monkeypatch.setattr(cubestar, "instructions_per_s", lambda: 4000.7)
+    names = ("rtl_clocks_per_s", "strides_per_s", "strobes_per_s", "instructions_per_s")
+    for name, rate in zip(names, (1000.4, 2000.6, 3000.2, 4000.7), strict=True):
+        monkeypatch.setattr(cubestar, name, lambda rate=rate: rate)
     monkeypatch.setattr(cubestar, "cold_build_s", lambda wiring: built(wiring, 5.678))
     monkeypatch.setattr(cubestar, "_capture", lambda _emulated: {"capture_wall_ms": 1.0})
     monkeypatch.setattr(cubestar, "_i2c", lambda: {"i2c_seccomp_fast": 7.0})
@@ -213,7 +213,7 @@ def test_all_of_cubestar_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPat
     assert asked[0] == {"engine": "compiled"}
 
 
-def test_all_of_cubesense_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cubesense_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     from cubestack.emulator.boards.cubesense import benchmark as board
 
     monkeypatch.setattr(cubesense, "power_up", powered(Device(clock), []))
@@ -227,7 +227,7 @@ def test_all_of_cubesense_is_measured(clock: Clock, monkeypatch: pytest.MonkeyPa
     assert set(found) == set(cubesense.BENCHMARK.figures)
 
 
-def test_aramis_is_measured_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_aramis_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes pictures in its loop, where one that is not active would only refuse to."""
     monkeypatch.setattr(benchmark, "ROUNDS", 1)
     monkeypatch.setattr(aramis, "LOOP_S", 1)
@@ -239,24 +239,20 @@ def test_aramis_is_measured_at_work(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """Devices whose benchmarks cost nothing, and one that has none."""
-    names = iter(BUILT_IN)
+
+    def benchmark_of(name: str) -> Benchmark:
+        return Benchmark({name: f"of {name}"}, lambda _one: {name: 1234.5})
+
     made = [
-        replace(
-            device(name),
-            studies={
-                "bench": lambda name=name: Benchmark(
-                    {name: f"of {name}"}, lambda _one: {name: 1234.5}
-                )
-            },
-        )
-        for name in names
+        replace(device(name), studies={"bench": lambda name=name: benchmark_of(name)})
+        for name in BUILT_IN
     ]
     made[1] = replace(made[1], studies={})
     monkeypatch.setattr(bench, "devices", lambda: made)
 
 
 @pytest.mark.usefixtures("measured")
-def test_every_device_with_a_benchmark_is_measured_and_told(run: Run) -> None:
+def test_command_measures_every_device_with_a_benchmark(run: Run) -> None:
     first, without, third = BUILT_IN
     found = run("bench", "--json")
     assert (found.code, json.loads(found.out)) == (0, {first: 1234.5, third: 1234.5})

@@ -1,7 +1,7 @@
-"""Calibrations: pictures of lights, what a reader is told, and what is refused."""
-
+import json
 from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -47,7 +47,7 @@ def calibrated(folder: Path, **more: Any) -> list[cubesense.CalibrateResult]:
     return list(cubesense.EXPERIMENT.run(Opener(device("cubesense")), options))
 
 
-def test_a_lens_is_found_from_pictures_of_lights(lights: Path) -> None:
+def test_fits_a_lens_to_pictures_of_lights(lights: Path) -> None:
     (found,) = calibrated(lights, out=lights / "out.json")
     assert (found.sensor, found.places) == ("sun", len(ANGLES))
     assert found.boresight_px == pytest.approx((322.5, 239.0), abs=0.1)
@@ -55,8 +55,6 @@ def test_a_lens_is_found_from_pictures_of_lights(lights: Path) -> None:
     assert (found.error_before_deg, found.error_after_deg) == (None, None)
     fitted = Fisheye(*found.boresight_px, found.factors, PIXELS_PER_DEGREE, 95.0)
     np.testing.assert_allclose(fitted.project(ANGLES), TRUE.project(ANGLES), atol=0.2)
-    import json
-
     told = json.loads((lights / "out.json").read_text("utf-8"))
     assert set(told) == {"sun"}
     assert told["sun"]["places"] == found.places
@@ -72,20 +70,20 @@ def test_a_lens_is_found_from_pictures_of_lights(lights: Path) -> None:
         ("file,alpha_deg,beta_deg\nnone.png,1,2\n", "none.png"),
     ],
 )
-def test_a_line_that_is_wrong_is_named(lights: Path, text: str, message: str) -> None:
+def test_names_an_invalid_line_of_angles(lights: Path, text: str, message: str) -> None:
     (lights / "angles.csv").write_text(text, "utf-8")
     with pytest.raises(ValueError, match=message):
         calibrated(lights)
 
 
-def test_angles_that_can_not_be_read_are_named(lights: Path) -> None:
+def test_names_a_missing_angles_file(lights: Path) -> None:
     (lights / "angles.csv").unlink()
     with pytest.raises(ValueError, match=r"angles\.csv can not be read: No such file"):
         calibrated(lights)
 
 
 @pytest.mark.parametrize(("above", "seen"), [(19, False), (21, True)])
-def test_a_light_is_20_grey_values_above_its_background(
+def test_light_is_at_least_20_grey_values_above_background(
     lights: Path, above: int, seen: bool
 ) -> None:
     picture = np.full((480, 640), 30, np.uint8)
@@ -103,7 +101,7 @@ RESULT = cubesense.CalibrateResult(
 )
 
 
-def test_a_reader_sees_the_parameters_of_the_telecommands() -> None:
+def test_summary_has_the_telecommand_parameters() -> None:
     lines = list(cubesense.EXPERIMENT.summarise([RESULT], 2.0))
     assert lines == [
         "nadir: 900 places; 1.250 px from the tables",
@@ -113,8 +111,6 @@ def test_a_reader_sees_the_parameters_of_the_telecommands() -> None:
         "  error at random poses: mean 0.500 deg before, 0.062 deg after",
         "2.0 s wall time",
     ]
-    from dataclasses import replace
-
     pictures = replace(RESULT, sensor="sun", error_before_deg=None, error_after_deg=None)
     lines = list(cubesense.EXPERIMENT.summarise([pictures], 2.0))
     assert "  Boresight1 X=371.25 Y=236.50" in lines
@@ -130,7 +126,7 @@ def test_a_reader_sees_the_parameters_of_the_telecommands() -> None:
         ({"images": "x", "angles": "y", "sensor": "sun", "scene": "z"}, "without --scene"),
     ],
 )
-def test_what_does_not_go_together_is_refused(options: dict[str, Any], message: str) -> None:
+def test_rejects_options_that_exclude_each_other(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         cubesense.CalibrateOptions(**options)
 
@@ -156,8 +152,6 @@ class _Named(type(CUBESTAR)):  # type: ignore[misc]
 
 
 class _Powered:
-    """What an experiment gets of a unit."""
-
     def __call__(self, scene: object, **_options: object) -> nullcontext[SimpleNamespace]:
         client = iter(Rotation.random(20, random_state=3))
         return nullcontext(SimpleNamespace(scene=scene, client=client))
@@ -166,7 +160,7 @@ class _Powered:
         return items
 
 
-def test_an_emulated_unit_s_principal_point_counts_from_the_sensor_s_corner(
+def test_principal_point_of_an_emulated_unit_counts_from_the_sensor_corner(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(calibrate, "GRID", (9, 5))  # quicker
@@ -179,18 +173,12 @@ def test_an_emulated_unit_s_principal_point_counts_from_the_sensor_s_corner(
 STARS = CalibrateResult(
     camera={"f_px": 1071.5, "cx_px": 512.25, "k1": -0.1},
     sigma={"f_px": 0.125, "cx_px": 0.25},
-    pairs_f_px=1071.25,
-    pictures=18,
-    tried=20,
-    stars=150,
-    rejected=3,
-    before_px=2.5,
-    after_px=0.0625,
-    lens_px=0.015625,
+    **{"pictures": 18, "tried": 20, "stars": 150, "rejected": 3},
+    **{"pairs_f_px": 1071.25, "before_px": 2.5, "after_px": 0.0625, "lens_px": 0.015625},
 )
 
 
-def test_a_reader_sees_the_camera_with_its_deviations() -> None:
+def test_summary_has_the_camera_with_sigmas() -> None:
     assert list(CUBESTAR.summarise([STARS], 1.5)) == [
         "150 stars of 18 pictures (20 tried, 3 stars left out)",
         "f_px     1071.50000 +- 0.12500",
@@ -200,8 +188,6 @@ def test_a_reader_sees_the_camera_with_its_deviations() -> None:
         "from the emulated unit's own lens: 0.016 px",
         "1.5 s wall time",
     ]
-    from dataclasses import replace
-
     unknown = list(CUBESTAR.summarise([replace(STARS, pairs_f_px=None, lens_px=None)], 1.5))
     assert not any("star pairs" in line or "own lens" in line for line in unknown)
 
@@ -214,12 +200,12 @@ def test_a_reader_sees_the_camera_with_its_deviations() -> None:
         ({"out": "no/such/x.json"}, "--out must be a file NAME.json"),
     ],
 )
-def test_options_of_star_trackers_that_make_no_sense(options: Any, message: str) -> None:
+def test_rejects_invalid_star_tracker_options(options: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         CalibrateOptions(**options)
 
 
-def test_pictures_are_those_of_a_folder_in_the_order_of_their_names(tmp_path: Path) -> None:
+def test_pictures_of_a_folder_are_sorted_by_name(tmp_path: Path) -> None:
     assert CalibrateOptions().pictures == []
     with pytest.raises(ValueError, match="has no pictures: "):
         CalibrateOptions(images=tmp_path).pictures  # noqa: B018

@@ -1,5 +1,3 @@
-"""Blocks of frames, of which some fail."""
-
 import pytest
 
 from cubestack.host.studies.campaign import block as blocks
@@ -11,7 +9,7 @@ def of(frames: int, device: str = "cubestar") -> FrameBlock:
     return FrameBlock(4, device, {"false_stars": 2}, {"false_stars": 2}, frames, 77)
 
 
-def test_rows_say_what_became_of_each_frame(failing: set[float]) -> None:
+def test_rows_have_the_outcome_of_each_frame(failing: set[float]) -> None:
     assert not failing
     rows = perform(of(40))
     assert [row.key for row in rows] == [(4, number) for number in range(40)]
@@ -22,12 +20,12 @@ def test_rows_say_what_became_of_each_frame(failing: set[float]) -> None:
     assert len({row.outcome for row in rows}) == 3
 
 
-def test_no_row_tells_how_long_it_took(failing: set[float]) -> None:
+def test_rows_contain_no_durations(failing: set[float]) -> None:
     assert not failing
     assert perform(of(5)) == perform(of(5))
 
 
-def test_a_frame_that_fails_is_a_row_and_the_others_are_measured(failing: set[float]) -> None:
+def test_failed_frame_is_a_row_and_others_are_measured(failing: set[float]) -> None:
     failing.add(0.8)
     rows = perform(of(40))
     assert [row.row for row in rows] == list(range(40))
@@ -45,13 +43,13 @@ def _results(seed: int):  # type: ignore[no-untyped-def]
     return blocks.measure("cubestar", frames=40, seed=seed, false_stars=2)
 
 
-def test_a_frame_of_two_cameras_has_two_rows() -> None:
+def test_frame_of_two_cameras_has_two_rows() -> None:
     assert rows_of(FrameBlock(0, "cubesense", {}, {}, 5, 1)) == 10
     assert rows_of(FrameBlock(0, "cubesense", {"sensor": "sun"}, {}, 5, 1)) == 5
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_a_real_device(profile: str) -> None:
+def test_block_of_a_real_device(profile: str) -> None:
     (one,) = CampaignPlan(
         device="cubestar", frames=2, seed=3, options={"profile": profile}
     ).blocks()

@@ -1,5 +1,3 @@
-"""`cubestack campaign`: runs, goes on, replays, and says in one line what is wrong."""
-
 import json
 from pathlib import Path
 
@@ -10,7 +8,7 @@ from cubestack.host.cli.main import main
 TEXT = 'device = "cubestar"\nframes = 2\nseed = 4\nblock = 1\n[grid]\nfalse_stars = [0, 10]\n'
 
 
-def test_a_campaign_from_begin_to_replay(
+def test_run_resume_report_and_replay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -23,12 +21,8 @@ def test_a_campaign_from_begin_to_replay(
     assert "--resume continues it" in capsys.readouterr().err
     assert main(["campaign", "false.toml", "--resume", "--workers", "1"]) == 0
     assert "right" in capsys.readouterr().out
-    assert (
-        main(
-            ["campaign", "report", "false.campaign", "--compare", "false.campaign", "--worst", "1"]
-        )
-        == 0
-    )
+    report = ["report", "false.campaign", "--compare", "false.campaign", "--worst", "1"]
+    assert main(["campaign", *report]) == 0
     assert "wrote false.campaign/report.html and 4 figures" in capsys.readouterr().err
     rows = Path("false.campaign/rows.jsonl").read_text("utf-8").splitlines()
     assert main(["campaign", "replay", "false.campaign", "3"]) == 0
@@ -48,7 +42,7 @@ def test_a_campaign_from_begin_to_replay(
         (["replay", "nowhere", "1"], "nowhere is no campaign's folder"),
     ],
 )
-def test_what_is_wrong_is_one_line(
+def test_rejects_wrong_arguments_in_one_line(
     words: list[str],
     error: str,
     tmp_path: Path,

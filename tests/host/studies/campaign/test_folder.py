@@ -1,5 +1,3 @@
-"""Folders of campaigns: what they refuse, and what they lose: nothing but what was torn."""
-
 import errno
 import json
 from pathlib import Path
@@ -16,7 +14,7 @@ def rows(block: int, count: int = 3) -> list[Row]:
     return [Row(block, row, 1, row, {}, "right", "", {"x": 0.1}) for row in range(count)]
 
 
-def test_rows_come_back_as_they_were_added(tmp_path: Path, plan: CampaignPlan) -> None:
+def test_rows_are_read_as_written_and_sorted(tmp_path: Path, plan: CampaignPlan) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     folder.add(rows(1))
     folder.add(rows(0))
@@ -26,9 +24,7 @@ def test_rows_come_back_as_they_were_added(tmp_path: Path, plan: CampaignPlan) -
 
 
 @pytest.mark.parametrize("cut", range(1, 200, 13))
-def test_a_torn_block_is_taken_out_and_nothing_else(
-    tmp_path: Path, plan: CampaignPlan, cut: int
-) -> None:
+def test_repair_removes_only_a_torn_block(tmp_path: Path, plan: CampaignPlan, cut: int) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     folder.add(rows(2))
     folder.add(rows(1))
@@ -38,7 +34,7 @@ def test_a_torn_block_is_taken_out_and_nothing_else(
     assert list(folder.rows()) == rows(2)
 
 
-def test_a_folder_is_resumed_only_with_the_same_plan(tmp_path: Path, plan: CampaignPlan) -> None:
+def test_resume_needs_the_same_plan(tmp_path: Path, plan: CampaignPlan) -> None:
     Folder.begun(tmp_path / "c", plan, resume=True)
     assert Folder.begun(tmp_path / "c", plan, resume=True).plan == plan
     with pytest.raises(FolderError, match="already has a campaign; --resume continues"):
@@ -48,7 +44,7 @@ def test_a_folder_is_resumed_only_with_the_same_plan(tmp_path: Path, plan: Campa
         Folder.begun(tmp_path / "c", other, resume=True)
 
 
-def test_a_folder_of_another_version_is_not_mixed(tmp_path: Path, plan: CampaignPlan) -> None:
+def test_resume_rejects_another_version(tmp_path: Path, plan: CampaignPlan) -> None:
     Folder.begun(tmp_path / "c", plan, resume=False)
     path = tmp_path / "c" / PLAN
     path.write_text(json.dumps(json.loads(path.read_text()) | {"version": "0.0.1"}))
@@ -64,20 +60,20 @@ def test_a_folder_of_another_version_is_not_mixed(tmp_path: Path, plan: Campaign
         ('{"plan": {}, "version": "1"}', "campaign.json: "),
     ],
 )
-def test_what_is_no_campaign_is_told(tmp_path: Path, told: str | None, error: str) -> None:
+def test_rejects_a_folder_that_is_no_campaign(tmp_path: Path, told: str | None, error: str) -> None:
     if told is not None:
         (tmp_path / PLAN).write_text(told)
     with pytest.raises(FolderError, match=error):
         Folder(tmp_path)
 
 
-def test_a_folder_with_other_files_is_left_alone(tmp_path: Path, plan: CampaignPlan) -> None:
+def test_rejects_a_folder_with_other_files(tmp_path: Path, plan: CampaignPlan) -> None:
     (tmp_path / "mine.txt").write_text("x")
     with pytest.raises(FolderError, match="is not empty and has no campaign"):
         Folder.begun(tmp_path, plan, resume=True)
 
 
-def test_only_one_process_works_on_a_campaign(tmp_path: Path, plan: CampaignPlan) -> None:
+def test_campaign_is_locked_by_one_process(tmp_path: Path, plan: CampaignPlan) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     with (
         folder.alone(),
@@ -87,7 +83,7 @@ def test_only_one_process_works_on_a_campaign(tmp_path: Path, plan: CampaignPlan
         pass
 
 
-def test_a_full_disk_is_told_by_its_file(
+def test_full_disk_names_the_file(
     tmp_path: Path, plan: CampaignPlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)

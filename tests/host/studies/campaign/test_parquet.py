@@ -1,6 +1,3 @@
-"""Rows as a Parquet file: each value in a column, read back by another library."""
-
-import sys
 from pathlib import Path
 
 import pyarrow.parquet
@@ -12,7 +9,7 @@ from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
 
 
-def test_a_column_for_each_value(failing: set[float], plan: CampaignPlan, tmp_path: Path) -> None:
+def test_each_value_has_a_column(failing: set[float], plan: CampaignPlan, tmp_path: Path) -> None:
     failing.add(0.9)
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows = list(run(folder, 1))
@@ -27,16 +24,8 @@ def test_a_column_for_each_value(failing: set[float], plan: CampaignPlan, tmp_pa
     assert {one["swept.false_stars"] for one in found} == {0, 9}
 
 
-def test_without_rows_there_is_no_file(plan: CampaignPlan, tmp_path: Path) -> None:
+def test_rejects_a_campaign_without_rows(plan: CampaignPlan, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     with pytest.raises(ValueError, match="has no rows yet"):
         parquet.write(folder)
     assert not (folder.path / parquet.FILE).exists()
-
-
-def test_what_is_missing_is_told(
-    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ValueError, match="pip install pyarrow"):
-        parquet.write(Folder.begun(tmp_path / "c", plan, resume=False))

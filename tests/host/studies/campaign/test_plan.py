@@ -1,5 +1,3 @@
-"""Plans: their blocks, and what is refused."""
-
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.host.studies.campaign.plan import CampaignPlan
+from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
+
+PAGE = Path(__file__).parents[4] / "docs" / "campaigns.md"
 
 TEXT = """
 device = "cubestar"
@@ -43,7 +44,7 @@ def test_every_combination_is_a_point(tmp_path: Path) -> None:
     assert all(3.5 <= limit <= 6 for limit in limits)
 
 
-def test_all_points_see_the_same_skies(tmp_path: Path) -> None:
+def test_all_points_have_the_same_skies(tmp_path: Path) -> None:
     plan = CampaignPlan.read(write(tmp_path / "a.toml"))
     seen: dict[Any, list[Any]] = {}
     for block in plan.blocks():
@@ -54,8 +55,7 @@ def test_all_points_see_the_same_skies(tmp_path: Path) -> None:
     assert len(set(first)) == len(first)
 
 
-def test_a_plan_that_tells_no_seed_is_that_of_seed_0() -> None:
-    """As with every command's --seed."""
+def test_seed_defaults_to_0() -> None:
     untold, zero, one = (
         [
             block.seed
@@ -75,7 +75,7 @@ def test_blocks_hold_all_frames(frames: int, size: int) -> None:
     assert len({block.seed for block in blocks}) == len(blocks)
 
 
-def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
+def test_paths_are_relative_to_the_plan(tmp_path: Path) -> None:
     write(tmp_path / "a.toml", 'device = "cubestar"\nframes = 1\n[grid]\nscene = ["x.toml"]\n')
     (block,) = CampaignPlan.read(tmp_path / "a.toml").blocks()
     assert block.options == {"scene": str(tmp_path / "x.toml")}
@@ -105,14 +105,32 @@ def test_files_are_found_from_the_plan_s_folder(tmp_path: Path) -> None:
         ("device = ", "Invalid value"),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path: Path, text: str, error: str) -> None:
+def test_rejects_invalid_plans(tmp_path: Path, text: str, error: str) -> None:
     with pytest.raises(ValueError, match=error) as caught:
         CampaignPlan.read(write(tmp_path / "a.toml", text))
     assert str(caught.value).startswith(f"{tmp_path / 'a.toml'}: ")
     assert "\n" not in str(caught.value)
 
 
-def test_the_plan_of_the_page(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[4] / "docs" / "campaigns.md").read_text("utf-8")
+def test_plan_of_the_page_is_valid(tmp_path: Path) -> None:
+    page = PAGE.read_text("utf-8")
     plan = CampaignPlan.read(write(tmp_path / "a.toml", page.split("```toml\n")[1].split("```")[0]))
     assert (plan.frames, len(plan.points)) == (1000, 8)
+
+
+@pytest.mark.parametrize("name", known_plans())
+def test_shipped_plan_is_valid_and_documented(name: str) -> None:
+    path = plan_file(name)
+    assert CampaignPlan.read(path).points
+    assert len(summary(path)) > 20
+    assert f"`{name}`" in PAGE.read_text("utf-8")
+
+
+def test_plan_name_prefers_a_file_and_must_exist(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=r"'seu-cubstar': give a .toml file, or .*seu-cubestar"):
+        plan_file("seu-cubstar")
+    (tmp_path / "seu-cubestar").write_text("", "utf-8")
+    assert plan_file("seu-cubestar") == Path("seu-cubestar")

@@ -1,5 +1,3 @@
-"""What a campaign's rows say together, and the page that shows it."""
-
 import re
 from base64 import b64decode
 from collections.abc import Callable, Sequence
@@ -52,7 +50,7 @@ def some(outcome: str, count: int, block: int = 1) -> dict[str, str]:
     return {f"{block}.{row}": outcome for row in range(count)}
 
 
-def test_rates_and_errors_are_those_of_the_rows(make: Make) -> None:
+def test_rates_and_errors_count_the_rows(make: Make) -> None:
     folder = make("a", some("refused", 20) | {"0.5": "failed"})
     few, many = rates(folder).values()
     assert (few["right"], few["failed"], many["right"], many["refused"]) == (119, 1, 100, 20)
@@ -64,12 +62,12 @@ def test_rates_and_errors_are_those_of_the_rows(make: Make) -> None:
 
 
 @pytest.mark.parametrize(("one", "other"), [(0, 0), (0, 1), (3, 9), (9, 3), (40, 41), (0, 30)])
-def test_chance_is_that_of_coins(one: int, other: int) -> None:
+def test_by_chance_is_a_binomial_test(one: int, other: int) -> None:
     expected = binomtest(one, one + other).pvalue if one + other else 1.0
     assert by_chance(one, other) == pytest.approx(expected)
 
 
-def test_a_change_is_told_where_it_is(make: Make) -> None:
+def test_comparison_finds_the_point_that_changed(make: Make) -> None:
     before, after = make("before", {}), make("after", some("refused", 20) | {"0.3": "wrong"})
     changes = {
         (dict(each.point)["false_stars"], each.outcome): each for each in compared(before, after)
@@ -82,12 +80,12 @@ def test_a_change_is_told_where_it_is(make: Make) -> None:
     assert [(each.outcome, each.worse) for each in back] == [("right", False)]
 
 
-def test_more_wrong_ones_are_worse(make: Make) -> None:
+def test_more_wrong_attitudes_are_worse(make: Make) -> None:
     changes = compared(make("before", {}), make("after", some("wrong", 30)))
     assert [each.outcome for each in changes if each.worse] == ["right", "wrong"]
 
 
-def test_only_the_same_skies_are_compared(make: Make, tmp_path: Path) -> None:
+def test_comparison_needs_the_same_skies(make: Make, tmp_path: Path) -> None:
     before = make("before", {})
     other = make("other", {}, seed=6)
     with pytest.raises(FolderError, match=r"other skies than .*: another seed"):
@@ -98,8 +96,6 @@ def test_only_the_same_skies_are_compared(make: Make, tmp_path: Path) -> None:
 
 
 class Page(HTMLParser):
-    """Sources and texts of a page."""
-
     def __init__(self, text: str) -> None:
         super().__init__()
         self.sources: list[str] = []
@@ -114,7 +110,7 @@ class Page(HTMLParser):
         self.cells.append(data)
 
 
-def test_the_page_holds_all_and_asks_for_nothing(make: Make) -> None:
+def test_report_page_is_self_contained(make: Make) -> None:
     folder = make("a", some("refused", 20) | {"0.5": "failed"})
     page, *figures = report.write(folder)
     assert [figure.name for figure in figures] == ["rates-false_stars.png", "error_deg.png"]
@@ -133,10 +129,9 @@ def test_the_page_holds_all_and_asks_for_nothing(make: Make) -> None:
     assert "false_stars = 9, hazard = ('moon',)" in told.cells
 
 
-def test_a_published_error_is_drawn_beside_errors_of_its_kind(
+def test_published_errors_are_marked_on_their_own_curve(
     make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """CubeStar's are across the boresight and about it; none is of the whole."""
     drawn = dict[str, list[float]]()
 
     def curves(name: str, _errors: object, marks: Sequence[tuple[float, str]]) -> bytes:
@@ -153,7 +148,7 @@ def test_a_published_error_is_drawn_beside_errors_of_its_kind(
     }
 
 
-def test_a_browser_shows_it_and_asks_for_nothing_else(make: Make, chromium: Any) -> None:
+def test_browser_shows_the_report_without_further_requests(make: Make, chromium: Any) -> None:
     page, *figures = report.write(make("a", some("refused", 20)))
     tab, asked = chromium.new_page(), list[str]()
     tab.on("request", lambda one: asked.append(one.url))
@@ -165,7 +160,7 @@ def test_a_browser_shows_it_and_asks_for_nothing_else(make: Make, chromium: Any)
     tab.close()
 
 
-def test_the_page_compares(make: Make) -> None:
+def test_report_page_shows_the_comparison(make: Make) -> None:
     before, after = make("before", {}), make("after", some("refused", 20))
     page, *_ = report.write(after, compared(before, after), before.path)
     cells = Page(page.read_text("utf-8")).cells
@@ -173,6 +168,6 @@ def test_the_page_compares(make: Make) -> None:
     assert f"Compared with {before.path}" in cells
 
 
-def test_without_rows_there_is_no_page(plan: CampaignPlan, tmp_path: Path) -> None:
+def test_report_rejects_a_campaign_without_rows(plan: CampaignPlan, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="has no rows yet"):
         report.write(Folder.begun(tmp_path / "c", plan, resume=False))

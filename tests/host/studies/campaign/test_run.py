@@ -1,15 +1,15 @@
-"""Campaigns of real devices: the same rows however many workers, kills or clusters."""
-
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cubestack.host.studies.campaign import block as blocks
+from cubestack.host.studies.campaign import run as running
 from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import count, replayed, run
@@ -29,7 +29,6 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def alone(small: Path, tmp_path_factory: pytest.TempPathFactory) -> Folder:
-    """What one worker makes of it."""
     folder = Folder.begun(
         tmp_path_factory.mktemp("c") / "alone", CampaignPlan.read(small), resume=False
     )
@@ -43,14 +42,14 @@ def content(folder: Path) -> bytes:
 
 
 @pytest.mark.slow
-def test_two_workers_make_the_same_file(alone: Folder, tmp_path: Path) -> None:
+def test_two_workers_write_the_same_file(alone: Folder, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "two", alone.plan, resume=False)
     assert len(list(run(folder, 2))) == 4
     assert content(folder.path) == content(alone.path)
 
 
 @pytest.mark.slow
-def test_a_cluster_makes_the_same_file(alone: Folder, tmp_path: Path) -> None:
+def test_cluster_writes_the_same_file(alone: Folder, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "cluster", alone.plan, resume=False)
     with dask_cluster() as cluster:
         list(run(folder, 1, cluster.scheduler_address))
@@ -59,7 +58,7 @@ def test_a_cluster_makes_the_same_file(alone: Folder, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kills", [1, 3])
-def test_kills_lose_only_blocks_in_flight(
+def test_kill_loses_only_blocks_in_progress(
     alone: Folder, small: Path, tmp_path: Path, kills: int
 ) -> None:
     out, generator = tmp_path / "killed", np.random.default_rng(8)
@@ -81,14 +80,9 @@ def test_kills_lose_only_blocks_in_flight(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [3, 0])
-def test_a_row_is_replayed(alone: Folder, number: int) -> None:
+def test_replay_reproduces_a_row(alone: Folder, number: int) -> None:
     row = list(alone.rows())[number]
-    again = replayed(alone, number)
-    assert blocks._plain(again) == row.result
-
-
-@pytest.mark.slow
-def test_what_cannot_be_replayed_is_told(alone: Folder) -> None:
+    assert blocks._plain(replayed(alone, number)) == row.result
     with pytest.raises(ValueError, match="has rows 0 to 3, not 4"):
         replayed(alone, 4)
 
@@ -101,7 +95,7 @@ def test_rates_are_counted_by_point(alone: Folder) -> None:
     assert found[(("false_stars", 0),)]["right"] == 2
 
 
-def test_what_is_there_is_not_measured_again(
+def test_resume_does_not_measure_existing_rows(
     failing: set[float], plan: CampaignPlan, tmp_path: Path
 ) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
@@ -118,7 +112,7 @@ def test_what_is_there_is_not_measured_again(
     assert ended[-3:] == ["failed"] * 3
 
 
-def test_where_everything_fails_nothing_is_kept(
+def test_no_rows_are_written_if_every_frame_fails(
     failing: set[float], plan: CampaignPlan, tmp_path: Path
 ) -> None:
     failing.add(-1.0)
@@ -127,3 +121,26 @@ def test_where_everything_fails_nothing_is_kept(
         list(run(folder, 1))
     assert (folder.path / PLAN).is_file()
     assert not list(folder.rows())
+
+
+@pytest.mark.usefixtures("failing")
+def test_rows_are_sorted_whichever_worker_ends_first(
+    plan: CampaignPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def performed_backwards(perform: Any, jobs: Any, *_workers: object) -> Iterator[Any]:
+        yield from ((job, perform(job)) for job in reversed(jobs))
+
+    def lines(folder: Folder) -> list[str]:  # wall times differ
+        return [
+            line.partition('"wall_ms"')[0] for line in content(folder.path).decode().splitlines()
+        ]
+
+    usual = Folder.begun(tmp_path / "usual", plan, resume=False)
+    list(run(usual, 1))
+    monkeypatch.setattr(running, "performed", performed_backwards)
+    other = Folder.begun(tmp_path / "other", plan, resume=False)
+    completed = [row.key for row in run(other, 1)]
+    keys = [row.key for row in other.rows()]
+    assert completed != keys == sorted(completed)
+    assert lines(other) == lines(usual)
+    assert [row.key for row in run(other, 1)] == keys

@@ -1,5 +1,3 @@
-"""The worst cases come first, with what the cameras saw."""
-
 from pathlib import Path
 
 from cubestack.host.studies.campaign.folder import Folder
@@ -8,7 +6,7 @@ from cubestack.host.studies.campaign.run import run
 from cubestack.host.studies.campaign.worst import worst
 
 
-def test_outcomes_first_then_errors(
+def test_worst_cases_are_sorted_by_outcome(
     tmp_path: Path, plan: CampaignPlan, failing: set[float]
 ) -> None:
     failing.add(0.9)
@@ -23,7 +21,7 @@ def test_outcomes_first_then_errors(
     assert not any(case.jpeg for case in cases)  # nothing was powered up
 
 
-def test_a_real_one_has_its_picture(tmp_path: Path) -> None:
+def test_worst_case_of_a_real_device_has_its_picture(tmp_path: Path) -> None:
     plan = CampaignPlan(device="cubestar", frames=2, options={"mag_limit": 3.8})
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     first, second = (row.result["error_cross_deg"] for row in run(folder, 1))

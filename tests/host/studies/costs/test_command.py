@@ -1,5 +1,3 @@
-"""`cubestack costs`: what a program costs as compiled code."""
-
 import json
 import shutil
 
@@ -14,17 +12,13 @@ COMPILER = "arm-none-eabi-gcc"
     ("option", "value", "known"),
     [("--level", "O9", "O0, O2, Os"), ("--precision", "half", "own, float, literals, double")],
 )
-def test_an_unknown_build_is_refused_in_one_line(
-    run: Run, option: str, value: str, known: str
-) -> None:
+def test_rejects_unknown_builds_in_one_line(run: Run, option: str, value: str, known: str) -> None:
     outcome = run("costs", "measure", option, value)
     assert outcome.code == 2
     assert outcome.line == f"cubestack costs: {option} must be one of {known}, not {value}"
 
 
-def test_without_the_compiler_it_says_what_to_install(
-    run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_compiler_names_the_package(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     from cubestack.emulator.boards.cubestar.compiled import build
 
     build.compiler_version.cache_clear()
@@ -35,7 +29,7 @@ def test_without_the_compiler_it_says_what_to_install(
 
 
 @pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
-def test_a_build_is_measured(run: Run) -> None:
+def test_measures_a_build(run: Run) -> None:
     outcome = run("costs", "measure", "--level", "Os", "--precision", "own", "--json")
     (build,) = json.loads(outcome.out)["builds"]
     assert build["build"] == "-Os own"

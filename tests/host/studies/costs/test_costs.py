@@ -1,8 +1,7 @@
-"""Costs of compiled code: what was measured once is what the page says, and how it is chosen."""
-
 import json
 import shutil
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,26 +19,25 @@ DOCS = Path(__file__).parents[4] / "docs"
 
 
 def recorded() -> list[CostMeasurement]:
-    """What was measured last."""
     data = json.loads(costs().file.read_text("utf-8"))
     return [CostMeasurement(**build) for build in data["builds"]]
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
-def test_the_table_of_the_page_is_that_of_the_data() -> None:
+def test_page_table_is_up_to_date() -> None:
     page = (DOCS / costs().document).read_text("utf-8")
     told = page.split("<!-- costs -->\n")[1].split("<!-- end of costs -->\n")[0].strip()
     assert costs().page(recorded()).strip() == told
 
 
-def test_all_phases_of_detection_and_matching_are_in_a_column() -> None:
+def test_columns_contain_all_phases_but_attitude() -> None:
     for one in recorded():
         shown = {phase for group in COLUMNS.values() for phase in group}
         assert one.phases.keys() - shown == {"attitude"}  # the published sum has none
         assert shown < one.phases.keys()
 
 
-def test_each_build_is_tried_and_two_with_other_memories() -> None:
+def test_cases_are_all_builds_and_two_with_other_memories() -> None:
     levels, kinds = costs().levels, costs().precisions
     cases = [(str(case.build), str(case.timing)) for case in _cases(levels, kinds)]
     assert cases == [(one.build, one.timing) for one in recorded()]
@@ -53,8 +51,8 @@ def test_each_build_is_tried_and_two_with_other_memories() -> None:
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"no {COMPILER}")
-def test_a_build_with_doubles_costs_what_was_recorded() -> None:
-    """Operands are doubles as well: a float that is converted has shorter functions."""
+def test_build_with_doubles_matches_the_recorded_costs() -> None:
+    """Operands must be doubles too: functions are shorter for a converted float."""
     (found,) = measure(["Os"], ["double"])
     if json.loads(costs().file.read_text("utf-8"))["compiler"] != compiler_version():
         pytest.skip("recorded of another compiler")
@@ -78,8 +76,6 @@ def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
     def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[CostMeasurement]:
         asked.append((levels, precisions))
         yield from BUILDS
-
-    from dataclasses import replace
 
     made = CostReport(
         levels=("O0", "O2"),
@@ -105,7 +101,7 @@ def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
 PAGE = "above\n<!-- costs -->\nold\n<!-- end of costs -->\nbelow\n"
 
 
-def test_operations_are_shown_beside_what_is_charged(run: Run, report: list[Any]) -> None:
+def test_table_compares_measured_and_charged_operations(run: Run, report: list[Any]) -> None:
     found = run("costs", "measure")
     assert found.code == 0
     lines = [line.split() for line in found.out.splitlines()]
@@ -120,13 +116,13 @@ def test_operations_are_shown_beside_what_is_charged(run: Run, report: list[Any]
     assert report == [(("O0", "O2"), ("own",))]
 
 
-def test_one_object_for_programs(run: Run, report: list[Any]) -> None:
+def test_json_is_one_object(run: Run, report: list[Any]) -> None:
     found = run("costs", "measure", "--level", "O2", "--json")
     assert json.loads(found.out) == {"builds": [one.build for one in BUILDS]}
     assert report == [(("O2",), ("own",))]
 
 
-def test_data_and_page_are_rewritten(run: Run, report: list[Any], tmp_path: Path) -> None:
+def test_write_updates_data_and_page(run: Run, report: list[Any], tmp_path: Path) -> None:
     assert run("costs", "measure", "--write").code == 0
     page = tmp_path / "docs" / "page.md"
     new = "above\n<!-- costs -->\n\n| 3 builds |\n\n<!-- end of costs -->\nbelow\n"
@@ -137,7 +133,7 @@ def test_data_and_page_are_rewritten(run: Run, report: list[Any], tmp_path: Path
 
 
 @pytest.mark.parametrize("cut", ["<!-- costs -->\n", "<!-- end of costs -->\n"])
-def test_a_page_without_a_place_is_told(
+def test_write_rejects_a_page_without_markers(
     run: Run, report: list[Any], tmp_path: Path, cut: str
 ) -> None:
     (tmp_path / "docs" / "page.md").write_text(PAGE.replace(cut, ""), "utf-8")
@@ -146,7 +142,7 @@ def test_a_page_without_a_place_is_told(
     assert "page.md has no <!-- costs -->" in found.err
 
 
-def test_without_such_a_device_it_says_so(
+def test_rejects_devices_without_compiled_costs(
     run: Run, report: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     devices = command.devices()[:1]

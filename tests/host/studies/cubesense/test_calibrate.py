@@ -1,5 +1,3 @@
-"""The error that is told before and after: what the sensor was told by then."""
-
 from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
@@ -15,8 +13,6 @@ LENS = Fisheye(300.0, 250.0, (0.5, 1.0, 0.0, 0.0, 0.0), 1.45, 95.0)
 
 
 class Bench:
-    """Opens one device for all its poses."""
-
     def __init__(self) -> None:
         self.client = Mock()
 
@@ -27,7 +23,7 @@ class Bench:
         return iter(views)
 
 
-def test_the_fitted_lens_is_loaded_between_the_two_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_fitted_lens_is_loaded_before_the_second_error(monkeypatch: pytest.MonkeyPatch) -> None:
     bench, options = Bench(), calibrate.CalibrateOptions(check_poses=3)
 
     def measured(*_: object) -> SimpleNamespace:

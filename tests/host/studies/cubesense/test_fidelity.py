@@ -1,4 +1,4 @@
-"""Figures of the fidelity page that are computed, by another way."""
+"""Figures of the fidelity page, computed in another way."""
 
 from itertools import combinations
 from typing import Any
@@ -10,7 +10,7 @@ from cubestack.emulator.camera.ov7620.fisheye import DISTORTION
 from cubestack.host.studies.cubesense.fidelity import _lens
 
 
-def test_the_discriminant_is_that_of_the_polynomial_s_roots() -> None:
+def test_discriminant_matches_the_roots_of_the_polynomial() -> None:
     nothing: Any = None
     differences = [one - other for one, other in combinations(np.roots(DISTORTION), 2)]
     expected = DISTORTION[0] ** 4 * np.prod(differences) ** 2

@@ -1,5 +1,3 @@
-"""How a CubeStar names the stars of a picture for its calibration."""
-
 from typing import Any
 
 import pytest
@@ -9,12 +7,7 @@ from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 
 
 class Unit:
-    """A CubeStar that was left tracking.
-
-    Attributes:
-        valid: whether it finds an attitude.
-        modes: of identification, at each picture.
-    """
+    """A CubeStar in tracking mode; ``modes`` are the identification modes of its pictures."""
 
     def __init__(self, valid: bool) -> None:
         self.valid = valid
@@ -36,7 +29,7 @@ class Unit:
 
 
 @pytest.mark.parametrize("valid", [True, False])
-def test_each_picture_is_lost_in_space_and_without_attitude_no_star_counts(valid: bool) -> None:
+def test_pictures_are_matched_lost_in_space_and_need_an_attitude(valid: bool) -> None:
     unit: Any = Unit(valid)
     assert EXPERIMENT.identify(unit) == (["a star"] if valid else [])
     assert unit.modes == [IdMode.LOST_IN_SPACE]

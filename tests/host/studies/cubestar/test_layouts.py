@@ -1,5 +1,3 @@
-"""What is calculated of the attitudes of a loop."""
-
 from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
@@ -29,7 +27,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, found: list[Found]) -> LayoutResul
     return layouts._measure(Layout.COPIED, lambda *_, **__: nullcontext(emulated), options)
 
 
-def test_an_attitude_ages_until_the_next_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_age_grows_until_the_next_attitude(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two a second that are 300 ms old when they come, at 100 mA."""
     turns = [Found(n * 10**12 // 2, 50.0 * n, 300.0, right=True) for n in range(5)]
     result = measured(monkeypatch, turns)
@@ -38,7 +36,7 @@ def test_an_attitude_ages_until_the_next_one(monkeypatch: pytest.MonkeyPatch) ->
     assert (result.power_mw, result.energy_mj) == (pytest.approx(330), pytest.approx(165))
 
 
-def test_of_one_attitude_there_is_no_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_attitude_has_no_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     result = measured(monkeypatch, [Found(10**12, 5.0, 300.0, right=None)])
     assert (result.attitudes, result.right, result.rate_hz) == (0, None, None)
     assert result.age_ms is result.oldest_ms is result.power_mw is result.energy_mj is None

@@ -1,5 +1,3 @@
-"""A night on a roof: which fields count, and how their scatter is put together."""
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
@@ -51,7 +49,7 @@ def opener(seen: list[Any]) -> Any:
     return opened
 
 
-def test_calm_fields_that_are_seen_are_pooled(asked: list[Any]) -> None:
+def test_scatter_is_pooled_over_calm_visible_fields(asked: list[Any]) -> None:
     found = night(opener(asked), 400)
     assert found["fields"] == len(GOOD)
     for place, name in enumerate(("ra", "dec", "roll")):
@@ -65,7 +63,7 @@ def test_calm_fields_that_are_seen_are_pooled(asked: list[Any]) -> None:
     assert found["most"] == pytest.approx(np.mean([12 + field for field in GOOD]))
 
 
-def test_fields_are_at_the_zenith_over_a_sidereal_day(asked: list[Any]) -> None:
+def test_fields_are_at_the_zenith_during_a_sidereal_day(asked: list[Any]) -> None:
     night(opener(asked), 10)
     scenes = [one for one in asked if hasattr(one, "quaternion")]
     asked_for = [one for one in asked if isinstance(one, SimpleNamespace)]
@@ -83,13 +81,13 @@ def test_fields_are_at_the_zenith_over_a_sidereal_day(asked: list[Any]) -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 3])
-def test_a_quick_run_is_of_one_field(asked: list[Any], frames: int) -> None:
+def test_quick_run_measures_one_field(asked: list[Any], frames: int) -> None:
     night(opener(asked), frames)
     asked_for = [one for one in asked if isinstance(one, SimpleNamespace)]
     assert [(one.count, one.interval_s) for one in asked_for] == [(3 + SETTLING, 1.0)]
 
 
-def test_an_attitude_that_names_no_star_rests_on_none(
+def test_attitude_without_matched_stars_counts_0(
     asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = module.log_lines
@@ -102,7 +100,7 @@ def test_an_attitude_that_names_no_star_rests_on_none(
     assert night(opener(asked), 1)["fewest"] == 0
 
 
-def test_without_a_field_there_is_nothing(
+def test_no_usable_field_gives_no_figures(
     asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "QUICK_FIELD", 1)
@@ -112,7 +110,7 @@ def test_without_a_field_there_is_nothing(
         assert night(opener(asked), 1) == {}
 
 
-def test_it_is_measured_end_to_end() -> None:
+def test_night_end_to_end() -> None:
     from cubestack.emulator.native.compiler import find_compiler
     from cubestack.host.studies.fidelity.table import Job, perform
 

@@ -1,5 +1,3 @@
-"""Stars of one picture, by whether it gave an attitude."""
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,7 +21,7 @@ TELEMETRY = {"DetectionSummary": {"NumStarsDetected": 9}, "NumIdStars": {"numIdS
         (True, False, TaskStatus.IDENTIFICATION_FAILED, (0, 0)),
     ],
 )
-def test_identities_are_judged_where_stars_have_some(
+def test_identities_are_judged_only_where_stars_are_identified(
     monkeypatch: pytest.MonkeyPatch,
     judged: bool,
     valid: bool,

@@ -1,5 +1,3 @@
-"""What the FPGAs of one board or two are doing, by their pins."""
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +18,7 @@ from cubestack.host.studies.cubestar.upsets import _state
         (2, "BOARD1_RNW BOARD2_ENABLE BOARD2_RNW", "reading"),
     ],
 )
-def test_a_device_stores_while_any_board_that_is_on_does(
+def test_state_is_storing_while_any_enabled_board_stores(
     boards: int, high: str, state: str
 ) -> None:
     engine: Any = SimpleNamespace(

@@ -1,5 +1,3 @@
-"""Which devices are shown, by the words of the command."""
-
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +26,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return seen
 
 
-def test_all_devices_are_shown_unless_one_is_named(
+def test_demo_shows_all_devices_or_the_named_one(
     run: Run, shown: list[str], tmp_path: Path
 ) -> None:
     first, *_, last = device_names()

@@ -1,9 +1,7 @@
-"""Demonstrations on devices of this process: what is told, written, and found."""
-
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.clients.cubestar.client import Attitude
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.rendered import cameras_of
@@ -27,7 +26,6 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 @pytest.fixture(autouse=True)
 def _here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Devices are powered up in this process."""
     seen = list[Target]()
 
     @contextmanager
@@ -100,7 +98,7 @@ def test_cubestar_solves_a_sky_and_a_picture(
     assert 2 < float(virtual_s) < 300
 
 
-def test_a_photograph_of_a_folder_has_its_camera_s_truth(tmp_path: Path) -> None:
+def test_photograph_has_the_truth_of_its_camera_file(tmp_path: Path) -> None:
     truth = (
         '{"images": {"missing.png": {}, "sky.png": '
         '{"quaternion_xyzw_inertial_to_camera": [0, 0, 0, 1]}}}'
@@ -117,9 +115,7 @@ def test_a_photograph_of_a_folder_has_its_camera_s_truth(tmp_path: Path) -> None
     assert cubestar._photograph(tmp_path / "none").camera is None
 
 
-def test_the_other_sign_is_the_same_attitude(capsys: pytest.CaptureFixture[str]) -> None:
-    from cubestack.host.clients.cubestar.client import Attitude
-
+def test_quaternion_of_either_sign_is_the_same_attitude(capsys: pytest.CaptureFixture[str]) -> None:
     found: Any = replace(_attitude(Attitude), quaternion=np.array([0.0, 0.0, 0.6, 0.8]))
     for sign in (1, -1):
         cubestar._report(found, sign * found.quaternion)
@@ -130,12 +126,10 @@ def test_the_other_sign_is_the_same_attitude(capsys: pytest.CaptureFixture[str])
 
 
 def _attitude(kind: Any) -> Any:
-    from dataclasses import fields
-
     return kind(**{field.name: 5 for field in fields(kind)} | {"valid": True})
 
 
-def test_cubesense_finds_both(
+def test_cubesense_finds_sun_and_nadir(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     line = SimpleNamespace(close=lambda: None)
@@ -159,7 +153,7 @@ def test_cubesense_finds_both(
     assert np.median(nadir[240:300, 280:340]) > 100  # the Earth
 
 
-def test_a_download_tells_its_progress() -> None:
+def test_download_calls_the_progress_function() -> None:
     picture = np.zeros((2, 2), np.uint8)
 
     def fetch(progress: Any) -> NDArray[np.uint8]:

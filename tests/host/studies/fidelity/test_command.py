@@ -1,5 +1,3 @@
-"""What `cubestack fidelity` tells while it measures."""
-
 from types import SimpleNamespace
 
 import pytest
@@ -8,7 +6,7 @@ from cubestack.host.studies.fidelity import command as fidelity
 from cubestack.host.studies.fidelity.table import Job
 
 
-def test_the_rest_takes_as_much_longer_as_the_done_took(
+def test_remaining_time_scales_with_the_time_so_far(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Jobs of 10, 20 and 30 s on a machine that needs twice as long."""
@@ -23,7 +21,7 @@ def test_the_rest_takes_as_much_longer_as_the_done_took(
     ]
 
 
-def test_a_quiet_one_counts_and_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quiet_counts_without_output(capsys: pytest.CaptureFixture[str]) -> None:
     job = Job("cubestar", "loop", "published", 1, 10.0)
     told = fidelity._Rest([job, job], quiet=True)
     assert [told(job), told(job)] == [1, 2]

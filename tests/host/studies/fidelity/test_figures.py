@@ -1,5 +1,3 @@
-"""Figures of the fidelity pages: those that cost little are measured anew, the sums are checked."""
-
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,40 +28,26 @@ CHEAP = [
 ]
 
 
-def cells_of(device: str) -> Iterator[tuple[Row, *tuple[str, ...]]]:
-    """Rows, and the page's cells of each."""
+def measured_cells(device: str) -> Iterator[tuple[Row, list[str]]]:
+    """Rows, and the page's cells of both profiles."""
     wanted = fidelity_of(device)
     page = (DOCS / wanted.page).read_text(encoding="utf-8")
     for table, rows in wanted.tables.items():
         begin, end = fidelity.marks(table)
         lines = page.split(begin)[1].split(end)[0].strip().splitlines()[2:]
         for row, line in zip(rows, lines, strict=True):
-            yield row, *line.removeprefix("| ").removesuffix(" |").split(" | ")
-
-
-def told(device: str) -> Iterator[tuple[Row, str, str]]:
-    """Rows, and what the page has of them in each profile."""
-    for row, _figure, _source, _published, *ours, _word, _command in cells_of(device):
-        yield row, ours[0], ours[1]
-
-
-@pytest.mark.parametrize("device", BUILT_IN)
-def test_a_page_names_the_command_that_measures_the_row(device: str) -> None:
-    """Were another magnitude or number of frames measured, the page would tell the old one."""
-    declared = fidelity_of(device)
-    for row, *_, word, command in cells_of(device):
-        assert (word, command) == (row.word, f"`{declared.command(device, row)}`"), row.key
+            yield row, line.removeprefix("| ").removesuffix(" |").split(" | ")[3:5]
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="the whole stack needs the compiled FPGA")
 @pytest.mark.parametrize(("device", "name"), CHEAP)
-def test_a_figure_is_still_what_the_page_says(device: str, name: str) -> None:
+def test_figure_matches_the_page(device: str, name: str) -> None:
     trial = fidelity_of(device).trials[name]
     found = [
         perform(Job(device, name, profile, trial.frames, 1.0))
         for profile in (("published", "extended") if trial.profiles else ("published",))
     ]
-    rows = [(row, cells) for row, *cells in told(device) if row.trial == name]
+    rows = [(row, cells) for row, cells in measured_cells(device) if row.trial == name]
     assert rows
     for row, cells in rows:
         for figures, cell in zip([*found, found[-1]], cells, strict=False):
@@ -74,21 +58,13 @@ def test_a_figure_is_still_what_the_page_says(device: str, name: str) -> None:
 
 
 def shot(detected: int, matched: int, wrong: int = 0, **more: Any) -> Shot:
-    """A right one with its stars."""
     usual = {"valid": True, "right": True, "tracked": False, "cross_deg": 0.01}
     return Shot(**usual | more, detected=detected, matched=matched, wrong=wrong)
 
 
-def test_rates_of_a_field_count_what_is_right_and_what_is_wrong(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    shots = [
-        shot(10, 10),
-        shot(10, 5, 2),
-        shot(8, 4, 2, right=False),
-        shot(5, 2, valid=False, right=False),
-        shot(0, 0, valid=False, right=False),
-    ]
+def test_field_rates_count_right_and_wrong_attitudes(monkeypatch: pytest.MonkeyPatch) -> None:
+    shots = [shot(10, 10), shot(10, 5, 2), shot(8, 4, 2, right=False)]
+    shots += [shot(*stars, valid=False, right=False) for stars in ((5, 2), (0, 0))]
     monkeypatch.setattr(cubestar, "field_shots", lambda _opened, frames, **_: shots[:frames])
     found = cubestar._field(None, 5)  # type: ignore[arg-type]
     assert found == {
@@ -100,7 +76,9 @@ def test_rates_of_a_field_count_what_is_right_and_what_is_wrong(
     }
 
 
-def test_of_a_sky_the_first_picture_can_not_be_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tracked_share_leaves_out_the_first_picture_of_a_sky(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     one = [shot(10, 8), *[shot(10, 10, tracked=True, cross_deg=0.03)] * 6, *[shot(10, 7)] * 3]
     two = [shot(0, 0, valid=False, right=False, cross_deg=np.nan)] * 2
     two += [shot(6, 6, right=False, cross_deg=0.5)]
@@ -122,7 +100,7 @@ def attitude(cross: float, roll: float = 0.0, **more: Any) -> SimpleNamespace:
     return SimpleNamespace(error_cross_deg=cross, error_roll_deg=roll, **usual | more)
 
 
-def test_errors_of_cubestar_are_of_right_ones_and_times_of_full_pictures() -> None:
+def test_cubestar_errors_count_right_attitudes_and_times_full_pictures() -> None:
     times = {"detect": 100.0, "match": 20.0, "attitude": 5.0}
     results = [attitude(0.001 * n, -0.002 * n) for n in range(101)]
     results += [attitude(3.0, 2.0, right=False), attitude(9.0, right=False, solved=False)]
@@ -141,14 +119,14 @@ def test_errors_of_cubestar_are_of_right_ones_and_times_of_full_pictures() -> No
     assert (found["algorithms_ms"], found["match_ms"], found["quest_ms"]) == (120, 40, 40)
 
 
-def test_without_a_right_or_full_one_cubestar_has_no_figure() -> None:
+def test_cubestar_without_right_attitudes_has_no_errors() -> None:
     found = cubestar._attitudes([attitude(3.0, right=False)])  # type: ignore[list-item]
     assert (found["right"], found["off"]) == (0, 100)
     rest = {name: value for name, value in found.items() if name not in ("right", "off")}
     assert all(np.isnan(value) for value in rest.values())
 
 
-def test_errors_of_aramis_are_in_arcsec_and_endings_are_counted() -> None:
+def test_aramis_errors_are_in_arcsec_and_outcomes_are_counted() -> None:
     results = [attitude(n / 3600, -2 * n / 3600, far=False, outcome="unique") for n in range(10)]
     results += [attitude(1.0, right=False, far=True, outcome="unique")]
     for ending in ("ambiguous", "ambiguous", "none"):
@@ -164,7 +142,7 @@ def test_errors_of_aramis_are_in_arcsec_and_endings_are_counted() -> None:
     assert found["roll95"] == pytest.approx(np.quantile(range(0, 20, 2), 0.95))
 
 
-def test_without_a_right_one_aramis_has_no_error() -> None:
+def test_aramis_without_right_attitudes_has_no_errors() -> None:
     found = aramis._attitudes(  # type: ignore[list-item]
         [attitude(1.0, right=False, solved=False, far=None, outcome="none")]
     )
@@ -172,7 +150,7 @@ def test_without_a_right_one_aramis_has_no_error() -> None:
     assert all(np.isnan(found[name]) for name in ("cross", "cross95", "roll95"))
 
 
-def test_cubesense_has_sigma_and_mean_on_each_axis_and_in_bands() -> None:
+def test_cubesense_figures_per_axis_and_per_band() -> None:
     rng = np.random.default_rng(5)
     truth, off = rng.uniform(-70, 70, (60, 2)), rng.normal(0.1, 0.3, (60, 2))
     phases = {"wait": 10.0, "store": 20.0, "total": 50.0}
@@ -211,7 +189,7 @@ def test_cubesense_has_sigma_and_mean_on_each_axis_and_in_bands() -> None:
     assert found["sigma_ms"] == pytest.approx(np.std(range(60)))
 
 
-def test_the_sun_is_measured_up_to_the_very_side() -> None:
+def test_sun_errors_at_90_degrees() -> None:
     one = {"alpha_deg": 90.05, "beta_deg": 0.0, "error_deg": 0.05, "edges": None, "detected": True}
     truth = {"truth_alpha_deg": 90.0, "truth_beta_deg": 0.0}
     times = {"phase_ms": {"wait": 1.0, "store": 1.0, "total": 2.0}}
@@ -232,10 +210,7 @@ def test_the_sun_is_measured_up_to_the_very_side() -> None:
     assert np.isnan(found["worst_rest"])
 
 
-def test_the_sun_stands_still_at_the_angles_that_the_row_names(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Results there scatter by a part of the angle: the largest is told."""
+def test_still_sun_is_measured_at_the_angles_of_the_row(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[float] = []
 
     def found_at(_device: str, *, frames: int, scene: Any, **_: Any) -> list[SimpleNamespace]:
@@ -259,20 +234,20 @@ compiled = pytest.mark.skipif(find_compiler() is None, reason="needs the compile
 
 
 @compiled
-def test_drawn_stars_are_found_within_a_hundredth_of_a_pixel() -> None:
+def test_centroid_errors_are_below_0_01_px() -> None:
     found = perform(Job("cubestar", "centroids", "extended", 1, 1.0))
     assert 0 < found["x"] < 0.01
     assert 0 < found["y"] < 0.01
 
 
 @compiled
-def test_spots_are_as_large_as_they_are_told() -> None:
+def test_spot_sizes_are_within_their_limits() -> None:
     found = perform(Job("cubestar", "spots", "published", 1, 1.0))
     assert 8 <= found["low"] < found["middle"] < found["high"] <= 40
 
 
 @compiled
-def test_a_turn_of_the_loop_has_the_published_times() -> None:
+def test_loop_has_the_published_times() -> None:
     found = perform(Job("cubestar", "loop", "published", 2, 1.0))
     parts = ("discard", "capture", "transfer", "detect", "match", "attitude")
     assert sum(found[part] for part in parts) < found["loop_total"] + 200
@@ -285,7 +260,7 @@ def test_a_turn_of_the_loop_has_the_published_times() -> None:
 
 @compiled
 @pytest.mark.parametrize(("name", "least"), [("v3.8-exact", 90), ("false1-lis", 60)])
-def test_the_published_field_is_identified(name: str, least: float) -> None:
+def test_published_field_is_identified(name: str, least: float) -> None:
     found = perform(Job("cubestar", name, "extended", 2, 1.0))
     assert (found["three"], found["right"], found["star_wrong"], found["off"]) == (100, 100, 0, 0)
     assert found["share"] > least
@@ -293,7 +268,7 @@ def test_the_published_field_is_identified(name: str, least: float) -> None:
 
 
 @compiled
-def test_a_slow_turn_is_tracked_and_a_fast_one_is_lost() -> None:
+def test_slow_slew_is_tracked_and_fast_slew_is_lost() -> None:
     slow = perform(Job("cubestar", "slew-0.0635", "extended", 3, 1.0))
     assert (slow["right"], slow["tracked"]) == (100, 100)
     assert slow["cross"] < 0.01

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.host.cli.main import make_parser
 from cubestack.host.devices.registry import BUILT_IN, device
 from cubestack.host.studies.fidelity import contract as declared
 from cubestack.host.studies.fidelity import table as fidelity
@@ -18,7 +19,7 @@ ROOT = Path(__file__).parents[4]
 LEAST_ROWS = 60
 
 
-def test_there_are_enough_rows_and_no_key_twice() -> None:
+def test_rows_have_unique_keys() -> None:
     keys = {name: [row.key for row in fidelity_of(name).rows] for name in BUILT_IN}
     assert sum(map(len, keys.values())) >= LEAST_ROWS
     for name, own in keys.items():
@@ -26,7 +27,7 @@ def test_there_are_enough_rows_and_no_key_twice() -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_every_trial_serves_a_row_and_every_row_has_one(name: str) -> None:
+def test_trials_and_rows_belong_together(name: str) -> None:
     rows = list(fidelity_of(name).rows)
     assert {row.trial for row in rows} == set(fidelity_of(name).trials)
     assert all(all((row.figure, row.source, row.published, row.ours)) for row in rows)
@@ -37,7 +38,7 @@ def test_every_trial_serves_a_row_and_every_row_has_one(name: str) -> None:
     "name",
     [pytest.param(name, marks=() if name == "aramis" else pytest.mark.slow) for name in BUILT_IN],
 )
-def test_a_quick_run_gives_every_row_a_value_in_both_profiles(run: Run, name: str) -> None:
+def test_quick_run_measures_every_row_in_both_profiles(run: Run, name: str) -> None:
     lines = run("fidelity", name, "--quick", "--json", "--workers", "1").out.splitlines()
     rows = [json.loads(line) for line in lines]
     assert [row["key"] for row in rows] == [row.key for row in fidelity_of(name).rows]
@@ -49,15 +50,13 @@ def test_a_quick_run_gives_every_row_a_value_in_both_profiles(run: Run, name: st
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_commands_of_the_rows_are_real(name: str) -> None:
-    from cubestack.host.cli.main import make_parser
-
+def test_commands_of_the_rows_are_valid(name: str) -> None:
     parser, declared = make_parser(), fidelity_of(name)
     for command in {declared.command(name, row) for row in declared.rows}:
         parser.parse_args(command.split())
 
 
-def test_rows_are_chosen_by_their_keys(run: Run) -> None:
+def test_rows_are_selected_by_key(run: Run) -> None:
     out = run("fidelity", "cubesense", "--rows", "power-*", "--workers", "1").out
     assert "table 7.1" in out
     assert "equation" not in out
@@ -66,7 +65,7 @@ def test_rows_are_chosen_by_their_keys(run: Run) -> None:
     assert refused.line.startswith("cubestack fidelity: no row is like colour")
 
 
-def test_a_part_is_not_written_to_the_pages(run: Run) -> None:
+def test_write_needs_all_rows(run: Run) -> None:
     refused = run("fidelity", "--write", "--quick")
     assert refused.code == 2
     assert "--write wants all rows" in refused.line
@@ -78,14 +77,14 @@ def lens_jobs() -> list[Job]:
     return fidelity.jobs_of("cubesense", rows)
 
 
-def test_several_processes_find_what_one_does(lens_jobs: list[Job]) -> None:
+def test_several_workers_give_the_same_figures(lens_jobs: list[Job]) -> None:
     told: list[Job] = []
     alone = fidelity.run_jobs(lens_jobs, 1, told.append)
     assert fidelity.run_jobs(lens_jobs, 2, told.append) == alone
     assert sorted(map(str, told)) == sorted(2 * [str(job) for job in lens_jobs])
 
 
-def test_fitted_power_is_the_published_one() -> None:
+def test_fitted_power_matches_the_published_power() -> None:
     for name in ("cubestar", "cubesense"):
         rows = [row for row in fidelity_of(name).rows if row.trial == "power"]
         assert {row.word for row in rows} == {"fitted"}
@@ -97,12 +96,12 @@ def test_fitted_power_is_the_published_one() -> None:
             assert ours == pytest.approx(published, rel=0.06), row.key
 
 
-def test_what_a_profile_does_not_change_runs_once(lens_jobs: list[Job]) -> None:
+def test_trials_without_profile_run_once(lens_jobs: list[Job]) -> None:
     assert {job.trial for job in lens_jobs} == {"lens", "power"}
     assert len(lens_jobs) == 2
 
 
-def test_frames_are_those_of_the_trial_unless_given() -> None:
+def test_number_of_frames_defaults_to_the_trial() -> None:
     rows = [row for row in fidelity_of("cubesense").rows if row.trial == "nadir"]
     trial = fidelity_of("cubesense").trials["nadir"]
     for options, frames in (({}, trial.frames), ({"quick": True}, trial.quick), ({"frames": 7}, 7)):
@@ -112,12 +111,12 @@ def test_frames_are_those_of_the_trial_unless_given() -> None:
 ROW = Row("a", "speed", "section 1", "3 m/s", "fitted", "walk", "{v:.1f} m/s")
 
 
-def test_what_there_is_not_is_a_dash() -> None:
+def test_missing_figure_is_a_dash() -> None:
     assert fidelity.shown(ROW, {"v": float("nan")}) == "- m/s"
     assert fidelity.shown(ROW, {"v": 2.96}) == "3.0 m/s"
 
 
-def test_a_table_with_another_word_is_refused(
+def test_rejects_a_table_with_an_unknown_word(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "published.md").write_text("## t\n| a | b | c | d | guessed | e | f |\n")
@@ -140,7 +139,7 @@ def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path / "page.md"
 
 
-def test_only_the_tables_of_a_page_are_rewritten(run: Run, page: Path) -> None:
+def test_write_replaces_only_the_tables(run: Run, page: Path) -> None:
     done = run("fidelity", "aramis", "--write", page.parent, "--workers", "1")
     assert done.code == 0
     assert f"wrote 1 rows to {page}\n" in done.err
@@ -154,7 +153,7 @@ def test_only_the_tables_of_a_page_are_rewritten(run: Run, page: Path) -> None:
     assert page.read_text() == once
 
 
-def test_a_page_without_a_place_is_refused_before_anything_is_measured(
+def test_write_rejects_a_page_without_markers_before_measuring(
     run: Run, page: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fidelity, "perform", None)
@@ -166,7 +165,7 @@ def test_a_page_without_a_place_is_refused_before_anything_is_measured(
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_rows_of_a_page_are_those_that_are_declared(name: str) -> None:
+def test_page_rows_match_the_declared_rows(name: str) -> None:
     wanted = fidelity_of(name)
     page = (ROOT / "docs" / wanted.page).read_text(encoding="utf-8")
     for table, rows in wanted.tables.items():

@@ -15,7 +15,7 @@ DOCS = Path(__file__).parents[4] / "docs"
 
 
 @pytest.mark.parametrize("name", sorted(known()))
-def test_each_hazard_is_shown_for_each_device_that_takes_it(name: str) -> None:
+def test_page_shows_each_hazard_for_each_device(name: str) -> None:
     page = (DOCS / PAGE).read_text("utf-8")
     (section,) = re.findall(rf"^## {name}\n(.*?)(?=^## |^<!--)", page, re.DOTALL | re.MULTILINE)
     shown = [part.name for part in (DOCS / PICTURES).glob(f"{name}-*")]
@@ -26,7 +26,7 @@ def test_each_hazard_is_shown_for_each_device_that_takes_it(name: str) -> None:
     assert set(re.findall(r"hazards/([\w.-]+)\)", section)) <= set(shown)
 
 
-def test_the_numbers_of_the_page_are_those_of_the_points() -> None:
+def test_page_numbers_match_the_points() -> None:
     page = (DOCS / PAGE).read_text("utf-8")
     lines = (DOCS / PICTURES / "points.jsonl").read_text("utf-8").splitlines()
     points = [json.loads(line) for line in lines]

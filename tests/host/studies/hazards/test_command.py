@@ -1,5 +1,3 @@
-"""`cubestack hazards`: lists, tables, and a folder of pictures and curves."""
-
 import json
 from pathlib import Path
 
@@ -9,14 +7,7 @@ from PIL import Image
 from cubestack.host.cli.main import main
 
 
-def test_the_list_has_every_hazard_with_its_scale(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["hazards", "--list"]) == 0
-    listed = capsys.readouterr().out
-    assert "moon" in listed
-    assert "hits" in listed
-
-
-def test_a_folder_gets_pictures_curves_and_points(
+def test_out_writes_pictures_curves_and_points(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", str(tmp_path)]
@@ -35,12 +26,14 @@ def test_a_folder_gets_pictures_curves_and_points(
     assert "| CubeStar | 60 | " in page
 
 
-def test_a_page_without_a_place_for_hazards_is_left_alone(
+def test_rejects_a_page_without_markers_and_a_file_as_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "hazards.md").write_text("mine\n", "utf-8")
     assert main(["hazards", "cubestar", "--out", str(tmp_path)]) == 2
     assert "hazards.md has no lines <!-- hazards -->" in capsys.readouterr().err
+    assert main(["hazards", "cubestar", "--out", str(tmp_path / "hazards.md")]) == 2
+    assert "is a file; a folder would be right" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -50,14 +43,8 @@ def test_a_page_without_a_place_for_hazards_is_left_alone(
         (["nobody"], "no device 'nobody'; known: cubestar"),
     ],
 )
-def test_what_there_is_not_is_one_line(
+def test_rejects_unknown_hazards_and_devices(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["hazards", *arguments]) == 2
     assert message in capsys.readouterr().err
-
-
-def test_a_file_is_no_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "out").write_text("", "utf-8")
-    assert main(["hazards", "cubestar", "--out", str(tmp_path / "out")]) == 2
-    assert "is a file; a folder would be right" in capsys.readouterr().err

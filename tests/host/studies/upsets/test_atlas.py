@@ -1,5 +1,3 @@
-"""The atlas counts what it was given, and rates go by how long the phases are."""
-
 from dataclasses import replace
 
 import pytest
@@ -18,14 +16,14 @@ WRONG = replace(PICTURE, answer="wrong", recovered=1)
 IDLE = replace(RIGHT, phase="idle")
 
 
-def test_names_have_no_numbers_and_every_effect_is_counted() -> None:
+def test_atlas_merges_numbered_names_and_counts_effects() -> None:
     (part,) = atlas([RIGHT, PICTURE, WRONG, IDLE])
     assert part.name == "writer.row"
     assert (part.effects["picture"], part.effects["nothing"], part.answers["wrong"]) == (2, 2, 1)
     assert (part.seen, part.healed) == (2, (1, 1))
 
 
-def test_a_phase_counts_for_the_part_of_the_loop_that_it_takes() -> None:
+def test_rate_weights_phases_by_duration() -> None:
     (part,) = atlas([RIGHT, PICTURE, WRONG, IDLE])
     # Of what is stored in a quarter of the second two upsets of three are seen, of 9 bits.
     assert part.a_day == pytest.approx(2.0 * 9 * 0.25 * 2 / 3)
@@ -33,13 +31,13 @@ def test_a_phase_counts_for_the_part_of_the_loop_that_it_takes() -> None:
     assert idle.a_day == pytest.approx(2.0 * 9 * 0.75)
 
 
-def test_what_is_left_over_is_not_seen_unless_an_answer_is_bad() -> None:
+def test_left_over_state_is_seen_only_with_a_bad_answer() -> None:
     left = replace(RIGHT, effect="left over")
     assert atlas([left])[0].seen == 0
     assert atlas([replace(left, answer="refused")])[0].seen == 1
 
 
-def test_a_table_has_all_parts_and_their_sum() -> None:
+def test_table_has_all_parts_and_their_sum() -> None:
     results = [RIGHT, WRONG, replace(WRONG, target="bank", bits=1)]
     table = list(rows(atlas(results)))
     assert [len(row) for row in table] == [len(HEAD)] * 3
@@ -48,7 +46,7 @@ def test_a_table_has_all_parts_and_their_sum() -> None:
     assert any("writer.row" in line and "1 picture" in line for line in lines(results))
 
 
-def test_a_report_has_table_and_figure() -> None:
+def test_report_has_table_and_figure() -> None:
     tested = experiment_of(device("cubestar"), "upsets")
     table, figure = tested.sections(map(vars, [RIGHT, WRONG]))
     assert list(table.head) == list(HEAD)

@@ -1,5 +1,3 @@
-"""Upsets of real boards: what must be harmless is, what is not shows, and a seed repeats it."""
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -51,7 +49,7 @@ def test_every_bit_is_hit_in_every_phase(counters: list[UpsetResult]) -> None:
 
 
 @pytest.mark.slow
-def test_a_counter_matters_only_where_it_counts(counters: list[UpsetResult]) -> None:
+def test_counter_upsets_matter_only_while_counting(counters: list[UpsetResult]) -> None:
     for result in counters:
         matters = {"writer.counter.row": "storing", "reader.counter.row": "reading"}
         if result.memory:
@@ -65,7 +63,7 @@ def test_a_counter_matters_only_where_it_counts(counters: list[UpsetResult]) -> 
 
 
 @pytest.mark.slow
-def test_a_seed_repeats_it() -> None:
+def test_same_seed_gives_the_same_results() -> None:
     options = {"registers": "writer.data", "memory_bits": 0, "seed": 5}
     first, again = (measured("cubestar", cubestar.EXPERIMENT, **options) for _ in range(2))
     assert first == again
@@ -86,7 +84,7 @@ def voted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.slow
-def test_a_voted_counter_is_immune(voted: None) -> None:
+def test_triple_voted_counter_is_immune(voted: None) -> None:
     rig = replace(cubestar.EXPERIMENT.rig(cubestar.CubeStarUpsetOptions()), phases=STORES)
     tested = replace(cubestar.EXPERIMENT, rig=lambda _options: rig)
     results = measured("cubestar", tested, registers="writer.counter.*", memory_bits=0)
@@ -111,7 +109,7 @@ def test_each_layout_has_its_registers(layout: str) -> None:
 
 
 @pytest.mark.parametrize("gateware", quick(["as-flown", "corrected"], 1))
-def test_two_linked_fpgas(gateware: str) -> None:
+def test_upsets_of_two_linked_fpgas(gateware: str) -> None:
     results = measured(
         *("cubesense", cubesense.EXPERIMENT),
         **{"gateware": gateware, "registers": "*_writer.ack", "memory_bits": 0},
@@ -122,18 +120,20 @@ def test_two_linked_fpgas(gateware: str) -> None:
     assert {result.effect for result in results} > {"nothing"}
 
 
-def test_a_register_that_is_not_there_is_told() -> None:
-    with pytest.raises(ValueError, match=r"no register is like 'writer.roww'; there are .*writer"):
-        measured("cubestar", cubestar.EXPERIMENT, registers="writer.roww")
-
-
-def test_a_memory_that_is_not_there_is_told() -> None:
-    with pytest.raises(ValueError, match=r"no memory 'flash'; there are .*SRAM, external"):
-        measured("cubestar", cubestar.EXPERIMENT, memories="flash")
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"registers": "writer.roww"}, r"no register is like 'writer.roww'; there are .*writer"),
+        ({"memories": "flash"}, r"no memory 'flash'; there are .*SRAM, external"),
+    ],
+)
+def test_rejects_unknown_registers_and_memories(options: dict[str, str], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        measured("cubestar", cubestar.EXPERIMENT, **options)
 
 
 @pytest.mark.slow
-def test_own_firmware_s_memories_are_hit_and_each_answer_asked_for() -> None:
+def test_upsets_of_firmware_memories() -> None:
     results = measured(
         *("cubestar", cubestar.EXPERIMENT, {"firmware": "reference"}),
         **{"memories": "ram,flash", "memory_bits": 2, "registers": "bank"},

@@ -1,14 +1,13 @@
-"""A copy of this process tells what it did, or how it failed; here nothing changes."""
-
 import os
 import time
+from collections.abc import Callable
 
 import pytest
 
 from cubestack.host.studies.upsets.fork import CopyError, in_copy
 
 
-def test_it_gives_what_came_and_changes_nothing_here() -> None:
+def test_copy_returns_its_result_and_leaves_this_process_unchanged() -> None:
     here = [1]
 
     def act() -> tuple[int, list[int]]:
@@ -20,20 +19,18 @@ def test_it_gives_what_came_and_changes_nothing_here() -> None:
     assert (there, here) == ([1, 2], [1])
 
 
-def test_much_comes_whole() -> None:
+def test_large_results_are_returned() -> None:
     assert in_copy(lambda: bytes(3_000_000)) == bytes(3_000_000)
 
 
-def test_an_error_is_told() -> None:
-    with pytest.raises(CopyError, match="ZeroDivisionError: "):
-        in_copy(lambda: 1 // 0)
+@pytest.mark.parametrize(
+    ("act", "message"), [(lambda: 1 // 0, "ZeroDivisionError: "), (lambda: os._exit(3), "died")]
+)
+def test_error_and_death_of_the_copy_are_raised(act: Callable[[], int], message: str) -> None:
+    with pytest.raises(CopyError, match=message):
+        in_copy(act)
 
 
-def test_a_death_is_told() -> None:
-    with pytest.raises(CopyError, match="died"):
-        in_copy(lambda: os._exit(3))
-
-
-def test_one_that_hangs_is_ended() -> None:
+def test_hanging_copy_times_out() -> None:
     with pytest.raises(CopyError, match=r"no end after 0.1 s"):
         in_copy(lambda: time.sleep(600), limit_s=0.1)

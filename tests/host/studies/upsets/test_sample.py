@@ -1,5 +1,3 @@
-"""What an upset is said to have done, from what the processor saw with it and without."""
-
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -57,7 +55,7 @@ def changed(*places: int) -> Snapshot:
         (replace(CLEAN, violations={"read-access": 1, "wire-contention": 1}), "contention"),
     ],
 )
-def test_the_gravest_is_told(found: Snapshot, effect: Effect) -> None:
+def test_effect_is_the_most_severe(found: Snapshot, effect: Effect) -> None:
     assert effect_of(found, CLEAN, ROW) == effect
 
 
@@ -65,7 +63,7 @@ def test_the_gravest_is_told(found: Snapshot, effect: Effect) -> None:
     ("answer", "right", "solved"),
     [("right", True, True), ("wrong", False, True), ("refused", False, False)],
 )
-def test_a_wrong_answer_is_one_and_a_refusal_is_none(
+def test_wrong_answer_is_solved_and_refusal_is_not(
     answer: Answer, right: bool, solved: bool
 ) -> None:
     one = UpsetResult(
@@ -124,10 +122,9 @@ class Device:
         (["refused", "wrong", "wrong", "wrong"], None),
     ],
 )
-def test_loops_are_started_and_judged_until_one_is_right(
+def test_loops_run_until_an_answer_is_right(
     answers: Sequence[Answer], recovered: int | None
 ) -> None:
-    """The one that was hit is only judged, at its end; each takes as long as the clean one."""
     device = Device(answers)
     upset = Upset(20 * PS_PER_US, "storing", UpsetTarget("ram", 13, memory=True))
     found = followed(device.running(), [upset, upset])

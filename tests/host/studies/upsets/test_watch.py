@@ -1,5 +1,3 @@
-"""What passes between a processor and its FPGA is kept, once and in its order."""
-
 from fractions import Fraction
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +8,7 @@ from cubestack.host.studies.upsets.watch import PortWatch
 
 
 class Port:
-    """An FPGA's port of which a test says the levels and the time."""
+    """An FPGA port whose levels and time are set by the test."""
 
     running = 2
 
@@ -41,7 +39,7 @@ class Port:
         return 2
 
 
-def test_an_acknowledge_is_noted_when_it_has_changed() -> None:
+def test_acknowledges_are_recorded_when_they_change() -> None:
     port: Any = Port()
     watch = PortWatch(port, ("ACK", "DONE"))
     for now_ps, name, level in (
@@ -57,7 +55,7 @@ def test_an_acknowledge_is_noted_when_it_has_changed() -> None:
     assert watch.seen == []  # it is as it was
 
 
-def test_bytes_are_kept_as_far_as_they_came() -> None:
+def test_received_bytes_are_kept() -> None:
     watch = PortWatch(Port(), ())  # type: ignore[arg-type]
     out = np.full(5, 9, np.uint8)
     assert watch.strobe_read(out, Fraction(1), 10) == 3
@@ -68,7 +66,7 @@ def test_bytes_are_kept_as_far_as_they_came() -> None:
     assert bytes(watch.data) == bytes([1, 2, 3, 4, 5])
 
 
-def test_all_else_goes_through() -> None:
+def test_other_calls_are_passed_on() -> None:
     port: Any = Port()
     watch = PortWatch(port, ("ACK",))
     watch.set_pin("READ", 1)
