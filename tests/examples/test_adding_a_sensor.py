@@ -117,7 +117,7 @@ class TestEditedSensor:
         assert done.stdout.split() == ["Glow", "[]"], done.stderr
 
 
-def test_its_own_tests_pass(tmp_path: Path) -> None:
+def test_tests_of_the_new_sensor_pass(tmp_path: Path) -> None:
     with new_sensor(tmp_path) as glow:
         tests = tmp_path / "glow-sensor" / "tests"
         done = glow.run(sys.executable, "-m", "pytest", "-q", *plugins(), tests)
@@ -125,7 +125,7 @@ def test_its_own_tests_pass(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_pip_installs_it(tmp_path: Path) -> None:
+def test_pip_installs_the_new_sensor(tmp_path: Path) -> None:
     python, target = sys.executable, tmp_path / "target"
     subprocess.run([python, "-m", "cubestack", "new-sensor", "glow"], cwd=tmp_path, check=True)
     options = ("-q", "--no-deps", "--no-build-isolation", "--target")

@@ -49,7 +49,7 @@ def memory_bytes(process: subprocess.Popen[str]) -> int:
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")  # pyserial's RFC 2217
 @pytest.mark.parametrize("transport", ["tcp", "pty", "rfc2217"])
-def test_others_are_served_and_memory_stays_flat(
+def test_other_clients_are_served_and_memory_stays_constant(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, transport: str
 ) -> None:
     if transport != "tcp" and not LONG:

@@ -58,7 +58,7 @@ class Client:
         self._socket.close()
 
 
-def test_time_stands_while_gdb_halts_and_ports_stay_open(
+def test_virtual_time_stops_while_gdb_halts_and_ports_stay_open(
     emulate: Emulate, program: Path, tmp_path: Path
 ) -> None:
     arguments = ("--firmware", program, "--tcp", 0, "--gdb", 0, "--gdb-wait")
@@ -111,7 +111,7 @@ def test_time_stands_while_gdb_halts_and_ports_stay_open(
     assert "FNDA:0,fail" in coverage
 
 
-def test_memory_tells_what_a_program_used(run: Run, program: Path) -> None:
+def test_memory_prints_used_bytes(run: Run, program: Path) -> None:
     told = json.loads(run("memory", "cubestar", "--firmware", program, "--json").out)
     assert told["static"] == 12
     assert 32 <= told["stack"] < 256
@@ -130,16 +130,13 @@ def test_shell_peeks_at_registers_and_variables(run: Run, program: Path) -> None
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [
-        (("memory", "cubestar"), "runs no firmware of its own: give --firmware"),
-        (("shell", "emulated:cubestar", "-c", "peek CMU"), "give --firmware"),
-        (("emulate", "cubestar", "--tcp", 0, "--gdb", 0), "runs no firmware of its own"),
-        (("emulate", "cubestar", "--tcp", 0, "--gdb-wait"), "--gdb-wait: give the port as well"),
-        (("emulate", "cubestar", "cubesense", "--gdb", 0), "--gdb belongs to one device"),
+        (("memory", "cubestar"), "cubestar runs no own firmware; add --firmware"),
+        (("shell", "emulated:cubestar", "-c", "peek CMU"), "start it with --firmware"),
+        (("emulate", "cubestar", "--tcp", 0, "--gdb", 0), "--gdb: cubestar runs no own firmware"),
+        (("emulate", "cubestar", "cubesense", "--gdb", 0), "--gdb applies to one device"),
     ],
 )
-def test_without_firmware_there_is_nothing_to_look_at(
-    run: Run, arguments: tuple[object, ...], error: str
-) -> None:
+def test_debug_options_need_firmware(run: Run, arguments: tuple[object, ...], error: str) -> None:
     outcome = run(*arguments)
     assert outcome.code
     assert error in outcome.line
@@ -175,7 +172,7 @@ def processed(halting: bool) -> tuple[str, object, int]:
 
 
 @pytest.mark.slow
-def test_halts_leave_no_mark_while_the_fpga_stores_a_picture() -> None:
+def test_breakpoints_do_not_change_the_run() -> None:
     alone, halting = processed(False), processed(True)
     assert halting[2] > 1000
     assert alone[:2] == halting[:2]

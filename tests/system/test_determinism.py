@@ -45,7 +45,7 @@ def run(name: str, seed: int) -> tuple[dict[str, Any], list[bytes]]:
 
 
 @pytest.mark.parametrize("name", quick(VIEWS, 1))
-def test_wire_repeats_to_the_picosecond_and_another_seed_differs(name: str) -> None:
+def test_same_seed_repeats_the_wire_to_the_picosecond(name: str) -> None:
     first, other = run(name, 1), run(name, 2)
     assert len(first[0]["sent"]) > 150
     assert run(name, 1) == first

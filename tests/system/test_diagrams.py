@@ -22,13 +22,13 @@ def test_committed_diagrams_are_up_to_date(drawn: dict[str, str]) -> None:
         assert (SENSORS / name).read_text(encoding="utf-8") == text, f"{name} {STALE}"
 
 
-def test_every_diagram_is_on_its_sensor_s_page(drawn: dict[str, str]) -> None:
+def test_every_diagram_is_shown_on_its_page(drawn: dict[str, str]) -> None:
     for name in drawn:
         page = Path(ROOT / "docs" / f"sensor-{name.split('-')[0]}.md").read_text(encoding="utf-8")
         assert f"](images/sensors/{name})" in page
 
 
-def test_the_picture_of_the_architecture_shows_folders_that_exist() -> None:
+def test_architecture_diagram_is_up_to_date() -> None:
     for floor, boxes in FLOORS.items():
         for box in boxes:
             assert (ROOT / floor / box.folder).is_dir(), f"{floor}/{box.folder}"

@@ -92,7 +92,7 @@ def test_bringup_names_the_step_that_fails(device: Any) -> None:
     assert done.stdout.splitlines()[-1].startswith("5 FAIL")
 
 
-def test_suite_of_a_driver(tmp_path: Path) -> None:
+def test_driver_suite_passes(tmp_path: Path) -> None:
     suite = tmp_path / "test_my_driver.py"
     shutil.copy(HERE / suite.name, suite)
     report = tmp_path / "report.xml"
@@ -113,7 +113,7 @@ def test_suite_of_a_driver(tmp_path: Path) -> None:
         *("slew_animation.py", "one_orbit.py"),
     ],
 )
-def test_without_a_target_each_says_how_it_is_called(name: str) -> None:
+def test_missing_target_prints_usage(name: str) -> None:
     done = subprocess.run([sys.executable, HERE / name], capture_output=True, text=True)
     assert done.returncode == 1
     assert done.stderr.startswith(f"usage: python {name} ")
@@ -121,7 +121,7 @@ def test_without_a_target_each_says_how_it_is_called(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_attitude_loop_settles() -> None:
+def test_attitude_loop_settles() -> None:
     done = subprocess.run(
         [sys.executable, HERE / "attitude_loop.py"], capture_output=True, text=True, check=True
     )
@@ -132,7 +132,7 @@ def test_the_attitude_loop_settles() -> None:
 
 
 @pytest.mark.slow
-def test_a_part_of_an_orbit_is_flown(tmp_path: Path) -> None:
+def test_one_orbit_writes_results_and_a_figure(tmp_path: Path) -> None:
     orbit = HERE / "orbits" / "sun-synchronous.toml"
     call = [sys.executable, HERE / "one_orbit.py", orbit, tmp_path, "8"]
     done = subprocess.run(call, capture_output=True, text=True, check=True)
@@ -142,7 +142,7 @@ def test_a_part_of_an_orbit_is_flown(tmp_path: Path) -> None:
     assert (tmp_path / "errors.png").stat().st_size > 10_000
 
 
-def test_a_slew_is_animated(tmp_path: Path) -> None:
+def test_slew_animation_writes_a_gif(tmp_path: Path) -> None:
     path = tmp_path / "slew.gif"
     call = [sys.executable, HERE / "slew_animation.py", path, "3"]
     done = subprocess.run(call, capture_output=True, text=True, check=True)

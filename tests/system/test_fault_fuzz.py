@@ -231,7 +231,7 @@ SCENES = {
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", quick(SCENES, 1))
-def test_nothing_upsets_a_board_for_good(name: str) -> None:
+def test_fuzzed_board_recovers_and_repeats(name: str) -> None:
     runs = []
     for _ in range(2):
         with open_device(name, SCENES[name], seed=4) as opened:
@@ -249,9 +249,7 @@ def test_nothing_upsets_a_board_for_good(name: str) -> None:
     ],
     ids=["bytes", "frames", "i2c"],
 )
-def test_after_any_noise_a_reset_leads_to_a_right_attitude(
-    turns: dict[str, float], events: int
-) -> None:
+def test_reset_after_noise_gives_a_right_attitude(turns: dict[str, float], events: int) -> None:
     with open_device("cubestar", SCENES["cubestar"], seed=4) as opened:
         Fuzzer(opened, 11, turns).run(events)
         client, cubestar = opened.client.client, opened.client

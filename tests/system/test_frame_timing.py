@@ -48,9 +48,7 @@ def striped(tmp_path: Path) -> PictureScene:
 
 
 @pytest.mark.parametrize("delay_ms", [10, 66])
-def test_too_short_a_delay_splits_the_picture(
-    session: Any, striped: PictureScene, delay_ms: int
-) -> None:
+def test_short_delay_splits_the_picture(session: Any, striped: PictureScene, delay_ms: int) -> None:
     with session(striped) as opened:
         capture_ms(opened.client, delay_ms)
         rows = opened.board.program._capture.pictures.image[:, 500].astype(float)
@@ -66,7 +64,7 @@ def test_too_short_a_delay_splits_the_picture(
 
 
 @pytest.mark.slow
-def test_the_published_delay_does_not(session: Any, striped: PictureScene) -> None:
+def test_published_delay_gives_a_whole_picture(session: Any, striped: PictureScene) -> None:
     with session(striped) as opened:
         capture_ms(opened.client, 70)
         streamed = opened.client.stream_image().astype(float)

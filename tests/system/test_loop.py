@@ -99,9 +99,7 @@ def test_tracks_at_the_published_rate(looping: Any, axis: int) -> None:
 
 
 @pytest.mark.parametrize("profile", ["published", "extended"])
-def test_as_published_it_tracks_by_itself_until_its_flash_is_worn(
-    session: Open, profile: str
-) -> None:
+def test_tracks_automatically_until_the_flash_is_worn(session: Open, profile: str) -> None:
     scene = replace(ORION, rate_deg_s=(0.1333, 0.0, 0.0), mag_limit=3.8)
     with session(scene, seed=1, profile=profile) as opened:
         opened.client.client.command("Trigger")

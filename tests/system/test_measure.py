@@ -55,7 +55,7 @@ def test_rates_of_identification(
     assert {frame["mode"] for frame in solved} == {mode}
 
 
-def test_profiles_find_the_same_sky_in_their_own_way(measure: Measure) -> None:
+def test_profiles_solve_the_same_sky_with_other_errors(measure: Measure) -> None:
     first, *others = (
         measure("--frames", 5, "--seed", 15, "--mag-limit", 3.8, *options)
         for options in ((), ("--profile", "published"), ("--profile", "extended"))
@@ -69,7 +69,7 @@ def test_profiles_find_the_same_sky_in_their_own_way(measure: Measure) -> None:
 @pytest.mark.parametrize(
     ("profile", "searched", "threshold"), [("published", True, 16), ("extended", False, 6)]
 )
-def test_the_first_call_of_a_user_is_right(
+def test_default_options_solve_the_first_frame(
     measure: Measure, profile: str, searched: bool, threshold: int
 ) -> None:
     """All stars in view: as published with 6 DN most pictures fail, or are wrong (--seed 1).
@@ -86,7 +86,7 @@ def test_the_first_call_of_a_user_is_right(
     assert plain["right"]
 
 
-def test_errors_without_noise_are_small_and_noise_makes_others(measure: Measure) -> None:
+def test_errors_without_noise_are_small(measure: Measure) -> None:
     frames = measure(*SAMPLE, "--seed", 14, "--no-noise")
     assert percent_right(frames) >= 95
     assert p95(frames, "error_cross_deg") <= 0.004

@@ -60,7 +60,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pasted]:
     return {one.line: one for one in found}
 
 
-def test_lines_share_a_shell_and_tell_how_they_ended(done: dict[str, Pasted]) -> None:
+def test_lines_share_a_shell_and_report_exit_codes(done: dict[str, Pasted]) -> None:
     codes = {line: one.code for line, one in done.items()}
     assert codes == {
         "export 'WORD=kept;' cd .": 0,
@@ -76,7 +76,7 @@ def test_lines_share_a_shell_and_tell_how_they_ended(done: dict[str, Pasted]) ->
     }
 
 
-def test_what_they_said_is_told(done: dict[str, Pasted]) -> None:
+def test_output_is_reported(done: dict[str, Pasted]) -> None:
     said = {line: one.said for line, one in done.items()}
     assert said["echo '$WORD' '>' 'written;' cat written"] == "kept"
     assert said["echo why it 'failed;' false"].strip() == "why it failed"
@@ -89,11 +89,11 @@ def test_what_they_said_is_told(done: dict[str, Pasted]) -> None:
     assert said["cat saved.py"] == 'print("saved")'
 
 
-def test_what_serves_ends_when_the_next_one_takes_its_place(done: dict[str, Pasted]) -> None:
+def test_server_ends_before_the_next_one_starts(done: dict[str, Pasted]) -> None:
     assert done["cubestack ended"].said == "cubestar ended"
 
 
-def test_what_takes_too_long_is_interrupted_and_the_shell_goes_on(tmp_path: Path) -> None:
+def test_timeout_interrupts_only_the_command(tmp_path: Path) -> None:
     shell = Shell(tmp_path)
     code, said = shell.run("sleep 1000", 0.1)
     assert code == 128 + signal.SIGTERM
@@ -103,7 +103,7 @@ def test_what_takes_too_long_is_interrupted_and_the_shell_goes_on(tmp_path: Path
 
 
 @pytest.mark.parametrize("command", ["shell", "ground"])
-def test_a_client_of_a_port_that_nobody_serves_is_left_out(tmp_path: Path, command: str) -> None:
+def test_client_without_a_server_is_skipped(tmp_path: Path, command: str) -> None:
     line = f"cubestack {command} ./tty --device cubestar"
     assert "somebody has to serve" in left_out(line, tmp_path, long=False)
     (tmp_path / "tty").touch()
@@ -111,11 +111,11 @@ def test_a_client_of_a_port_that_nobody_serves_is_left_out(tmp_path: Path, comma
 
 
 @pytest.mark.parametrize("line", ["pip install -e ./glow-sensor", "cubestack ground run.rec"])
-def test_what_a_reader_has_to_bring_is_left_out(tmp_path: Path, line: str) -> None:
+def test_lines_that_need_files_of_the_reader_are_skipped(tmp_path: Path, line: str) -> None:
     assert left_out(line, tmp_path, long=False)
 
 
 @pytest.mark.parametrize("long", [False, True])
-def test_long_ones_are_pasted_on_demand(tmp_path: Path, long: bool) -> None:
+def test_long_commands_run_on_demand(tmp_path: Path, long: bool) -> None:
     for line in ("make test-all", "cubestack layouts"):
         assert (left_out(line, tmp_path, long=long) == "") is long

@@ -31,7 +31,7 @@ def sections(text: str, mark: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_layouts_of_the_pages_are_those_of_the_tables(page: str) -> None:
+def test_frame_tables_match_the_register_pages(page: str) -> None:
     """A table that differs is to be copied from the page on the registers, which is generated."""
     device, frames = PAGES[page]
     declared = sections(text_of(f"registers-{device}"), "##")
@@ -43,7 +43,7 @@ def test_layouts_of_the_pages_are_those_of_the_tables(page: str) -> None:
     assert codes <= shown.keys()
 
 
-def test_states_of_the_page_are_those_of_the_program() -> None:
+def test_task_states_match_the_program() -> None:
     part = sections(text_of("protocols"), "##")["States of a task"]
     rows = [line.strip("|").split("|") for line in part.splitlines() if line.startswith("|")][2:]
     states = [cell.strip() for row in rows for cell in row[1:] if cell.strip()]
@@ -57,7 +57,7 @@ def test_states_of_the_page_are_those_of_the_program() -> None:
     assert told == TASKS
 
 
-def test_the_attitude_of_the_page_is_that_of_the_device() -> None:
+def test_attitude_example_matches_the_device() -> None:
     page = text_of("protocols")
     (block,) = re.findall(r"```wire-sky\n(.*?)```", page, re.DOTALL)
     lines = [(line[:2], bytes.fromhex(line[3:])) for line in block.splitlines()]

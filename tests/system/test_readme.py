@@ -23,7 +23,7 @@ def test_caption_is_the_one_stored_in_the_picture() -> None:
 
 
 @pytest.mark.slow
-def test_a_new_run_gives_the_same_caption_but_for_its_numbers(tmp_path: Path) -> None:
+def test_new_run_gives_the_same_caption(tmp_path: Path) -> None:
     _, caption = hero(tmp_path)
     stored = caption_of(README)
     assert re.sub(NUMBER, "N", caption) == re.sub(NUMBER, "N", stored)

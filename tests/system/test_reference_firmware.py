@@ -13,7 +13,7 @@ from .reference_pictures import compare
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 
-def test_pictures_are_told_alike_in_every_mode() -> None:
+def test_telemetry_of_pictures_matches_in_every_mode() -> None:
     found = list(compare(3, 16, "reference"))
     assert [one.differences for one in found] == [[]] * 3
     assert {one.mode for one in found} == {"lost", "assisted", "as it stands"}

@@ -59,9 +59,7 @@ def uptime_s(node: NodeClient) -> float:
     return float(answer["RuntimeSeconds"]) + float(answer["RuntimeMilliseconds"]) / 1000
 
 
-def test_the_loop_tracks_and_keeps_its_time_through_its_resets(
-    star: AnyEmulated, node: NodeClient
-) -> None:
+def test_loop_tracks_and_keeps_time_across_resets(star: AnyEmulated, node: NodeClient) -> None:
     node.command("Trigger")
     node.pause(4.85)
     loop, identification = node.telemetry("LoopStatus"), node.telemetry("ExtendedIdentification")
@@ -98,7 +96,7 @@ def test_settings_survive_a_reset_and_power_up_values_return(node: NodeClient) -
     assert node.telemetry("ExtendedIdentification")["TcmdCount"] == 1
 
 
-def test_the_watchdog_ends_a_hang(node: NodeClient) -> None:
+def test_watchdog_ends_a_hang(node: NodeClient) -> None:
     node.command("TestWDG")
     node.pause(1.9)
     assert node.telemetry("TcmdProcessed")["Processed"] == 0  # interrupts are served
@@ -124,7 +122,7 @@ def test_a_latch_up_is_cut_off_and_healed(
     assert raised(node) == {"OverCurrent"}
 
 
-def test_only_its_own_profile_is_taken(node: NodeClient) -> None:
+def test_rejects_other_profiles(node: NodeClient) -> None:
     shown = node.telemetry("Profile")
     perform(node, "SetProfile", Profile="PUBLISHED")
     with pytest.raises(CommandRefusedError):
@@ -134,7 +132,7 @@ def test_only_its_own_profile_is_taken(node: NodeClient) -> None:
     assert node.telemetry("Profile") == shown
 
 
-def test_a_picture_goes_up_and_down(node: NodeClient) -> None:
+def test_picture_upload_and_download(node: NodeClient) -> None:
     perform(node, "UploadImage")
     data = bytes(range(128))
     perform(node, "UploadBlock", BlockNumber=4000, Data=data)
@@ -159,7 +157,7 @@ def test_a_picture_goes_up_and_down(node: NodeClient) -> None:
         (b"\x55", b"", {"UART_ProtocolError"}),
     ],
 )
-def test_what_is_no_message_is_answered_and_flagged(
+def test_invalid_messages_are_answered_and_flagged(
     star: AnyEmulated, wire: bytes, answer: bytes, flags: set[str]
 ) -> None:
     port = star.serial(timeout=0.2)
@@ -170,7 +168,7 @@ def test_what_is_no_message_is_answered_and_flagged(
     assert raised(client) == flags
 
 
-def test_the_same_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
+def test_telemetry_and_telecommands_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
     bus = star.smbus()
     address = INTERFACE.i2c_address
     assert bus.read_i2c_block_data(address, 128, 4) == [5, 3, 0, 1]
@@ -183,7 +181,7 @@ def test_the_same_over_i2c(star: AnyEmulated, node: NodeClient) -> None:
     assert raised(node) == wanted
 
 
-def test_conformance_of_what_is_read(star: AnyEmulated, node: NodeClient) -> None:
+def test_conformance_of_telemetry_and_framing(star: AnyEmulated, node: NodeClient) -> None:
     notes = device("cubestar").conformance
     target = Target("emulated", INTERFACE, node, controls=EmulatedControls(star))
     run = CheckRun(target, notes=notes)

@@ -187,7 +187,7 @@ def check(name: str, column: int, before: dict[str, object], bench: Any, saved: 
 
 
 @pytest.mark.parametrize("name", BENCHES)
-def test_every_row_is_looked_at(name: str) -> None:
+def test_every_row_of_the_page_is_tested(name: str) -> None:
     assert {*table(name)} - {*ITEMS[name]} == {"waiting telecommands"} & {*table(name)}
     assert {cell for row in table(name).values() for cell in row} <= {"kept", "lost", "saved"}
 

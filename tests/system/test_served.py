@@ -47,14 +47,14 @@ def test_plain_pyserial_on_a_pseudo_terminal_and_over_tcp(
     assert served.process.returncode == 0
 
 
-def test_the_example_is_short_and_knows_only_the_protocol() -> None:
+def test_example_is_short_and_uses_only_the_protocol() -> None:
     text = EXAMPLE.read_text(encoding="utf-8")
     assert "cubestack" not in text
     assert len(text.splitlines()) <= 40
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_it_cleanly(emulate: Emulate, tmp_path: Path, number: int) -> None:
+def test_signal_stops_it_cleanly(emulate: Emulate, tmp_path: Path, number: int) -> None:
     with emulate("--pty", "port") as served:
         assert (tmp_path / "port").is_char_device()
         served.process.send_signal(number)
@@ -62,30 +62,10 @@ def test_a_signal_ends_it_cleanly(emulate: Emulate, tmp_path: Path, number: int)
     assert not os.path.lexists(tmp_path / "port")
 
 
-def test_a_second_emulator_is_refused_the_same_port(emulate: Emulate) -> None:
+def test_port_in_use_is_an_error(emulate: Emulate) -> None:
     with emulate("--tcp", 0) as served:
         port = int(served.port.rsplit(":", 1)[1])
         with pytest.raises(AssertionError, match="choose another port"), emulate("--tcp", port):
             pass
         with socket.create_connection(("127.0.0.1", port), timeout=10):
             pass  # the first one still serves
-
-
-def code_block(language: str, word: str) -> str:
-    """The block of ``language`` in the README that has ``word`` in it."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    blocks = re.findall(rf"```{language}\n(.*?)```", readme, re.DOTALL)
-    (block,) = (block for block in blocks if word in block)
-    return str(block)
-
-
-def test_first_script_of_the_readme(emulate: Emulate, tmp_path: Path) -> None:
-    command = code_block("sh", "emulate cubestar --pty").split()
-    assert command[:3] == [".venv/bin/cubestack", "emulate", "cubestar"]
-    script = code_block("python", "cubestack.connect")
-    with emulate(*command[3:]):
-        first, *stars = run_python("-c", script, folder=tmp_path).splitlines()
-    assert "valid=True" in first
-    identified = [star.split()[0] for star in stars if not star.startswith("None")]
-    assert len(identified) >= 4
-    assert all(number.isdigit() for number in identified)

@@ -47,7 +47,7 @@ def test_a_program_finds_every_device(served: None, route: str) -> None:
 
 
 @pytest.mark.skipif(Path(f"/dev/i2c-{BUS}").exists(), reason="a real bus of that number")
-def test_a_target_without_a_device_file_is_the_emulated_bus(served: None) -> None:
+def test_i2c_target_without_a_device_file_is_emulated(served: None) -> None:
     target = open_target(f"i2c:{BUS}:{INTERFACE.i2c_address:#04x}")
     try:
         assert target.interface is INTERFACE

@@ -62,7 +62,7 @@ def life(seed: int, *, strides: bool) -> dict[str, object]:
     "seed",
     [pytest.param(seed, marks=() if seed < QUICK else pytest.mark.slow) for seed in range(200)],
 )
-def test_nothing_tells_them_apart(seed: int) -> None:
+def test_strides_do_not_change_the_run(seed: int) -> None:
     quick, exact = life(seed, strides=True), life(seed, strides=False)
     assert [name for name in exact if quick[name] != exact[name]] == []
     assert str(exact["recording"]).count("\n") > 4

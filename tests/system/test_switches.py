@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES
-from cubestack.firmware_model.interface.cubesense.codes import ResetTarget
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
@@ -27,15 +26,6 @@ OTHERS = {
     "cubestar": "pair_limit=60,voting=algorithm-2,reduction=30.3",
     "cubesense": "distortion=equidistant,edges=listing,sun=all-pixels",
     "aramis": "identities=appendix-e,weights=grey-level",
-}
-
-RESTARTED = [target.name for target in ResetTarget]
-
-#: Telecommands that reset, and whether a changed switch outlives them.
-RESETS = {
-    "cubestar": [("MCUReset", {}, True), ("TestWDG", {}, True), ("Reset", {}, False)],
-    "cubesense": [("Reset", {"Target": target}, target != "MCU") for target in RESTARTED],
-    "aramis": [("Reset", {}, False)],
 }
 
 
@@ -79,7 +69,7 @@ def test_each_value_of_each_switch_is_set_and_read_back(unit: AnyEmulated) -> No
 
 @pytest.mark.parametrize("mixed", [False, True], ids=["profile", "switches"])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_changed_device_measures_as_one_that_was_powered_up_so(name: str, mixed: bool) -> None:
+def test_changed_profile_measures_like_a_fresh_device(name: str, mixed: bool) -> None:
     profile, other = PROFILES if mixed else PROFILES[::-1]
     changes = OTHERS[name] if mixed else ""
     declared = device(name).switches.declared()
@@ -107,16 +97,7 @@ def test_a_changed_device_measures_as_one_that_was_powered_up_so(name: str, mixe
             assert (found == wanted) is expected
 
 
-def test_what_a_reset_keeps(unit: AnyEmulated) -> None:
-    for telecommand, parameters, kept in RESETS[unit.device.name]:
-        unit.client.set_profile("published")
-        unit.client.client.command(telecommand, **parameters)
-        unit.wait(5.0)
-        published = unit.client.profile() != unit.device.switches.of("extended")
-        assert published is kept, telecommand
-
-
-def test_the_loops_resets_keep_it(extended: dict[str, AnyEmulated]) -> None:
+def test_loop_resets_keep_the_switches(extended: dict[str, AnyEmulated]) -> None:
     unit = extended["cubestar"]
     unit.client.set_switch("transitions", "automatic")
     perform(unit, "Trigger", {})
@@ -129,7 +110,7 @@ def test_the_loops_resets_keep_it(extended: dict[str, AnyEmulated]) -> None:
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=15)
 @given(st.data())
-def test_any_sequence_of_parameters_does_what_its_numbers_say(
+def test_any_sequence_of_profile_and_switch_commands(
     extended: dict[str, AnyEmulated], name: str, data: st.DataObject
 ) -> None:
     """Beside a model that has nothing but the numbers of the tables."""

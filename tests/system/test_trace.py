@@ -52,7 +52,7 @@ STORIES: dict[str, tuple[str, list[tuple[str, object]], tuple[float, float]]] = 
 
 
 @pytest.mark.parametrize("device", STORIES)
-def test_a_command_leads_from_line_to_pins_and_back(device: str, tmp_path: Path) -> None:
+def test_command_is_traced_from_line_to_pins(device: str, tmp_path: Path) -> None:
     command, story, (least_s, most_s) = STORIES[device]
     with traced(device, tmp_path) as client:
         client.pause(0.5)
@@ -73,9 +73,7 @@ def test_a_command_leads_from_line_to_pins_and_back(device: str, tmp_path: Path)
     assert any(at[0] < time_ns <= at[1] for time_ns, _ in told)  # that it is busy
 
 
-def test_a_recording_becomes_the_trace_of_its_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_replay_makes_the_same_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with traced("cubesense", tmp_path) as client:
         client.command("CaptureOnly", Camera=1, Sram=1, Location=0)
         client.pause(0.3)

@@ -58,7 +58,7 @@ def done(line: str, folder: Path) -> str:
     return str(finished.stdout)
 
 
-def test_every_command_is_one_of_those_tried_here() -> None:
+def test_all_commands_are_tested() -> None:
     assert commands() == [
         *("python3 -m venv .venv", ". .venv/bin/activate", "pip install cubestack pytest", ""),
         *("cubestack measure cubesense --frames 3 --profile extended", ""),
@@ -67,17 +67,17 @@ def test_every_command_is_one_of_those_tried_here() -> None:
     ]
 
 
-def test_it_works_once_it_is_installed(folder: Path) -> None:
+def test_measure_command_runs(folder: Path) -> None:
     assert "nadir" in done("cubestack measure cubesense --frames 3 --profile extended", folder)
 
 
-def test_the_driver_measures_what_the_text_says(folder: Path, sensor: None) -> None:
+def test_driver_prints_the_documented_angles(folder: Path, sensor: None) -> None:
     told = done("python sunsensor.py ./ttyCUBESENSE", folder)
     numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", told)]
     assert numbers == pytest.approx([20, 10, -8, 12], abs=0.2)
 
 
-def test_its_tests_pass_and_one_fails_without_the_loop(folder: Path, tmp_path: Path) -> None:
+def test_driver_tests_pass_and_detect_a_missing_retry(folder: Path, tmp_path: Path) -> None:
     assert "4 passed" in done("pytest test_sunsensor.py", folder)
     worse = tmp_path / "worse"
     shutil.copytree(folder, worse, ignore=shutil.ignore_patterns("__pycache__", "tty*"))

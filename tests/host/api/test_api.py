@@ -15,7 +15,7 @@ def test_every_public_name_is_documented(name: str) -> None:
     assert name in dir(cubestack)
 
 
-def test_the_lazy_names_are_the_public_ones() -> None:
+def test_lazy_names_are_the_public_ones() -> None:
     assert {*cubestack._HOMES, "__version__"} == set(cubestack.__all__)
     with pytest.raises(AttributeError, match="no attribute 'opendevice'"):
         _ = cubestack.opendevice

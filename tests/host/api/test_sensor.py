@@ -14,13 +14,13 @@ def test_every_name_loads(name: str) -> None:
     assert name in dir(sensor)
 
 
-def test_a_name_is_that_of_the_module_it_comes_from() -> None:
+def test_names_are_those_of_their_modules() -> None:
     assert sensor.u8 is u8
     for names in sensor.TOPICS.values():
         assert all(name == own for name, (_, own) in names.items())
 
 
-def test_an_unknown_name_is_rejected() -> None:
+def test_unknown_name_is_rejected() -> None:
     with pytest.raises(AttributeError, match=r"'cubestack.sensor' has no attribute 'Nodeboard'"):
         _ = sensor.Nodeboard
 

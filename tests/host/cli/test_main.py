@@ -112,7 +112,7 @@ def test_wrong_arguments_are_one_line(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("kind = sky", ("no TOML",)),
+        ("kind = sky", ("not a TOML file",)),
         ('kind = "sea"', ("kind", "sky", "sea")),
         ('kind = "sky"\nra_deg = 1.0', ("dec_deg",)),
         ('kind = "sky"\nra_deg = 1.0\ndec_deg = 2.0\ncolour = 3', ("colour", "mag_limit")),
@@ -149,7 +149,9 @@ def test_rejects_other_picture_formats(run: Run, tmp_path: Path) -> None:
     picture = dark_picture(tmp_path / "sky.gif")
     check_one_line(run("measure", "cubestar", "--image", picture), "GIF", "PNG, JPEG, TIFF")
     picture.write_text("stars")
-    check_one_line(run("measure", "cubestar", "--image", picture), "no picture", "PNG, JPEG, TIFF")
+    check_one_line(
+        run("measure", "cubestar", "--image", picture), "not a picture", "PNG, JPEG, TIFF"
+    )
 
 
 @pytest.mark.parametrize(

@@ -297,7 +297,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         if made.stop is not None:
             raise made.stop
 
-    monkeypatch.setattr(campaign.Plan, "read", lambda path: path)
+    monkeypatch.setattr(campaign.CampaignPlan, "read", lambda path: path)
     monkeypatch.setattr(campaign.Folder, "begun", lambda *_of, **_how: made)
     monkeypatch.setattr(campaign.campaigns, "count", lambda _plan: 8)
     monkeypatch.setattr(campaign.campaigns, "run", run)

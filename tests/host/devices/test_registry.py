@@ -24,12 +24,12 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[EntryPoint]]:
     device.cache_clear()
 
 
-def test_the_names_of_declarations_are_those_they_are_registered_by() -> None:
+def test_declared_names_match_the_entry_points() -> None:
     assert [one.name for one in devices()] == list(device_names())
     assert [one.name for one in devices()] == [one.interface.name.lower() for one in devices()]
 
 
-def test_listing_them_loads_no_emulator() -> None:
+def test_listing_devices_loads_no_emulator() -> None:
     script = (
         "import sys; from cubestack.host.devices.registry import devices; list(devices());"
         "print([m for m in sys.modules if m.startswith(('cubestack.emulator', 'amaranth'))])"
@@ -46,12 +46,12 @@ def test_listing_them_loads_no_emulator() -> None:
         ("other", "the interface of other is called CubeStar"),
     ],
 )
-def test_a_name_that_can_not_be_everywhere_is_refused(name: str, message: str) -> None:
+def test_rejects_invalid_names(name: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         replace(device("cubestar"), name=name)
 
 
-def test_a_name_in_any_case_is_found_and_an_unknown_one_told() -> None:
+def test_name_lookup_ignores_case() -> None:
     assert device("CubeStar") is device("cubestar")
     with pytest.raises(TargetError, match="no device 'cubestart'; known: cubestar, cubesense"):
         device("cubestart")
@@ -64,7 +64,7 @@ def test_a_name_in_any_case_is_found_and_an_unknown_one_told() -> None:
         ("no_such_module:DEVICE", "device other: no_such_module:DEVICE does not load"),
     ],
 )
-def test_a_wrong_registration_is_told_by_name_and_left_out_of_lists(
+def test_invalid_registration_is_reported_and_not_listed(
     registered: list[EntryPoint], value: str, message: str
 ) -> None:
     registered.append(EntryPoint("other", value, registry.GROUP))
@@ -74,7 +74,7 @@ def test_a_wrong_registration_is_told_by_name_and_left_out_of_lists(
         device("other")
 
 
-def test_a_table_that_does_not_load_leaves_the_others() -> None:
+def test_merged_tables_skip_one_that_does_not_load() -> None:
     tables = {
         "cubestar": get("nowhere:TOPS"),
         "aramis": lambda: {"a": 1},
@@ -83,7 +83,7 @@ def test_a_table_that_does_not_load_leaves_the_others() -> None:
     assert merged_tables(lambda one: tables[one.name]()) == {"a": 1, "b": 2}
 
 
-def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]) -> None:
+def test_built_in_device_can_not_be_replaced(registered: list[EntryPoint]) -> None:
     registered.append(EntryPoint("cubestar", "nowhere:NOTHING", registry.GROUP))
     assert device("cubestar").title == "CubeStar"
 
@@ -97,7 +97,7 @@ def test_nobody_takes_the_name_of_one_that_is_there(registered: list[EntryPoint]
         ("cubesense", {"mcu_addressing": "yes"}, "must be true or false, not 'yes'"),
     ],
 )
-def test_options_that_make_no_sense(name: str, options: dict[str, object], message: str) -> None:
+def test_rejects_invalid_options(name: str, options: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         open_device(name, **options)
 

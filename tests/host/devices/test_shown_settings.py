@@ -19,7 +19,7 @@ CORNERS = ("XMin", "XMax", "YMin", "YMax")
         ("aramis", "SetGain", ["Gain.Gain"]),
     ],
 )
-def test_each_setting_is_shown_once_and_one_with_areas_once_in_each(
+def test_each_setting_is_shown_once_per_area(
     name: str, telecommand: str, places: list[str]
 ) -> None:
     sensor = device(name)

@@ -50,7 +50,7 @@ def after(path: Path, time_ps: int) -> list[object]:
     return [event for event in events if event.time_ps > time_ps]
 
 
-def test_what_comes_after_is_as_it_was(make):
+def test_rerun_is_identical(make):
     devices, past = make("cubesense")
     kernel = devices[0].board.kernel
     talk(devices[0], 7)
@@ -80,7 +80,7 @@ def test_what_comes_after_is_as_it_was(make):
     assert sorted(past.file(0).read_text().splitlines()) == sorted(before.splitlines())
 
 
-def test_what_was_done_after_that_time_is_not_done_again(make):
+def test_later_actions_are_not_repeated(make):
     devices, past = make("cubesense")
     kernel = devices[0].board.kernel
     talk(devices[0], 7)
@@ -96,7 +96,7 @@ def test_what_was_done_after_that_time_is_not_done_again(make):
     assert devices[0].client.client.telemetry("Configuration")["Threshold1"] == 7
 
 
-def test_it_can_end_on_the_way(make):
+def test_going_back_can_stop_earlier(make):
     devices, past = make("cubesense")
     kernel = devices[0].board.kernel
     kernel.advance_to(5 * PS_PER_S)
@@ -151,7 +151,7 @@ class FakeClient(SerialPort):
         return len(data)
 
 
-def test_ports_stand_still_meanwhile_and_lead_to_the_new_device(make):
+def test_ports_pause_and_reconnect_to_the_new_device(make):
     devices, past = make("cubesense")
     kernel = devices[0].board.kernel
     port = FakeClient(devices[0].board.uart)
@@ -180,7 +180,7 @@ def test_ports_stand_still_meanwhile_and_lead_to_the_new_device(make):
     assert bytes(port.got) == 2 * answer
 
 
-def test_a_file_that_makes_no_device_any_more_leaves_all_as_it_is(make, tmp_path):
+def test_invalid_recording_keeps_the_old_device(make, tmp_path):
     scene = tmp_path / "sun.toml"
     scene.write_text('kind = "earth-sun"\n')
     devices, past = make("cubesense", scene=scene)
@@ -196,7 +196,7 @@ def test_a_file_that_makes_no_device_any_more_leaves_all_as_it_is(make, tmp_path
     assert not past.again
 
 
-def test_a_record_that_was_ended_has_all_that_was_said_and_nothing_later(make):
+def test_closed_recording_is_complete_and_final(make):
     devices, past = make("cubesense")
     path = past.file(0)
     talk(devices[0], 7)

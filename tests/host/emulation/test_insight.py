@@ -17,7 +17,7 @@ from tests.emulator.iss.efm32gg.bench import MS, Bench
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_a_profile_has_the_cycles_of_all_devices(tmp_path: Path, count: int) -> None:
+def test_profile_sums_the_cycles_of_all_devices(tmp_path: Path, count: int) -> None:
     path, cycles = tmp_path / "profile", 0
     with ExitStack() as stack:
         watch = InsightFiles(profile=path).open(stack)
@@ -35,7 +35,7 @@ def test_a_profile_has_the_cycles_of_all_devices(tmp_path: Path, count: int) -> 
     assert int(path.read_text().split("totals: ")[1]) == pytest.approx(cycles, abs=100)
 
 
-def test_a_closed_device_listens_for_no_debugger(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closing_a_device_closes_its_debugger(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         debugging, "open_debugger", lambda _board, port, **_: GdbEndpoint(port, target)
     )

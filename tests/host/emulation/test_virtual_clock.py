@@ -69,7 +69,7 @@ def followed(clock: VirtualClock, device: FakeDevice) -> Any:
     return clock.follow(device)  # type: ignore[arg-type]
 
 
-def test_a_poll_loop_of_an_hour_is_virtual(clock: VirtualClock, driver: Any) -> None:
+def test_poll_loop_of_an_hour_takes_virtual_time(clock: VirtualClock, driver: Any) -> None:
     device, began_s = FakeDevice(5.0), time.monotonic()
     with followed(clock, device):
         assert not driver.poll(lambda: False)
@@ -79,7 +79,7 @@ def test_a_poll_loop_of_an_hour_is_virtual(clock: VirtualClock, driver: Any) -> 
     assert time.monotonic() - began_s < 60
 
 
-def test_a_loop_that_only_looks_at_the_clock_ends(clock: VirtualClock, driver: Any) -> None:
+def test_busy_loop_ends(clock: VirtualClock, driver: Any) -> None:
     device = FakeDevice()
     with followed(clock, device):
         looks = driver.spin(0.1)
@@ -87,7 +87,7 @@ def test_a_loop_that_only_looks_at_the_clock_ends(clock: VirtualClock, driver: A
     assert device.time_s == pytest.approx(0.1, abs=3e-5)
 
 
-def test_all_clocks_go_by_the_same_time(clock: VirtualClock) -> None:
+def test_all_clocks_show_virtual_time(clock: VirtualClock) -> None:
     with followed(clock, FakeDevice(7.0)):
         began = [getattr(time, name)() for name in CLOCKS]
         assert began == pytest.approx([real() / NS_PER_S for real in CLOCKS.values()], abs=5)
@@ -99,7 +99,7 @@ def test_all_clocks_go_by_the_same_time(clock: VirtualClock) -> None:
         assert at_ns / NS_PER_S == pytest.approx(time.monotonic(), abs=1e-4)
 
 
-def test_all_devices_go_on_and_the_clock_never_goes_back(clock: VirtualClock) -> None:
+def test_clock_of_several_devices_is_monotonic(clock: VirtualClock) -> None:
     one, other = FakeDevice(100.0), FakeDevice(3.0)
     with followed(clock, one), followed(clock, other):
         began_s = time.monotonic()
@@ -116,7 +116,7 @@ def test_all_devices_go_on_and_the_clock_never_goes_back(clock: VirtualClock) ->
         assert time.monotonic() - between_s == pytest.approx(10, abs=1e-3)
 
 
-def test_others_keep_wall_time(clock: VirtualClock, driver: Any) -> None:
+def test_other_modules_and_threads_keep_wall_time(clock: VirtualClock, driver: Any) -> None:
     device = FakeDevice()
     with followed(clock, device):
         began_s = REAL["monotonic"]()
@@ -134,7 +134,7 @@ def test_others_keep_wall_time(clock: VirtualClock, driver: Any) -> None:
         assert REAL["monotonic"]() - began_s >= 0.005
 
 
-def test_afterwards_all_is_as_it_was(clock: VirtualClock, driver: Any) -> None:
+def test_leaving_restores_the_clocks(clock: VirtualClock, driver: Any) -> None:
     own = dict(vars(driver))
     with followed(clock, FakeDevice()):
         from time import sleep as kept

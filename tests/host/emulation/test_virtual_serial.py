@@ -47,7 +47,7 @@ def opened(line: Line, timeout: float | None) -> VirtualSerial:
 COMING = ((5.25, b"ab"), (5.5, b"cd\n"), (8.0, b"e"))
 
 
-def test_a_read_ends_with_its_last_byte() -> None:
+def test_read_returns_after_its_last_byte() -> None:
     line = Line(*COMING)
     port = opened(line, 1.0)
     assert port.read(3) == b"abc"
@@ -57,7 +57,7 @@ def test_a_read_ends_with_its_last_byte() -> None:
     assert port.in_waiting == 0
 
 
-def test_a_read_ends_when_its_time_is_over_with_what_came() -> None:
+def test_read_times_out_with_what_arrived() -> None:
     line = Line(*COMING)
     port = opened(line, 1.0)
     assert port.read(9) == b"abcd\n"
@@ -66,7 +66,7 @@ def test_a_read_ends_when_its_time_is_over_with_what_came() -> None:
     assert line.now_s == pytest.approx(7.0)
 
 
-def test_a_line_is_read_to_its_end() -> None:
+def test_readline_stops_at_the_newline() -> None:
     line = Line(*COMING)
     port = opened(line, 1.0)
     assert port.readline() == b"abcd\n"
@@ -80,18 +80,18 @@ def test_a_line_is_read_to_its_end() -> None:
     ("expected", "size", "found"),
     [(b"bc", None, b"abc"), (b"\n", 2, b"ab"), (b"x", 4, b"abcd"), (b"x", None, b"abcd\n")],
 )
-def test_what_is_read_ends_with_a_text_a_size_or_the_time(
+def test_read_until_stops_at_text_size_or_timeout(
     expected: bytes, size: int | None, found: bytes
 ) -> None:
     assert opened(Line(*COMING), 1.0).read_until(expected, size) == found
 
 
 @pytest.mark.parametrize(("size", "found"), [(-1, b"abcd\n"), (0, b""), (2, b"ab")])
-def test_a_line_may_be_cut(size: int, found: bytes) -> None:
+def test_readline_has_a_maximum_size(size: int, found: bytes) -> None:
     assert opened(Line(*COMING), 1.0).readline(size) == found
 
 
-def test_without_a_time_it_waits_as_long_as_it_takes() -> None:
+def test_read_without_a_timeout_waits() -> None:
     line = Line(*COMING)
     port = opened(line, None)
     assert port.read(6) == b"abcd\ne"
@@ -99,7 +99,7 @@ def test_without_a_time_it_waits_as_long_as_it_takes() -> None:
     assert opened(Line((900.0, b"x\n")), None).readline() == b"x\n"
 
 
-def test_nothing_is_waited_for_where_the_time_is_0() -> None:
+def test_timeout_0_returns_at_once() -> None:
     line = Line((5.0, b"ab"), (5.1, b"c"))
     port = opened(line, 0.0)
     assert port.read(3) == b"ab"
@@ -107,7 +107,7 @@ def test_nothing_is_waited_for_where_the_time_is_0() -> None:
     assert line.now_s == 5.0
 
 
-def test_what_is_written_is_counted_and_sent() -> None:
+def test_write_returns_the_number_of_bytes() -> None:
     line = Line()
     assert opened(line, 0.0).write(bytearray(b"abc")) == 3
     assert line.said == b"abc"

@@ -45,7 +45,7 @@ def measure(**options: Any) -> list[AramisResult]:
     return list(measure_device("aramis", **options))  # type: ignore[arg-type]
 
 
-def test_a_random_sky_lost_in_space() -> None:
+def test_random_sky_lost_in_space() -> None:
     frames = measure(frames=3, profile="extended")
     for frame in frames:
         assert (frame.right, frame.wrong, frame.flips, frame.status) == (True, 0, 0, "")
@@ -58,7 +58,7 @@ def test_a_random_sky_lost_in_space() -> None:
     assert frames[0].truth != frames[1].truth
 
 
-def test_runs_repeat_but_for_the_wall_time() -> None:
+def test_same_seed_repeats_the_result() -> None:
     first, again, other = (
         replace(measure(frames=1, seed=seed)[0], wall_ms=0.0) for seed in (4, 4, 5)
     )
@@ -77,7 +77,7 @@ def test_modes_noise_rates_and_published_settings() -> None:
     assert turning.right
 
 
-def test_bits_turned_over_in_flash_are_counted() -> None:
+def test_bit_flips_in_flash_are_counted() -> None:
     for frame in measure(bit_flips=3e-6, frames=2):
         assert 0 < frame.corrected <= frame.flips
         assert (frame.right, frame.lost) == (True, 0)
@@ -87,7 +87,7 @@ def test_bits_turned_over_in_flash_are_counted() -> None:
     assert damaged.reason in ("catalogue_damaged", "no_catalogue")
 
 
-def test_a_scene_file_and_a_scene(tmp_path: Path) -> None:
+def test_scene_file_and_scene_object(tmp_path: Path) -> None:
     path = tmp_path / "sky.toml"
     path.write_text('kind = "sky"\nra_deg = 84.0\ndec_deg = -1.0\n', encoding="utf-8")
     made = SkyScene.pointing(84.0, -1.0)
@@ -96,7 +96,7 @@ def test_a_scene_file_and_a_scene(tmp_path: Path) -> None:
     assert all(frame.right for frame in frames)
 
 
-def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
+def test_picture_file(tmp_path: Path) -> None:
     scene = SkyScene.pointing(84.0, -1.0, 20.0)
     settings = read_settings(RegisterFile(REGISTERS))
     settings = replace(settings, exposure_rows=6299, gains=(15.0,) * 4)  # type: ignore[arg-type]
@@ -108,7 +108,7 @@ def test_a_picture_file_as_the_light(tmp_path: Path) -> None:
     assert attitude_error_deg(np.array(frame.quaternion), scene.quaternion)[0] < 0.01
 
 
-def test_a_table_for_readers(run: Run) -> None:
+def test_command_prints_a_table(run: Run) -> None:
     shown = run("measure", "aramis", "--frames", "2", "--profile", "extended").out
     assert all(text in shown for text in ("100.0 % right", "mean time", "confirmed"))
 
@@ -123,7 +123,7 @@ def test_a_table_for_readers(run: Run) -> None:
         ({"false_mags": (6, 4.5)}, "the brightest first"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(options: dict[str, Any], complaint: str) -> None:
+def test_rejects_invalid_options(options: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         measure(**options)
 
@@ -132,7 +132,7 @@ def test_options_that_make_no_sense_are_refused(options: dict[str, Any], complai
     ("third", "turned_deg", "far"),
     [((25930,), 0, False), ((25930,), 20, False), ((25930,), 24, True), ((), 0, None)],
 )
-def test_a_triangle_more_than_a_field_away_is_wrong_as_the_thesis_counts(
+def test_far_triangle_is_wrong_as_in_the_thesis(
     third: tuple[int, ...], turned_deg: float, far: bool | None
 ) -> None:
     belt = [Star(0, 0.0, 0.0, 100.0, one) for one in (26311, 26727, *third)]
@@ -141,7 +141,7 @@ def test_a_triangle_more_than_a_field_away_is_wrong_as_the_thesis_counts(
     assert _is_far(belt, FIELD_DEG, None) is None
 
 
-def test_what_is_far_is_told_beside_what_is_wrong() -> None:
+def test_summary_counts_far_triangles() -> None:
     (frame,) = found = measure(frames=1, profile="published")
     assert frame.far is False
     lines = list(EXPERIMENT.summarise([*found, replace(frame, far=True)], 1.0))

@@ -6,7 +6,7 @@ from cubestack.host.experiments.measure import measure
 @pytest.mark.parametrize(
     ("sensor", "told", "other"), [("sun", "sun_pixels", "edges"), ("nadir", "edges", "sun_pixels")]
 )
-def test_what_was_found_is_told_under_its_own_name(sensor: str, told: str, other: str) -> None:
+def test_each_sensor_has_its_own_column(sensor: str, told: str, other: str) -> None:
     (result,) = measure("cubesense", frames=1, sensor=sensor)
     assert result.sensor == sensor
     assert getattr(result, told) > 0

@@ -12,7 +12,7 @@ from cubestack.host.experiments.cubestar.measure import CubeStarOptions, _pictur
 from cubestack.host.experiments.measure import measure
 
 
-def test_what_crosses_a_later_frame_is_there_while_it_is_exposed() -> None:
+def test_debris_crosses_a_frame_during_its_exposure() -> None:
     devices = list[Any]()
     list(measure("cubestar", frames=2, hazard=("debris",), mag_limit=2.0, opened=devices.append))
     (emulated,) = devices
@@ -28,7 +28,7 @@ def camera_file(folder: Path, quaternion: list[float]) -> Path:
     return path
 
 
-def test_the_truth_of_a_picture_is_that_of_its_camera_file(tmp_path: Path) -> None:
+def test_truth_is_read_from_the_camera_file(tmp_path: Path) -> None:
     camera = camera_file(tmp_path, [0.5, -0.5, 0.1, 0.7])
     truth = _picture_truth(Path("elsewhere/sky.png"), camera)
     np.testing.assert_array_equal(truth, [0.5, -0.5, 0.1, 0.7])
@@ -36,14 +36,12 @@ def test_the_truth_of_a_picture_is_that_of_its_camera_file(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("quaternion", [[0, 0, 1], [0, 0, 0, 0, 1], [0, 0, 0.1, 1], [1, 0, 0, 1]])
-def test_a_truth_that_is_no_unit_quaternion_is_refused(
-    quaternion: list[float], tmp_path: Path
-) -> None:
+def test_rejects_truth_that_is_no_unit_quaternion(quaternion: list[float], tmp_path: Path) -> None:
     with pytest.raises(CameraFileError, match=r"sky\.png's quaternion must be four of unit"):
         _picture_truth(Path("sky.png"), camera_file(tmp_path, quaternion))
 
 
-def test_a_threshold_is_searched_over_five_skies_and_the_camera_looks_back() -> None:
+def test_threshold_search_uses_five_skies_and_restores_the_scene() -> None:
     own = object()
     emulated: Any = SimpleNamespace(scene=own)
     seen = [emulated.scene for _ in _views(emulated, CubeStarOptions(seed=4))]
