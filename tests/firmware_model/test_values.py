@@ -1,12 +1,14 @@
-"""The limits of every declared value: one set of tests for all of them."""
+"""Declared values: reading, texts, and the limits of every one that there is."""
 
 import math
+import re
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cubestack.emulator.camera.mlx75412.lens import LENS
@@ -15,10 +17,21 @@ from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.values import (
     FLAG,
     NUMBER,
+    REQUIRED,
     WHOLE,
     Declaration,
     DeclaredValues,
     ListDeclaration,
+    choice,
+    described,
+    flag,
+    named,
+    number,
+    positive,
+    read_table,
+    text,
+    vector,
+    whole,
 )
 from cubestack.host.devices.registry import devices
 from cubestack.host.options import Options
@@ -39,6 +52,105 @@ NEEDED: dict[str, dict[str, Any]] = {
     "SkyCondition": {"optics": LENS},
     "SkyScene": SKY,
 }
+
+
+@dataclass(frozen=True)
+class Some(DeclaredValues):
+    """A value of each kind."""
+
+    angle_deg: float = number(1.0, "an angle", -3, 4, formerly="angle")
+    rate_km_s: float = positive(2.0, "a rate")
+    count: int = whole(3, "how many", high=9)
+    on: bool = flag(False, "on")
+    way: int = choice(1, "where to", {"up": 1, "down": 2})
+    at: tuple[float, ...] = vector(2, (0.0, 1.0), "where")
+    label: str | None = text(None, "a name")
+    plain: str = "anything"
+
+
+KEYS = Some.declared()
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "value"),
+    [
+        ("angle_deg", 4, 4.0),
+        ("angle_deg", 5, "-3 to 4 deg, not 5"),
+        ("angle_deg", 10**400, "a number, not 1000"),
+        ("angle_deg", math.nan, "a number, not nan"),
+        ("rate_km_s", 0, "above 0 km/s, not 0"),
+        ("count", np.int64(9), 9),
+        ("count", 10, "at most 9, not 10"),
+        ("count", 2.0, "a whole number, not 2.0"),
+        ("on", 1, "true or false, not 1"),
+        ("way", "down", 2),
+        ("way", 2, "one of up, down, not 2"),
+        ("at", np.array([1, 2]), (1.0, 2.0)),
+        ("at", [1], "a list of 2 numbers, not [1]"),
+        ("at", [1, "2"], "a number, not '2'"),
+        ("label", 5, "text, not 5"),
+    ],
+)
+def test_reads_values_of_files_and_programs(name: str, given: Any, value: Any) -> None:
+    if not isinstance(value, str):
+        assert KEYS[name].read(given) == value
+        return
+    with pytest.raises(ValueError, match=f"^must be {re.escape(value)}"):
+        KEYS[name].read(given)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "value"),
+    [
+        ("angle_deg", "-1e0", -1.0),
+        ("angle_deg", "x", "a number, not 'x'"),
+        ("angle_deg", "9", "-3 to 4 deg, not 9.0"),
+        ("count", "0x8", 8),
+        ("count", "1.0", "a whole number, not '1.0'"),
+        ("on", "TRUE", True),
+        ("way", "left", "one of up, down, not 'left'"),
+        ("at", "1,2", (1.0, 2.0)),
+        ("at", "1", "a list of 2 numbers, not '1'"),
+    ],
+)
+def test_reads_texts_of_command_lines(name: str, given: str, value: Any) -> None:
+    if not isinstance(value, str):
+        assert KEYS[name].parse(given) == KEYS[name].take(given) == value
+        return
+    with pytest.raises(ValueError, match=f"^must be {re.escape(value)}"):
+        KEYS[name].parse(given)
+
+
+def test_a_table_has_the_declared_keys() -> None:
+    keys = {**KEYS, **named({"needed": whole(REQUIRED, "is needed")})}
+    assert read_table({"count": 1, "needed": 2}, keys) == {"count": 1, "needed": 2}
+    for table, message in (
+        ({}, "needs the key needed"),
+        ({"needed": "x"}, "needed must be a whole number, not 'x'"),
+        ({"other": 1}, "unknown key 'other'; allowed are angle_deg, rate_km_s"),
+    ):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            read_table(table, keys)
+    with pytest.warns(FutureWarning, match=r"key angle is deprecated .* write angle_deg"):
+        assert read_table({"angle": 2}, KEYS) == {"angle_deg": 2.0}
+
+
+def test_limits_can_depend_on_other_values() -> None:
+    some = Some(count=5)
+    some.check_within("count", low=5)
+    with pytest.raises(ValueError, match=r"^count must be 6 to 9, not 5$"):
+        some.check_within("count", low=6)
+
+
+def test_describes_values_for_forms() -> None:
+    assert described(KEYS)["angle_deg"] == {
+        **{"type": "number", "unit": "deg", "default": 1.0},
+        **{"low": -3, "high": 4, "meaning": "an angle"},
+    }
+    assert KEYS["way"].described()["choices"] == ["up", "down"]
+    assert KEYS["way"].described()["default"] == "up"
+    assert KEYS["at"].described()["of"] == {"type": "number"}
+    assert "plain" not in KEYS
 
 
 def owners(kind: type[DeclaredValues] = DeclaredValues) -> Iterator[type[Any]]:
