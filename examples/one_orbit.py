@@ -66,7 +66,7 @@ def fly(path: Path, seconds: float) -> list[dict[str, Any]]:
             begun = star.time_s
             camera = Camera.SUN if len(rows) % 2 else Camera.NADIR
             found = off_deg(sense, camera)
-            row = {"time_s": round(begun, 3), "shadow": round(orbit.around(begun).shadow, 4)}
+            row = {"time_s": round(begun, 3), "shadow": round(orbit.surroundings(begun).shadow, 4)}
             star.wait(max(0.0, begun + 0.8 - star.time_s))  # its loop is idle then
             row |= {"asked": camera.name, "off_deg": found, "star_deg": star_deg(star)}
             rows.append(row)

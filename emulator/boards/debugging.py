@@ -93,7 +93,7 @@ def open_debugger(board: DebuggedBoard, port: int, *, wait: bool = False) -> Gdb
         Monitor(board, board.insight.symbols),
     )
     endpoint = GdbEndpoint(port, debugger)
-    debugger.visit = endpoint.visit
+    debugger.poll = endpoint.poll
     debugger.serve = lambda: endpoint.serve(SERVE_S)
     board.processor.debugger = debugger
     if wait:

@@ -88,7 +88,7 @@ class SerialWire(UartTap):
     def _receive(self, byte: int, flags: int) -> None:
         machine, unit = self.processor.machine, BY_PIN | self.rx
         rate = self._uart.form.baud << RATE_SHIFT
-        self.processor.give(lambda: machine.uart_receive(unit, byte, flags | rate))
+        self.processor.change_inputs(lambda: machine.uart_receive(unit, byte, flags | rate))
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Core:
     def flip(self, register: str, bit: int) -> None:
         machine = self.processor.machine
         value = machine.register(register) ^ 1 << bit
-        self.processor.give(lambda: machine.set_register(register, value))
+        self.processor.change_inputs(lambda: machine.set_register(register, value))
 
 
 @dataclass(eq=False)
@@ -136,7 +136,7 @@ class SlaveWire:
         """End the transfer, and a pending question."""
         self._pending = False
         machine = self.processor.machine
-        self.processor.give(lambda: machine.i2c_slave_stop(self._unit))
+        self.processor.change_inputs(lambda: machine.i2c_slave_stop(self._unit))
 
     @property
     def _unit(self) -> int:

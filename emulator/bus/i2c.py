@@ -147,7 +147,7 @@ class I2cBus:
         self._listeners: list[I2cTarget] = []
         self._open: list[OpenTarget] = []
         self._general = Forwarder(lambda: self._listeners)
-        self._taken = False
+        self._occupied = False
         self._turns: deque[simpy.Event] = deque()
         self.fault_hook: I2cFaultHook | None = None
         self.taps: list[I2cTap] = []
@@ -199,31 +199,31 @@ class I2cBus:
                 tap.transfer_ended(messages, began_ps, failure)
 
     def _in_turn(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
-        if self._taken:
-            yield from self._take_turn()
-        self._taken = True
+        if self._occupied:
+            yield from self._wait_for_turn()
+        self._occupied = True
         try:
             yield from self._transfer(messages)
         finally:
-            self._hand_on()
+            self._end_turn()
 
-    def _take_turn(self) -> Generator[simpy.Event, Any, None]:
+    def _wait_for_turn(self) -> Generator[simpy.Event, Any, None]:
         turn = self.kernel.event()
         self._turns.append(turn)
         try:
             yield turn
         except BaseException:  # a cancelled transfer must not block the queue
             if turn.triggered:
-                self._hand_on()
+                self._end_turn()
             else:
                 self._turns.remove(turn)
             raise
 
-    def _hand_on(self) -> None:
+    def _end_turn(self) -> None:
         if self._turns:
             self._turns.popleft().succeed()
         else:
-            self._taken = False
+            self._occupied = False
 
     def _transfer(self, messages: list[I2cMessage]) -> Generator[simpy.Event, Any, None]:
         addressed: I2cTarget | None = None
@@ -271,7 +271,7 @@ class I2cBus:
             addressed.i2c_stop()
         for target in self._open:
             offer = partial(target.i2c_address, address, message.reading)
-            if (yield from self._stretched(offer, address)):
+            if (yield from self._call_stretched(offer, address)):
                 found = found or target
         if found is None:
             raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
@@ -282,7 +282,7 @@ class I2cBus:
             message.data = bytearray()
             wanted = message.read
             while len(message.data) < wanted:
-                byte = yield from self._stretched(target.i2c_read, message.address)
+                byte = yield from self._call_stretched(target.i2c_read, message.address)
                 yield self.kernel.timeout(BITS_PER_BYTE * self.bit_ps)
                 if self.fault_hook is not None:
                     yield from self.fault_hook.after_byte(message.address, read=True)
@@ -295,11 +295,11 @@ class I2cBus:
             if self.fault_hook is not None:
                 yield from self.fault_hook.after_byte(message.address, read=False)
             write = partial(target.i2c_write, byte)
-            if not (yield from self._stretched(write, message.address)):
+            if not (yield from self._call_stretched(write, message.address)):
                 text = f"I2C device {message.address:#04x} did not acknowledge byte {byte:#04x}"
                 raise I2cError(errno.EIO, text)
 
-    def _stretched(
+    def _call_stretched(
         self, call: Callable[[], T | None], address: int
     ) -> Generator[simpy.Event, Any, T]:
         give_up_ps = self.kernel.now + LONGEST_STRETCH_PS

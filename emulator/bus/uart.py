@@ -34,8 +34,8 @@ class FaultHook(Protocol):
     ) -> None:
         """The device sends ``data``; call ``line`` with what arrives, in order of time."""
 
-    def to_device(self, byte: int, start_ps: int, hear: Callable[[int, int], None]) -> None:
-        """A byte that began at ``start_ps`` ended; ``hear`` makes the device receive one now."""
+    def to_device(self, byte: int, start_ps: int, receive: Callable[[int, int], None]) -> None:
+        """A byte that began at ``start_ps`` ended; ``receive`` makes the device receive one now."""
 
 
 class Uart:
@@ -138,7 +138,7 @@ class Uart:
                     if form == self.form and self._sampler.next_ps() is None:
                         yield self._env.timeout(self.byte_ps)
                         self._incoming.popleft()
-                        self._hear(byte, self._env.now - self.byte_ps)
+                        self._deliver(byte, self._env.now - self.byte_ps)
                     else:
                         yield from self._sample(byte, form)
                         self._incoming.popleft()
@@ -153,7 +153,7 @@ class Uart:
         """Send one character of another format, and deliver what the device received by its end."""
         end_ps = self._env.now + form.character_ps
         self._sampler.put(byte, self._env.now, form)
-        yield from self._found_by(end_ps)
+        yield from self._deliver_until(end_ps)
         yield self._env.timeout(end_ps - self._env.now)
 
     def _finish(self) -> Generator[simpy.Event, Any, None]:
@@ -161,22 +161,22 @@ class Uart:
         while not self._arrival.triggered and (next_ps := self._sampler.next_ps()) is not None:
             wait_ps = max(0, next_ps - self._env.now)
             yield simpy.AnyOf(self._env, [self._arrival, self._env.timeout(wait_ps)])
-            yield from self._found_by(self._env.now)
+            yield from self._deliver_until(self._env.now)
 
-    def _found_by(self, until_ps: int) -> Generator[simpy.Event, Any, None]:
+    def _deliver_until(self, until_ps: int) -> Generator[simpy.Event, Any, None]:
         for character in self._sampler.take(until_ps):
             yield self._env.timeout(max(0, character.time_ps - self._env.now))
             if character.framing_error:
                 self._drop_character()
             else:
-                self._hear(character.value, self._env.now - self.byte_ps)
+                self._deliver(character.value, self._env.now - self.byte_ps)
 
     def _drop_character(self) -> None:
         self.framing_errors += 1
         for tap in self.taps:
             tap.framing_error(self._env.now)
 
-    def _hear(self, byte: int, start_ps: int) -> None:
+    def _deliver(self, byte: int, start_ps: int) -> None:
         for tap in self.host_taps:
             tap(byte, start_ps)
         if self.fault_hook is None:

@@ -53,7 +53,7 @@ class Injection:
         """Random numbers that depend on ``key`` alone, not on earlier effects."""
         return np.random.Generator(np.random.PCG64([self.seed, self.number, *key]))
 
-    def strikes(self, rate: float) -> bool:
+    def has_effect(self, rate: float) -> bool:
         """Draw whether it has an effect, with probability ``rate``."""
         return rate >= 1 or float(self.generator.random()) < rate
 

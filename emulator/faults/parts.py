@@ -46,14 +46,14 @@ class CameraFaults(Mechanism):
 
         def follow(channel: str, on: bool) -> None:
             switched(channel, on)
-            if on and channel == site.channel and self._dead:
+            if on and channel == site.channel and self._is_dead:
                 site.power(False, self._now_ps())
 
         power.on_switch = follow
         engine.attach(source, name)
 
     @property
-    def _dead(self) -> bool:
+    def _is_dead(self) -> bool:
         return bool(active(self.injections, table.CameraDead, self.env.now))
 
     def _now_ps(self) -> int:
@@ -76,7 +76,7 @@ class CameraFaults(Mechanism):
     def end(self, injection: Injection) -> None:
         now_ps = self._now_ps()
         super().end(injection)
-        if isinstance(injection.fault, table.CameraDead) and not self._dead:
+        if isinstance(injection.fault, table.CameraDead) and not self._is_dead:
             self.report(now_ps, injection, "is back")
             self._site.power(self._power.is_on(self._site.channel), now_ps)
         self._engine.stream_changed(self._name)

@@ -104,12 +104,12 @@ class PinFaults(Mechanism, FpgaPort):
         return self._engine.run(until_ps)
 
     def strobe_read(self, out: NDArray[np.uint8], period: Fraction, until_ps: int) -> int:
-        return self._around(lambda: self._engine.strobe_read(out, period, until_ps))
+        return self._between_reads(lambda: self._engine.strobe_read(out, period, until_ps))
 
     def access(self, transactions: Transactions, until_ps: int) -> int:
-        return self._around(lambda: self._engine.access(transactions, until_ps))
+        return self._between_reads(lambda: self._engine.access(transactions, until_ps))
 
-    def _around(self, take: Callable[[], int]) -> int:
+    def _between_reads(self, take: Callable[[], int]) -> int:
         for act in self.around_reads:
             act()
         done = take()

@@ -59,7 +59,7 @@ class FaultySource:
         self.period = source.period
         self.line_clocks = source.line_clocks
         self.active_columns = source.active_columns
-        self._cut: tuple[tuple[object, ...], list[_Piece]] | None = None
+        self._cache: tuple[tuple[object, ...], list[_Piece]] | None = None
 
     def segment_at(self, time_ps: int) -> PixelSegment | None:
         """The source's segment, split at a missing or additional clock."""
@@ -75,9 +75,9 @@ class FaultySource:
             *(base.start_ps, base.clocks, self.line_clocks, self.active_columns, self.period),
             *((injection.number, injection.end_ps) for injection in self.injections),
         )
-        if self._cut is None or self._cut[0] != key:
-            self._cut = key, self._pieces(base)
-        for piece in self._cut[1]:
+        if self._cache is None or self._cache[0] != key:
+            self._cache = key, self._pieces(base)
+        for piece in self._cache[1]:
             if piece.end_ps > time_ps:
                 self.period = piece.period
                 self.line_clocks = piece.line_clocks
@@ -188,11 +188,11 @@ class FaultySource:
 def _lines(injection: Injection, start_ps: int, line_ps: Fraction, rows: int) -> range:
     """Lines that are read out while a fault is active."""
 
-    def first_from(time_ps: int) -> int:
+    def first_row_from(time_ps: int) -> int:
         return min(max(-((start_ps - time_ps) // line_ps), 0), rows)
 
-    end = rows if injection.end_ps is None else first_from(injection.end_ps)
-    return range(first_from(injection.start_ps), end)
+    end = rows if injection.end_ps is None else first_row_from(injection.end_ps)
+    return range(first_row_from(injection.start_ps), end)
 
 
 def _apply(picture: Picture, lines: range, injection: Injection) -> str:

@@ -54,24 +54,24 @@ class LineFaults(Mechanism):
                 self._host_free_ps = arrival_ps + byte_ps
                 line(bytes([arrived]), arrival_ps, byte_ps)
 
-    def to_device(self, byte: int, start_ps: int, hear: Callable[[int, int], None]) -> None:
+    def to_device(self, byte: int, start_ps: int, receive: Callable[[int, int], None]) -> None:
         arrived, delay_ps = self._disturb(byte, start_ps, "to-device")
         if arrived is None:
             return
         now_ps = self.env.now
         due_ps = max(now_ps + delay_ps, self._device_free_ps)
         if due_ps == now_ps:
-            hear(arrived, start_ps)
+            receive(arrived, start_ps)
             return
         self._device_free_ps = due_ps + (now_ps - start_ps)
-        self.env.process(self._later(due_ps, arrived, start_ps, hear))
+        self.env.process(self._receive_later(due_ps, arrived, start_ps, receive))
 
-    def _later(
-        self, due_ps: int, byte: int, start_ps: int, hear: Callable[[int, int], None]
+    def _receive_later(
+        self, due_ps: int, byte: int, start_ps: int, receive: Callable[[int, int], None]
     ) -> Steps:
         held_ps = due_ps - self.env.now
         yield self.env.timeout(held_ps)
-        hear(byte, start_ps + held_ps)
+        receive(byte, start_ps + held_ps)
 
     def _disturb(self, byte: int, start_ps: int, way: str) -> tuple[int | None, int]:
         """The changed byte, or None, and its delay in ps."""
@@ -80,7 +80,7 @@ class LineFaults(Mechanism):
             fault = injection.fault
             assert isinstance(fault, table.UartDrop | table.UartCorrupt | table.UartDelay)
             acts = fault.direction in ("both", way) and injection.active(start_ps)
-            if not acts or not injection.strikes(fault.rate):
+            if not acts or not injection.has_effect(fault.rate):
                 continue
             match fault:
                 case table.UartDrop():
@@ -109,7 +109,7 @@ class BusFaults(Mechanism):
     def before_start(self) -> Steps:
         """Wait until both lines are high; EBUSY if one is low for over 1 s."""
         give_up_ps = self.env.now + LONGEST_STRETCH_PS
-        while (held := self._stuck()) is not None:
+        while (held := self._stuck_line()) is not None:
             injection, fault = held
             self.report(self.env.now, injection, f"{fault.line} is low, no start is possible")
             error = I2cError(errno.EBUSY, f"I2C line {fault.line} was low for over 1 s")
@@ -117,15 +117,15 @@ class BusFaults(Mechanism):
 
     def after_address(self, address: int) -> Steps:
         """Fail as without a target, or if a line is held."""
-        yield from self._lines_free(address)
+        yield from self._wait_for_lines(address)
         if self._nack("address"):
             raise I2cError(errno.ENXIO, f"no I2C device answers at {address:#04x}")
 
     def after_byte(self, address: int, read: bool) -> Steps:
         """Stretch the clock, or reject a byte from the host."""
-        yield from self._lines_free(address)
+        yield from self._wait_for_lines(address)
         for injection, fault in active(self.injections, table.I2cStretch, self.env.now):
-            if injection.strikes(fault.rate):
+            if injection.has_effect(fault.rate):
                 stretch_ps = round(fault.stretch_us * PS_PER_US)
                 self.report(self.env.now, injection, f"{fault.stretch_us:g} us")
                 yield self.env.timeout(min(stretch_ps, LONGEST_STRETCH_PS))
@@ -134,13 +134,13 @@ class BusFaults(Mechanism):
         if not read and self._nack("byte"):
             raise I2cError(errno.EIO, f"I2C device {address:#04x} did not acknowledge a byte")
 
-    def _stuck(self) -> tuple[Injection, table.I2cStuck] | None:
+    def _stuck_line(self) -> tuple[Injection, table.I2cStuck] | None:
         return next(iter(active(self.injections, table.I2cStuck, self.env.now)), None)
 
-    def _lines_free(self, address: int) -> Steps:
+    def _wait_for_lines(self, address: int) -> Steps:
         """Within a transfer, SCL held low stretches the clock; SDA held low is another host."""
         give_up_ps = self.env.now + LONGEST_STRETCH_PS
-        while (held := self._stuck()) is not None:
+        while (held := self._stuck_line()) is not None:
             injection, fault = held
             self.report(self.env.now, injection, f"{fault.line} is low in a transfer")
             if fault.line == "SDA":
@@ -155,7 +155,7 @@ class BusFaults(Mechanism):
 
     def _nack(self, on: str) -> bool:
         for injection, fault in active(self.injections, table.I2cNack, self.env.now):
-            if fault.on == on and injection.strikes(fault.rate):
+            if fault.on == on and injection.has_effect(fault.rate):
                 self.report(self.env.now, injection, f"{on} not acknowledged")
                 return True
         return False

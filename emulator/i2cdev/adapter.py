@@ -12,7 +12,7 @@ from cubestack.emulator.sim.virtual_time import PS_PER_S, Kernel
 from cubestack.firmware_model.formats.linux_i2c import Function
 
 EVENTS = 8
-"""Kernel events between two calls of ``goes_on``; fewer than in a transfer of a few bytes."""
+"""Kernel events between two calls of ``may_continue``; fewer than in a transfer of a few bytes."""
 
 Done = Callable[[int], None]
 
@@ -87,7 +87,7 @@ class I2cAdapter:
         return len(self._open) > len(self._held)
 
     @property
-    def beginning(self) -> bool:
+    def begins_transfer(self) -> bool:
         """Whether ``drive`` would begin a transfer, not continue one."""
         return bool(self._waiting) and (self._driven is None or self._driven.ended)
 
@@ -104,17 +104,17 @@ class I2cAdapter:
         else:
             self.env.process(self._perform(messages, done))
 
-    def drive(self, goes_on: Callable[[], bool]) -> None:
+    def drive(self, may_continue: Callable[[], bool]) -> None:
         """Run the kernel through the current transfer, else through the oldest that waits.
 
-        Must not be called by a process of the kernel. ``goes_on`` is called every ``EVENTS``
+        Must not be called by a process of the kernel. ``may_continue`` is called every ``EVENTS``
         events; when it returns False, the transfer continues as part of the kernel.
         """
         if self._driven is None or self._driven.ended:
             if not self._waiting:
                 return
             self._driven = _Driven(self._perform(*self._waiting.popleft()))
-        self._driven.drive(self.env, goes_on)
+        self._driven.drive(self.env, may_continue)
 
     def _perform(self, messages: list[I2cMessage], done: Done) -> Generator[simpy.Event, Any, None]:
         give_up_ps = self.env.now + self.timeout_ps
@@ -176,8 +176,8 @@ class _Driven:
         self._steps = steps
         self._event: simpy.Event | None = None
 
-    def drive(self, kernel: Kernel, goes_on: Callable[[], bool]) -> None:
-        """Run ``kernel`` and the steps, until ``goes_on`` returns False."""
+    def drive(self, kernel: Kernel, may_continue: Callable[[], bool]) -> None:
+        """Run ``kernel`` and the steps, until ``may_continue`` returns False."""
         event, left = self._event, 0
         if event is None:
             event, left = self._next_event(None), EVENTS
@@ -186,7 +186,7 @@ class _Driven:
         while event is not None:
             while not event.processed:
                 if not left:
-                    if not goes_on():
+                    if not may_continue():
                         self._wait_for(event)
                         return
                     left = EVENTS

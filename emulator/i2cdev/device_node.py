@@ -39,7 +39,7 @@ class DeviceNode:
         self.listing = f"i2c-{bus}\ti2c       \tcubestack emulated bus            \tI2C adapter\n"
         self._name = f"i2c-{bus}"
 
-    def may_be(self, path: str) -> bool:
+    def may_match(self, path: str) -> bool:
         """Whether ``path`` may name an emulated file; a fast check before ``find``."""
         return path.endswith(self._name) or path == LISTING
 

@@ -52,10 +52,10 @@ class GuestProcess(Endpoint):
     """A running program; as a port of a scheduler, it reports the program's end."""
 
     def __init__(
-        self, process: "subprocess.Popen[bytes]", name: str, *, adopts: bool = False
+        self, process: "subprocess.Popen[bytes]", name: str, *, reaps_children: bool = False
     ) -> None:
         self.name = name
-        self._adopts = adopts
+        self._reaps_children = reaps_children
         self._process = process
         self._pidfd = os.pidfd_open(process.pid)
 
@@ -79,7 +79,7 @@ class GuestProcess(Endpoint):
         if not self.ended:
             if poll_now(self._pidfd, select.POLLIN):
                 self._process.poll()
-        elif self._adopts:
+        elif self._reaps_children:
             _reap_children()
 
     def close(self) -> None:
@@ -117,7 +117,7 @@ def start_filtered(
         process.wait()
         raise RouteError(answer[1:].decode() or "the launcher failed")
     supervisor = Supervisor(Listener(descriptors[0]), abi, node, numbers, files)
-    return GuestProcess(process, command[0], adopts=True), supervisor
+    return GuestProcess(process, command[0], reaps_children=True), supervisor
 
 
 def start_preloaded(

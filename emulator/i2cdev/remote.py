@@ -46,7 +46,7 @@ class RemoteBus(Endpoint):
             link.close()
             raise PortError(
                 f"no emulation serves {self.name} ({error.strerror or error}); "
-                "start one with cubestack emulate, or leave out --attach"
+                "start one with cubestack emulate, or omit --attach"
             ) from error
         link.setblocking(False)
         return link

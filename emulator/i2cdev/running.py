@@ -58,11 +58,11 @@ def run_program(
     *,
     pace: Literal["real", "fast"],
     route: guest_process.Route | None = None,
-    say: Callable[[str], None] = lambda _text: None,
+    report: Callable[[str], None] = lambda _text: None,
 ) -> int:
     """Run ``command``, for which ``bus`` is /dev/i2c-``number``; returns its exit status.
 
-    Without a ``route``, seccomp is tried, then preload; ``say`` receives the route and the reason.
+    Without a ``route``, seccomp is tried, then preload; ``report`` gets the route and the reason.
     Processes that the program leaves behind are also served until they end.
 
     Raises:
@@ -84,8 +84,8 @@ def run_program(
         running.append(run := _Run(program, supervisor))
         for each in early:
             run.signalled(each)
-        say(f"/dev/i2c-{number} is served by {reason}")
-        _serve(bus, run, pace=pace, say=say)
+        report(f"/dev/i2c-{number} is served by {reason}")
+        _serve(bus, run, pace=pace, report=report)
     finally:
         for signal_number, handler in handlers.items():
             signal.signal(signal_number, handler)
@@ -95,7 +95,7 @@ def run_program(
 
 
 def _serve(
-    bus: HostBus, run: "_Run", *, pace: Literal["real", "fast"], say: Callable[[str], None]
+    bus: HostBus, run: "_Run", *, pace: Literal["real", "fast"], report: Callable[[str], None]
 ) -> None:
     """Serve ``run`` until it ends; without a scheduler if the bus is in another process."""
     ports = [bus.port, *run.ports]
@@ -115,8 +115,8 @@ def _serve(
         pace=pace,
         i2c=bus.adapter,
         i2c_ports=ports,
-        always_asleep=run.hands_over,
-        report=say,
+        always_asleep=run.shares_processor,
+        report=report,
     ) as scheduler:
         run.on_end = scheduler.stop
         gc.freeze()  # keeps collections between transfers short: the catalogue is large
@@ -149,12 +149,12 @@ class _Run(Endpoint):
         return self._dropped or (self._program.ended and not served)
 
     @property
-    def hands_over(self) -> bool:
+    def shares_processor(self) -> bool:
         """Whether program and supervisor share a processor, so that calls arrive without delay.
 
         Busy-waiting would then only delay the program.
         """
-        return self._supervisor is not None and self._supervisor.hands_over
+        return self._supervisor is not None and self._supervisor.shares_processor
 
     def signalled(self, number: int) -> None:
         """Forward a signal; not Ctrl-C, which the terminal sends to the program as well."""

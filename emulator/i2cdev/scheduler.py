@@ -75,7 +75,7 @@ class I2cScheduler(Endpoint):
         self._busy = busy
         self._pace = pace
         self._watch = Watch(ports, always_asleep=always_asleep)
-        self._came_ns = self._answered_ns = self._ended_ns = self._late_ns = self._spare_ns = 0
+        self._called_ns = self._answered_ns = self._ended_ns = self._late_ns = self._spare_ns = 0
         self._quickest_ns = TURNAROUND_NS
         adapter.driven = True
 
@@ -107,8 +107,8 @@ class I2cScheduler(Endpoint):
 
     def _serve(self, ports: Iterable[Endpoint], *, came: bool) -> None:
         if came:
-            self._came_ns = self._pace.now_ns()
-            self._quickest_ns = min(self._quickest_ns, self._came_ns - self._answered_ns)
+            self._called_ns = self._pace.now_ns()
+            self._quickest_ns = min(self._quickest_ns, self._called_ns - self._answered_ns)
         now_ps = self._kernel.now
         for port in ports:
             port.exchange(now_ps)
@@ -127,7 +127,7 @@ class I2cScheduler(Endpoint):
             if adapter.answered > answered:
                 self._answered_ns = self._ended_ns = self._pace.now_ns()
                 return True
-            if adapter.busy and not adapter.beginning:
+            if adapter.busy and not adapter.begins_transfer:
                 return False
         due_ps = adapter.release_ps()
         return due_ps is not None and self._release(due_ps)
@@ -139,27 +139,27 @@ class I2cScheduler(Endpoint):
         end_ns = clock() + VISIT_NS
         if self._pace.fast:
 
-            def goes_on() -> bool:
+            def may_continue() -> bool:
                 return clock() < end_ns and not kernel.paused
         else:
-            if adapter.beginning:
+            if adapter.begins_transfer:
                 kernel.advance_to(self._pace.ps_at(self._start_ns()) + self._ahead_ps())
             limit_ps = self._pace.now_ps() + self._ahead_ps() + AHEAD_PS
 
-            def goes_on() -> bool:
+            def may_continue() -> bool:
                 ahead = (kernel.horizon() or 0) > limit_ps
                 return clock() < end_ns and not ahead and not kernel.paused
 
-        adapter.drive(goes_on)
+        adapter.drive(may_continue)
         while kernel.horizon() == kernel.now and not kernel.paused:  # remaining events at this time
             kernel.step()
 
     def _start_ns(self) -> int:
         """When an arrived call begins on the wire, unless that is still busy."""
-        if self._came_ns - self._ended_ns <= TURNAROUND_NS:
-            return self._came_ns - MAX_DEBT_NS
+        if self._called_ns - self._ended_ns <= TURNAROUND_NS:
+            return self._called_ns - MAX_DEBT_NS
         way_ns = self._quickest_ns if self._quickest_ns < TURNAROUND_NS else 0
-        return self._came_ns - way_ns - min(self._late_ns, MAX_DEBT_NS)
+        return self._called_ns - way_ns - min(self._late_ns, MAX_DEBT_NS)
 
     def _release(self, due_ps: int) -> bool:
         clock_ns, due_ns = self._pace.now_ns, self._pace.ns_at(due_ps - self._ahead_ps())

@@ -70,7 +70,7 @@ class GdbEndpoint(Endpoint):
         if data == b"" or (self._session is not None and self._session.ended):
             self._drop()
 
-    def visit(self) -> None:
+    def poll(self) -> None:
         """Call ``exchange`` if that is due; cheap enough for a loop."""
         now_ns = time.monotonic_ns()
         if now_ns >= self._polled_ns + POLL_NS:

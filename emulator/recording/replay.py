@@ -72,7 +72,7 @@ class Replay:
         """Send nothing more; bytes on a wire still arrive."""
         self._stopped = True
 
-    def _until(self, time_ps: int) -> Generator[simpy.Event, Any, bool]:
+    def _wait_until(self, time_ps: int) -> Generator[simpy.Event, Any, bool]:
         yield self._kernel.timeout(max(0, time_ps - self._kernel.now))
         return not self._stopped
 
@@ -82,7 +82,7 @@ class Replay:
                 continue
             if isinstance(event, rec.LineBytes) and event.side == "device":
                 continue
-            if not (yield from self._until(event.time_ps)):
+            if not (yield from self._wait_until(event.time_ps)):
                 return
             if isinstance(event, rec.LineBytes):
                 uart.host_writes(event.data)
@@ -91,13 +91,13 @@ class Replay:
 
     def _act(self, act: Callable[[rec.Control], None]) -> Generator[simpy.Event, Any, None]:
         for control in self._recording.controls:
-            if not (yield from self._until(control.time_ps)):
+            if not (yield from self._wait_until(control.time_ps)):
                 return
             act(control)
 
     def _transfer(self, bus: I2cBus) -> Generator[simpy.Event, Any, None]:
         for transfer in self._recording.transfers:
-            if not (yield from self._until(transfer.time_ps)):
+            if not (yield from self._wait_until(transfer.time_ps)):
                 return
             messages = [
                 I2cMessage(m.address, read=len(m.data), probe_read=not m.data)

@@ -126,7 +126,7 @@ class RtlEngine(ABC):
         return {}
 
     @property
-    def clocks_at_once(self) -> int:
+    def stride_clocks(self) -> int:
         """Number of clocks that ran within strides; see ``hdl.blocks.stride``."""
         return 0
 
@@ -388,7 +388,7 @@ class RtlEngine(ABC):
         source, clock = camera.source, camera.pins.clock
         segment = None if source is None else source.segment_at(self.now_ps)
         if source is None or segment is None:
-            self._go_to(camera, None, 0)
+            self._enter_segment(camera, None, 0)
             return
         loaded = LoadedSegment.of(source, segment)
         edge = loaded.first_edge(first_ps)
@@ -401,7 +401,7 @@ class RtlEngine(ABC):
             camera.loaded = loaded
             self._follow_segment(camera)
         else:
-            self._go_to(camera, loaded, edge)
+            self._enter_segment(camera, loaded, edge)
 
     def _follow_segment(self, camera: _Camera) -> None:
         """Continue after the loaded segment, all edges of which have run."""
@@ -413,16 +413,16 @@ class RtlEngine(ABC):
             # Both starts are rounded down, so the gap between them may be 1 ps longer.
             segment = source.segment_at(over.end_ps + 1)
         if segment is None:
-            self._go_to(camera, None, 0)
+            self._enter_segment(camera, None, 0)
             return
         if segment.start_ps < over.end_ps:
             raise ValueError(
                 f"the source's next segment starts at {segment.start_ps} ps, "
                 f"before the last one's end at {over.end_ps} ps"
             )
-        self._go_to(camera, LoadedSegment.of(source, segment), 0)
+        self._enter_segment(camera, LoadedSegment.of(source, segment), 0)
 
-    def _go_to(self, camera: _Camera, loaded: LoadedSegment | None, edge: int) -> None:
+    def _enter_segment(self, camera: _Camera, loaded: LoadedSegment | None, edge: int) -> None:
         camera.loaded = loaded
         camera.entered = (loaded.segment.start_ps if loaded else self.now_ps, edge)
         if loaded is None and self._get(camera.pins.clock):

@@ -106,7 +106,7 @@ class Atmosphere(DeclaredValues):
         light = 10 ** (-0.4 * self.extinction_mag * air)
         if self.scintillation:
             # A log-normal distribution with mean 1.
-            variance = np.log1p((self._twinkle(exposure_s, aperture_mm) * air**1.75) ** 2)
+            variance = np.log1p((self._scintillation(exposure_s, aperture_mm) * air**1.75) ** 2)
             light *= np.exp(np.sqrt(variance) * scatter - variance / 2)
         return moved, np.where(height_deg > 0, light, 0.0)
 
@@ -118,7 +118,7 @@ class Atmosphere(DeclaredValues):
         length = max(aperture_mm / 1000, WIND_M_S * exposure_s)
         return float(np.sqrt(0.18 * WAVELENGTH_M**2 * r0 ** (-5 / 3) * length ** (-1 / 3)))
 
-    def _twinkle(self, exposure_s: float, aperture_mm: float) -> float:
+    def _scintillation(self, exposure_s: float, aperture_mm: float) -> float:
         """Relative standard deviation of a star's light at the zenith."""
         diameter_cm = max(aperture_mm / 10, POINT_CM)
         height = np.exp(-self.height_m / SCALE_HEIGHT_M)

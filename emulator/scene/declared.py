@@ -14,7 +14,7 @@ class DeclaredScene(DeclaredValues):
     """Base of frozen dataclasses whose fields are declared values, each a key of scene files.
 
     Attributes:
-        kind: what files of such scenes have as ``kind``.
+        kind: value of the key ``kind`` in their files.
     """
 
     kind: ClassVar[str]
@@ -27,17 +27,17 @@ class DeclaredScene(DeclaredValues):
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """The scene of a TOML file; SceneError names the key that is wrong."""
+        """Read a scene file; SceneError names the wrong key."""
         kinds = {cls.kind: lambda table: cls(**read_table(table, cls.declared()))}
         return read_scene_file(path, kinds, f'"{cls.kind}"')
 
     def sky_map(self, now_ps: int) -> SkyMap:
-        """Where it is on a map of the sky, at a time; by default nowhere."""
+        """Its map of the sky at a time in ps; by default empty."""
         return SkyMap("no map", ())
 
     @classmethod
     def form(cls) -> SceneForm[Self]:
-        """What tools can do with such scenes beside reading files."""
+        """What tools need of such scenes."""
         return SceneForm(
             {cls.kind: described(cls.declared())}, lambda board: board.scene, _table, cls.sky_map
         )

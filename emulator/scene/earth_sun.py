@@ -63,18 +63,18 @@ class Mounting(DeclaredValues):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if np.linalg.norm(np.cross(_unit("boresight", self.boresight), self._right)) < 1e-6:
+        if np.linalg.norm(np.cross(_unit("boresight", self.boresight), self._right_axis)) < 1e-6:
             raise SceneError(f"right must not be along the boresight {self.boresight!r}")
 
     @property
-    def _right(self) -> NDArray[np.float64]:
+    def _right_axis(self) -> NDArray[np.float64]:
         return _unit("right", self.right)
 
     @property
     def matrix(self) -> NDArray[np.float64]:
         """Rotation (3, 3) from body axes to camera axes."""
         z = _unit("boresight", self.boresight)
-        x = _unit("right", self._right - (self._right @ z) * z)
+        x = _unit("right", self._right_axis - (self._right_axis @ z) * z)
         return np.array([x, np.cross(z, x), z])
 
 
@@ -159,8 +159,10 @@ class EarthSunScene(DeclaredValues):
         radius = np.radians(angular_radius_deg(self.altitude_km))
         for hazard in self.hazards:
             if isinstance(hazard, EarthHazard):
-                stand = hazard.stand(np.asarray(self.nadir), np.asarray(self.sun), float(radius))
-                for name, vector in zip(("nadir", "sun"), stand, strict=True):
+                places = hazard.place_bodies(
+                    np.asarray(self.nadir), np.asarray(self.sun), float(radius)
+                )
+                for name, vector in zip(("nadir", "sun"), places, strict=True):
                     object.__setattr__(self, name, vector)
 
     @classmethod

@@ -179,7 +179,7 @@ class Orbit:
         """Orbital period from node to node, without the Earth's flattening."""
         return float(2 * np.pi / self.satellite.no_kozai * 60)
 
-    def around(self, time_s: float) -> Surroundings:
+    def surroundings(self, time_s: float) -> Surroundings:
         """The surroundings at a time; SceneError if SGP4 reports an error."""
         days, part = self._start_days
         part += time_s / DAY_S
@@ -202,18 +202,18 @@ class Orbit:
 
     def body(self, time_s: float) -> tuple[Vector, Vector]:
         """Rotation (3, 3) from ICRS to body axes, and the body rate (3,) in deg/s."""
-        now = self.attitude.matrix(self.around(time_s))
-        soon = self.attitude.matrix(self.around(time_s + STEP_S))
+        now = self.attitude.matrix(self.surroundings(time_s))
+        soon = self.attitude.matrix(self.surroundings(time_s + STEP_S))
         return now, rate_between(now, soon, STEP_S)
 
     def sky(self, time_s: float, scene: SkyScene, name: str) -> SkyScene:
         """``scene`` with attitude and hazards for the star tracker ``name`` from then on."""
-        around = self.around(time_s)
+        around = self.surroundings(time_s)
         body, rate = self.body(time_s)
         mounting = self.mountings.get(name, BODY_Z).matrix
         camera = mounting @ body
         pose = Pose(quaternion_from_matrix(camera), mounting @ rate, time_s)
-        hazards = _near(around, camera[2]) if self.hazards else ()
+        hazards = _nearby_hazards(around, camera[2]) if self.hazards else ()
         others = tuple(one for one in scene.hazards if one.name not in DISTURBING)
         return replace(
             scene,
@@ -223,13 +223,15 @@ class Orbit:
             hazards=(*others, *hazards),
         )
 
-    def below(self, time_s: float, scene: EarthSunScene, lasts_s: float = 0.0) -> EarthSunScene:
+    def earth_sun_scene(
+        self, time_s: float, scene: EarthSunScene, lasts_s: float = 0.0
+    ) -> EarthSunScene:
         """``scene`` with the directions for a satellite's sun and nadir cameras from then on.
 
         The Earth does not move within a scene, so its direction is that in the middle of
         ``lasts_s``, the time for which the scene is used.
         """
-        around = self.around(time_s + lasts_s / 2)
+        around = self.surroundings(time_s + lasts_s / 2)
         body, rate = self.body(time_s)
         # Scene axes are the body axes at virtual time 0, extrapolated with the present rate.
         back = matrix_from_quaternion(propagate((0, 0, 0, 1), rate, time_s)).T @ body
@@ -249,7 +251,7 @@ DISTURBING = {"earth-limb": 60.0, "moon": 60.0, "sun-glare": 100.0}
 """Hazards for star trackers, and the angle in deg beyond which they are neglected."""
 
 
-def _near(around: Surroundings, boresight: Vector) -> tuple[SkyHazard, ...]:
+def _nearby_hazards(around: Surroundings, boresight: Vector) -> tuple[SkyHazard, ...]:
     def away_deg(direction: Vector) -> float:
         return float(np.degrees(np.arccos(np.clip(boresight @ direction, -1, 1))))
 
@@ -288,12 +290,12 @@ def moon(julian_date: float) -> Vector:
     """Position (3,) of the Moon relative to the Earth's centre, axes of date, km."""
     t = (julian_date - J2000) / 36525
 
-    def terms(function: Any, rows: Sequence[tuple[float, float, float]]) -> float:
+    def sum_terms(function: Any, rows: Sequence[tuple[float, float, float]]) -> float:
         return float(sum(size * function(np.radians(at + rate * t)) for size, at, rate in rows))
 
-    longitude = 218.32 + 481267.881 * t + terms(np.sin, _LONGITUDE)
-    latitude = terms(np.sin, _LATITUDE)
-    parallax = 0.9508 + terms(np.cos, _PARALLAX)
+    longitude = 218.32 + 481267.881 * t + sum_terms(np.sin, _LONGITUDE)
+    latitude = sum_terms(np.sin, _LATITUDE)
+    parallax = 0.9508 + sum_terms(np.cos, _PARALLAX)
     along, above = np.radians([longitude, latitude])
     distance = EARTH_RADIUS_KM / np.sin(np.radians(parallax))
     ecliptic = np.array(

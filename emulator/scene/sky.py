@@ -137,7 +137,7 @@ class SkyScene(DeclaredValues):
         places = generator.random((self.false_stars, 2))
         return places, generator.uniform(*self.false_star_mag, self.false_stars)
 
-    def turned(self, rotation_deg: ArrayLike) -> "SkyScene":
+    def rotate(self, rotation_deg: ArrayLike) -> "SkyScene":
         """The same sky, all poses rotated by a rotation vector (3,), camera axes, degrees."""
         first, *later = (
             replace(pose, quaternion=propagate(pose.quaternion, rotation_deg, 1.0))

@@ -86,7 +86,7 @@ class Debugger:
         windows: further memories, by the regions that they add to the memory map.
         command: answers ``monitor`` commands that do not concern the processor.
         serve: called repeatedly while the kernel is paused; blocks briefly for debugger input.
-        visit: called before each kernel step; polls the debugger when that is due.
+        poll: called before each kernel step; polls the debugger when that is due.
     """
 
     kernel: Kernel
@@ -96,13 +96,13 @@ class Debugger:
     windows: Mapping[MemoryRegion, Window] = field(default_factory=dict)
     command: Callable[[list[str]], str] = lambda words: ""
     serve: Callable[[], None] = lambda: None
-    visit: Callable[[], None] = lambda: None
+    poll: Callable[[], None] = lambda: None
 
     def __post_init__(self) -> None:
         self.halted: Reason | None = None
         self._attached = False
         self._range: tuple[int, int] | None = None
-        self._to_wake = False  # a step ended in sleep: halt when the core wakes
+        self._halt_on_wake = False  # a step ended in sleep: halt when the core wakes
         self._at_bkpt: int | None = None
         self._reported_lock_up = False
         self._watches: dict[tuple[int, int, WatchKind], Watch] = {}
@@ -115,7 +115,7 @@ class Debugger:
         vars(self.kernel)["step"] = self._step
 
     def _gated_step(self) -> None:
-        self.visit()
+        self.poll()
         while self.kernel.paused:
             self.serve()
         self._step()
@@ -129,12 +129,12 @@ class Debugger:
             return Stop(StopReason.TIME, machine.now_ps)
         if not self._attached:
             return machine.run(until_ps)
-        if self._range is None or self._to_wake:
+        if self._range is None or self._halt_on_wake:
             stop = machine.run(until_ps)
         else:
             stop = machine.step(until_ps, self._range)
         self._halt_on(stop)
-        if self._to_wake and not machine.asleep:
+        if self._halt_on_wake and not machine.asleep:
             self._halt(Reason())
         return stop
 
@@ -143,13 +143,13 @@ class Debugger:
             self._reported_lock_up = False
         match stop.reason:
             case StopReason.STEPPED if self.machine.asleep:
-                self._to_wake = True
+                self._halt_on_wake = True
             case StopReason.STEPPED:
                 self._halt(Reason())
             case StopReason.BREAKPOINT:
                 self._halt(Reason(breakpoint=True))
             case StopReason.WATCHPOINT:
-                self._halt(Reason(watch=self._hit(self.machine.watch_hit)))
+                self._halt(Reason(watch=self._find_watchpoint(self.machine.watch_hit)))
             case StopReason.HALTED:
                 self._at_bkpt = self.machine.register("pc")
                 self._halt(Reason())
@@ -167,7 +167,7 @@ class Debugger:
                 return signal
         return SIGSEGV
 
-    def _hit(self, hit: WatchHit) -> tuple[WatchKind, int]:
+    def _find_watchpoint(self, hit: WatchHit) -> tuple[WatchKind, int]:
         for start, count, kind in self._watches:
             matches = kind == "access" or hit.write == (kind == "write")
             if matches and start < hit.address + hit.size and hit.address < start + count:
@@ -178,7 +178,7 @@ class Debugger:
         self.halted = reason
         self.kernel.hold(HOLDER)
         self._range = None
-        self._to_wake = False
+        self._halt_on_wake = False
 
     # --- the debugger's side --------------------------------------------------------------------
 
@@ -218,7 +218,7 @@ class Debugger:
 
     def step(self, low: int, high: int) -> None:
         self.resume()
-        self._range, self._to_wake = (low, high), self.machine.asleep
+        self._range, self._halt_on_wake = (low, high), self.machine.asleep
 
     def register(self, name: str) -> int:
         return self.machine.register(name)

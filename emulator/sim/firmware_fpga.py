@@ -53,10 +53,10 @@ class FpgaCoupling:
         self._pins, self._by_driver = tuple(pins), compiled and not banks
         self._error: BaseException | None = None
         self._callbacks = (
-            binding.ATTEND(self._guarded(fpga.attend, 0)),
-            binding.SLOW_GET(self._guarded(self._get, 0)),
-            binding.SLOW_SET(self._guarded(self._set, None)),
-            binding.SLOW_EXTERNAL(self._guarded(self._external, -1)),
+            binding.ATTEND(self._guard(fpga.attend, 0)),
+            binding.SLOW_GET(self._guard(self._get, 0)),
+            binding.SLOW_SET(self._guard(self._set, None)),
+            binding.SLOW_EXTERNAL(self._guard(self._external, -1)),
         )
         self._couple()
 
@@ -119,7 +119,7 @@ class FpgaCoupling:
         self.fpga.access(wanted, self.fpga.now_ps + int(wanted.period) + 1)
         return int(data[0])
 
-    def _guarded(self, act: Callable[..., int | None], failed: int | None) -> Callable[..., object]:
+    def _guard(self, act: Callable[..., int | None], failed: int | None) -> Callable[..., object]:
         """Wrap ``act`` for compiled code, through which exceptions can not propagate."""
 
         def call(*arguments: int) -> object:

@@ -156,7 +156,7 @@ class FirmwareProcessor:
         if not self._input.triggered:
             self._input.succeed()
 
-    def give(self, act: Callable[[], None]) -> None:
+    def change_inputs(self, act: Callable[[], None]) -> None:
         """Change the machine's inputs by ``act`` at the kernel's time."""
         self.catch_up()
         act()
@@ -170,12 +170,12 @@ class FirmwareProcessor:
         while True:
             if env.horizon() == env.now:
                 yield env.timeout(0)  # all other processes that are due now run first
-            stop = self._run_machine(self._until())
+            stop = self._run_machine(self._run_limit_ps())
             while env.paused:  # by the debugger; then continue as if it had not stopped
                 yield env.urgent(env.now)
                 if stop.sends or self._early:
                     break
-                stop = self._go_on(self._until())
+                stop = self._run_without_hook(self._run_limit_ps())
             yield from self._settle(stop)
             if not self._awake and self._sleeps(stop):
                 yield from self._sleep()
@@ -184,16 +184,16 @@ class FirmwareProcessor:
             standing = standing + 1 if stop.now_ps == reached_ps and ahead_ps <= 0 else 0
             reached_ps = stop.now_ps
             if standing > 2:  # a machine that makes no progress must not block the kernel
-                yield from self._await_input(self._until())
+                yield from self._await_input(self._run_limit_ps())
                 continue
             yield env.timeout(max(0, ahead_ps))
 
     def _run_machine(self, until_ps: int) -> Stop:
         if self._coupling is not None:
             self._coupling.before_run()
-        return self._go_on(until_ps)
+        return self._run_without_hook(until_ps)
 
-    def _go_on(self, until_ps: int) -> Stop:
+    def _run_without_hook(self, until_ps: int) -> Stop:
         """Run without ``before_run``, which is done already."""
         runner = self.machine if self.debugger is None else self.debugger
         stop = runner.run(until_ps)
@@ -230,7 +230,7 @@ class FirmwareProcessor:
         if _is_power_of_ten(times):
             self.on_fault(what if times == 1 else f"{what}, {times} times now")
 
-    def _until(self) -> int:
+    def _run_limit_ps(self) -> int:
         """The time before which no other event happens."""
         now_ps, horizon = self.env.now, self.env.horizon()
         if horizon is None:

@@ -132,12 +132,12 @@ class Processor:
                 yield self.env.timeout(self.boot_us * PS_PER_US)
                 cause = yield from self._execute(self.program)
             except simpy.Interrupt:
-                cause = yield from self._stopped()
+                cause = yield from self._handle_resets()
             self.resets += 1
             self._wake = self.env.event()  # a reset clears pending interrupts
             self.program = self.boot(cause)
 
-    def _stopped(self) -> Steps:
+    def _handle_resets(self) -> Steps:
         """Handle ``reset``; returns the cause of the reset that comes first."""
         cause, hang_us = self._forced
         self.waiting = self.dozing = False
@@ -145,7 +145,7 @@ class Processor:
         try:
             yield self.env.timeout(hang_us * PS_PER_US)
         except simpy.Interrupt:
-            return (yield from self._stopped())
+            return (yield from self._handle_resets())
         if self._accesses:
             self._accesses = False
             self.on_access(False)
@@ -163,7 +163,7 @@ class Processor:
                 except StopIteration:
                     text = f"{program!r} returned from main: it must end in Reset"
                     raise RuntimeError(text) from None
-                yield from self._pay()
+                yield from self._spend_cycles()
                 if isinstance(request, requests.Reset):
                     return request.cause
                 try:
@@ -171,7 +171,7 @@ class Processor:
                 except ValueError as error:
                     raise RequestError(f"{_place(routine)}: {error}") from error
 
-    def _pay(self) -> Steps:
+    def _spend_cycles(self) -> Steps:
         """Stay busy for the charged cycles, and for those that interrupts charge meanwhile."""
         while cycles := self.meter.take():
             yield self.env.timeout(self._clock.elapse(cycles))
@@ -280,7 +280,7 @@ class Processor:
         period = Fraction(request.cycles * PS_PER_S, self._clock.hz)
         done = 0
         while done < len(request.target):
-            yield from self._pay()
+            yield from self._spend_cycles()
             self._follow()
             fpga = self._port
             # At least one cycle: an event within it is an interrupt in the middle of the loop.
@@ -292,7 +292,7 @@ class Processor:
     def _bus_access(self, request: requests.BusAccess) -> Steps:
         done, total = 0, len(request.addresses)
         while done < total:
-            yield from self._pay()
+            yield from self._spend_cycles()
             self._follow()
             fpga = self._port
             addresses, data = request.addresses[done:], request.data[done:]

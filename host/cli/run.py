@@ -109,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
                 bus,
                 pace=args.pace,
                 route=args.route,
-                say=(lambda _text: None) if args.quiet else say,
+                report=(lambda _text: None) if args.quiet else say,
             )
         except RouteError as error:
             raise OSError(str(error)) from None

@@ -54,5 +54,5 @@ def _seen(orbit: Orbit, device: AnyEmulated) -> Any:
     if isinstance(scene, SkyScene):
         return orbit.sky(device.time_s, scene, device.device.name)
     if isinstance(scene, EarthSunScene):
-        return orbit.below(device.time_s, scene, INTERVAL_S)
+        return orbit.earth_sun_scene(device.time_s, scene, INTERVAL_S)
     raise ValueError(f"{device.device.name} looks at a picture, which follows no orbit")

@@ -161,7 +161,7 @@ def processed(halting: bool) -> tuple[str, object, int]:
                 else:
                     debugger.step(0, 0)
 
-            debugger.visit, debugger.serve = lambda: None, resume
+            debugger.poll, debugger.serve = lambda: None, resume
             for name in ("uart_receive_handler", "time_us", "fpga_acknowledges"):
                 debugger.set_breakpoint(board.insight.symbols.function(name).address, True)
         device.wait(0.3)

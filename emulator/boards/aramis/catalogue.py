@@ -119,7 +119,7 @@ def build_database(
         vectors=vectors.astype(np.float32),
         v_mag=sky.v_mag[chosen].astype(np.float32),
         stars=triples.astype(np.uint16),
-        faces=_faces(vectors[triples], sphere.centres.astype(np.float64)),
+        faces=_nearest_faces(vectors[triples], sphere.centres.astype(np.float64)),
         areas=areas,
         moments=moments[by_moment],
         moment_triangles=by_moment.astype(np.uint32),
@@ -209,7 +209,9 @@ def _properties(corners: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDAr
     return areas.astype(np.float32), (areas * (a**2 + b**2 + c**2) / 36).astype(np.float32)
 
 
-def _faces(corners: NDArray[np.float64], centres: NDArray[np.float64]) -> NDArray[np.uint16]:
+def _nearest_faces(
+    corners: NDArray[np.float64], centres: NDArray[np.float64]
+) -> NDArray[np.uint16]:
     """Face (m,) whose centre is closest to each triangle's centre."""
     middles = corners.sum(axis=1)
     parts: list[NDArray[Any]] = [

@@ -84,7 +84,7 @@ class Ppi:
             if lines and taken + lines == rows:  # until the last line's last pixel
                 clocks = (lines - 1) * self._camera.line_clocks + self._camera.active_columns
             end_ps = int(segment.start_ps + clocks * self._camera.period)
-            if (yield from self._until(end_ps)) and lines:
+            if (yield from self._wait_until(end_ps)) and lines:
                 assert segment.pixels is not None
                 piece = segment.pixels()[:lines]
                 wrong_lines |= piece.shape[1] != columns
@@ -96,7 +96,7 @@ class Ppi:
                 self._end(run, FrameEnd.WRONG_LINES if wrong_lines else FrameEnd.STORED)
                 return
 
-    def _until(self, end_ps: int) -> Generator[simpy.Event, Any, bool]:
+    def _wait_until(self, end_ps: int) -> Generator[simpy.Event, Any, bool]:
         """Wait for the end of a segment; False if the lines changed before."""
         changed = self._changed
         timeout = self._env.timeout(max(0, end_ps - self._env.now))

@@ -89,7 +89,7 @@ class CubeStarBoard(CubeStarStack):
             boot_us=BOOT_US,
             on_pin=self._pin_changed,
             on_activity=lambda busy: self.power.set_state("processor", "run" if busy else "sleep"),
-            on_access=self._accessed,
+            on_access=self._access_changed,
             on_forced_reset=self._release_pins,
         )
         self.power.on_overcurrent = lambda channel: self.program.supply.overcurrent(channel)

@@ -221,7 +221,7 @@ class CubeStarFirmwareBoard(CubeStarStack):
         before = self.machine.analog.copy()
         self._set_analog()
         if (before != self.machine.analog).any():
-            self.processor.give(self.machine.analog_changed)
+            self.processor.change_inputs(self.machine.analog_changed)
 
 
 _CAMERA_RESET = pin_number(wired.CAMERA_RESET)

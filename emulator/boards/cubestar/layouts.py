@@ -46,7 +46,7 @@ class LayoutBoard:
         return sum(_stores(pins, board) for board in self.boards)
 
 
-def _powered(fpgas: tuple[str, ...], memories: int) -> PowerTable:
+def _power_table(fpgas: tuple[str, ...], memories: int) -> PowerTable:
     """Currents with ``fpgas`` boards and ``memories`` memories as separate parts."""
     parts = dict(CUBESTAR_POWER.parts)
     whole, sram = parts.pop("fpga").ma, parts.pop("memory").ma
@@ -91,15 +91,21 @@ BOARDS = {
         "cubestar", wiring.cubestar_wiring, CUBESTAR_POWER, _copied_states, external_ram=True
     ),
     Layout.SHARED: LayoutBoard(
-        "cubestar-shared", wiring.cubestar_shared_wiring, _powered(("fpga",), 1), _one_fpga_states
+        "cubestar-shared",
+        wiring.cubestar_shared_wiring,
+        _power_table(("fpga",), 1),
+        _one_fpga_states,
     ),
     Layout.TWO_MEMORIES: LayoutBoard(
-        "cubestar-double", wiring.cubestar_double_wiring, _powered(("fpga",), 2), _one_fpga_states
+        "cubestar-double",
+        wiring.cubestar_double_wiring,
+        _power_table(("fpga",), 2),
+        _one_fpga_states,
     ),
     Layout.TWO_BOARDS: LayoutBoard(
         "cubestar-shared",
         wiring.cubestar_two_boards_wiring,
-        _powered(("fpga1", "fpga2"), 2),
+        _power_table(("fpga1", "fpga2"), 2),
         _two_board_states,
         BOARD_PREFIXES,
     ),

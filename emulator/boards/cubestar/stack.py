@@ -130,7 +130,7 @@ class CubeStarStack(Board):
             self.stored.append(self.camera.frame_from(self._storing_since_ps))
         self._set_states()
 
-    def _accessed(self, busy: bool) -> None:
+    def _access_changed(self, busy: bool) -> None:
         self._accesses = busy
         self._set_states()
 

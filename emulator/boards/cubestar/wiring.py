@@ -33,7 +33,7 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
     def storing(level: Level) -> Collection[str]:
         return ("imager",) if _stores(level) else ()
 
-    def stored(level: Level) -> Collection[str]:
+    def stored_cameras(level: Level) -> Collection[str]:
         return ("imager",) if level(pins.ACK) else ()
 
     return Wiring(
@@ -44,7 +44,7 @@ def cubestar_wiring(top: CubeStarTop | None = None) -> Wiring:
         data=pins.DATA,
         acknowledges=(pins.ACK,),
         storing=storing,
-        stored=stored,
+        stored=stored_cameras,
         # Two clocks release the reset, one ends the store, one the line.
         settling_clocks=8,
         burst_levels=(((pins.DCLK, 0), *_STORING),),
@@ -89,7 +89,7 @@ def _on_bus(
         stores = any(_stores(level, board) for board in boards)
         return ("imager",) if stores else ()
 
-    def stored(level: Level) -> Collection[str]:
+    def stored_cameras(level: Level) -> Collection[str]:
         # All boards share one camera, so all must have finished.
         waits = (level(board + pins.ACK) or not _stores(level, board) for board in boards)
         return ("imager",) if all(waits) else ()
@@ -102,7 +102,7 @@ def _on_bus(
         data=pins.AD_LOW.ports[1].name,
         acknowledges=tuple(board + pins.ACK for board in boards),
         storing=storing,
-        stored=stored,
+        stored=stored_cameras,
         settling_clocks=8,  # as above
         contention=contention,
         burst_levels=burst_levels,

@@ -9,7 +9,7 @@ DARK_DOUBLING_K = 8.0
 """Temperature rise that doubles the dark current: assumed, typical of silicon."""
 
 
-def doubled(at_reference: float, temperature_c: float, reference_c: float) -> float:
+def dark_at(at_reference: float, temperature_c: float, reference_c: float) -> float:
     """A dark current or signal at ``temperature_c``, from its value at ``reference_c``."""
     return float(at_reference * 2 ** ((temperature_c - reference_c) / DARK_DOUBLING_K))
 

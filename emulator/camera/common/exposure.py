@@ -105,7 +105,7 @@ def star_pixels(
     For tests and drawings.
     """
     sky = load_sky(scene.epoch, _limit(scene))
-    vectors, covered = _through(scene, camera_state(scene, optics, shutter), sky.vectors)
+    vectors, covered = _apparent_lights(scene, camera_state(scene, optics, shutter), sky.vectors)
     pixels, _ = _instant(scene, optics, shutter, vectors, 0.5)
     columns, rows = optics.columns, optics.rows
     x, y = pixels.T
@@ -130,7 +130,7 @@ def _stars(
     near = sky.vectors @ boresight > math.cos(math.radians(min(reach, 180)))
     vectors, rates = sky.vectors[near], optics.electrons_per_second(sky.v_mag[near])
     if scene.hazards:
-        vectors, covered = _through(scene, camera_state(scene, optics, shutter), vectors)
+        vectors, covered = _apparent_lights(scene, camera_state(scene, optics, shutter), vectors)
         vectors, rates = vectors[~covered], rates[~covered]
     if scene.atmosphere is None:
         return vectors, rates
@@ -142,7 +142,7 @@ def _stars(
     return vectors, rates * share
 
 
-def _through(
+def _apparent_lights(
     scene: SkyScene, now: CameraState, vectors: Vectors, depth: int = -1
 ) -> tuple[Vectors, NDArray[np.bool_]]:
     """Apparent directions (n, 3) of light from ``vectors``, and which (n,) hazards hide.
@@ -170,7 +170,7 @@ def _hazard_lights(
             lights = hazard.lights(now)
             if lights is None:
                 break
-            vectors, covered = _through(scene, now, lights.vectors, hazard.depth)
+            vectors, covered = _apparent_lights(scene, now, lights.vectors, hazard.depth)
             places, weights = _instant(scene, optics, shutter, vectors[~covered], phase)
             rates = optics.electrons_per_second(lights.v_mag[~covered])
             yield places, rates * weights / len(phases)

@@ -61,9 +61,9 @@ def _brightness_map(
     coarse = brightness(hazards, now, directions)
     if coarse is None:
         return None
-    down, across = _hats(optics.rows, y), _hats(optics.columns, x)
+    down, across = _interpolation_weights(optics.rows, y), _interpolation_weights(optics.columns, x)
     image = np.asarray(down @ coarse.reshape(len(y), len(x)) @ across.T, np.float32)
-    fine = _not_smooth(hazards, now, directions.reshape(len(y), len(x), 3))
+    fine = _is_steep(hazards, now, directions.reshape(len(y), len(x), 3))
     if not fine.any():
         return image
     rows = np.minimum(np.searchsorted(y, np.arange(optics.rows), "right"), len(y) - 1) - 1
@@ -75,7 +75,7 @@ def _brightness_map(
     return image
 
 
-def _not_smooth(
+def _is_steep(
     hazards: Sequence[SkyHazard], now: CameraState, nodes: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Cells (ny-1, nx-1) of the grid of ``nodes`` (ny, nx, 3) that need all their pixels."""
@@ -119,7 +119,7 @@ def _grid(
     return (x, y), optics.unproject(np.stack([across.ravel(), down.ravel()], axis=1))
 
 
-def _hats(size: int, nodes: NDArray[np.float64]) -> Values:
+def _interpolation_weights(size: int, nodes: NDArray[np.float64]) -> Values:
     """Weights (size, len(nodes)) for linear interpolation between ``nodes``."""
     step = nodes[1] - nodes[0]
     weights = np.maximum(1 - np.abs(np.arange(size)[:, None] - nodes) / step, 0)
@@ -142,6 +142,10 @@ def _field(optics: Optics) -> tuple[Values, Values]:
         for dx, dy in ((0.5, 0), (-0.5, 0), (0, 0.5), (0, -0.5))
     )
     solid = np.linalg.norm(np.cross(right - left, below - above), axis=1)
-    smooth = _hats(optics.rows, ys) @ solid.reshape(len(ys), len(xs)) @ _hats(optics.columns, xs).T
+    smooth = (
+        _interpolation_weights(optics.rows, ys)
+        @ solid.reshape(len(ys), len(xs))
+        @ _interpolation_weights(optics.columns, xs).T
+    )
     electrons = smooth * optics.electrons_per_second(0.0) * optics.even_light
     return directions.astype(np.float32), electrons.astype(np.float32)

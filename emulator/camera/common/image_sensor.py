@@ -68,7 +68,7 @@ class ImageSensor(ABC, Generic[S, C]):
             scene, condition = view.scene, view.condition
         if not any(isinstance(scene, kind) for kind in self.scene_types):
             raise TypeError(f"{self.sees}, not {scene!r}")
-        self._use(scene, condition)
+        self._set_view(scene, condition)
 
     @property
     def condition(self) -> C:
@@ -77,9 +77,9 @@ class ImageSensor(ABC, Generic[S, C]):
 
     @condition.setter
     def condition(self, condition: C) -> None:
-        self._use(self._scene, condition)
+        self._set_view(self._scene, condition)
 
-    def _use(self, scene: S, condition: C) -> None:
+    def _set_view(self, scene: S, condition: C) -> None:
         self._check(scene, condition)
         self._scene, self._condition = scene, condition
 
@@ -111,7 +111,7 @@ class ImageSensor(ABC, Generic[S, C]):
             return
         self._registers.reset()
         self._clock = PixelClock(self._hz, now_ps) if run else None
-        self._restarted(now_ps)
+        self._on_restart(now_ps)
         self.on_change()
 
     @property
@@ -120,7 +120,7 @@ class ImageSensor(ABC, Generic[S, C]):
         return self._images[-1][1] if self._images else None
 
     @abstractmethod
-    def _restarted(self, now_ps: int) -> None: ...
+    def _on_restart(self, now_ps: int) -> None: ...
 
     def _cached(self, frame: object, render: Callable[[], Grey]) -> Grey:
         """The image of ``frame``; rendered again only after a change of scene or condition."""

@@ -60,7 +60,7 @@ class SkyCondition(DeclaredValues):
     @property
     def hot_count(self) -> int:
         """Number of hot pixels, including those of the hazards."""
-        return self.hot_pixels + effects.hot(self.hazards)
+        return self.hot_pixels + effects.hot_pixels(self.hazards)
 
     @cached_property
     def lens(self) -> Optics:

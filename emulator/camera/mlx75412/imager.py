@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cubestack.emulator.camera.common.dark import doubled, hot_pixels
+from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 from cubestack.emulator.camera.common.hazards import effects
 from cubestack.emulator.camera.common.imager import Grey, Imager, Light
 from cubestack.emulator.camera.common.view import SkyCondition
@@ -46,7 +46,7 @@ class Corrections:
 
 def dark_dn12_per_second(temperature_c: float) -> float:
     """Mean dark signal in counts of 12 bits per second."""
-    return doubled(DARK_DN12_PER_S_AT_65_C, temperature_c, 65.0)
+    return dark_at(DARK_DN12_PER_S_AT_65_C, temperature_c, 65.0)
 
 
 def ideal_counts(electrons: Light) -> Grey:

@@ -106,7 +106,7 @@ class Mlx75412(StarSensor):
         """Whether it sends frames."""
         return self.running and bool(_ENABLE.of(self._registers.active("MODE_SELECT")))
 
-    def _restarted(self, now_ps: int) -> None:
+    def _on_restart(self, now_ps: int) -> None:
         self._spans.clear()
         self._forget_frames(now_ps)
 
@@ -132,7 +132,7 @@ class Mlx75412(StarSensor):
         if not self._spans:
             self._append(_Span(0, IDLE_CLOCKS, vsync=0))
         while (last := self._spans[-1]).cut or clock.end_ps(last.first, last.clocks) <= time_ps:
-            self._append(self._after(clock, last))
+            self._append(self._next_span(clock, last))
         span = next(
             s for s in self._spans if not s.cut and clock.end_ps(s.first, s.clocks) > time_ps
         )
@@ -154,7 +154,7 @@ class Mlx75412(StarSensor):
         if span.rows and span.frame is not None:
             self._frames.append(span.frame)
 
-    def _after(self, clock: PixelClock, last: _Span) -> _Span:
+    def _next_span(self, clock: PixelClock, last: _Span) -> _Span:
         if not self.enabled:
             return _Span(last.end, IDLE_CLOCKS, vsync=0)
         if last.frame is None or last.cut:

@@ -9,7 +9,7 @@ read-out noise follow. Values that neither publishes are marked as assumed.
 
 from dataclasses import dataclass
 
-from cubestack.emulator.camera.common.dark import doubled
+from cubestack.emulator.camera.common.dark import dark_at
 
 FULL_WELL_ELECTRONS = 10 ** (45 / 10)
 READ_NOISE_ELECTRONS = FULL_WELL_ELECTRONS / 10 ** (68.2 / 20)
@@ -45,4 +45,4 @@ class NoiseTerms:
 
 
 def dark_electrons_per_s(temperature_c: float) -> float:
-    return doubled(DARK_ELECTRONS_PER_S_AT_25_C, temperature_c, 25.0)
+    return dark_at(DARK_ELECTRONS_PER_S_AT_25_C, temperature_c, 25.0)

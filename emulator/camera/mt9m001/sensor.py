@@ -88,7 +88,7 @@ class Mt9m001(StarSensor):
     def enabled(self) -> bool:
         return self.running and self._settings.enabled
 
-    def _restarted(self, now_ps: int) -> None:
+    def _on_restart(self, now_ps: int) -> None:
         self._settings = read_settings(self._registers)
         self._frames.clear()
         self._since = 0

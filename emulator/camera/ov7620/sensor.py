@@ -132,7 +132,7 @@ class Ov7620(ImageSensor[EarthSunScene, FisheyeCondition]):
         for reflection in scene.reflections:
             check_field(reflection.alpha_deg, reflection.beta_deg)
 
-    def _restarted(self, now_ps: int) -> None:
+    def _on_restart(self, now_ps: int) -> None:
         del now_ps
         self._sccb = SccbSlave(chip.REGISTERS.i2c_address, self._write)
         self._frames.clear()

@@ -57,7 +57,7 @@ class FisheyeCondition(DeclaredValues):
     @property
     def hot_count(self) -> int:
         """Number of single stuck pixels, including those of the hazards."""
-        return self.hot_pixels + effects.hot(self.hazards)
+        return self.hot_pixels + effects.hot_pixels(self.hazards)
 
 
 EarthSunView = View[EarthSunScene, FisheyeCondition]

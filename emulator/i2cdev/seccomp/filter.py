@@ -81,12 +81,12 @@ def make_filter(abi: Abi, descriptors: range) -> bytes:
     ]
     calls = abi.calls
     steps += [(_EQUAL, calls["ioctl"], "ioctl", "")]
-    steps += _each(ON_DESCRIPTOR, abi, "descriptor")
+    steps += _jumps(ON_DESCRIPTOR, abi, "descriptor")
     steps += [
         (_EQUAL, calls["fcntl"], "fcntl", ""),
         (_EQUAL, calls["newfstatat"], "empty path", ""),
     ]
-    steps += _each(ON_PATH, abi, "notify")
+    steps += _jumps(ON_PATH, abi, "notify")
     steps += ["allow", (_RETURN, _RET_ALLOW, "", "")]
     steps += ["ioctl", (_LOAD, _low(1), "", "")]
     steps += [(_EQUAL, number, "notify", "") for number in Ioctl]
@@ -103,7 +103,7 @@ def make_filter(abi: Abi, descriptors: range) -> bytes:
     return _assemble(steps)
 
 
-def _each(names: Iterable[str], abi: Abi, label: str) -> list[Step | str]:
+def _jumps(names: Iterable[str], abi: Abi, label: str) -> list[Step | str]:
     return [(_EQUAL, abi.calls[name], label, "") for name in names if name in abi.calls]
 
 

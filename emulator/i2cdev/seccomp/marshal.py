@@ -40,7 +40,7 @@ def ioctl(call: Notification) -> Marshalled:
                 linux.Call.IOCTL, linux.pack_ioctl(number, 0), partial(_put, call.pid, argument)
             )
         case _:
-            return Marshalled(linux.Call.IOCTL, linux.pack_ioctl(number, argument), _nothing)
+            return Marshalled(linux.Call.IOCTL, linux.pack_ioctl(number, argument), _without_data)
 
 
 def read(call: Notification, *, vector: bool = False) -> Marshalled:
@@ -54,7 +54,7 @@ def write(call: Notification, *, vector: bool = False) -> Marshalled:
     """A write; of a ``vector``, only the first part is written. Raises OSError."""
     place, count = _first_part(call) if vector else call.arguments[1:3]
     data = read_memory(call.pid, place, min(count, linux.MAX_MESSAGE_BYTES))
-    return Marshalled(linux.Call.WRITE, data, _nothing)
+    return Marshalled(linux.Call.WRITE, data, _without_data)
 
 
 def _first_part(call: Notification) -> tuple[int, int]:
@@ -112,5 +112,5 @@ def _put(pid: int, place: int, result: int, data: bytes) -> int:
     return result
 
 
-def _nothing(result: int, _data: bytes) -> int:
+def _without_data(result: int, _data: bytes) -> int:
     return result

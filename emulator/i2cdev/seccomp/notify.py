@@ -48,17 +48,17 @@ class Listener:
 
     Attributes:
         fd: descriptor; readable while a call is pending, hung up when all processes have ended.
-        hands_over: whether a caller and this process wake each other on the same processor. Waking
-            up on another one would take longer than the rest of a call, except for a process that
-            busy-waits with real-time priority.
+        shares_processor: whether a caller and this process wake each other on the same processor.
+            Waking up on another one would take longer than the rest of a call, except for a process
+            that busy-waits with real-time priority.
     """
 
     def __init__(self, fd: int) -> None:
         self.fd = fd
-        self._one_step = True
-        self.hands_over = not has_priority() and self._hand_over()
+        self._can_add_and_send = True
+        self.shares_processor = not has_priority() and self._share_processor()
 
-    def _hand_over(self) -> bool:
+    def _share_processor(self) -> bool:
         """Request wake-ups on the same processor; returns whether that is supported."""
         try:
             fcntl.ioctl(self.fd, _SET_FLAGS, _SAME_PROCESSOR)
@@ -86,7 +86,7 @@ class Listener:
             return False
         return True
 
-    def let_pass(self, call: Notification) -> None:
+    def continue_call(self, call: Notification) -> None:
         """Let the kernel perform the call as without a filter."""
         self._send(_RESPONSE.pack(call.id, 0, 0, _CONTINUE))
 
@@ -98,18 +98,18 @@ class Listener:
         self, call: Notification, fd: int, number: int, *, close_on_exec: bool
     ) -> None:
         """Install a copy of ``fd`` in the process as ``number``, which the call returns."""
-        how = _AT_NUMBER | _AND_SEND if self._one_step else _AT_NUMBER
+        how = _AT_NUMBER | _AND_SEND if self._can_add_and_send else _AT_NUMBER
         flags = os.O_CLOEXEC if close_on_exec else 0
         try:
             fcntl.ioctl(self.fd, _ADD_DESCRIPTOR, _ADDITION.pack(call.id, how, fd, number, flags))
         except OSError as error:
-            if not self._one_step or error.errno != errno.EINVAL:
+            if not self._can_add_and_send or error.errno != errno.EINVAL:
                 self.answer(call, -(error.errno or errno.EIO))
                 return
-            self._one_step = False  # before Linux 5.14
+            self._can_add_and_send = False  # before Linux 5.14
             self.answer_with_descriptor(call, fd, number, close_on_exec=close_on_exec)
         else:
-            if not self._one_step:
+            if not self._can_add_and_send:
                 self.answer(call, number)
 
     def _send(self, response: bytes) -> None:
@@ -140,9 +140,9 @@ class _Window:
     def __init__(self) -> None:
         self._buffer = ctypes.create_string_buffer(self.SIZE)
         self._view = memoryview(self._buffer).cast("B")
-        self._here = _Part(ctypes.addressof(self._buffer), 0)
-        self._there = _Part(0, 0)
-        self._parts = ctypes.byref(self._here), ctypes.byref(self._there)
+        self._local = _Part(ctypes.addressof(self._buffer), 0)
+        self._remote = _Part(0, 0)
+        self._parts = ctypes.byref(self._local), ctypes.byref(self._remote)
 
     def read(self, pid: int, address: int, count: int) -> bytes:
         """At most ``SIZE`` bytes of a process's memory; raises OSError, EFAULT if unmapped."""
@@ -157,8 +157,8 @@ class _Window:
             self._move(_writev, pid, address, len(data))
 
     def _move(self, function: Callable[..., int], pid: int, address: int, count: int) -> None:
-        self._here.length = self._there.length = count
-        self._there.base = address
+        self._local.length = self._remote.length = count
+        self._remote.base = address
         here, there = self._parts
         done = function(pid, here, 1, there, 1, 0)
         if done < 0:

@@ -65,7 +65,7 @@ class Supervisor(Endpoint):
 
     Attributes:
         ended: whether every process under the filter has ended.
-        hands_over: see ``Listener``.
+        shares_processor: see ``Listener``.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Supervisor(Endpoint):
     ) -> None:
         self.name = node.path
         self.ended = False
-        self.hands_over = listener.hands_over
+        self.shares_processor = listener.shares_processor
         self._listener = listener
         self._abi = abi
         self._node = node
@@ -165,11 +165,11 @@ class Supervisor(Endpoint):
         except OSError:
             text = ""  # the kernel will report the error
         found = None
-        if self._node.may_be(text):
+        if self._node.may_match(text):
             start = None if folder is None else _signed(call.arguments[folder])
             found = self._node.find(text, call.pid, start)
         if found is None:
-            self._listener.let_pass(call)
+            self._listener.continue_call(call)
         else:
             handle(call, found)
 
@@ -215,7 +215,7 @@ class Supervisor(Endpoint):
         self, call: Notification, found: Found, buffer: int, *, extended: bool = False
     ) -> None:
         if found is Found.LISTING:  # i2c-tools only read it
-            self._listener.let_pass(call)
+            self._listener.continue_call(call)
             return
         node = self._node
         data = node.statx() if extended else node.stat(compact=self._abi.compact_stat)
@@ -263,7 +263,7 @@ class Supervisor(Endpoint):
         except OSError:
             inode = 0
         if inode not in self._opened:
-            self._listener.let_pass(call)
+            self._listener.continue_call(call)
         else:
             handle(call, self._opened[inode][0])
 

@@ -47,7 +47,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 
 
-def _longs(*values: int) -> ctypes.Array[ctypes.c_int64]:
+def _int64_array(*values: int) -> ctypes.Array[ctypes.c_int64]:
     return (_LONG * len(values))(*values)
 
 
@@ -80,7 +80,7 @@ class CompiledEngine(RtlEngine):
         addresses = [memory.ctypes.data for memory in self.memories.values()]
         self._driver = self._library.driver_new(
             (_POINTER * len(addresses))(*addresses),
-            _longs(*astuple(sram_timing or sram.SramTiming())),
+            _int64_array(*astuple(sram_timing or sram.SramTiming())),
             sram.MAX_VIOLATIONS,
             skipping,
         )
@@ -133,7 +133,7 @@ class CompiledEngine(RtlEngine):
         return dict(self._registers)
 
     @property
-    def clocks_at_once(self) -> int:
+    def stride_clocks(self) -> int:
         return int(self._library.driver_clocks_at_once(self._handle))
 
     def use_strides(self, on: bool) -> None:
@@ -169,7 +169,7 @@ class CompiledEngine(RtlEngine):
         segment, half = loaded.segment, loaded.half_period
         clock = segment.start_ps, half.numerator, half.denominator, loaded.edges
         lines = segment.rows, loaded.line_clocks, loaded.active_columns, segment.vsync
-        self._library.driver_load(self._handle, camera, _longs(*clock, *lines), edge)
+        self._library.driver_load(self._handle, camera, _int64_array(*clock, *lines), edge)
 
     def _use_pixels(self, camera: int, pixels: NDArray[np.uint8]) -> None:
         # The loaded segment keeps the array alive while the driver reads it.
@@ -197,7 +197,7 @@ class CompiledEngine(RtlEngine):
         arrays = transactions.addresses.ctypes.data, transactions.data.ctypes.data
         times = start, cycle.numerator, cycle.denominator, transactions.cycles
         limits = transactions.write, transactions.select, transactions.above
-        record = _longs(*arrays, len(transactions), *limits, *times, *transactions.offsets)
+        record = _int64_array(*arrays, len(transactions), *limits, *times, *transactions.offsets)
         event, over = 0, _INT(not len(transactions))
         while not over.value:
             running = sum(1 << camera.number for camera in self._running())

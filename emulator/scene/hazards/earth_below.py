@@ -36,7 +36,9 @@ class EarthHazard(SkyHazard):
 
     cameras: ClassVar[tuple[str, ...]] = ("nadir",)
 
-    def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
+    def place_bodies(
+        self, nadir: Vectors, sun: Vectors, radius_rad: float
+    ) -> tuple[Vectors, Vectors]:
         """Directions (3,) of the Earth, whose angular radius is ``radius_rad``, and Sun."""
         del radius_rad
         return nadir, sun
@@ -102,9 +104,13 @@ class Terminator(EarthHazard):
         del state
         return cls(phase_deg=strength, towards_deg=float(generator.uniform(0, 360)))
 
-    def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
+    def place_bodies(
+        self, nadir: Vectors, sun: Vectors, radius_rad: float
+    ) -> tuple[Vectors, Vectors]:
         del sun, radius_rad
-        return nadir, _turned(-nadir, np.radians(self.phase_deg), np.radians(self.towards_deg))
+        return nadir, _direction_from(
+            -nadir, np.radians(self.phase_deg), np.radians(self.towards_deg)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,13 +133,15 @@ class EarthInSunCamera(EarthHazard):
         del state
         return cls(above_deg=strength, towards_deg=float(generator.uniform(0, 360)))
 
-    def stand(self, nadir: Vectors, sun: Vectors, radius_rad: float) -> tuple[Vectors, Vectors]:
+    def place_bodies(
+        self, nadir: Vectors, sun: Vectors, radius_rad: float
+    ) -> tuple[Vectors, Vectors]:
         del nadir
         away = radius_rad + np.radians(self.above_deg)
-        return _turned(sun, min(float(away), np.pi), np.radians(self.towards_deg)), sun
+        return _direction_from(sun, min(float(away), np.pi), np.radians(self.towards_deg)), sun
 
 
-def _turned(centre: Vectors, away_rad: float, around_rad: float) -> Vectors:
+def _direction_from(centre: Vectors, away_rad: float, around_rad: float) -> Vectors:
     """The unit vector (3,) at ``away_rad`` from ``centre``, to the side ``around_rad``."""
     one = np.cross(centre, np.eye(3)[np.argmin(np.abs(centre))])
     one /= np.linalg.norm(one)

@@ -232,19 +232,19 @@ def _scattered_light(
     # Steps of the golden angle spread the parts evenly.
     cosine = 1 - (np.arange(PARTS) + 0.5) / PARTS * (1 - math.cos(radius))
     turned = np.arange(PARTS, dtype=np.float64) * (math.pi * (3 - math.sqrt(5)))
-    parts = _around(np.arccos(cosine), np.asarray(turned))
+    parts = _directions(np.arccos(cosine), np.asarray(turned))
     area = 2 * math.pi * (1 - math.cos(radius)) / PARTS
     light = limb.ground(parts @ limb._axes) * area
     heights = np.linspace(0, min(radius + OUTER_RAD, math.pi), 120)
     turns = np.linspace(0, math.pi, 40)
-    places = _around(np.repeat(heights, len(turns)), np.tile(turns, len(heights)))
+    places = _directions(np.repeat(heights, len(turns)), np.tile(turns, len(heights)))
     apart = np.arccos(np.clip(places @ parts.T, -1, 1))
     # A part has an area: scattered light does not peak within its radius.
     scattered = aureole(np.maximum(apart, math.sqrt(area / math.pi)), limb.scatter) @ light
     return heights, turns, scattered.reshape(len(heights), len(turns))
 
 
-def _around(heights: NDArray[np.float64], turns: NDArray[np.float64]) -> Vectors:
+def _directions(heights: NDArray[np.float64], turns: NDArray[np.float64]) -> Vectors:
     """Unit vectors (n, 3) at angles ``heights`` (n,) from the third axis, ``turns`` around it."""
     sine = np.sin(heights)
     return np.stack([sine * np.cos(turns), sine * np.sin(turns), np.cos(heights)], axis=1)

@@ -72,7 +72,7 @@ def heliocentric(planet: str, julian_date: float) -> Vector:
     in_orbit = axis * np.array(
         [np.cos(anomaly) - eccentricity, np.sqrt(1 - eccentricity**2) * np.sin(anomaly), 0]
     )
-    turned = _about_z(node) @ _about_x(inclination) @ _about_z(perihelion - node)
+    turned = _about_z(node) @ _rotation_about_x(inclination) @ _about_z(perihelion - node)
     return np.asarray(FROM_ECLIPTIC @ turned @ in_orbit, np.float64)
 
 
@@ -102,10 +102,10 @@ def _about_z(angle: float) -> Vector:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def _about_x(angle: float) -> Vector:
+def _rotation_about_x(angle: float) -> Vector:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
 
 
-FROM_ECLIPTIC = _about_x(OBLIQUITY_RAD)
+FROM_ECLIPTIC = _rotation_about_x(OBLIQUITY_RAD)
 """Rotation (3, 3) from the ecliptic and equinox of J2000 to ICRS axes."""

@@ -318,7 +318,7 @@ def _prime_tracking(
         raise ValueError("--mode tracking needs a sky scene: an image has no previous frame")
     axis = rng.standard_normal(3)
     rate = offset_deg * rng.random() * axis / np.linalg.norm(axis)
-    emulated.scene = scene.turned(rate)
+    emulated.scene = scene.rotate(rate)
     emulated.client.capture_and_process()
     emulated.scene = scene
     emulated.client.client.command("ClearErrorFlags")

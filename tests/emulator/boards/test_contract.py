@@ -103,7 +103,7 @@ def test_a_bus_of_another_kernel_and_a_kernel_that_is_under_way_are_refused() ->
 
 def test_scenes_change_while_boards_run(stack: ExitStack) -> None:
     boards = powered(stack)
-    for name, other in (("cubestar", SKY.turned((1, 0, 0))), ("aramis", SKY)):
+    for name, other in (("cubestar", SKY.rotate((1, 0, 0))), ("aramis", SKY)):
         boards[name].scene = other
         assert boards[name].scene is other
         with pytest.raises(TypeError, match="is a sky or a picture, not EarthSunScene"):

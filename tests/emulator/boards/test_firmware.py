@@ -47,7 +47,7 @@ class Processor:
         self.machine = Machine()
         self.calls: list[str] = []
 
-    def give(self, act: Any) -> None:
+    def change_inputs(self, act: Any) -> None:
         self.calls.append("give")
         act()
 

@@ -200,6 +200,6 @@ def test_an_injection_s_numbers_are_its_own() -> None:
     assert [one.draw(value, 7) for value in (0, 6, 7, 99)] == [0, 6, 6, 6]
     drawn = {one.draw(None, 7, key) for key in range(100)}
     assert drawn == set(range(7))
-    assert one.strikes(1.0)
-    assert not any(one.strikes(0.0) for _ in range(100))
-    assert sum(one.strikes(0.25) for _ in range(4000)) == pytest.approx(1000, abs=100)
+    assert one.has_effect(1.0)
+    assert not any(one.has_effect(0.0) for _ in range(100))
+    assert sum(one.has_effect(0.25) for _ in range(4000)) == pytest.approx(1000, abs=100)

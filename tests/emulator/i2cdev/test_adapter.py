@@ -114,10 +114,10 @@ def test_driven_transfers_are_the_same(patience, steps):
 
 def test_a_drive_without_a_transfer(kernel, adapter):
     adapter.driven = True
-    assert not adapter.beginning
+    assert not adapter.begins_transfer
     adapter.drive(lambda: True)
     adapter.submit([I2cMessage(0x1A)], lambda _result: None)
-    assert adapter.beginning
+    assert adapter.begins_transfer
     adapter.drive(lambda: True)
-    assert not adapter.beginning
+    assert not adapter.begins_transfer
     assert not adapter.busy

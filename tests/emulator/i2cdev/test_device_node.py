@@ -29,7 +29,7 @@ NODE = DeviceNode(7)
     ],
 )
 def test_paths(path, found):
-    assert (NODE.find(path, os.getpid(), None) if NODE.may_be(path) else None) is found
+    assert (NODE.find(path, os.getpid(), None) if NODE.may_match(path) else None) is found
 
 
 def test_relative_paths(monkeypatch):

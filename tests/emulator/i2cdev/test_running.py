@@ -17,6 +17,8 @@ def test_a_program_without_supervisor_is_served_until_it_ends(
     said: list[str] = []
     command = ["sh", "-c", "exit 3"]
     with closing(bus.port):
-        code = running.run_program(command, 7, bus, pace="fast", route="preload", say=said.append)
+        code = running.run_program(
+            command, 7, bus, pace="fast", route="preload", report=said.append
+        )
     assert code == 3
     assert said[0] == "/dev/i2c-7 is served by preload, as requested"

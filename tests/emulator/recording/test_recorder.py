@@ -169,10 +169,10 @@ class Losing:
     def to_host(self, data, first_ps, byte_ps, line) -> None:
         line(data, first_ps, byte_ps)
 
-    def to_device(self, byte, start_ps, hear) -> None:
+    def to_device(self, byte, start_ps, receive) -> None:
         self.count += 1
         if self.count % 2:
-            hear(byte, start_ps)
+            receive(byte, start_ps)
 
 
 def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):

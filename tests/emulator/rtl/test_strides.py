@@ -77,8 +77,8 @@ def test_a_picture_is_stored_alike(board: Callable[[], Wiring], seed: int) -> No
                 name = list(registers)[int(rng.integers(len(registers)))]
                 bit = int(rng.integers(registers[name]))
                 step(engines, lambda engine, n=name, b=bit: engine.flip(n, b), (name, bit))
-        assert engines[0].clocks_at_once > 10 * COLUMNS
-        assert engines[1].clocks_at_once == 0
+        assert engines[0].stride_clocks > 10 * COLUMNS
+        assert engines[1].stride_clocks == 0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -104,7 +104,7 @@ def test_bytes_are_read_alike(seed: int) -> None:
                 later_ps = engines[0].now_ps + int(rng.integers(10**9))
                 for engine in engines:
                     engine.flip(register, number // 8, later_ps)
-        assert engines[0].clocks_at_once > 10_000
+        assert engines[0].stride_clocks > 10_000
 
 
 @pytest.mark.parametrize("timing", SLOW_PARTS)
@@ -137,7 +137,7 @@ def test_switched_off_they_are_not_made() -> None:
         engine.attach(source)
         engine.set_pin("ENABLE", 1)
         engine.run(source.end_ps // 2)
-        assert engine.clocks_at_once == 0
+        assert engine.stride_clocks == 0
         engine.use_strides(True)
         engine.run(source.end_ps)
-        assert engine.clocks_at_once > COLUMNS
+        assert engine.stride_clocks > COLUMNS

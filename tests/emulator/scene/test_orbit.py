@@ -48,7 +48,7 @@ def orbit(**changes: Any) -> Orbit:
 def test_the_published_case_comes_out() -> None:
     satellite = Satrec.twoline2rv(*VALLADO, WGS72)
     start = datetime(2000, 6, 27, 18, 50, 19, 733568, tzinfo=UTC)  # day 179.78495062
-    around = Orbit(satellite, start).around(0.0)
+    around = Orbit(satellite, start).surroundings(0.0)
     of_date = precession(satellite.jdsatepoch + satellite.jdsatepochF) @ around.position_km
     assert of_date == pytest.approx((7022.46529266, -1400.08296755, 0.03995155), abs=1e-2)
 
@@ -147,18 +147,18 @@ def test_the_moon_is_where_the_text_book_has_it() -> None:
 def test_the_sun_is_on_the_equator_at_an_equinox(when: Any, dec_deg: float) -> None:
     """Equinox and solstice of 2026, by the almanacs; in the axes of date."""
     start = datetime(2026, *when, tzinfo=UTC)
-    around = orbit(start=start).around(0.0)
+    around = orbit(start=start).surroundings(0.0)
     sun = precession(2461119.5 + (start - datetime(2026, 3, 20, tzinfo=UTC)).days) @ around.sun
     assert np.degrees(np.arcsin(sun[2])) == pytest.approx(dec_deg, abs=0.02)
 
 
 def test_a_circular_orbit_stays_as_high_and_comes_back() -> None:
     own = orbit()
-    heights = [own.around(at).altitude_km for at in np.linspace(0, own.period_s, 50)]
+    heights = [own.surroundings(at).altitude_km for at in np.linspace(0, own.period_s, 50)]
     assert heights == pytest.approx([600] * 50, abs=20)  # the Earth is no ball
     axis = EARTH_RADIUS_KM + 600
     assert own.period_s == pytest.approx(2 * np.pi * np.sqrt(axis**3 / 398_600.8), rel=1e-6)
-    first, again = own.around(0.0), own.around(own.period_s)
+    first, again = own.surroundings(0.0), own.surroundings(own.period_s)
     assert first.nadir @ again.nadir == pytest.approx(1.0, abs=1e-4)
 
 
@@ -166,7 +166,7 @@ def test_the_shadow_lasts_as_long_as_geometry_says() -> None:
     """A cylinder behind the Earth: half the shadow's arc, for a Sun that is b from the orbit."""
     own = orbit()
     times = np.arange(0, own.period_s, 2.0)
-    around = [own.around(at) for at in times]
+    around = [own.surroundings(at) for at in times]
     normal = np.cross(around[0].position_km, around[0].velocity_km_s)
     sine = float(around[0].sun @ normal / np.linalg.norm(normal))
     height = around[0].altitude_km
@@ -202,7 +202,7 @@ def test_a_rate_is_what_propagates_one_attitude_to_the_other(seed: int) -> None:
 def test_nadir_pointing_points_there_and_turns_once_an_orbit() -> None:
     own = orbit(attitude=NadirPointing())
     body, rate = own.body(1000.0)
-    around = own.around(1000.0)
+    around = own.surroundings(1000.0)
     assert body @ around.nadir == pytest.approx((0, 0, 1), abs=1e-9)
     assert body @ around.velocity_km_s / 7.5 == pytest.approx((1, 0, 0), abs=0.02)
     assert rate == pytest.approx((0, -360 / own.period_s, 0), abs=2e-4)
@@ -239,10 +239,10 @@ def test_a_sky_camera_sees_the_attitude_of_its_mounting(at: float) -> None:
 @pytest.mark.parametrize("at", [0.0, 30.0, 2000.0])
 def test_the_satellites_cameras_see_earth_and_sun(at: float) -> None:
     own = orbit(attitude=Inertial(rate_deg_s=(0.3, -0.2, 0.1)))
-    scene = own.below(at, EarthSunScene(seed=3))
+    scene = own.earth_sun_scene(at, EarthSunScene(seed=3))
     assert scene.seed == 3
     for later in (at, at + 0.9):
-        around, time_ps = own.around(later), round(later * PS_PER_S)
+        around, time_ps = own.surroundings(later), round(later * PS_PER_S)
         body, _ = own.body(later)
         for target, mounting, direction in (
             (CameraTarget.SUN, scene.sun_camera, around.sun),
@@ -252,8 +252,8 @@ def test_the_satellites_cameras_see_earth_and_sun(at: float) -> None:
             expected = mounting.matrix @ body @ direction
             assert truth.vector == pytest.approx(expected, abs=2e-3 if later > at else 1e-9)
             assert (truth.alpha_deg, truth.beta_deg) == angles_from_vector(truth.vector)
-    assert scene.altitude_km == pytest.approx(own.around(at).altitude_km)
-    assert scene.hidden(scene.sun) == (own.around(at).shadow > 0.5)
+    assert scene.altitude_km == pytest.approx(own.surroundings(at).altitude_km)
+    assert scene.hidden(scene.sun) == (own.surroundings(at).shadow > 0.5)
 
 
 def test_only_what_is_near_disturbs_the_sky() -> None:
@@ -262,7 +262,7 @@ def test_only_what_is_near_disturbs_the_sky() -> None:
     for direction in ((0, 0, 1), (0, 0, -1), (0, -1, 0), (1, 0, 0)):
         turned = replace(own, mountings={"camera": Mounting(direction, (0.6, 0.8, 0.0))})
         for at in np.arange(0, 5800, 600.0):
-            around = own.around(at)
+            around = own.surroundings(at)
             camera = turned.mountings["camera"].matrix @ own.body(at)[0]
             names = {h.name for h in turned.sky(at, SkyScene([0, 0, 0, 1]), "camera").hazards}
             seen |= names
@@ -281,4 +281,4 @@ def test_elements_that_hold_no_more_are_told() -> None:
     )  # decays within days: Vallado and others 2006
     own = Orbit(Satrec.twoline2rv(*lines), datetime(2006, 6, 16, tzinfo=UTC))
     with pytest.raises(SceneError, match=r"no orbit 5e\+06 s after the start: "):
-        own.around(5e6)
+        own.surroundings(5e6)

@@ -27,7 +27,7 @@ def load(folder: Path, text: str):
 
 def test_the_least_that_there_must_be(tmp_path: Path) -> None:
     orbit = load(tmp_path, START + CIRCLE)
-    assert orbit.around(0.0).altitude_km == pytest.approx(600, abs=20)
+    assert orbit.surroundings(0.0).altitude_km == pytest.approx(600, abs=20)
     assert isinstance(orbit.attitude, NadirPointing)
     assert (orbit.mountings, orbit.hazards) == ({}, True)
 

@@ -30,7 +30,7 @@ def test_later_poses_hold_from_their_start_on() -> None:
 
 def test_turned() -> None:
     q = quaternion_from_pointing(10, 20, 30)
-    scene = SkyScene(q, mag_limit=3.0, poses=(Pose(q, at_s=1.0),)).turned((0, 0, 5.0))
+    scene = SkyScene(q, mag_limit=3.0, poses=(Pose(q, at_s=1.0),)).rotate((0, 0, 5.0))
     for time_ps in (0, 2 * 10**12):
         assert attitude_error_deg(scene.truth(time_ps), q) == pytest.approx((0, 5.0), abs=1e-9)
     assert scene.mag_limit == 3.0

@@ -57,7 +57,7 @@ def test_scenes_follow_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
 def test_measurements_match_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
     orbit, star, sense = satellite
     star.wait(60.0)
-    assert orbit.around(60.0).shadow == 0
+    assert orbit.surroundings(60.0).shadow == 0
     star.client.capture_and_process()
     found = star.client.attitude()
     assert found.valid
@@ -68,7 +68,7 @@ def test_measurements_match_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
     for which, direction in ((Camera.SUN, "sun"), (Camera.NADIR, "nadir")):
         measured = sense.client.capture_and_detect(which)
         assert measured.detect == DetectResult.SUCCESS
-        around, body = orbit.around(sense.time_s), orbit.body(sense.time_s)[0]
+        around, body = orbit.surroundings(sense.time_s), orbit.body(sense.time_s)[0]
         scene = scene_of(sense)
         mounting = scene.sun_camera if which == Camera.SUN else scene.nadir_camera
         expected = mounting.matrix @ body @ getattr(around, direction)
@@ -78,9 +78,9 @@ def test_measurements_match_the_orbit(satellite: tuple[Any, Any, Any]) -> None:
 
 def test_sun_is_not_found_in_shadow() -> None:
     orbit = load_orbit(ORBIT)
-    dark = next(at for at in range(0, 5800, 10) if orbit.around(at).shadow == 1)
+    dark = next(at for at in range(0, 5800, 10) if orbit.surroundings(at).shadow == 1)
     # Turned so that the sun camera would look straight at it all the time.
-    to_sun = Mounting(-orbit.around(dark).sun).matrix
+    to_sun = Mounting(-orbit.surroundings(dark).sun).matrix
     attitude = Inertial(tuple(quaternion_from_matrix(to_sun)))
     start = orbit.start + timedelta(seconds=dark - 60)
     orbit = replace(orbit, start=start, attitude=attitude, mountings={})

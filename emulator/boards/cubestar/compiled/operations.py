@@ -36,8 +36,8 @@ def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
     rng = np.random.default_rng(_SEED)
     kind = np.float64 if double else np.float32
     operands = {
-        "left": _around_one(rng).astype(kind),
-        "right": _around_one(rng).astype(kind),
+        "left": _values_near_one(rng).astype(kind),
+        "right": _values_near_one(rng).astype(kind),
         "unit": rng.uniform(-1, 1, _OPERANDS).astype(kind),
         "whole": rng.integers(-100_000, 100_000, _OPERANDS, np.int32),
         "other": rng.integers(1, 1000, _OPERANDS, np.int32),
@@ -59,7 +59,7 @@ def measure(calls: Calls, *, double: bool = False) -> dict[str, float]:
     return found
 
 
-def _around_one(rng: np.random.Generator) -> NDArray[np.float64]:
+def _values_near_one(rng: np.random.Generator) -> NDArray[np.float64]:
     """Factors and summands of both signs that keep chains of them in range."""
     signs: NDArray[np.float64] = rng.choice([-1.0, 1.0], _OPERANDS)
     return rng.uniform(0.5, 1.6, _OPERANDS) * signs

@@ -51,7 +51,7 @@ class SensorHazard(Hazard):
         del temperature_c
         return lens
 
-    def hot(self) -> int:
+    def hot_pixels(self) -> int:
         """Number of additional hot pixels, as hot as usual for the sensor."""
         return 0
 

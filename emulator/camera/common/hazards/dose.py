@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.camera.common.dark import doubled
+from cubestack.emulator.camera.common.dark import dark_at
 from cubestack.emulator.camera.common.hazards.contract import Exposure, Field, SensorHazard
 from cubestack.emulator.scene.hazards.hazard import Strength
 from cubestack.firmware_model.values import number
@@ -62,7 +62,7 @@ class Dose(SensorHazard):
     def charge(self, exposure: Exposure, generator: np.random.Generator) -> Field | None:
         del generator
         mean = SOURCE_ELECTRONS_PER_S * exposure.seconds
-        mean = doubled(mean, exposure.temperature_c, SOURCE_C)
+        mean = dark_at(mean, exposure.temperature_c, SOURCE_C)
         sources = self.sources_per_pixel(exposure.pitch_um)
         image: Field = np.zeros(exposure.shape, np.float32)
         places, strengths = _sources(self.seed, sources, image.size)

@@ -39,8 +39,8 @@ def lens(own: Lens, hazards: Hazards, temperature_c: float) -> Lens:
     return own
 
 
-def hot(hazards: Hazards) -> int:
-    return sum(hazard.hot() for hazard in hazards)
+def hot_pixels(hazards: Hazards) -> int:
+    return sum(hazard.hot_pixels() for hazard in hazards)
 
 
 def dark_rise(hazards: Hazards) -> float:

@@ -27,7 +27,7 @@ class HotPixels(SensorHazard):
 
     count: int = whole(1000, "number of hot pixels beside those of the key `hot_pixels`", 0, 75_000)
 
-    def hot(self) -> int:
+    def hot_pixels(self) -> int:
         return self.count
 
 

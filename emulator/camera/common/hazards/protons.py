@@ -103,11 +103,11 @@ class Protons(SensorHazard):
         paths = self.depth_um / cosine
         rows, columns = exposure.shape
         middle = generator.random((count, 2)) * (columns, rows) - 0.5
-        along = _turned(paths * np.sqrt(1 - cosine**2) / exposure.pitch_um, generator)
+        along = _random_vectors(paths * np.sqrt(1 - cosine**2) / exposure.pitch_um, generator)
         starts, kev = middle - along / 2, lost_kev(energies, paths, generator)
         who, fast_kev, reach = _deltas(energies, paths, self.depth_um, generator)
         fast = starts[who] + generator.random((len(who), 1)) * along[who]
-        aside = _turned(reach / exposure.pitch_um, generator)
+        aside = _random_vectors(reach / exposure.pitch_um, generator)
         return _tracks(
             np.concatenate([starts, fast]),
             np.concatenate([along, aside]),
@@ -166,7 +166,7 @@ def _largest_delta_ev(energies_mev: Numbers) -> Numbers:
     return np.asarray(2 * ELECTRON_MASS_EV * (gamma**2 - 1) / (1 + 2 * gamma * ratio + ratio**2))
 
 
-def _turned(lengths: Numbers, generator: np.random.Generator) -> Numbers:
+def _random_vectors(lengths: Numbers, generator: np.random.Generator) -> Numbers:
     """Vectors (n, 2) of these lengths in random directions."""
     angles = 2 * math.pi * generator.random(len(lengths))
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=1)

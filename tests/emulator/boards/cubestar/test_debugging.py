@@ -316,7 +316,7 @@ def test_whatever_clients_do_the_board_goes_on(
     """Drawn packets at a board that runs, with clients that come and go."""
     rng = np.random.default_rng(5)
     debugger: Any = board.processor.debugger
-    debugger.visit = debugger.serve = lambda: None
+    debugger.poll = debugger.serve = lambda: None
     places = (0, 0x100, 0x2000_0000, 0x2001_FFF0, 0x4000_C000, 0xE000_E010, 0xC000_0000, 1 << 31)
     for _ in range(8):
         client = Session(debugger)

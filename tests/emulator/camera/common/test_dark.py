@@ -2,14 +2,14 @@
 
 import pytest
 
-from cubestack.emulator.camera.common.dark import doubled, hot_pixels
+from cubestack.emulator.camera.common.dark import dark_at, hot_pixels
 
 
 @pytest.mark.parametrize(
     ("temperature_c", "factor"), [(20, 1), (28, 2), (36, 4), (12, 0.5), (24, 2**0.5)]
 )
 def test_eight_degrees_double_it(temperature_c: float, factor: float) -> None:
-    assert doubled(3.0, temperature_c, 20.0) == pytest.approx(3.0 * factor)
+    assert dark_at(3.0, temperature_c, 20.0) == pytest.approx(3.0 * factor)
 
 
 def test_hot_pixels_are_as_many_as_asked_each_in_its_place() -> None:

@@ -25,7 +25,7 @@ class Sensor(ImageSensor[Any, Any]):
         if scene == "odd":
             raise ValueError("odd")
 
-    def _restarted(self, now_ps: int) -> None:
+    def _on_restart(self, now_ps: int) -> None:
         self.restarts.append(now_ps)
 
     def look(self, frame: object) -> int:

@@ -73,7 +73,7 @@ class Kernel:
     put in.
     """
 
-    hands_over = False
+    shares_processor = False
 
     def __init__(self) -> None:
         self.fd = os.eventfd(0, os.EFD_SEMAPHORE)
@@ -89,7 +89,7 @@ class Kernel:
     def waits(self, call: Notification) -> bool:
         return not self.killed
 
-    def let_pass(self, call: Notification) -> None:
+    def continue_call(self, call: Notification) -> None:
         self.answers[call.id] = "pass"
 
     def answer(self, call: Notification, result: int) -> None:
