@@ -250,7 +250,7 @@ def markdown_table() -> str:
     rows = [head, ("---",) * len(head)]
     for kind, fault in FAULTS.items():
         texts = [
-            f"`{name}`: {one.meaning}, {one.allowed} ({_default(one.default)})"
+            f"`{name}`: {one.meaning}, {one.limits or one.wanted} ({_default(one.default)})"
             for name, one in fault.declared().items()
         ]
         rows.append((f"`{kind}`", fault.site.value, fault.effect(), "; ".join(texts) or "none"))
@@ -260,7 +260,7 @@ def markdown_table() -> str:
 def _default(value: object) -> str:
     match value:
         case None:
-            return "drawn"
+            return "random"
         case bool():
             return str(value).lower()
         case float():
