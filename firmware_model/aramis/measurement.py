@@ -1,6 +1,8 @@
 """One measurement: picture, catalogue, stars, identities, attitude, and the time of each step.
+
 AraMiS thesis, sections 2.2 (getStarAttitudeQuaternion) and 7.3; figure 8.1. Only this module calls
-the processing, :mod:`cubestack.firmware_model.aramis.pipeline`."""
+the processing, :mod:`cubestack.firmware_model.aramis.pipeline`.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

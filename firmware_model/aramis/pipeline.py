@@ -1,5 +1,8 @@
-"""From a picture to an attitude. AraMiS thesis, figure 8.1 and section 7.3: threshold over five
-pictures, spike removal, centroids, identification and attitude."""
+"""From a picture to an attitude.
+
+AraMiS thesis, figure 8.1 and section 7.3: threshold over five pictures, spike removal, centroids,
+identification and attitude.
+"""
 
 from dataclasses import dataclass, replace
 

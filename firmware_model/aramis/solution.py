@@ -1,5 +1,7 @@
-"""Settings, stars and outcome of an identification. AraMiS thesis, sections 5.7 (the three
-outcomes), 5.9 (rough direction) and appendix E."""
+"""Settings, stars and outcome of an identification.
+
+AraMiS thesis, sections 5.7 (the three outcomes), 5.9 (rough direction) and appendix E.
+"""
 
 from dataclasses import dataclass
 from typing import Literal

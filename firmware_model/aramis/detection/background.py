@@ -1,6 +1,9 @@
-"""The threshold between sky and stars, from the last five pictures. AraMiS thesis, section 3.5:
-their mean grey level plus twice the noise. The noise is the standard deviation over the same pixels
-(the thesis does not define it); stars cover too few pixels to matter."""
+"""The threshold between sky and stars, from the last five pictures.
+
+AraMiS thesis, section 3.5: their mean grey level plus twice the noise. The noise is the standard
+deviation over the same pixels (the thesis does not define it); stars cover too few pixels to
+matter.
+"""
 
 from collections import deque
 

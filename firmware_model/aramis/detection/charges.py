@@ -1,5 +1,7 @@
-"""Cost of the search for stars: the part's operations for each thing done. Masks and histograms are
-bytes of the processor's own memory, pictures are in external memory."""
+"""Cost of the search for stars: the part's operations for each thing done.
+
+Masks and histograms are bytes of the processor's own memory, pictures are in external memory.
+"""
 
 from math import ceil, log2
 

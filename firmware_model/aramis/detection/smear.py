@@ -1,7 +1,9 @@
-"""How far motion drew the stars out during the exposure. An extension: the thesis has none. The
-second moments of a streak along and across differ by the square of its length over twelve, as those
-of a line do, whatever the star's width. Streaks of a turn are parallel, or around the boresight.
-Tracks of protons have all directions and are no stars."""
+"""How far motion drew the stars out during the exposure.
+
+An extension: the thesis has none. The second moments of a streak along and across differ by the
+square of its length over twelve, as those of a line do, whatever the star's width. Streaks of a
+turn are parallel, or around the boresight. Tracks of protons have all directions and are no stars.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

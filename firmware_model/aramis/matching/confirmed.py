@@ -1,8 +1,10 @@
-"""Attitudes that further stars confirm, within the time limit. An extension: the AraMiS thesis
-accepts every unique triangle, and many of its results are wrong (section 8.2). Here triples propose
-attitudes (``triple_triangles``) to the search that all star trackers share
-(``star_tracker.search``). The accepted one is corrected to the middle row's time where stars moved,
-fitted to its stars, and refused where its angles are too uncertain."""
+"""Attitudes that further stars confirm, within the time limit.
+
+An extension: the AraMiS thesis accepts every unique triangle, and many of its results are wrong
+(section 8.2). Here triples propose attitudes (``triple_triangles``) to the search that all star
+trackers share (``star_tracker.search``). The accepted one is corrected to the middle row's time
+where stars moved, fitted to its stars, and refused where its angles are too uncertain.
+"""
 
 from dataclasses import replace
 
@@ -14,7 +16,7 @@ from cubestack.firmware_model.aramis.field import CameraField
 from cubestack.firmware_model.aramis.matching.shutter import FEWEST, at_middle_row
 from cubestack.firmware_model.aramis.matching.triple_triangles import TripleTriangles
 from cubestack.firmware_model.aramis.solution import NONE, Profile, Solution, StarList, unsolved
-from cubestack.firmware_model.attitude.geometry import turned
+from cubestack.firmware_model.attitude.geometry import scaled, turned
 from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
@@ -29,7 +31,7 @@ FEWEST_STARS = 4
 LEVELS = (0.15, 0.4, 1.0)
 
 SCALES = 30  #: attitudes that count for one whose focal length was changed
-MOVED = 1.0  #: error of a star that was put back to the middle row, as a share of its way (chosen)
+MOVED = 1.0  #: error of stars that were put back to the middle row, as a share of their way (chosen)
 
 #: Error of a real lens beside the model, which triples must bear (measured with real pictures).
 LENS_PX = 0.1
@@ -143,6 +145,7 @@ def _at_middle_row(
     still = measured.smear_px <= profile.smear_px or measured.skew_px <= 0
     if still or len(named) < FEWEST:
         return vectors, sigmas
+    vectors = scaled(vectors, found.factor, meter)
     heights = measured.centroids[named, 1] / np.float32(field.rows) - np.float32(0.5)
     predicted = turned(picture.stars.vectors[found.stars], found.rotation)
     meter.charge(f32_mul=9 * len(named), f32_add=6 * len(named), loop=len(named))
@@ -151,10 +154,11 @@ def _at_middle_row(
     )
     if sigma_rad > profile.motion_sigma_rad and measured.skew_px > profile.moved_px:
         return None
-    moved = MOVED * np.sqrt(np.sum((straight - vectors) ** 2, axis=1))
+    moved = MOVED * np.sqrt(np.mean(np.sum((straight - vectors) ** 2, axis=1)))
     meter.charge(f32_mul=5 * len(named), f32_add=6 * len(named), f32_div=len(named))
-    meter.charge(f32_sqrt=3 * len(named))
-    return straight, (np.hypot(sigmas, moved) / np.sqrt(weights)).astype(np.float32)
+    meter.charge(f32_sqrt=2 * len(named) + 1)
+    sigmas = (np.hypot(sigmas, moved) / np.sqrt(weights)).astype(np.float32)
+    return scaled(straight, 1 / found.factor, meter), sigmas
 
 
 class DatabaseStars:

@@ -1,6 +1,8 @@
-"""Detection of stars in an image: the published search, and the one above the background. A search
-yields the pixels that it reads and writes in order; the caller performs the accesses, on an array
-or on a memory behind an FPGA."""
+"""Detection of stars in an image: the published search, and the one above the background.
+
+A search yields the pixels that it reads and writes in order; the caller performs the accesses, on
+an array or on a memory behind an FPGA.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

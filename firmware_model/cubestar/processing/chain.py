@@ -1,4 +1,5 @@
 """The chain from image to attitude: detection, matching and QUEST, with the time of each step.
+
 CubeStar thesis, sections 5.3.3 to 5.3.5. ``transitions`` decides which search identifies an image.
 """
 

@@ -1,7 +1,9 @@
 """The attitude from identified stars: weighted with votes, or with the stars' expected errors.
+
 Inverse squares of the expected errors are the weights of least variance (Shuster and Oh 1981), and
 with the residuals they give the covariance. Errors that all stars share leave no residual:
-aberration of light, up to 1e-4 rad, is left to users that know the velocity."""
+aberration of light, up to 1e-4 rad, is left to users that know the velocity.
+"""
 
 from dataclasses import dataclass
 
