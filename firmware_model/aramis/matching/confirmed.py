@@ -31,7 +31,7 @@ FEWEST_STARS = 4
 LEVELS = (0.15, 0.4, 1.0)
 
 SCALES = 30  #: attitudes that count for one whose focal length was changed
-MOVED = 1.0  #: error of stars that were put back to the middle row, as a share of their way (chosen)
+MOVED = 1.0  #: error of stars that were moved to the middle row, as a share of their way (chosen)
 
 #: Error of a real lens beside the model, which triples must bear (measured with real pictures).
 LENS_PX = 0.1
