@@ -26,19 +26,13 @@ _UNITS = ("deg", "rad", "arcsec", "km", "mm", "um", "px", "ms", "us", "ns", "mag
 
 @dataclass(frozen=True)
 class ValueKind:
-    """A type of values.
+    """A type of values."""
 
-    Attributes:
-        name: in JSON.
-        what: for error texts: "a number".
-        read: converts what TOML, JSON or a program gave; raises one of ``_OTHER`` for another type.
-        parse: converts a text for ``read``; raises the same.
-    """
-
-    name: str
-    what: str
+    name: str  #: in JSON
+    what: str  #: for error texts: "a number"
+    #: converts what TOML, JSON or a program gave; raises one of ``_OTHER`` for another type
     read: Callable[[Any], Any]
-    parse: Callable[[str], Any]
+    parse: Callable[[str], Any]  #: converts a text for ``read``; raises the same
 
 
 def _number(given: Any) -> float:
@@ -393,12 +387,9 @@ class DeclaredValues:
 
     A field is declared by a `Declaration` as its default, as in
     ``rate: float = number(1.0, "share of the bytes", 0, 1)``. Other fields are left alone.
-
-    Attributes:
-        error: raised for a value that is not allowed.
     """
 
-    error: ClassVar[type[ValueError]] = ValueError
+    error: ClassVar[type[ValueError]] = ValueError  #: raised for a value that is not allowed
     _declared: ClassVar[dict[str, Declaration]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:

@@ -43,17 +43,11 @@ class Site(Enum):
 
 @dataclass(frozen=True)
 class Fault(DeclaredValues):
-    """Base of all faults; its declared values are its parameters.
+    """Base of all faults; its declared values are its parameters."""
 
-    Attributes:
-        kind: its name in a plan.
-        site: what it acts on.
-        momentary: it happens at one instant, so it has no duration.
-    """
-
-    kind: ClassVar[str]
-    site: ClassVar[Site]
-    momentary: ClassVar[bool]
+    kind: ClassVar[str]  #: its name in a plan
+    site: ClassVar[Site]  #: what it acts on
+    momentary: ClassVar[bool]  #: it happens at one instant, so it has no duration
     error = FaultError
 
     def __init_subclass__(cls, kind: str, site: Site, momentary: bool = False) -> None:

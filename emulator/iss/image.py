@@ -39,19 +39,13 @@ class Memory:
 
 @dataclass(frozen=True)
 class Image:
-    """A program.
+    """A program."""
 
-    Attributes:
-        segments: (address, bytes) for the flash, sorted by address.
-        path: of the file; None if it is not from a file.
-        elf: contents of the file if it is an ELF file, for symbols.
-        hash: SHA-256 of the segments, in hexadecimal.
-    """
-
-    segments: tuple[tuple[int, bytes], ...]
-    path: Path | None = None
+    segments: tuple[tuple[int, bytes], ...]  #: (address, bytes) for the flash, sorted by address
+    path: Path | None = None  #: of the file; None if it is not from a file
+    #: contents of the file if it is an ELF file, for symbols
     elf: bytes | None = field(default=None, repr=False)
-    hash: str = field(init=False)
+    hash: str = field(init=False)  #: SHA-256 of the segments, in hexadecimal
 
     def __post_init__(self) -> None:
         digest = sha256()

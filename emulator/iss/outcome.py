@@ -20,17 +20,11 @@ class StopReason(IntEnum):
 
 
 class Stop(NamedTuple):
-    """End of a run.
+    """End of a run."""
 
-    Attributes:
-        reason: why it ended.
-        now_ps: time of the machine.
-        sends: whether there are messages in the outbox.
-    """
-
-    reason: StopReason
-    now_ps: int
-    sends: bool = False
+    reason: StopReason  #: why it ended
+    now_ps: int  #: time of the machine
+    sends: bool = False  #: whether there are messages in the outbox
 
 
 class OutgoingKind(IntEnum):
@@ -54,23 +48,14 @@ class OutgoingKind(IntEnum):
 
 
 class Outgoing(NamedTuple):
-    """A message from the machine.
+    """A message from the machine."""
 
-    Attributes:
-        kind: meaning of the other attributes.
-        unit: port pin, peripheral or stimulus port.
-        value: level, byte or address.
-        extra: further value, by kind.
-        time_ps: time of the event.
-        text: of text messages.
-    """
-
-    kind: OutgoingKind
-    unit: int
-    value: int
-    extra: int
-    time_ps: int
-    text: str = ""
+    kind: OutgoingKind  #: meaning of the other attributes
+    unit: int  #: port pin, peripheral or stimulus port
+    value: int  #: level, byte or address
+    extra: int  #: further value, by kind
+    time_ps: int  #: time of the event
+    text: str = ""  #: of text messages
 
 
 class Watch(NamedTuple):

@@ -64,20 +64,13 @@ class MemoryPins:
 
 @dataclass(frozen=True)
 class BusPins:
-    """Pins to the microcontroller's external bus, whose lower lines are an i / o / oe triple.
+    """Pins to the microcontroller's external bus, whose lower lines are an i / o / oe triple."""
 
-    Attributes:
-        selects: chip selects, low active.
-        high: address bits 23..16, then 7..0.
-        low: address bits 15..8, then the byte, as ``low_I``, ``low_O`` and ``low_OE``.
-        latch: address latch enable, high active.
-        read, write: strobes, low active.
-    """
-
-    selects: tuple[str, ...]
-    high: str
-    low: str
-    latch: str
+    selects: tuple[str, ...]  #: chip selects, low active
+    high: str  #: address bits 23..16, then 7..0
+    low: str  #: address bits 15..8, then the byte, as ``low_I``, ``low_O`` and ``low_OE``
+    latch: str  #: address latch enable, high active
+    #: read, write: strobes, low active
     read: str
     write: str
 

@@ -100,18 +100,14 @@ class Reflection(DeclaredValues):
 
 @dataclass(frozen=True, eq=False)
 class SensorTruth:
-    """What a sensor should measure. For comparisons with results; the firmware never gets it.
+    """What a sensor should measure. For comparisons with results; the firmware never gets it."""
 
-    Attributes:
-        vector: unit vector (3,) in camera axes, to the Sun or to the Earth's centre.
-        alpha_deg, beta_deg: the same direction as the sensor's angles.
-        visible: whether the Sun, or any part of the Earth, is in the camera's field.
-    """
-
+    #: unit vector (3,) in camera axes, to the Sun or to the Earth's centre
     vector: NDArray[np.float64]
+    #: alpha_deg, beta_deg: the same direction as the sensor's angles
     alpha_deg: float
     beta_deg: float
-    visible: bool
+    visible: bool  #: whether the Sun, or any part of the Earth, is in the camera's field
 
 
 @dataclass(frozen=True, eq=False)

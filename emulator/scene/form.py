@@ -83,19 +83,13 @@ class SkyMap:
 
 @dataclass(frozen=True)
 class SceneForm(Generic[V]):
-    """What tools need of the scenes of one kind of device.
+    """What tools need of the scenes of one kind of device."""
 
-    Attributes:
-        keys: of scene files, by kind, as ``values.described`` has them.
-        view: the scene and condition that the cameras of a board have.
-        table: the scene file's table that gives such a view again.
-        sky_map: the map of such a view, with its state at a time in ps.
-    """
-
+    #: of scene files, by kind, as ``values.described`` has them
     keys: Mapping[str, Mapping[str, Any]]
-    view: Callable[[Any], V]
-    table: Callable[[V], Table]
-    sky_map: Callable[[V, int], SkyMap]
+    view: Callable[[Any], V]  #: the scene and condition that the cameras of a board have
+    table: Callable[[V], Table]  #: the scene file's table that gives such a view again
+    sky_map: Callable[[V, int], SkyMap]  #: the map of such a view, with its state at a time in ps
 
 
 def _field(one: CameraField) -> dict[str, Any]:

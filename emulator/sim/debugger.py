@@ -80,22 +80,19 @@ class Debugger:
     """A target for debuggers: a machine that a processor runs in virtual time.
 
     The methods from ``registers`` on implement ``iss.gdb.target.Target``.
-
-    Attributes:
-        own_regions: the part's memory map.
-        windows: further memories, by the regions that they add to the memory map.
-        command: answers ``monitor`` commands that do not concern the processor.
-        serve: called repeatedly while the kernel is paused; blocks briefly for debugger input.
-        poll: called before each kernel step; polls the debugger when that is due.
     """
 
     kernel: Kernel
     machine: Machine
     reset: Callable[[], None]
-    own_regions: tuple[MemoryRegion, ...]
+    own_regions: tuple[MemoryRegion, ...]  #: the part's memory map
+    #: further memories, by the regions that they add to the memory map
     windows: Mapping[MemoryRegion, Window] = field(default_factory=dict)
+    #: answers ``monitor`` commands that do not concern the processor
     command: Callable[[list[str]], str] = lambda words: ""
+    #: called repeatedly while the kernel is paused; blocks briefly for debugger input
     serve: Callable[[], None] = lambda: None
+    #: called before each kernel step; polls the debugger when that is due
     poll: Callable[[], None] = lambda: None
 
     def __post_init__(self) -> None:

@@ -32,23 +32,18 @@ TEMPERATURES_C = (-60.0, 125.0)
 
 @dataclass(frozen=True)
 class SkyCondition(DeclaredValues):
-    """Properties of a camera that looks at the sky.
-
-    Attributes:
-        optics: the lens.
-        hazards: faults of lens and sensor.
-    """
+    """Properties of a camera that looks at the sky."""
 
     error = SceneError
 
-    optics: Optics
+    optics: Optics  #: the lens
     noise: bool = flag(True, "false: no shot, dark and read noise, no defects")
     seed: int = whole(0, "of noise and hot pixels", 0)
     temperature_c: float = number(
         20.0, "of the sensor; the dark current doubles every 8 degrees", *TEMPERATURES_C
     )
     hot_pixels: int = whole(20, "pixels made hot by radiation", 0)
-    hazards: tuple[SensorHazard, ...] = ()
+    hazards: tuple[SensorHazard, ...] = ()  #: faults of lens and sensor
 
     def __post_init__(self) -> None:
         super().__post_init__()

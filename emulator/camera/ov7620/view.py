@@ -25,10 +25,6 @@ class FisheyeCondition(DeclaredValues):
 
     The Sun's image ends where its level crosses from background to object at the published
     exposure; the CubeSense thesis has 8 px and 6 px, between which the default is chosen.
-
-    Attributes:
-        nadir_lens, sun_lens: errors of a camera's lens; None: those of the unit.
-        hazards: faults of lenses and sensors, drawn for each camera.
     """
 
     error = SceneError
@@ -38,12 +34,13 @@ class FisheyeCondition(DeclaredValues):
     hot_pairs: int = whole(0, "pairs of such pixels, side by side", 0)
     noise: bool = flag(True, "false: no noise, but for hot pixels")
     seed: int = whole(0, "of noise and hot pixels", 0)
+    #: nadir_lens, sun_lens: errors of a camera's lens; None: those of the unit
     nadir_lens: LensError | None = None
     sun_lens: LensError | None = None
     temperature_c: float = number(
         20.0, "of lenses and sensors; only hazards depend on it", *TEMPERATURES_C
     )
-    hazards: tuple[SensorHazard, ...] = ()
+    hazards: tuple[SensorHazard, ...] = ()  #: faults of lenses and sensors, drawn for each camera
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -36,17 +36,12 @@ def framed(data: bytes) -> bytes:
 
 @dataclass
 class Deframer:
-    """Splits a client's bytes into packets and interrupts.
+    """Splits a client's bytes into packets and interrupts."""
 
-    Attributes:
-        acknowledging: whether packets are acknowledged.
-        replies: acknowledgements to send; the owner clears them.
-        again: whether the client requests the last packet again; the owner clears it.
-    """
-
-    acknowledging: bool = True
+    acknowledging: bool = True  #: whether packets are acknowledged
+    #: acknowledgements to send; the owner clears them
     replies: bytearray = field(default_factory=bytearray)
-    again: bool = False
+    again: bool = False  #: whether the client requests the last packet again; the owner clears it
     _unread: bytearray = field(default_factory=bytearray)
 
     def feed(self, data: bytes) -> Iterator[bytes | None]:

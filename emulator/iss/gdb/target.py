@@ -11,34 +11,22 @@ WatchKind = Literal["write", "read", "access"]
 
 @dataclass(frozen=True)
 class Stop:
-    """Why the target is halted.
+    """Why the target is halted."""
 
-    Attributes:
-        signal: one of the above.
-        watch: kind and address of the watchpoint that was hit.
-        breakpoint: whether it halted at a breakpoint.
-    """
-
-    signal: int = SIGTRAP
-    watch: tuple[WatchKind, int] | None = None
-    breakpoint: bool = False
+    signal: int = SIGTRAP  #: one of the above
+    watch: tuple[WatchKind, int] | None = None  #: kind and address of the watchpoint that was hit
+    breakpoint: bool = False  #: whether it halted at a breakpoint
 
 
 @dataclass(frozen=True)
 class MemoryRegion:
-    """A region of the memory map.
+    """A region of the memory map."""
 
-    Attributes:
-        kind: flash is written by the protocol's flash commands, as by ``load``.
-        start: first address.
-        length: in bytes.
-        block: size of an erase block of flash, in bytes.
-    """
-
+    #: flash is written by the protocol's flash commands, as by ``load``
     kind: Literal["ram", "rom", "flash"]
-    start: int
-    length: int
-    block: int = 0
+    start: int  #: first address
+    length: int  #: in bytes
+    block: int = 0  #: size of an erase block of flash, in bytes
 
 
 class DebugTarget(Protocol):

@@ -32,17 +32,11 @@ Read = Callable[[int, int], bytes]
 
 
 class Frame(NamedTuple):
-    """A line of a backtrace.
+    """A line of a backtrace."""
 
-    Attributes:
-        address: of the running instruction, or of the one after the call.
-        place: an address within the call, which identifies the function.
-        note: how the frame was found if that is uncertain, or its kind.
-    """
-
-    address: int
-    place: int
-    note: str = ""
+    address: int  #: of the running instruction, or of the one after the call
+    place: int  #: an address within the call, which identifies the function
+    note: str = ""  #: how the frame was found if that is uncertain, or its kind
 
 
 def backtrace(symbols: Symbols, registers: Mapping[int, int], read: Read) -> list[Frame]:

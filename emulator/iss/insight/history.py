@@ -9,12 +9,9 @@ FUNCTION, EXCEPTION, HANDLER = "function", "exception", "handler"
 
 
 class History:
-    """Converts an observer's changes to variables of a trace.
+    """Converts an observer's changes to variables of a trace."""
 
-    Attributes:
-        variables: bits of each variable by name; None for text.
-    """
-
+    #: bits of each variable by name; None for text
     variables: Mapping[str, int | None] = {FUNCTION: None, EXCEPTION: 8, HANDLER: None}
 
     def __init__(self, observer: Observer, interrupts: Mapping[int, str]) -> None:

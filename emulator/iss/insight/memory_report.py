@@ -18,26 +18,17 @@ VECTOR_TABLE = 0xE000_ED08
 
 @dataclass(frozen=True)
 class MemoryUse:
-    """Bytes; None if unknown.
+    """Bytes; None if unknown."""
 
-    Attributes:
-        flash: of the program.
-        flash_size, ram_size: of the part.
-        static: data with fixed addresses.
-        heap: from there to the highest byte written.
-        stack: deepest use of the main stack.
-        process_stack: lowest address of the process stack; None if there is none.
-        free: never used, between heap and main stack.
-    """
-
-    flash: int
+    flash: int  #: of the program
+    #: flash_size, ram_size: of the part
     flash_size: int
     ram_size: int
-    static: int | None
-    heap: int | None
-    stack: int | None
-    process_stack: int | None
-    free: int | None
+    static: int | None  #: data with fixed addresses
+    heap: int | None  #: from there to the highest byte written
+    stack: int | None  #: deepest use of the main stack
+    process_stack: int | None  #: lowest address of the process stack; None if there is none
+    free: int | None  #: never used, between heap and main stack
 
 
 def memory_use(observer: Observer) -> MemoryUse:

@@ -28,21 +28,13 @@ MOST_CHANGES = 1 << 14
 
 @dataclass(frozen=True, order=True)
 class Edge:
-    """Calls from one place to one function.
+    """Calls from one place to one function."""
 
-    Attributes:
-        site: address of the call, or number of the exception.
-        callee: address of the function.
-        count: number of calls.
-        cycles: of the function and everything it called.
-        exception: whether the processor called it.
-    """
-
-    site: int
-    callee: int
-    count: int
-    cycles: int
-    exception: bool
+    site: int  #: address of the call, or number of the exception
+    callee: int  #: address of the function
+    count: int  #: number of calls
+    cycles: int  #: of the function and everything it called
+    exception: bool  #: whether the processor called it
 
 
 class Change(NamedTuple):
@@ -54,19 +46,12 @@ class Change(NamedTuple):
 
 
 class Figures(NamedTuple):
-    """Further measurements.
+    """Further measurements."""
 
-    Attributes:
-        main_sp: lowest main stack pointer while in use; None before the first use.
-        process_sp: likewise of the process stack.
-        idle_cycles: cycles asleep.
-        edges_lost: calls not counted because the table was full.
-    """
-
-    main_sp: int | None
-    process_sp: int | None
-    idle_cycles: int
-    edges_lost: int
+    main_sp: int | None  #: lowest main stack pointer while in use; None before the first use
+    process_sp: int | None  #: likewise of the process stack
+    idle_cycles: int  #: cycles asleep
+    edges_lost: int  #: calls not counted because the table was full
 
 
 @dataclass

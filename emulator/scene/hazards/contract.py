@@ -76,24 +76,16 @@ class Ring:
 
 @dataclass(frozen=True, eq=False)
 class CameraState:
-    """The camera at one instant of an exposure, as far as hazards need it.
+    """The camera at one instant of an exposure, as far as hazards need it."""
 
-    Attributes:
-        axes: (3, 3), the camera's x, y and boresight as rows, in the scene's axes.
-        width_deg, height_deg: of the picture, as angles from edge to edge through its centre.
-        half_field_deg: angle from the boresight beyond which no light reaches the picture.
-        pixel_rad: angle of a pixel on the boresight.
-        time_s: virtual time of the instant.
-        exposure_s: of each pixel.
-    """
-
-    axes: Vectors
+    axes: Vectors  #: (3, 3), the camera's x, y and boresight as rows, in the scene's axes
+    #: width_deg, height_deg: of the picture, as angles from edge to edge through its centre
     width_deg: float
     height_deg: float
-    half_field_deg: float
-    pixel_rad: float
-    time_s: float = 0.0
-    exposure_s: float = 0.0
+    half_field_deg: float  #: angle from the boresight beyond which no light reaches the picture
+    pixel_rad: float  #: angle of a pixel on the boresight
+    time_s: float = 0.0  #: virtual time of the instant
+    exposure_s: float = 0.0  #: of each pixel
 
     @property
     def boresight(self) -> Vectors:

@@ -28,13 +28,9 @@ EDGE = 0.15
 
 
 class EarthHazard(SkyHazard):
-    """A hazard that places Earth and Sun; this base leaves them where they are.
+    """A hazard that places Earth and Sun; this base leaves them where they are."""
 
-    Attributes:
-        cameras: names of those that it makes it harder for.
-    """
-
-    cameras: ClassVar[tuple[str, ...]] = ("nadir",)
+    cameras: ClassVar[tuple[str, ...]] = ("nadir",)  #: names of those that it makes it harder for
 
     def place_bodies(
         self, nadir: Vectors, sun: Vectors, radius_rad: float

@@ -29,18 +29,12 @@ from cubestack.firmware_model.values import (
 
 @dataclass(frozen=True)
 class Strength:
-    """The scale on which experiments vary a hazard.
+    """The scale on which experiments vary a hazard."""
 
-    Attributes:
-        key: what varies: a field, or a quantity that ``sample`` converts.
-        unit: of its values, empty for a plain number.
-        values: from harmless to worst.
-        default: of a hazard without a given strength; None: the last of ``values``.
-    """
-
-    key: str
-    unit: str
-    values: tuple[float, ...]
+    key: str  #: what varies: a field, or a quantity that ``sample`` converts
+    unit: str  #: of its values, empty for a plain number
+    values: tuple[float, ...]  #: from harmless to worst
+    #: of a hazard without a given strength; None: the last of ``values``
     default: float | None = None
 
     @property
@@ -56,17 +50,11 @@ def heading(default: Any, meaning: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Hazard(DeclaredValues):
-    """Something that makes pictures hard to use; SceneError for a value out of its range.
+    """Something that makes pictures hard to use; SceneError for a value out of its range."""
 
-    Attributes:
-        name: of its table in scene files and on the command line.
-        meaning: what it is, one phrase.
-        strength: the scale on which experiments vary it.
-    """
-
-    name: ClassVar[str]
-    meaning: ClassVar[str]
-    strength: ClassVar[Strength]
+    name: ClassVar[str]  #: of its table in scene files and on the command line
+    meaning: ClassVar[str]  #: what it is, one phrase
+    strength: ClassVar[Strength]  #: the scale on which experiments vary it
 
     error = SceneError
     seed: int = whole(0, "of everything random in it", 0, 2**63 - 1)
@@ -89,18 +77,13 @@ class Hazard(DeclaredValues):
 
 @dataclass(frozen=True, kw_only=True)
 class HazardTables(Declaration):
-    """The key ``hazards``: tables as ``[hazards.moon]``; several of a kind: ``[[hazards.debris]]``.
-
-    Attributes:
-        kinds: of hazards, by name.
-        seed: of a hazard whose table has none.
-    """
+    """The key ``hazards``: tables as ``[hazards.moon]``; several of a kind: ``[[hazards.debris]]``."""
 
     meaning: str = "what makes the picture hard to use"
     default: Any = None
     kind: ValueKind = TABLE
-    kinds: Mapping[str, type[Hazard]]
-    seed: int = 0
+    kinds: Mapping[str, type[Hazard]]  #: of hazards, by name
+    seed: int = 0  #: of a hazard whose table has none
 
     def read(self, given: Any) -> tuple[Hazard, ...]:
         if not isinstance(given, dict):

@@ -25,17 +25,11 @@ Numbers = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Population:
-    """Protons behind the walls of a satellite.
+    """Protons behind the walls of a satellite."""
 
-    Attributes:
-        hits_cm2_s: through a flat sensor, from both sides.
-        median_mev: median energy; its logarithm has a normal distribution.
-        spread: standard deviation of that, as a factor on the energy.
-    """
-
-    hits_cm2_s: float
-    median_mev: float
-    spread: float
+    hits_cm2_s: float  #: through a flat sensor, from both sides
+    median_mev: float  #: median energy; its logarithm has a normal distribution
+    spread: float  #: standard deviation of that, as a factor on the energy
 
 
 ORBITS = {

@@ -85,7 +85,7 @@ def test_cubestar_solves_a_sky_and_a_picture(
         "virtual time: discard 70.0 ms",
         "published:    discard 68 ms",
         "rendered sky: Orion",
-        "a picture file that this project rendered itself",
+        "an image rendered by this project",
     ):
         assert text in told
     rows = re.findall(r"(measured|truth) +RA +([\d.]+)°  Dec +([+-][\d.]+)°", told)
