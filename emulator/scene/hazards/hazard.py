@@ -77,7 +77,7 @@ class Hazard(DeclaredValues):
 
 @dataclass(frozen=True, kw_only=True)
 class HazardTables(Declaration):
-    """The key ``hazards``: tables as ``[hazards.moon]``; several of a kind: ``[[hazards.debris]]``."""
+    """The key ``hazards``: tables as ``[hazards.moon]``, or ``[[hazards.debris]]`` for several."""
 
     meaning: str = "what makes the picture hard to use"
     default: Any = None
