@@ -1,5 +1,3 @@
-"""What is distributed is whole."""
-
 import shutil
 import subprocess
 import sys
@@ -12,7 +10,7 @@ ROOT = Path(__file__).parent.parent
 
 
 def kept() -> set[str]:
-    """Files of the clone; nothing where this is none."""
+    """Files in git; empty outside a clone."""
     call = ["git", "-C", str(ROOT), "ls-files", "-z"]
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         return set()
@@ -20,7 +18,7 @@ def kept() -> set[str]:
     return {name for name in found.split("\0") if name and (ROOT / name).is_file()}
 
 
-def test_the_source_distribution_has_every_file(tmp_path: Path) -> None:
+def test_source_distribution_has_every_file(tmp_path: Path) -> None:
     files = kept()
     if not files:
         pytest.skip("this is no clone")

@@ -1,11 +1,11 @@
-"""What only Linux has is asked for where it is used, and not by an import: as on macOS."""
+"""Linux-only features are used at run time, not at import, as macOS needs."""
 
 import subprocess
 import sys
 
 import pytest
 
-#: Has a process look like one on macOS to the modules of the library, which it imports all.
+#: Imports all modules of the library in a process that looks like macOS.
 ON_MACOS = """
 import ctypes, fcntl, importlib, os, pkgutil, resource, select, signal, socket, sys, time
 
@@ -57,7 +57,7 @@ def on_macos(*words: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(call, capture_output=True, text=True, timeout=300)
 
 
-def test_every_module_is_imported_and_a_device_runs() -> None:
+def test_modules_import_and_a_device_runs_on_macos() -> None:
     done = on_macos("shell", "emulated:cubesense", "-c", "read Power")
     assert done.returncode == 0, done.stderr
     first, *said = done.stdout.splitlines()
@@ -67,7 +67,7 @@ def test_every_module_is_imported_and_a_device_runs() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [("run", "--", "true"), ("emulate", "cubestar", "--i2c", "7")])
-def test_what_needs_linux_says_so(words: tuple[str, ...]) -> None:
+def test_linux_only_commands_print_one_line(words: tuple[str, ...]) -> None:
     done = on_macos(*words)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()

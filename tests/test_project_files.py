@@ -1,5 +1,3 @@
-"""Files around the code: of one version, and workflows that call what there is."""
-
 import re
 import subprocess
 import sys
@@ -25,7 +23,7 @@ def text_of(name: str) -> str:
     return (ROOT / name).read_text(encoding="utf-8")
 
 
-def test_the_version_is_the_same_everywhere() -> None:
+def test_version_is_the_same_everywhere() -> None:
     version = project()["version"]
     releases = re.findall(r"^## (\d.*?) - (\d{4}-\d\d-\d\d)$", text_of("CHANGELOG.md"), re.M)
     citation = yaml.safe_load(text_of("CITATION.cff"))
@@ -35,7 +33,7 @@ def test_the_version_is_the_same_everywhere() -> None:
     assert releases == sorted(releases, key=lambda one: one[1], reverse=True)
 
 
-def test_the_changelog_has_the_usual_headings() -> None:
+def test_changelog_has_the_usual_headings() -> None:
     kinds = set(re.findall(r"^### (.*)$", text_of("CHANGELOG.md"), re.M))
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
@@ -56,7 +54,7 @@ def commands(workflow: Any) -> Iterator[str]:
 
 
 @pytest.mark.parametrize(("name", "workflow"), list(workflows()))
-def test_workflows_call_what_there_is(name: str, workflow: Any) -> None:
+def test_workflows_use_existing_targets(name: str, workflow: Any) -> None:
     targets = re.findall(r"^([\w-]+):", text_of("Makefile"), re.M)
     extras = project()["optional-dependencies"]
     found = list(commands(workflow))
@@ -72,7 +70,7 @@ def test_workflows_call_what_there_is(name: str, workflow: Any) -> None:
         assert address == project()["urls"]["Repository"]
 
 
-def test_pytest_knows_the_options_of_the_workflows() -> None:
+def test_pytest_options_of_the_workflows_exist() -> None:
     call = [sys.executable, "-m", "pytest", "--help"]
     known = subprocess.run(call, capture_output=True, text=True, check=True, cwd=ROOT).stdout
     for option in set(re.findall(r"--cubestack-[\w-]+", text_of("docs/ci.md"))):
@@ -80,7 +78,7 @@ def test_pytest_knows_the_options_of_the_workflows() -> None:
 
 
 @pytest.mark.slow
-def test_the_measurement_of_the_workflows_passes(run: Any) -> None:
+def test_measurement_of_the_workflows_passes(run: Any) -> None:
     (words,) = {
         one.partition("cubestack ")[2]
         for name, workflow in workflows()
@@ -91,7 +89,7 @@ def test_the_measurement_of_the_workflows_passes(run: Any) -> None:
     assert run(*words.split()).code == 0
 
 
-def test_the_image_is_of_what_is_in_the_tree() -> None:
+def test_docker_image_is_built_from_the_tree() -> None:
     lines = text_of("Dockerfile").splitlines()
     assert [line for line in lines if line.startswith("COPY")] == [
         "COPY . /source",
@@ -102,7 +100,7 @@ def test_the_image_is_of_what_is_in_the_tree() -> None:
     assert extras == {"ground", "release"} <= set(project()["optional-dependencies"])
 
 
-def test_no_page_installs_by_a_name_that_is_not_published() -> None:
+def test_no_page_installs_from_an_index() -> None:
     by_name = re.compile(r"pip install\b[^\n]*?[ \"']cubestack(?:\[[\w,]+\])?(?![\[\w/.-]| @ )")
     assert by_name.search("pip install pytest 'cubestack[hdl]'")
     texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")]
