@@ -133,7 +133,6 @@ def test_shell_peeks_at_registers_and_variables(run: Run, program: Path) -> None
         (("memory", "cubestar"), "cubestar runs no own firmware; add --firmware"),
         (("shell", "emulated:cubestar", "-c", "peek CMU"), "start it with --firmware"),
         (("emulate", "cubestar", "--tcp", 0, "--gdb", 0), "--gdb: cubestar runs no own firmware"),
-        (("emulate", "cubestar", "cubesense", "--gdb", 0), "--gdb applies to one device"),
     ],
 )
 def test_debug_options_need_firmware(run: Run, arguments: tuple[object, ...], error: str) -> None:

@@ -178,15 +178,6 @@ def test_rejects_options_of_one_device_for_several(
     assert found.line.endswith(f"--{option} applies to one device, but several are given")
 
 
-def test_names_an_invalid_orbit_file(run: Run, tmp_path: Path) -> None:
-    orbit = tmp_path / "orbit.toml"
-    orbit.write_text("altitude = high\n", "utf-8")
-    found = run("emulate", "cubestar", "--pty", tmp_path / "tty", "--orbit", orbit)
-    assert found.code == 2
-    assert str(orbit) in found.err
-    assert not (tmp_path / "tty").is_symlink()
-
-
 @pytest.mark.parametrize(
     ("given", "past"),
     [
