@@ -1,4 +1,4 @@
-"""The command as a shell sees it; properties are tested with the same examples everywhere."""
+"""Runs the command in-process; Hypothesis uses the same examples everywhere."""
 
 import gc
 import shutil
@@ -25,7 +25,7 @@ class Outcome(NamedTuple):
 
     @property
     def line(self) -> str:
-        """The one line that was said of what is wrong, and nothing else."""
+        """The only line of output, on standard error."""
         assert self.out == ""
         (line,) = self.err.splitlines()
         return line
@@ -36,7 +36,7 @@ Run = Callable[..., Outcome]
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that share a fixture of their module stay in one process, so that it is made once."""
+    """Tests that share a module fixture run in one process, so that it is made once."""
     for item in items:
         shared = getattr(item, "_fixtureinfo", None)
         found = shared.name2fixturedefs.values() if shared else ()
@@ -46,30 +46,30 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What was collected stays: no need to look through it for garbage again and again."""
+    """Excludes the collected tests from garbage collection."""
     gc.collect()
     gc.freeze()
 
 
 @pytest.fixture
 def profile() -> str:
-    """Profile of what is tested; a test about one of them is parametrized with its name."""
+    """Profile of the devices; tests of one profile are parametrised with its name."""
     return DEFAULT_PROFILE
 
 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Runs the command with arguments, as the shell would see it on a machine that is quick."""
+    """Runs the command with arguments, without progress lines."""
     from cubestack.host import terminal
     from cubestack.host.cli.main import main
 
-    monkeypatch.setattr(terminal, "EVERY_S", 3600.0)  # else it tells how long something takes
+    monkeypatch.setattr(terminal, "EVERY_S", 3600.0)
 
     def call(*arguments: object) -> Outcome:
         capsys.readouterr()
         try:
             code = main([str(argument) for argument in arguments])
-        except SystemExit as end:  # argparse's way out
+        except SystemExit as end:  # raised by argparse
             code = int(end.code or 0)
         return Outcome(code, *capsys.readouterr())
 
@@ -78,18 +78,18 @@ def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
-    """A real browser, without a window; skips where there is none."""
+    """A headless browser; skips if there is none."""
     program = shutil.which("chromium") or shutil.which("chromium-browser")
     if program is None:
         pytest.skip("chromium is not installed")
     api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    # Its own program may lack a library of the system, such as libatomic1.
+    # Its driver may lack a system library such as libatomic1.
     call = [sys.executable, "-m", "playwright", "--version"]
     tried = subprocess.run(call, capture_output=True, text=True)
     if tried.returncode != 0:
         pytest.skip(f"playwright does not start: {tried.stderr.strip()}")
     with api.sync_playwright() as playwright:
-        # In a container there is no sandbox to be had, and only our own pages are opened.
+        # Containers have no sandbox, and only our own pages are opened.
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield browser
         browser.close()

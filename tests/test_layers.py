@@ -1,4 +1,4 @@
-"""Imports run downward only, between the packages and inside of each; every package is declared."""
+"""Imports run downward only, between packages and inside them; every package is declared."""
 
 import ast
 import sys
@@ -85,7 +85,7 @@ def name_of(path: Path) -> str:
 
 @cache
 def imported(path: Path) -> tuple[tuple[str, bool], ...]:
-    """Names that a module imports, and whether it does so when it is loaded itself."""
+    """Names that a module imports, and whether at load time."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     lazy = {
         id(node)
@@ -113,7 +113,7 @@ def modules() -> frozenset[str]:
 
 
 def own(path: Path) -> Iterator[tuple[str, bool]]:
-    """What a module imports of this distribution, below ``cubestack``."""
+    """Imports of this distribution, without ``cubestack.``, and whether at load time."""
     for name, at_load in imported(path):
         if name.startswith("cubestack."):
             yield name.removeprefix("cubestack."), at_load
@@ -145,12 +145,12 @@ def test_imports_run_downward_inside_of_a_package(package: str) -> None:
                 assert below, f"{name_of(path)} may not import {name}"
 
 
-def test_no_module_imports_itself_by_way_of_others() -> None:
+def test_no_import_cycles() -> None:
     graph = {
         name_of(path): {name for name, _ in own(path) if f"cubestack.{name}" in modules()}
         for path in sources()
     }
-    TopologicalSorter(graph).prepare()  # tells a circle, module by module
+    TopologicalSorter(graph).prepare()  # names a cycle
 
 
 def test_only_declared_distributions_are_imported() -> None:

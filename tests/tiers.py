@@ -1,4 +1,4 @@
-"""Which cases of a parametrized test run each time, and which only with all tests."""
+"""Which cases of a parametrised test are quick, and which are slow."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,9 +9,9 @@ PARAM = type(pytest.param())
 
 
 def quick(cases: Iterable[Any], count: int) -> list[Any]:
-    """All cases; ``count`` of them, evenly spread, run each time, and the others are slow.
+    """All cases; all but ``count`` evenly spread ones are marked slow.
 
-    A tuple is a case of several values; a value that is a tuple is to be a ``pytest.param``.
+    A tuple is a case of several values; wrap a value that is a tuple in ``pytest.param``.
     """
     found = list(cases)
     kept = {place * len(found) // count for place in range(count)}
@@ -19,7 +19,7 @@ def quick(cases: Iterable[Any], count: int) -> list[Any]:
 
 
 def quick_ones(cases: Iterable[Any], *names: str) -> list[Any]:
-    """All cases; those of these names run each time, and the others are slow."""
+    """All cases; all but the named ones are marked slow."""
     return [case if case in names else _slow(case) for case in cases]
 
 

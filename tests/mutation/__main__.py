@@ -1,4 +1,4 @@
-"""How good are the tests? Wrong lines are put into the Python code, and those counted that pass.
+"""Mutation testing: changes the Python code and counts changes that no test detects.
 
 examples, from the project's folder:
   python -m tests.mutation --record                          which tests run which lines; once
@@ -7,9 +7,9 @@ examples, from the project's folder:
   python -m tests.mutation --count 400 --seed 7 --jobs 2
   python -m tests.mutation --folder firmware_model/cubestar
 
-A mutant is killed when a test fails, or when the tests do not end in time. It faces the tests that
-run its line, and without a recorded run those of the nearest files. Survivors are printed; some
-change nothing that can be seen. Exit status 1 when fewer than 90 % are killed.
+A mutant is killed if a test fails or times out. Its tests are those that run its line, or, without
+a recorded run, those of the nearest files. Survivors are printed; some have no visible effect.
+Exit status 1 if fewer than 90 % are killed.
 """
 
 import argparse
@@ -32,10 +32,10 @@ ENOUGH = 0.9
 
 
 def chosen(folder: Path, seed: int) -> list[Mutant]:
-    """All, in the order of the lots that they draw: modules weigh as much as they have lines.
+    """All mutants in a random order, weighted by the lines of their modules.
 
-    A lot is drawn by the seed, the module's name and the mutant's text, so that the first ones stay
-    the first ones while other code changes.
+    The order depends on the seed, the name of the module and the text of the mutant, so that it
+    hardly changes when other code does.
     """
     drawn = list[tuple[float, Mutant]]()
     for path in modules(ROOT):
@@ -52,7 +52,7 @@ def chosen(folder: Path, seed: int) -> list[Mutant]:
 
 
 def results(tried: list[Mutant], jobs: int) -> Iterator[tuple[Mutant, bool]]:
-    """Each with whether it was killed, in their order; in so many copies at the same time."""
+    """Mutants and whether each was killed, in order; runs ``jobs`` copies in parallel."""
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         copies: Queue[Copy] = Queue()
         for job in range(jobs):

@@ -40,7 +40,7 @@ class Mutant:
     after: str
 
     def put_into(self, text: str) -> str:
-        """The module with the mutant, from its ``text``."""
+        """The ``text`` of the module with the mutant."""
         code = text.encode()
         return (code[: self.first] + self.after.encode() + code[self.last :]).decode()
 
@@ -50,13 +50,13 @@ class Mutant:
 
 
 def modules(root: Path) -> list[Path]:
-    """Those of the three parts, relative to ``root``, in order."""
+    """Modules of the three parts, relative to ``root``, sorted."""
     found = (path for part in PARTS for path in (root / part).rglob("*.py"))
     return sorted(path.relative_to(root) for path in found)
 
 
 def mutants(path: Path, text: str) -> list[Mutant]:
-    """All of one module, in the order of its lines; a module that does not parse raises."""
+    """All mutants of a module, by line; raises if the module does not parse."""
     starts = [0]
     for line in text.encode().splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
@@ -71,7 +71,7 @@ def mutants(path: Path, text: str) -> list[Mutant]:
 
 
 def _changes(tree: ast.AST) -> Iterator[tuple[int, ast.expr | ast.stmt, str]]:
-    """Nodes, after the first lines of their statements, and what stands there instead."""
+    """(first lines of their statements, nodes, replacements)."""
     same_as_pass = {id(node.body[-1]) for node in ast.walk(tree) if isinstance(node, FUNCTIONS)}
     for statement, node in _nodes(tree):
         match node:
@@ -119,12 +119,12 @@ def _nodes(tree: ast.AST, statement: int = 0) -> Iterator[tuple[int, ast.AST]]:
 
 
 def _says_only(statement: ast.stmt) -> bool:
-    """Whether it is a text, or three dots."""
+    """Whether it is a text or an ellipsis."""
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
 
 
 def _is_colour(node: ast.AST) -> bool:
-    """Whether it is red, green and blue of 255."""
+    """Whether it is a colour of three values up to 255."""
     match node:
         case ast.Tuple([ast.Constant(red), ast.Constant(green), ast.Constant(blue)]):
             shares = red, green, blue

@@ -1,4 +1,4 @@
-"""Of pytest, for the runs that are made here: tests, how long each takes, which failed first."""
+"""Plugin of pytest for mutation runs: tests, their durations, and the first failure."""
 
 import json
 import os
@@ -20,18 +20,18 @@ _durations: dict[str, float] = defaultdict(float)
 
 
 def without_group(test: str) -> str:
-    """Its name without what pytest-xdist appends where tests stay together."""
+    """The test name without the group that pytest-xdist appends."""
     return _GROUP.sub("", test)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """All tests are known."""
+    """Keeps the names of all tests."""
     if path := os.environ.get(COLLECTED):
         Path(path).write_text(json.dumps([item.nodeid for item in session.items]), "utf-8")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what is known."""
+    """Deselects recorded tests."""
     known = _known()
     left_out = [item for item in items if without_group(item.nodeid) in known]
     if left_out:
@@ -40,7 +40,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """A phase of a test has ended."""
+    """Adds the duration of a phase."""
     test = without_group(report.nodeid)
     _durations[test] += report.duration
     if report.failed and (path := os.environ.get(FAILED)):
@@ -48,7 +48,7 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Written by the process that has heard of all tests, not by its workers."""
+    """Writes the results in the main process, not in its workers."""
     path = os.environ.get(DURATIONS)
     if path and not hasattr(session.config, "workerinput"):
         Path(path).write_text(json.dumps(_known() | _durations), "utf-8")

@@ -1,4 +1,4 @@
-"""Which tests run a line, by one recorded run of all of them, and how long each takes."""
+"""Which tests run a line and how long they take, from one recorded run."""
 
 import json
 import os
@@ -78,7 +78,7 @@ def record(root: Path, *, new: bool = False) -> int:
 
 
 def collected(root: Path, environment: Mapping[str, str]) -> set[str]:
-    """The tests that there are in ``root``; none of a file that can not be imported."""
+    """Tests in ``root``, without files that can not be imported."""
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         names = Path(folder, "names.json")
         call = [sys.executable, "-m", "pytest", "-q", "--collect-only", "-p", "no:cacheprovider"]
@@ -93,7 +93,7 @@ def collected(root: Path, environment: Mapping[str, str]) -> set[str]:
 
 
 class Reached:
-    """A recorded run. Raises FileNotFoundError where there is none."""
+    """A recorded run; FileNotFoundError if there is none."""
 
     def __init__(self, root: Path) -> None:
         self._folder = root / FOLDER
@@ -101,7 +101,7 @@ class Reached:
         self._lines: dict[Path, dict[int, list[str]]] = {}
 
     def update(self, present: Set[str]) -> list[str]:
-        """Forget the tests that are not ``present`` any more; return those that were not yet."""
+        """Removes tests that are not ``present``; returns the unrecorded ones."""
         new = sorted(present - self.durations.keys())
         self.durations = {test: self.durations[test] for test in self.durations.keys() & present}
         return new
@@ -165,10 +165,10 @@ class Reached:
 
 
 def _names(contexts: Iterable[str]) -> set[str]:
-    """Of tests: a context is a test's name and the phase of it; that of imports has no name."""
+    """Test names of contexts, which end with the phase; imports have no name."""
     return {without_group(context.rpartition("|")[0]) for context in contexts} - {""}
 
 
 def _names_of_processes(contexts: Iterable[str]) -> set[str]:
-    """Of tests that started one: as pytest tells them, with the phase in brackets."""
+    """Names of tests that started a process, with the phase in brackets."""
     return {without_group(context.rpartition(" (")[0]) for context in contexts} - {""}

@@ -1,4 +1,4 @@
-"""The tests that a mutant has to face."""
+"""Selects the tests of a mutant."""
 
 import os
 from collections.abc import Callable
@@ -18,7 +18,7 @@ LEAST_S, SLOWER = 30.0, 3.0
 
 
 class Suite:
-    """Chooses the tests that a mutant has to face, of those that are ``present`` in a copy."""
+    """Selects tests of a mutant among those ``present`` in a copy."""
 
     def __init__(self, present: Callable[[], set[str]]) -> None:
         self._reached: Reached | None = None
@@ -30,7 +30,7 @@ class Suite:
         self._new = self._reached.update(present())
 
     def tests(self, mutant: Mutant) -> tuple[list[str], float]:
-        """Arguments for pytest, and the seconds that it may take."""
+        """Arguments for pytest, and its time limit in seconds."""
         if self._reached:
             files = {str(file) for file in files_for(mutant.path)}
             recorded, new = self._reached.tests(mutant, files), near(mutant.path, self._new)
@@ -41,7 +41,7 @@ class Suite:
 
 
 def near(path: Path, tests: list[str]) -> list[str]:
-    """Those that stand in the test files for a module, or compare tables with the documents."""
+    """Tests in the files for a module, and those that compare tables with documents."""
     files = {*DOCUMENTS, *map(str, _ranked(path))}
     return [test for test in tests if test.partition("::")[0] in files]
 

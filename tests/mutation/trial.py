@@ -1,4 +1,4 @@
-"""One mutant and the tests that it has to face, in a copy of the project."""
+"""One mutant and its tests, in a copy of the project."""
 
 import os
 import shutil
@@ -26,7 +26,7 @@ for name, module in list(sys.modules.items()):
 
 
 class Copy:
-    """A copy of the project in ``root``, that mutants are put into, one at a time."""
+    """A copy of the project in ``root`` for one mutant at a time."""
 
     def __init__(self, root: Path, folder: Path) -> None:
         self._tree, self._failed = folder / "tree", folder / "failed"
@@ -43,11 +43,11 @@ class Copy:
         self._sound: dict[str, bool] = {}
 
     def collected(self) -> set[str]:
-        """Its tests: without those that need what stands beside the project."""
+        """Tests of the copy, without those that need files beside the project."""
         return collected(self._tree, self._environment)
 
     def killed(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
-        """Whether one of the tests, that passes without it, fails with the mutant."""
+        """Whether a test that passes without the mutant fails with it."""
         target = self._tree / mutant.path
         original = target.read_text("utf-8")
         while tests:
@@ -69,7 +69,7 @@ class Copy:
         return False
 
     def _write(self, target: Path, text: str) -> None:
-        """Each time with another date, in s, by which Python knows what it has compiled."""
+        """Changes the file date as well, so that Python compiles it again."""
         target.write_text(text, "utf-8")
         self._writes += 1
         os.utime(target, (self._writes, self._writes))

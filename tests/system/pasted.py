@@ -50,7 +50,7 @@ TOLD = 15
 
 
 class Pasted(NamedTuple):
-    """A command, and what became of it; ``code`` is None where it was left out."""
+    """A command and its result; ``code`` is None if it was skipped."""
 
     document: str
     line: str
@@ -69,10 +69,10 @@ class Pasted(NamedTuple):
 
 
 class Shell:
-    """A bash that is typed into; job control is on, as in a terminal."""
+    """A bash with job control, as in a terminal."""
 
     def __init__(self, folder: Path) -> None:
-        """Start it in ``folder``, with nothing of this process's virtual environment."""
+        """Starts it in ``folder`` without the virtual environment of this process."""
         own = os.environ.get("VIRTUAL_ENV")
         path = [one for one in os.environ["PATH"].split(":") if not own or own not in one]
         dropped = {"VIRTUAL_ENV", "PYTHONPATH", "PYTHONHOME"}
@@ -103,7 +103,7 @@ class Shell:
         self._said.put(None)
 
     def run(self, line: str, limit_s: float) -> tuple[int, list[str]]:
-        """Its exit status, and what it said; it is interrupted after ``limit_s``."""
+        """Exit status and output; interrupts the command after ``limit_s``."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{{ {line}\n}} </dev/null\nprintf '\\n{MARK} %s\\n' $?\n")
         self._process.stdin.flush()
@@ -123,7 +123,7 @@ class Shell:
             said.append(heard)
 
     def _interrupt(self) -> None:
-        """End all of the command; by Ctrl-C the shell would end as well."""
+        """Ends the command with its children; Ctrl-C would end the shell as well."""
         tasks = Path(f"/proc/{self._process.pid}/task").glob("*/children")
         for child in {int(one) for task in tasks for one in task.read_text().split()}:
             if child not in self._served:
@@ -131,7 +131,7 @@ class Shell:
                     os.killpg(child, signal.SIGTERM)
 
     def serve(self, line: str, limit_s: float) -> tuple[int, list[str]]:
-        """Start what serves, and wait until it says so; what served before has ended."""
+        """Ends the previous server, starts this one and waits until it is ready."""
         self.hang_up()
         log = self.folder / "served.log"
         log.write_text("")
@@ -159,7 +159,7 @@ class Shell:
 
 
 def left_out(line: str, folder: Path, *, long: bool) -> str:
-    """Why a line is not pasted; empty where it is."""
+    """Why a line is skipped; empty if it is run."""
     words = words_of(line)
     if words[0] == "make" and not long and LONG_TARGETS & set(words):
         return "takes minutes"
@@ -183,7 +183,7 @@ def left_out(line: str, folder: Path, *, long: bool) -> str:
 def pasted(
     document: Path, folder: Path, *, long: bool, limit_s: float, ready: Sequence[str] = ()
 ) -> Iterator[Pasted]:
-    """Paste the blocks of ``document`` into a shell in ``folder``, after the lines ``ready``."""
+    """Runs the blocks of ``document`` in a shell in ``folder``, after the lines ``ready``."""
     shell = Shell(folder)
     try:
         for line in ready:
@@ -211,7 +211,7 @@ def _paste(shell: Shell, document: str, line: str, *, long: bool, limit_s: float
 
 
 def _paste_python(shell: Shell, block: Code, number: int, limit_s: float) -> Iterator[Pasted]:
-    """Save a block that names its file; of README.md, run one that is a script."""
+    """Saves a block that names its file; runs scripts of README.md."""
     named = re.match(r"# (\w+\.py)\n", block.text)
     name = named[1] if named else f"pasted{number}.py"
     if named or block.document == "README.md":
@@ -222,7 +222,7 @@ def _paste_python(shell: Shell, block: Code, number: int, limit_s: float) -> Ite
 
 
 def fresh(folder: Path) -> Path:
-    """A copy of the project in ``folder``, as somebody has it who has just got it."""
+    """A fresh copy of the project in ``folder``."""
     if (ROOT / ".git").exists():
         subprocess.run(["git", "clone", "-q", str(ROOT), str(folder)], check=True)
     else:

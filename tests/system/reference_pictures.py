@@ -61,7 +61,7 @@ class Compared:
 
 
 def compare(frames: int, seed: int, firmware: str) -> Iterator[Compared]:
-    """Take random pictures, and compare what comes of each."""
+    """Takes random pictures and compares the telemetry of both programs."""
     rng, cubestar = np.random.default_rng(seed), device("cubestar")
     with ExitStack() as stack:
         scene = SkyScene(random_quaternion(rng))
@@ -88,7 +88,7 @@ def compare(frames: int, seed: int, firmware: str) -> Iterator[Compared]:
 
 
 def _mode(rng: np.random.Generator, scene: Any) -> tuple[str, list[tuple[str, dict[str, Any]]]]:
-    """A mode and the telecommands for it: lost in space, a rough boresight, or as it stands."""
+    """A random mode and its telecommands: lost, assisted, or unchanged."""
     chosen = str(rng.choice(["lost", "assisted", "as it stands"]))
     if chosen == "lost":
         return chosen, [("setIDMode", {"IdMode": IdMode.LOST_IN_SPACE})]

@@ -81,7 +81,7 @@ def picture(rng: np.random.Generator, false: int, *, uncut: bool, mirrored: bool
 
 
 def ours(rays: Rays) -> tuple[float, Attitude | None]:
-    """Time in s, and attitude of profile `extended`, all confirming stars weighted alike."""
+    """Time in s and attitude by profile `extended`, with equal weights."""
     meter = Meter(CORTEX_M3)
     started = time.process_time()
     found = identify(rays, None, CATALOGUE, FIELD, meter)
@@ -95,7 +95,7 @@ def ours(rays: Rays) -> tuple[float, Attitude | None]:
 
 
 def public(tolerance_rad: float) -> Solver:
-    """ruststartracker's with a tolerance of the angles between stars."""
+    """The solver ruststartracker with a tolerance of star angles."""
     from ruststartracker.libruststartracker import StarMatcher
 
     matcher = StarMatcher(

@@ -30,7 +30,7 @@ def calibrate(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
 def test_finds_the_lens_of_an_emulated_unit(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """The lens undoes distortion as the tables do; a camera file's model is 0.1 px from that."""
+    """The model of a camera file is within 0.1 px of the tables' distortion."""
     scene, out = tmp_path / "unit.toml", tmp_path / "camera.json"
     scene.write_text(UNIT, encoding="utf-8")
     found = calibrate(capsys, "--emulated", 8, "--scene", scene, "--out", out)

@@ -22,7 +22,7 @@ pytestmark = needs_toolchain
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Sleeps between ticks of a millisecond, and sends each byte back."""
+    """Sleeps between ticks of 1 ms and echoes each byte."""
     return build("debugged", tmp_path_factory.mktemp("debugged"))
 
 
@@ -142,7 +142,7 @@ def test_debug_options_need_firmware(run: Run, arguments: tuple[object, ...], er
 
 
 def processed(halting: bool) -> tuple[str, object, int]:
-    """Trace of a boot and a picture with the reference firmware, its memory, and the halts."""
+    """Trace of a boot and a picture with the reference firmware, memory, number of halts."""
     with cubestack.open_device("cubestar", firmware="reference", seed=2) as device:
         board: Any = device.board
         stream, halts = io.StringIO(), list[int]()

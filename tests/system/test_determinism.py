@@ -29,7 +29,7 @@ VIEWS: dict[str, tuple[Callable[[int], Any], list[str]]] = {
 
 
 def run(name: str, seed: int) -> tuple[dict[str, Any], list[bytes]]:
-    """What passes on the line in a few captures and turns of the loop; the memories in the end."""
+    """Traffic of a few captures and loop turns, and the final memories."""
     view, commands = VIEWS[name]
     with open_device(name, view(seed), seed=seed) as opened:
         ear, client = Ear(opened.board.uart), opened.client.client

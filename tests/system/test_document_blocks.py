@@ -45,7 +45,7 @@ def of(language: str) -> list[Any]:
 
 
 def commands() -> Iterator[tuple[str, list[str]]]:
-    """Document and words of each command of a shell; without environment."""
+    """Document and words of each shell command, without its environment."""
     for block in BLOCKS:
         if block.language == "sh":
             for line in lines_of(block.text):
@@ -55,7 +55,7 @@ def commands() -> Iterator[tuple[str, list[str]]]:
 
 
 def own() -> Iterator[tuple[str, str]]:
-    """Document and line of each command of this project."""
+    """Document and line of each `cubestack` command."""
     for document, words in commands():
         if (call := own_call(words)) is not None:
             yield document, call
@@ -133,7 +133,7 @@ def test_commands_parse(document: str, line: str, folder: Path) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of a reader: files that the documents name are there, with what they say."""
+    """A folder with the files that the documents name."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     for name, text in reader_files().items():
         (tmp_path / name).write_text(text, encoding="utf-8")

@@ -42,7 +42,6 @@ def load(folder: Path, text: str) -> Any:
 
 
 def section(text: str, heading: str) -> str:
-    """The part of a Markdown text below a heading."""
     return text.split(f"## {heading}\n")[1].split("\n## ")[0]
 
 
@@ -96,7 +95,7 @@ def test_documented_defaults_match_the_code(heading: str, defaults: tuple[object
 
 
 def hazard_rows(hazard: type[Hazard]) -> list[str]:
-    """The rows of a table of all keys of a hazard but the seed."""
+    """Table rows of all keys of a hazard except the seed."""
     rows = []
     for name, one in hazard.declared().items():
         value = one.default
@@ -161,7 +160,7 @@ DOCUMENTS = [
 
 
 def anchors(path: Path) -> set[str]:
-    """Of a document's headings, as a repository's page and the site both make them."""
+    """Anchors of the headings, as GitHub and the site make them."""
     text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
     headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
     plain = (re.sub(r"[^\w\s-]", "", heading.lower()).strip() for heading in headings)

@@ -41,7 +41,7 @@ def run(*command: str | Path, cwd: Path | None = None) -> "subprocess.CompletedP
 
 
 def check_attitude(device: Any, output: str) -> None:
-    """What a program printed is the attitude that the camera had."""
+    """The printed attitude is that of the camera."""
     quaternion = np.array([float(word) for word in output.split()])
     cross, roll = errors(quaternion / np.linalg.norm(quaternion), device.board.truth())
     assert cross < 0.02  # telemetry counts in steps of 1e-4

@@ -87,7 +87,7 @@ class Fuzzer:
         self.steady = [m for m in interface.telemetries if m.supported and not m.has_side_effect]
 
     def run(self, events: int) -> tuple[int, str]:
-        """Make ``events``; how many faults did something, and the trace."""
+        """Makes ``events`` events; returns the number of effective faults and the trace."""
         due = CHECK_EVERY
         while self.events < events:
             self.turns[np.searchsorted(self.shares, self.rng.random())]()
@@ -99,7 +99,7 @@ class Fuzzer:
         return self.board.faults.events, self.trace.hexdigest()
 
     def _watched_step(self) -> None:
-        """Time goes on: a hang in virtual time would else be one in wall time."""
+        """Fails if virtual time stops advancing."""
         self._step()
         now_ps = self.kernel.now
         self._still = self._still + 1 if now_ps == self._then_ps else 0
@@ -107,7 +107,7 @@ class Fuzzer:
         assert self._still < MOST_AT_ONCE, f"{MOST_AT_ONCE} things happen at {now_ps} ps"
 
     def check(self) -> None:
-        """Without faults, every good frame is answered the first time, on each way in."""
+        """Without faults, each good frame is answered at once on UART and I2C."""
         self.board.faults.clear()
         self._listen(QUIET_S)
         self._calm()
@@ -127,7 +127,7 @@ class Fuzzer:
         self.trace.update(repr(found).encode())
 
     def _calm(self) -> None:
-        """A stream or a picture may be on its way: wait for its end."""
+        """Waits for the end of a stream or picture."""
         until_ps = self.kernel.now + LONGEST_STREAM_S * PS_PER_S
         while self.kernel.now < until_ps:
             if not self._listen(QUIET_S):
@@ -170,7 +170,7 @@ class Fuzzer:
         self._frame(commands=True)
 
     def _bench(self) -> None:
-        """Any byte, now and then one that takes or sends a picture."""
+        """Sends any byte; some of them take or send a picture."""
         if "bench_uart" in self.lines:
             self.events += 1
             self.lines["bench_uart"].write(self.rng.bytes(1))

@@ -18,7 +18,7 @@ READ_OUT_MS = ROWS * LINE_MS
 
 
 def capture_ms(cubestar: Any, delay_ms: int) -> float:
-    """Of a capture, from enabling the sensor to ACK, as telemetry tells it."""
+    """Time from enabling the sensor to ACK, from telemetry."""
     cubestar.client.command("SetDiscardDelay", Delay=delay_ms)
     cubestar.capture()
     phases = cubestar.phase_times()
@@ -41,7 +41,8 @@ def test_frame_rate_register(session: Any, register: int, published_fps: float) 
 
 @pytest.fixture
 def striped(tmp_path: Path) -> PictureScene:
-    """Row r of this picture has the grey value 20 + r // 4, and a light that scales."""
+    """A picture whose row r has the grey value 20 + r
+    4; its light scales with exposure."""
     rows = np.repeat(20 + np.arange(ROWS, dtype=np.uint8) // 4, 1024).reshape(ROWS, 1024)
     Image.fromarray(rows).save(tmp_path / "striped.png")
     return PictureScene(tmp_path / "striped.png", exposure_ms=385.6)

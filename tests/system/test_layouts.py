@@ -32,7 +32,7 @@ FULL = ImageBlockSize.BYTES_128.length
 
 
 class Node:
-    """A CubeStar of a memory layout, and its host."""
+    """A CubeStar with a memory layout, and its client."""
 
     def __init__(self, opened: AnyEmulated, layout: Layout) -> None:
         self.layout = layout
@@ -53,7 +53,7 @@ class Node:
         return {name for name, up in self.client.telemetry("ErrorFlags").items() if up}
 
     def seen(self) -> dict[str, Any]:
-        """All that a host gets of one capture, but for times and currents."""
+        """Telemetry of a capture without times and currents."""
         status, attitude = self.cubestar.capture_and_process(), self.cubestar.attitude()
         telemetry = ("DetectionSummary", "MatchSummary", "DetectionThresholdValues")
         return {name: self.client.telemetry(name) for name in telemetry} | {
@@ -66,7 +66,7 @@ class Node:
 
     @property
     def memory(self) -> np.ndarray:
-        """Where the layout has the picture of the first capture."""
+        """The memory with the first picture."""
         name = "SRAM" if self.layout is Layout.SHARED else "SRAM2"
         found: np.ndarray = self.board.engine.memories[name]
         return found
@@ -228,7 +228,7 @@ def test_banks_are_separate(node: Node, published: Published) -> None:
 
 @pytest.mark.slow
 def test_loop_rate_and_age_of_each_layout(capsys: pytest.CaptureFixture[str]) -> None:
-    """Twice the rate with two memories; no layout without a copy is older than 600 ms."""
+    """Two memories double the rate; attitudes without a copy are younger than 600 ms."""
     assert main(["layouts", "--seconds", "2", "--json", "--profile", "extended"]) == 0
     lines = capsys.readouterr().out.splitlines()
     rows = [json.loads(line) for line in lines]

@@ -31,7 +31,7 @@ PUBLISHED_MEAN_MW = 396.2
 
 
 class Turn(NamedTuple):
-    """What the host saw after an iteration, and the errors of the attitude, in degrees."""
+    """Attitude and phases after an iteration, and attitude errors in degrees."""
 
     attitude: Attitude
     phases: dict[str, float]
@@ -40,7 +40,7 @@ class Turn(NamedTuple):
 
 
 def run_loop(opened: Any, scene: SkyScene, iterations: int) -> list[Turn]:
-    """Poll once a second, as a satellite's computer would."""
+    """Polls once per second, like a satellite's computer."""
     cubestar, kernel = opened.client, opened.board.kernel
     turns = []
     for _ in range(iterations):
@@ -55,7 +55,7 @@ def run_loop(opened: Any, scene: SkyScene, iterations: int) -> list[Turn]:
 
 @pytest.fixture
 def looping(session: Open) -> Iterator[Any]:
-    """Starts the loop on a scene: lost in space first, tracking from then on."""
+    """Starts the loop on a scene, first lost in space, then tracking."""
 
     def start(scene: SkyScene) -> Any:
         opened: Any = stack.enter_context(session(scene, seed=1))
@@ -115,7 +115,7 @@ def test_tracks_automatically_until_the_flash_is_worn(session: Open, profile: st
 
 
 def matched_share(opened: Any, rate_deg_s: float, rng: np.random.Generator) -> float:
-    """Share of the detected stars that are identified, lost in space, over a few random poses."""
+    """Share of identified stars, lost in space, at 12 random poses."""
     detected = matched = 0
     for _ in range(12):
         side = rng.uniform(0, 2 * np.pi)

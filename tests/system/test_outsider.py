@@ -55,7 +55,7 @@ def measure(device: AnyEmulated) -> None:
 
 
 def by_frame(output: str) -> dict[int, list[tuple[str, str]]]:
-    """(name, value) of each line, by the frame's ID; a frame without an answer has none."""
+    """(name, value) of each line by frame ID; empty for frames without an answer."""
     frames: dict[int, list[tuple[str, str]]] = {}
     for line in output.splitlines():
         name, _, value = line.partition("=")
@@ -69,7 +69,7 @@ def by_frame(output: str) -> dict[int, list[tuple[str, str]]]:
 
 
 def same(field: Field, value: str, text: str) -> bool:
-    """Whether the program's ``value`` is what the shell shows."""
+    """Whether ``value`` equals what the shell shows."""
     if field.type.startswith("bytes"):
         return value == text
     if field.choices is not None:
@@ -80,7 +80,7 @@ def same(field: Field, value: str, text: str) -> bool:
 
 
 def check(interface: Interface, name: str, shell: Shell, output: str) -> int:
-    """Every line is what the shell shows; the number of lines."""
+    """Compares each line with the shell; returns the number of lines."""
     lines, frames = 0, by_frame(output)
     published = [message for message in interface.telemetries if not message.extension]
     assert {message.id for message in published} == {*frames}

@@ -31,7 +31,7 @@ def star(elf: Path) -> Iterator[AnyEmulated]:
 
 
 def answer(star: AnyEmulated, letter: bytes, size: int = 64, timeout_s: float = 0.05) -> bytes:
-    """What comes within a while after a letter was sent."""
+    """Bytes received within ``timeout_s`` after sending a letter."""
     port = star.serial(timeout=timeout_s)
     port.write(letter)
     return port.read(size)

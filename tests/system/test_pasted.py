@@ -47,7 +47,7 @@ esac
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pasted]:
-    """A document pasted, with a command that does little."""
+    """Results of the document, with a stub of the command."""
     folder = tmp_path_factory.mktemp("reader")
     command = folder / "bin" / "cubestack"
     command.parent.mkdir()

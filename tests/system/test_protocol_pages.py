@@ -21,7 +21,7 @@ def text_of(page: str) -> str:
 
 
 def sections(text: str, mark: str) -> dict[str, str]:
-    """Text below each heading of a level, up to the next one of that level or above."""
+    """Text below each heading of a level, up to the next heading of that level or above."""
     parts = re.split(rf"^{mark} (.*)$", text, flags=re.MULTILINE)
     end = rf"^#{{1,{len(mark)}}} "
     return {
@@ -32,7 +32,7 @@ def sections(text: str, mark: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_frame_tables_match_the_register_pages(page: str) -> None:
-    """A table that differs is to be copied from the page on the registers, which is generated."""
+    """If they differ, copy the table from the generated register page."""
     device, frames = PAGES[page]
     declared = sections(text_of(f"registers-{device}"), "##")
     shown = sections(text_of(page), "###")

@@ -1,8 +1,3 @@
-"""The reference firmware says over the wire, bit by bit, what the Python program says of a picture.
-
-Two hundred pictures: ``python -m tests.system.reference_pictures``.
-"""
-
 import pytest
 
 import cubestack

@@ -16,7 +16,7 @@ Read = Callable[[Any], object]
 
 
 def shown(frame: str, *fields: str) -> Read:
-    """Those fields of a telemetry frame; all without any."""
+    """The given fields of a telemetry frame, by default all."""
     return lambda bench: [
         value for name, value in bench.telemetry(frame).items() if not fields or name in fields
     ]
@@ -32,7 +32,7 @@ def saved_delay(bench: Any) -> object:
 
 
 def many(frame: str) -> Read:
-    """Whether more telecommands were counted than a reset and this look take."""
+    """Whether more telecommands were counted than the reset and this read make."""
     return lambda bench: bench.telemetry(frame)["TcmdCount"] > 10
 
 
@@ -92,7 +92,7 @@ def do(bench: Any, name: str, **parameters: object) -> None:
 
 
 def prepare(bench: Any) -> None:
-    """What all devices have: other switches, counted telecommands, an error flag."""
+    """Changes switches, counts telecommands and sets an error flag, on any device."""
     for _ in range(11):
         do(bench, "SetProfile", Profile="EXTENDED")
     bench.board.i2c().i2c_rdwr(i2c_msg.read(bench.interface.i2c_address, 1))  # without an ID
@@ -161,7 +161,7 @@ RESETS: list[tuple[str, int, str, dict[str, Any]]] = [
 
 
 def table(name: str) -> dict[str, list[str]]:
-    """Rows of a page's table: what becomes of each item, by column."""
+    """Rows of the page's table: item, and its fate by column."""
     page = (ROOT / "docs" / f"{PAGES[name]}.md").read_text(encoding="utf-8")
     part = page.split("## What a reset keeps\n")[1].split("\n## ")[0]
     rows = [line.strip("|").split("|") for line in part.splitlines() if line.startswith("|")]
@@ -174,7 +174,7 @@ def there_is(name: str, bench: Any) -> dict[str, object]:
 
 
 def check(name: str, column: int, before: dict[str, object], bench: Any, saved: object) -> None:
-    """Each item is as the page has it; ``before``: what there was to keep."""
+    """Each item is as documented; ``before`` are the values before the reset."""
     wrong = []
     for item, read in ITEMS[name].items():
         value = read(bench)

@@ -18,7 +18,7 @@ EXAMPLE = ROOT / "examples" / "plain_pyserial.py"
 
 
 def run_python(*arguments: object, folder: Path) -> str:
-    """Run a Python program as a user would; what it prints."""
+    """Output of a Python program in a process of its own."""
     command = [sys.executable, *map(str, arguments)]
     result = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr

@@ -24,7 +24,7 @@ READ_ALL = (
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """`emulate` with all three, whose sockets are in a folder of their own."""
+    """`emulate` with all devices and a socket folder of its own."""
     folder = tmp_path_factory.mktemp("run", numbered=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))

@@ -20,7 +20,7 @@ QUICK = 6
 
 
 def life(seed: int, *, strides: bool) -> dict[str, object]:
-    """A random sky, board and faults: what passed on the line, and what is there in the end."""
+    """Traffic and final state of a random sky, board and faults."""
     rng = np.random.default_rng(seed)
     scene = SkyScene(random_quaternion(rng), mag_limit=4.0, seed=seed)
     layout = LAYOUTS[int(rng.integers(len(LAYOUTS)))]

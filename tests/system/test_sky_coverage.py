@@ -28,7 +28,7 @@ TOLERANCE = 1.5
 
 
 def coverage(limit: float, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Count the stars brighter than ``limit`` around random boresights; columns of the table."""
+    """Table columns: counts of stars brighter than ``limit`` around random boresights."""
     boresights = rng.standard_normal((POSES, 3))
     boresights /= np.linalg.norm(boresights, axis=1, keepdims=True)
     cosines = boresights.astype(np.float32) @ load_sky(EPOCH, limit).vectors.T.astype(np.float32)

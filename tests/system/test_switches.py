@@ -113,7 +113,7 @@ def test_loop_resets_keep_the_switches(extended: dict[str, AnyEmulated]) -> None
 def test_any_sequence_of_profile_and_switch_commands(
     extended: dict[str, AnyEmulated], name: str, data: st.DataObject
 ) -> None:
-    """Beside a model that has nothing but the numbers of the tables."""
+    """Compared with a model that has only the numbers of the tables."""
     node, interface = extended[name].client.client, extended[name].device.interface
     assert isinstance(node, NodeClient)
     ids = [interface.telecommand(f"Set{what}").id for what in ("Profile", "Switch")]

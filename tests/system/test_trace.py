@@ -28,7 +28,7 @@ def read(path: Path) -> vcd.Changes:
 
 @contextmanager
 def traced(device: str, folder: Path) -> Iterator[Client]:
-    """The client of a device whose run is traced and recorded in ``folder``."""
+    """The client of a device that is traced and recorded in ``folder``."""
     args = argparse.Namespace(record=folder / "run.rec", trace=folder / "run.vcd")
     with open_device(device, seed=2) as opened, ExitStack() as stack:
         record(args, opened, stack, emulated_setup(2, None))

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.xdist_group("tutorial")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An empty folder with the files of the text."""
+    """A folder with the files of the tutorial only."""
     made = tmp_path_factory.mktemp("newcomer")
     for kind, block in BLOCK.findall(TEXT):
         if kind == "python":
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def environment() -> dict[str, str]:
-    """Of a shell in which what the text installs is installed."""
+    """A shell environment with the installed packages."""
     own = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
     return own | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
 

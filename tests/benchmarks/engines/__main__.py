@@ -25,7 +25,7 @@ from tests.benchmarks.engines.workloads import WORKLOADS, WrongPictureError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure and report; 2 when an engine fails, which is said."""
+    """Measures and reports; 2 if an engine fails."""
     parser = argparse.ArgumentParser(
         prog="engines", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -64,7 +64,7 @@ def _by_top(found: list[Speed]) -> dict[str, dict[str, float]]:
 
 
 def _report(found: list[Speed], missing: dict[str, str]) -> dict[str, object]:
-    """Clocks a second, and how many times as many the compiled engine makes as each other one."""
+    """Clocks per second, and the ratio of the compiled engine to each other one."""
     clocks, ratio = {}, {}
     for top, rates in _by_top(found).items():
         clocks[top] = {name: round(rate) for name, rate in rates.items()}

@@ -25,11 +25,11 @@ ROOT = Path(__file__).parents[3]
 
 
 class CocotbError(RuntimeError):
-    """The simulation did not come to its end."""
+    """The simulation failed."""
 
 
 def missing_for_cocotb() -> str | None:
-    """What is to be installed for :func:`run_cocotb`, or None."""
+    """What to install for :func:`run_cocotb`, or None."""
     if importlib.util.find_spec("cocotb") is None:
         return "pip install cocotb"
     if shutil.which("iverilog") is None:

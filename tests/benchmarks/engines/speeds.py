@@ -20,7 +20,7 @@ _NO_COMPILER = "a C++ compiler (apt-get install g++, or pip install ziglang)"
 
 
 class Speed(NamedTuple):
-    """Pixel clocks of all of a top's cameras for each second of processor time."""
+    """Pixel clocks of all cameras per second of processor time."""
 
     top: str
     engine: str
@@ -28,8 +28,6 @@ class Speed(NamedTuple):
 
 
 class _Engine(NamedTuple):
-    """An engine to be measured."""
-
     make: Callable[[Workload], RtlEngine] | None  # starts it; None for the one that runs elsewhere
     lines: int | None  # of a sample, None being a whole frame
     rounds: int  # the best one counts: the others were disturbed
@@ -46,7 +44,7 @@ ENGINES = {
 
 
 def absent() -> dict[str, str]:
-    """What is to be installed for each engine that is not here."""
+    """What to install for each missing engine."""
     missing = {"cocotb": missing_for_cocotb()}
     if find_compiler() is None:
         missing |= dict.fromkeys(("compiled", "verilator"), _NO_COMPILER)
@@ -56,7 +54,7 @@ def absent() -> dict[str, str]:
 
 
 def prepare(top: str) -> None:
-    """Build what the engines that are here need for a top, where the cache has it not."""
+    """Builds what the available engines need for a top and the cache lacks."""
     missing = absent()
     for name in ("compiled", "verilator"):
         make = ENGINES[name].make

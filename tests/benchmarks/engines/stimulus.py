@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 @cocotb.test()
 async def sample(dut: Any) -> None:
-    """Drive the cameras' pins for so many lines."""
+    """Drives the pins of the cameras for a number of lines."""
     folder = Path(os.environ["CUBESTACK_SAMPLE"])
     given = np.load(folder / "sample.npz")
     setup = json.loads(str(given["setup"]))
@@ -47,7 +47,7 @@ async def sample(dut: Any) -> None:
 
 
 async def _memory(dut: Any, pins: dict[str, str], memory: NDArray[np.uint8]) -> None:
-    """Written as soon as the pulse begins: all its pins stand until it ends."""
+    """Writes at the start of the pulse; all its pins are stable until the end."""
     address, data, write_n = (getattr(dut, pins[pin]) for pin in ("A", "D_O", "WE_N"))
     while True:
         await FallingEdge(write_n)

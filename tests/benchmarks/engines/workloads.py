@@ -42,7 +42,7 @@ class Workload:
     clock_hz: int
 
     def cameras(self) -> dict[str, RepeatedFrame]:
-        """The camera of each name, each with its own random picture, always the same."""
+        """The cameras by name, each with a fixed random picture."""
         period = Fraction(PS_PER_S, self.clock_hz)
         rng = np.random.default_rng(0)
         return {
@@ -56,23 +56,23 @@ class Workload:
         }
 
     def begin(self, engine: RtlEngine) -> None:
-        """The cameras are there, and the pins have their levels."""
+        """Connects the cameras and sets the pins."""
         for camera, source in self.cameras().items():
             engine.attach(source, camera)
         for pin, level in self.levels:
             engine.set_pin(pin, level)
 
     def clocks(self, lines: int) -> int:
-        """Pixel clocks of a sample, of all cameras."""
+        """Pixel clocks of all cameras in a sample."""
         return len(self.stored) * (self.blank_clocks + lines * self.line_clocks)
 
     def end_ps(self, lines: int) -> int:
-        """Time of the last falling edge of a sample, or after it, and before the next edge."""
+        """A time between the last falling edge of a sample and the next edge."""
         clocks = self.blank_clocks + lines * self.line_clocks
         return int(clocks * Fraction(PS_PER_S, self.clock_hz)) - 1
 
     def check(self, lines: int, memories: Mapping[str, NDArray[np.uint8]]) -> None:
-        """WrongPictureError when a memory does not hold its camera's lines."""
+        """WrongPictureError if a memory does not hold the lines of its camera."""
         width = 1 << ceil_log2(self.columns)
         for name, camera in self.cameras().items():
             memory = memories[self.stored[name]]

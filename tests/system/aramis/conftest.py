@@ -1,5 +1,3 @@
-"""What the tests of a whole AraMiS star tracker share."""
-
 import pytest
 
 from cubestack.emulator.boards.aramis.catalogue import onboard_database
@@ -7,7 +5,7 @@ from cubestack.emulator.boards.aramis.catalogue import onboard_database
 
 @pytest.fixture(scope="session", autouse=True)
 def _compiler() -> None:
-    """No FPGA, so no compiler is wanted; but the catalogue, which is compiled and kept here."""
+    """Needs no FPGA, only the catalogue, which is compiled and cached."""
     onboard_database()
 
 

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(not PICTURES, reason="the pictures are not part 
 
 
 def drawn_anew(path: Path, folder: Path) -> Path:
-    """The picture in the middle of 1280 x 1024 square pixels."""
+    """The picture, resampled to the middle of 1280 x 1024 square pixels."""
     with Image.open(path) as opened:
         doubled = np.repeat(np.asarray(opened), 2, axis=0)
     # Even, so that its middle is the sensor's; the sizes are off by less than a thousandth.

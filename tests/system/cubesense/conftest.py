@@ -1,5 +1,3 @@
-"""What the tests of a whole CubeSense share."""
-
 from functools import partial
 from typing import Any
 
