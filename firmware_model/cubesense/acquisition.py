@@ -178,11 +178,11 @@ class Acquisition:
     # --- images in sequence ---------------------------------------------------------------------
 
     @property
-    def picture_open(self) -> bool:
-        """Whether the FPGA still presents the image of ``open_picture``, where reading ended."""
+    def image_open(self) -> bool:
+        """Whether the FPGA still presents the image of ``open_image``, where reading ended."""
         return self._open is not None and self._supply.available(self._open)
 
-    def open_picture(self, sram: codes.Sram) -> Routine[bool]:
+    def open_image(self, sram: codes.Sram) -> Routine[bool]:
         """Go to the first pixel of the image in ``sram``; False if the memory is off."""
         if not self._supply.available(sram):
             return False
@@ -200,7 +200,7 @@ class Acquisition:
 
     def skip_bytes(self, count: int) -> Routine[None]:
         """Skip ``count`` bytes: at once if the program can set the address, else clocked."""
-        if self._mcu_addressing and count > fpga.ADDRESS_BYTES and self.picture_open:
+        if self._mcu_addressing and count > fpga.ADDRESS_BYTES and self.image_open:
             self._position += count
             yield SetPin(pins.SHIFT, 0)
             yield from self._send_address(self._position % codes.IMAGE_BYTES)
@@ -211,7 +211,7 @@ class Acquisition:
     def _strobe(self, chunks: Iterable[NDArray[np.uint8]], cycles: int) -> Routine[None]:
         """Clock bytes into ``chunks``, and check the supply currents from time to time."""
         for chunk in chunks:
-            if not self.picture_open:
+            if not self.image_open:
                 return
             yield StrobeRead(chunk, cycles)
             self._position += len(chunk)

@@ -11,7 +11,7 @@ from typing import Any
 
 from cubestack.firmware_model.cubesense.acquisition import Acquisition
 from cubestack.firmware_model.cubesense.camera_control import CameraControl
-from cubestack.firmware_model.cubesense.download import Download, PictureReader
+from cubestack.firmware_model.cubesense.download import Download, ImageReader
 from cubestack.firmware_model.cubesense.jobs import Background, Job, Measure, TelecommandJob
 from cubestack.firmware_model.cubesense.measurement import Measurement, make_table
 from cubestack.firmware_model.cubesense.state import CameraSettings, State, distortion_of
@@ -54,7 +54,7 @@ class Commands:
     measurement: Measurement
 
     def __post_init__(self) -> None:
-        self.reader = PictureReader(self.acquisition)  #: reads images, for every stream
+        self.reader = ImageReader(self.acquisition)  #: reads images, for every stream
         self.download = Download(self.meter, self.reader)  #: the frame that telemetry returns
         self._routines: dict[str, Callable[[TelecommandJob], Routine[int | None]]] = {
             "Reset": self._reset,

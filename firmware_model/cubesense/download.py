@@ -1,6 +1,6 @@
 """Image transfer to a host: a reader that continues where it stopped, and frames of 128 bytes.
 
-An FPGA presents an image in sequence, so `PictureReader` keeps it open between two reads. It skips
+An FPGA presents an image in sequence, so `ImageReader` keeps it open between two reads. It skips
 to pixels ahead; for pixels behind, and after another use of the FPGAs, it starts again. A download
 in the order of its frames reads the image once.
 
@@ -49,7 +49,7 @@ def frame_pixels(size: codes.ImageSize, frame: int) -> NDArray[np.int32]:
 
 
 @dataclass(eq=False)
-class PictureReader:
+class ImageReader:
     """Reads any pixels of an image; in ascending order, the image is read once."""
 
     acquisition: Acquisition
@@ -68,7 +68,7 @@ class PictureReader:
                 return False
             yield from self.acquisition.read_bytes(target[start:end])
             self._next += end - start
-        return self.acquisition.picture_open
+        return self.acquisition.image_open
 
     def read_run(self, sram: codes.Sram, start: int, count: int) -> Routine[bytes | None]:
         """``count`` pixels from ``start`` on; None if the memory is off."""
@@ -79,20 +79,20 @@ class PictureReader:
 
     def _seek(self, sram: codes.Sram, pixel: int) -> Routine[bool]:
         """Go to ``pixel``; one behind is reached from the first pixel again."""
-        if not self.acquisition.picture_open or sram != self._sram or pixel < self._next:
+        if not self.acquisition.image_open or sram != self._sram or pixel < self._next:
             self._sram, self._next = sram, 0
-            if not (yield from self.acquisition.open_picture(sram)):
+            if not (yield from self.acquisition.open_image(sram)):
                 return False
         if pixel > self._next:
             yield from self.acquisition.skip_bytes(pixel - self._next)
             self._next = pixel
-        return self.acquisition.picture_open
+        return self.acquisition.image_open
 
 
 class Download:
     """The frame that is being prepared, or is ready."""
 
-    def __init__(self, meter: Meter, reader: PictureReader) -> None:
+    def __init__(self, meter: Meter, reader: ImageReader) -> None:
         self._meter = meter
         self._reader = reader
         self._wanted: FrameRequest | None = None

@@ -8,7 +8,7 @@ Earth and the Sun at the same time, so their buffers share memory.
 """
 
 from cubestack.firmware_model.cubesense.links.bench import LETTERS
-from cubestack.firmware_model.cubesense.links.picture_sender import CHUNK_BYTES
+from cubestack.firmware_model.cubesense.links.image_sender import CHUNK_BYTES
 from cubestack.firmware_model.cubesense.links.registers import READ_AHEAD_BYTES
 from cubestack.firmware_model.cubesense.vision.distortion import TABLE_ENTRIES, Projection
 from cubestack.firmware_model.cubesense.vision.edges import MAX_EDGES

@@ -8,8 +8,8 @@ frame (section 5.3.6).
 from dataclasses import dataclass
 
 from cubestack.firmware_model.cubestar import phases
+from cubestack.firmware_model.cubestar.image_memory import ImageMemory
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
-from cubestack.firmware_model.cubestar.pictures import Pictures
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar.codes import TaskStatus
@@ -26,7 +26,7 @@ class ImageCapture:
     state: State
     supply: SupplyMonitor
     sensor: ImageSensor
-    pictures: Pictures
+    memory: ImageMemory
 
     def get_image(self, meanwhile: Routine[bool] | None = None) -> Routine[bool]:
         """Capture an image; raises a flag and returns False if it failed.
@@ -42,7 +42,7 @@ class ImageCapture:
             yield from meanwhile
         if failure is None:
             started_us: int = yield ReadTimer()
-            if (yield from self.pictures.fetch()):
+            if (yield from self.memory.fetch()):
                 yield from phases.end(self.state, "transfer_us", started_us)
             if self.supply.cut:  # during the transfer
                 failure = "ImageCaptureError"
@@ -86,13 +86,13 @@ class ImageCapture:
         The image's time is that of ACK's poll, which is late if ``meanwhile`` outlasts the frame.
         """
         started_us: int = yield ReadTimer()
-        yield from self.pictures.begin()
+        yield from self.memory.begin()
         self.supply.sample()
         if meanwhile is not None:
             yield from meanwhile
-        pin = self.pictures.acknowledge
+        pin = self.memory.acknowledge
         stored: bool = yield AwaitPin(pin, 1, ACK_TIMEOUT_US, ACK_POLL_CYCLES)
-        yield from self.pictures.end(stored)
+        yield from self.memory.end(stored)
         yield from phases.end(self.state, "capture_us", started_us)
         ended_us: int = yield ReadTimer()
         self.state.retained.image_ms = (ended_us - self.sensor.age_at_frame_end_us()) // 1000

@@ -113,7 +113,7 @@ class Commands(CommandExecutor):
 
     def _test_memory(self, _command: QueuedCommand) -> Routine[None]:
         self.state.retained.image_present = 0
-        passed = yield from self._capture.pictures.test_memory()
+        passed = yield from self._capture.memory.test_memory()
         self.memory_test = codes.MemoryTest.PASSED if passed else codes.MemoryTest.FAILED
 
     def _paged(self, command: QueuedCommand) -> int:
@@ -131,19 +131,19 @@ class Commands(CommandExecutor):
             codes.TestPattern.RAMPING: column,
         }[command.values["TestPaternType"]]
         pixels = np.broadcast_to(pattern, (ROWS, COLUMNS)).astype(np.uint8)
-        yield from self._capture.pictures.write(0, pixels.reshape(-1))
+        yield from self._capture.memory.write(0, pixels.reshape(-1))
         self._meter.charge(i32_add=IMAGE_BYTES, loop=IMAGE_BYTES)
         return (yield from self._capture.mark_replaced())
 
     def _begin_upload(self, _command: QueuedCommand) -> Routine[bool]:
         self.next_block = self.blocks_received = 0
-        yield from self._capture.pictures.write(0, np.zeros(IMAGE_BYTES, np.uint8))
+        yield from self._capture.memory.write(0, np.zeros(IMAGE_BYTES, np.uint8))
         self._meter.charge(loop=IMAGE_BYTES)
         return (yield from self._capture.mark_replaced())
 
     def _upload_block(self, command: QueuedCommand) -> Routine[bool]:
         number, pixels = command.values["BlockNumber"], np.frombuffer(command.values["Data"], "u1")
-        yield from self._capture.pictures.write(number * UPLOAD_BLOCK_BYTES, pixels)
+        yield from self._capture.memory.write(number * UPLOAD_BLOCK_BYTES, pixels)
         self._meter.charge(loop=UPLOAD_BLOCK_BYTES)
         self.next_block = number + 1
         self.blocks_received += 1
@@ -156,7 +156,7 @@ class Commands(CommandExecutor):
     def _stream_image(self, _command: QueuedCommand) -> Routine[None]:
         for start in range(0, IMAGE_BYTES, UPLOAD_BLOCK_BYTES):
             yield from self._await_room(STREAM_BACKLOG_BYTES)
-            block = yield from self._capture.pictures.read(start, UPLOAD_BLOCK_BYTES)
+            block = yield from self._capture.memory.read(start, UPLOAD_BLOCK_BYTES)
             self.state.hardware.uart_send(encode_frame(block))
             self._meter.charge(loop=UPLOAD_BLOCK_BYTES)
 

@@ -12,9 +12,9 @@ from cubestack.firmware_model.cubestar.capture import ImageCapture
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.commands import Commands
 from cubestack.firmware_model.cubestar.hardware import CubeStarHardware
+from cubestack.firmware_model.cubestar.image_memory import image_memory
 from cubestack.firmware_model.cubestar.image_sensor import ImageSensor
 from cubestack.firmware_model.cubestar.link import CubeStarLink
-from cubestack.firmware_model.cubestar.pictures import pictures_of
 from cubestack.firmware_model.cubestar.processing.chain import Processing
 from cubestack.firmware_model.cubestar.reset_cause import cause_of
 from cubestack.firmware_model.cubestar.state import State
@@ -47,7 +47,7 @@ class CubeStarProgram:
         state.reset_cause = cause_of(hardware.reset_causes)
         #: supply monitor; its ``overcurrent`` is the comparators' interrupt
         self.supply = SupplyMonitor(state)
-        self._pictures = pictures_of(layout, state, meter, self.supply)
+        self._pictures = image_memory(layout, state, meter, self.supply)
         self._capture = ImageCapture(state, self.supply, ImageSensor(state), self._pictures)
         self._processing = Processing(meter, state, self._capture, catalogue)
         self.commands = Commands(self._processing)  #: the telecommands

@@ -238,7 +238,7 @@ class Telemetry:
         if length > longest:  # 256 bytes come as two reads
             start += longest if self._commands.second_half else 0
             self._commands.second_half = not self._commands.second_half
-        data = self._capture.pictures.read_now(start, min(length, longest))
+        data = self._capture.memory.read_now(start, min(length, longest))
         if data is None:
             self._state.raise_flag("StatusError")
             data = b""

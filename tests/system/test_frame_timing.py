@@ -52,7 +52,7 @@ def striped(tmp_path: Path) -> PictureScene:
 def test_short_delay_splits_the_picture(session: Any, striped: PictureScene, delay_ms: int) -> None:
     with session(striped) as opened:
         capture_ms(opened.client, delay_ms)
-        rows = opened.board.program._capture.pictures.image[:, 500].astype(float)
+        rows = opened.board.program._capture.memory.image[:, 500].astype(float)
     # The rows of the undefined frame that were still to come, then the first of the good one.
     rest = ROWS - 1 - int(delay_ms / LINE_MS)
     (seam,) = (at for at in range(rest - 2, rest + 2) if abs(rows[at] - rows[at - 1]) > 5)

@@ -84,7 +84,7 @@ class Published:
         with open_device("cubestar", ORION) as opened:
             node = Node(opened, Layout.COPIED)
             self.seen = node.seen()
-            self.picture: np.ndarray = node.board.program._capture.pictures.image.copy()
+            self.picture: np.ndarray = node.board.program._capture.memory.image.copy()
             self.star = int(self.picture.argmax()) // FULL
             assert node.block(self.star) == self.block(self.star)
 

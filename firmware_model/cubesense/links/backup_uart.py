@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.jobs import Background
-from cubestack.firmware_model.cubesense.links.picture_sender import PictureSender
+from cubestack.firmware_model.cubesense.links.image_sender import ImageSender
 from cubestack.firmware_model.cubesense.links.registers import RegisterLink
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.firmware_model.mcu.requests import Routine
@@ -26,7 +26,7 @@ class BackupUart:
 
     def __post_init__(self) -> None:
         link = self.registers
-        self._picture = PictureSender(link.hardware, link.meter, link.reader, Port.NODE)
+        self._image = ImageSender(link.hardware, link.meter, link.reader, Port.NODE)
         self._work = Background(self._send)
         self._sending = False
         self._message = bytearray()
@@ -56,17 +56,17 @@ class BackupUart:
         if register is None or not register.readable:
             return
         if not register.streams:
-            self._picture.send(self.registers.read(register))
+            self._image.send(self.registers.read(register))
             return
         self._sending = True
-        self._picture.begin()
+        self._image.begin()
         if self.registers.queue.request(self._work):
             self.registers.hardware.wake()
 
     def _send(self) -> Routine[None]:
         """Main loop: send a piece of the image, and queue the next one."""
         sram = self.registers.state.image_sram
-        done = not self._sending or (yield from self._picture.send_some(sram))
+        done = not self._sending or (yield from self._image.send_some(sram))
         if self._sending and not done:
             self.registers.queue.request(self._work)
         self._sending = self._sending and not done

@@ -10,10 +10,10 @@ image again for every piece.
 from collections import deque
 from dataclasses import dataclass
 
-from cubestack.firmware_model.cubesense.download import PictureReader
+from cubestack.firmware_model.cubesense.download import ImageReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue
-from cubestack.firmware_model.cubesense.links.picture_sender import PictureSender
+from cubestack.firmware_model.cubesense.links.image_sender import ImageSender
 from cubestack.firmware_model.cubesense.measurement import Measurement
 from cubestack.firmware_model.cubesense.state import State
 from cubestack.firmware_model.interface.codec.letters import Letter
@@ -38,13 +38,13 @@ class BenchLink:
     meter: Meter
     state: State
     queue: JobQueue
-    reader: PictureReader
+    reader: ImageReader
     measurement: Measurement
 
     def __post_init__(self) -> None:
         self._letters: deque[Letter] = deque()
         self._work = Background(self._serve)
-        self._picture = PictureSender(self.hardware, self.meter, self.reader, Port.BENCH)
+        self._image = ImageSender(self.hardware, self.meter, self.reader, Port.BENCH)
 
     def uart_byte(self, byte: int) -> None:
         self.meter.charge(uart_interrupt=1)
@@ -65,10 +65,10 @@ class BenchLink:
         if letter == service_port.CAPTURES[camera]:
             done = yield from self._capture(letter, camera)
         else:
-            done = yield from self._picture.send_some(codes.Sram(camera))
+            done = yield from self._image.send_some(codes.Sram(camera))
         if done:
             self._letters.popleft()
-            self._picture.begin()
+            self._image.begin()
         if self._letters:
             self.queue.request(self._work, next_turn=True)
 
@@ -77,5 +77,5 @@ class BenchLink:
         self.state.schedule(camera, sram, detect=False)
         yield from self.measurement.measure(camera, sram, detect=False)
         if self.state.results[camera].capture.stored:
-            self._picture.send(letter.answer or b"")
+            self._image.send(letter.answer or b"")
         return True

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from cubestack.firmware_model.cubesense.download import PictureReader
+from cubestack.firmware_model.cubesense.download import ImageReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware
 from cubestack.firmware_model.cubesense.jobs import Background, JobQueue, Measure, TelecommandJob
 from cubestack.firmware_model.cubesense.state import State
@@ -45,7 +45,7 @@ class ImageStream:
 
     hardware: CubeSenseHardware
     queue: JobQueue
-    reader: PictureReader
+    reader: ImageReader
 
     def __post_init__(self) -> None:
         self._work = Background(self._fill)
@@ -94,7 +94,7 @@ class RegisterLink:
     meter: Meter
     state: State
     queue: JobQueue
-    reader: PictureReader
+    reader: ImageReader
 
     def __post_init__(self) -> None:
         self._image = ImageStream(self.hardware, self.queue, self.reader)

@@ -121,7 +121,7 @@ class Processing:
         self.state.task_status = TaskStatus.DETECTING
         started_us: int = yield ReadTimer()
         with self._cycles():
-            detection = yield from self.capture.pictures.search(
+            detection = yield from self.capture.memory.search(
                 configuration.detection_config(
                     settings,
                     plain_weights=self._switches.weights == "intensity",

@@ -103,10 +103,10 @@ class Links(Runner, HostSide):
         yield Pay()
 
     @property
-    def picture_open(self) -> bool:
+    def image_open(self) -> bool:
         return self._open is not None and self._open not in self.off
 
-    def open_picture(self, sram: codes.Sram) -> Routine[bool]:
+    def open_image(self, sram: codes.Sram) -> Routine[bool]:
         self.opened.append(sram)
         yield Pay()
         self._open, self._position = sram, 0
@@ -117,7 +117,7 @@ class Links(Runner, HostSide):
         assert self._open is not None
         end = self._position + len(target)
         assert end <= codes.IMAGE_BYTES
-        if self.picture_open:
+        if self.image_open:
             target[:] = self.pictures[self._open, self._position : end]
         self._position = end
         self.read += len(target)

@@ -184,7 +184,7 @@ def parts(rng: np.random.Generator) -> Iterator[tuple[int, int]]:
 def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
     rig = Rig(mcu_addressing=mcu_addressing)
     acquisition, picture = rig.acquisition, rig.memories[sram].reshape(-1)
-    assert rig.perform(acquisition.open_picture(sram)) is True
+    assert rig.perform(acquisition.open_image(sram)) is True
     at = 0
     for skip, read in parts(np.random.default_rng(sram)):
         rig.perform(acquisition.skip_bytes(skip))
@@ -192,7 +192,7 @@ def test_a_picture_is_read_in_parts(sram: Sram, mcu_addressing: bool) -> None:
         rig.perform(acquisition.read_bytes(target))
         at += skip + read
         assert np.array_equal(target, picture[at - read : at])
-    assert acquisition.picture_open
+    assert acquisition.image_open
     assert np.array_equal(rig.memories[sram].reshape(-1), picture)
 
 
@@ -200,7 +200,7 @@ def test_addresses_save_the_clocks_of_what_is_skipped() -> None:
     times = []
     for mcu_addressing in (False, True):
         rig = Rig(mcu_addressing=mcu_addressing)
-        rig.perform(rig.acquisition.open_picture(Sram.SRAM1))
+        rig.perform(rig.acquisition.open_image(Sram.SRAM1))
         start_us = rig.now_us
         rig.perform(rig.acquisition.skip_bytes(IMAGE_BYTES - 64))
         times.append(rig.now_us - start_us)
@@ -216,21 +216,21 @@ def test_a_picture_is_closed_by_any_other_command(rig: Rig) -> None:
         rig.acquisition.window(Sram.SRAM1),
         rig.acquisition.scan(Sram.SRAM2, NadirLines(EdgeConfig(), rig.meter)),
     ):
-        rig.perform(rig.acquisition.open_picture(Sram.SRAM1))
+        rig.perform(rig.acquisition.open_image(Sram.SRAM1))
         rig.perform(rig.acquisition.read_bytes(target))
-        assert rig.acquisition.picture_open
+        assert rig.acquisition.image_open
         rig.perform(other)
-        assert not rig.acquisition.picture_open
+        assert not rig.acquisition.image_open
 
 
 def test_a_picture_in_a_memory_that_is_off(rig: Rig) -> None:
     target = np.zeros(5000, np.uint8)
-    rig.perform(rig.acquisition.open_picture(Sram.SRAM1))
+    rig.perform(rig.acquisition.open_image(Sram.SRAM1))
     latch_after(rig, Sram.SRAM1, 1000)
     rig.perform(rig.acquisition.read_bytes(target))
-    assert not rig.acquisition.picture_open
+    assert not rig.acquisition.image_open
     assert not target[1000 + SAMPLE_BYTES + CHUNK :].any()
-    assert rig.perform(rig.acquisition.open_picture(Sram.SRAM1)) is False
+    assert rig.perform(rig.acquisition.open_image(Sram.SRAM1)) is False
 
 
 def test_single_pixels_by_address() -> None:

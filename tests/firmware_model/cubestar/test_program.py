@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
+from cubestack.firmware_model.cubestar.image_memory import ITERATION_US
 from cubestack.firmware_model.cubestar.image_sensor import SETTLE_US
-from cubestack.firmware_model.cubestar.pictures import ITERATION_US
 from cubestack.firmware_model.cubestar.program import RESET_LEAD_US
 from cubestack.firmware_model.interface.cubestar import ResetCause
 from cubestack.firmware_model.mcu.requests import (

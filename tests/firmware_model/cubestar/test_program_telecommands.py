@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cubestack.firmware_model.cubestar.pictures import ITERATION_US
+from cubestack.firmware_model.cubestar.image_memory import ITERATION_US
 from cubestack.firmware_model.cubestar.program import RESET_LEAD_US
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE, TaskStatus

@@ -182,7 +182,7 @@ class Star(Bench):
     @property
     def transferred(self) -> np.ndarray:
         """The picture in the processor's memory, (512, 1024)."""
-        memory: np.ndarray = self.board.program._capture.pictures.image
+        memory: np.ndarray = self.board.program._capture.memory.image
         return memory.copy()
 
     @property

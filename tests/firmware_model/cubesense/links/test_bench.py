@@ -4,7 +4,7 @@ import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port
 from cubestack.firmware_model.cubesense.links.bench import LETTERS
-from cubestack.firmware_model.cubesense.links.picture_sender import CHUNK_BYTES
+from cubestack.firmware_model.cubesense.links.image_sender import CHUNK_BYTES
 from cubestack.firmware_model.interface.cubesense.codes import (
     IMAGE_BYTES,
     Camera,

@@ -37,7 +37,7 @@ def _drive(*levels: tuple[str, int], board: str = "") -> Routine[None]:
 
 
 @dataclass(eq=False)
-class Pictures(ABC):
+class ImageMemory(ABC):
     """The newest image, and the storage of the next one.
 
     All offsets are within the newest image, of ``IMAGE_BYTES``. A place is a position for an image;
@@ -138,7 +138,7 @@ class Pictures(ABC):
         return int(self.state.settings.get("SelectImageBank", "Bank"))
 
 
-class _CopiedPictures(Pictures):
+class _CopiedImages(ImageMemory):
     """Images at the start of the processor's own external RAM."""
 
     iteration_us = ITERATION_US
@@ -184,7 +184,7 @@ class _CopiedPictures(Pictures):
         return len(data)
 
 
-class _BusPictures(Pictures):
+class _BusMemory(ImageMemory):
     """Base of the layouts without a copy."""
 
     _open = False  #: the bus leads to the newest image
@@ -222,7 +222,7 @@ class _BusPictures(Pictures):
         return count
 
 
-class _SharedPictures(_BusPictures):
+class _SharedMemory(_BusMemory):
     """One memory of two banks, the places: either the FPGA or the program accesses it."""
 
     while_storing = False
@@ -241,7 +241,7 @@ class _SharedPictures(_BusPictures):
         yield from self.start()
 
 
-class _TwoMemoryPictures(_BusPictures):
+class _TwoMemories(_BusMemory):
     """Two memories of one image each, the places, at one FPGA, used alternately."""
 
     def start(self) -> Routine[None]:
@@ -258,7 +258,7 @@ class _TwoMemoryPictures(_BusPictures):
             self.state.retained.image_place ^= 1
 
 
-class _TwoBoardPictures(_BusPictures):
+class _TwoBoards(_BusMemory):
     """Two boards with one memory of two banks each, used alternately.
 
     The low bit of a place is its board, the high bit its bank.
@@ -295,13 +295,13 @@ class _TwoBoardPictures(_BusPictures):
         return place & 1, (place >> 1) * IMAGE_BYTES
 
 
-_KINDS: dict[Layout, type[Pictures]] = {
-    Layout.COPIED: _CopiedPictures,
-    Layout.SHARED: _SharedPictures,
-    Layout.TWO_MEMORIES: _TwoMemoryPictures,
-    Layout.TWO_BOARDS: _TwoBoardPictures,
+_KINDS: dict[Layout, type[ImageMemory]] = {
+    Layout.COPIED: _CopiedImages,
+    Layout.SHARED: _SharedMemory,
+    Layout.TWO_MEMORIES: _TwoMemories,
+    Layout.TWO_BOARDS: _TwoBoards,
 }
 
 
-def pictures_of(layout: Layout, state: State, meter: Meter, supply: SupplyMonitor) -> Pictures:
+def image_memory(layout: Layout, state: State, meter: Meter, supply: SupplyMonitor) -> ImageMemory:
     return _KINDS[layout](state, meter, supply)

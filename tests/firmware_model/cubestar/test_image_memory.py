@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cubestack.firmware_model.cubestar.detection import DetectionConfig, detect_stars
+from cubestack.firmware_model.cubestar.image_memory import ITERATION_US, image_memory
 from cubestack.firmware_model.cubestar.memory import RETENTION_BYTES
-from cubestack.firmware_model.cubestar.pictures import ITERATION_US, pictures_of
 from cubestack.firmware_model.cubestar.state import State
 from cubestack.firmware_model.cubestar.supply import SupplyMonitor
 from cubestack.firmware_model.interface.cubestar import IMAGE_BYTES
@@ -37,10 +37,10 @@ class Board(Runner):
         self.pins: dict[str, int] = {}
         self.levels: list[tuple[str, int]] = []
         self.state = State(self, self.meter)  # type: ignore[arg-type]  # what it does not use is missing
-        self.pictures = pictures_of(layout, self.state, self.meter, SupplyMonitor(self.state))
+        self.image_memory = image_memory(layout, self.state, self.meter, SupplyMonitor(self.state))
         self.accesses = 0
         self.stuck: list[int] = []
-        self.perform(self.pictures.start())
+        self.perform(self.image_memory.start())
 
     def _pay(self) -> None:
         """Cycles stay on the meter, for tests to look at."""
@@ -81,16 +81,16 @@ class Board(Runner):
 
     def stored(self, picture: NDArray[np.uint8]) -> None:
         """The FPGA stores a picture where the pins say."""
-        self.perform(self.pictures.begin())
+        self.perform(self.image_memory.begin())
         select, place = 0, self.pins.get("BANK", 0)
         if self.layout is Layout.TWO_MEMORIES:
             place = self.pins["INTO"]
         if self.layout is Layout.TWO_BOARDS:
             (select,) = (n for n in (0, 1) if not self.pins[f"BOARD{n + 1}_RNW"])
-            assert self.pictures.acknowledge == f"BOARD{select + 1}_ACK"
+            assert self.image_memory.acknowledge == f"BOARD{select + 1}_ACK"
             place = self.pins[f"BOARD{select + 1}_BANK"]
         self.memories[select][place * IMAGE_BYTES :][:IMAGE_BYTES] = picture.reshape(-1)
-        self.perform(self.pictures.end(True))
+        self.perform(self.image_memory.end(True))
 
 
 @pytest.fixture(params=ON_BUS, ids=lambda layout: layout.value)
@@ -99,7 +99,7 @@ def board(request: pytest.FixtureRequest) -> Board:
 
 
 def read_all(board: Board) -> NDArray[np.uint8]:
-    return np.frombuffer(board.perform(board.pictures.read(0, IMAGE_BYTES)), np.uint8)
+    return np.frombuffer(board.perform(board.image_memory.read(0, IMAGE_BYTES)), np.uint8)
 
 
 def test_the_newest_picture_is_read_wherever_it_was_stored(board: Board) -> None:
@@ -109,33 +109,33 @@ def test_the_newest_picture_is_read_wherever_it_was_stored(board: Board) -> None
         picture = rng.integers(0, 256, IMAGE_BYTES, dtype=np.uint8)
         board.stored(picture)
         assert np.array_equal(read_all(board), picture)
-        assert board.pictures.read_now(1234, 128) == picture[1234:][:128].tobytes()
+        assert board.image_memory.read_now(1234, 128) == picture[1234:][:128].tobytes()
 
 
 def test_a_picture_that_was_not_stored_leaves_the_last_one(board: Board) -> None:
     """Where there is a second memory; a shared one holds half of a picture then."""
     picture = np.arange(IMAGE_BYTES).astype(np.uint8)
     board.stored(picture)
-    board.perform(board.pictures.begin())
-    board.perform(board.pictures.end(False))
+    board.perform(board.image_memory.begin())
+    board.perform(board.image_memory.end(False))
     assert np.array_equal(read_all(board), picture)
 
 
 def test_while_the_next_picture_is_stored_the_last_one_is_there_or_none(board: Board) -> None:
     picture = np.arange(IMAGE_BYTES).astype(np.uint8)
     board.stored(picture)
-    board.perform(board.pictures.begin())
-    if board.pictures.while_storing:
+    board.perform(board.image_memory.begin())
+    if board.image_memory.while_storing:
         assert np.array_equal(read_all(board), picture)
-        assert board.pictures.read_now(7, 9) == picture[7:16].tobytes()
+        assert board.image_memory.read_now(7, 9) == picture[7:16].tobytes()
     else:
         assert board.layout is Layout.SHARED
-        assert board.pictures.read_now(7, 9) is None
+        assert board.image_memory.read_now(7, 9) is None
 
 
 def test_without_supply_there_is_no_way_to_the_picture(board: Board) -> None:
     board.state.retained.imager_off = 1
-    assert board.pictures.read_now(0, 1) is None
+    assert board.image_memory.read_now(0, 1) is None
 
 
 @pytest.mark.parametrize("config", [DetectionConfig(), DetectionConfig(background=True)])
@@ -148,7 +148,7 @@ def test_the_search_is_that_in_an_array_and_leaves_the_picture(
     expected = detect_stars(sky.picture, config, own)
     board.meter.take()
     before, accesses = dict(board.meter.counts), board.accesses
-    found = board.perform(board.pictures.search(config))
+    found = board.perform(board.image_memory.search(config))
     assert np.array_equal(found.centroids, expected.centroids)
     assert np.array_equal(found.intensities, expected.intensities)
     assert (found.dark_value, found.end) == (expected.dark_value, expected.end)
@@ -170,17 +170,17 @@ def test_pixels_are_zero_on_the_bus_during_the_search(board: Board, sky: Sky) ->
             written.add(int(request.data[0]))
 
     board.on_request = look
-    board.perform(board.pictures.search(DetectionConfig()))
+    board.perform(board.image_memory.search(DetectionConfig()))
     assert written == {0}
 
 
 def test_memory_test_finds_one_bit_in_any_memory(board: Board) -> None:
-    assert board.perform(board.pictures.test_memory()) is True
+    assert board.perform(board.image_memory.test_memory()) is True
     boards = 2 if board.layout is Layout.TWO_BOARDS else 1
     assert board.accesses == 4 * boards * SIZE  # every place, both ways, twice
     for stuck in (0, 777_777, SIZE - 1):
         board.stuck = [stuck]
-        assert board.perform(board.pictures.test_memory()) is False
+        assert board.perform(board.image_memory.test_memory()) is False
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_control_pins_change_in_the_gateware_s_order(layout: Layout, log: str) -
 
 
 def test_rate_is_twice_as_high_with_two_memories() -> None:
-    rates = {layout: ITERATION_US / Board(layout).pictures.iteration_us for layout in ON_BUS}
+    rates = {layout: ITERATION_US / Board(layout).image_memory.iteration_us for layout in ON_BUS}
     assert rates == {Layout.SHARED: 1, Layout.TWO_MEMORIES: 2, Layout.TWO_BOARDS: 2}
 
 
@@ -216,6 +216,6 @@ def test_an_interrupt_pays_for_each_byte_that_it_reads(layout: Layout, count: in
     board.external_ram = np.zeros(IMAGE_BYTES, np.uint8)
     board.stored(np.zeros(IMAGE_BYTES, np.uint8))
     accesses, cycles = board.meter.counts["ebi_read"], board.meter.total
-    assert len(board.pictures.read_now(5, count) or b"") == count
+    assert len(board.image_memory.read_now(5, count) or b"") == count
     assert board.meter.counts["ebi_read"] - accesses == count
     assert board.meter.total - cycles >= count * EBI.cycles

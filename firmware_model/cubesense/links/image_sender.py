@@ -5,7 +5,7 @@ The program does other jobs between two pieces.
 
 from dataclasses import dataclass, field
 
-from cubestack.firmware_model.cubesense.download import PictureReader
+from cubestack.firmware_model.cubesense.download import ImageReader
 from cubestack.firmware_model.cubesense.hardware import CubeSenseHardware, Port
 from cubestack.firmware_model.interface.cubesense import codes, service_port
 from cubestack.firmware_model.mcu.costs import Meter
@@ -18,12 +18,12 @@ _BYTE_US = -(-10 * 1_000_000 // service_port.SERVICE_PORT.baud)
 
 
 @dataclass(eq=False)
-class PictureSender:
+class ImageSender:
     """Sends images on ``port``, one at a time."""
 
     hardware: CubeSenseHardware
     meter: Meter
-    reader: PictureReader
+    reader: ImageReader
     port: Port
     _sent: int = field(default=0, init=False)
 
