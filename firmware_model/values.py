@@ -212,8 +212,8 @@ class ListDeclaration(Declaration):
         return "a list" if self.count is None else f"a list of {self.count} {what}"
 
     def read(self, given: Any) -> Any:
-        array = hasattr(given, "tolist")
-        return self._made(given, given.tolist() if array else given, self.part.read)
+        parts = given.tolist() if hasattr(given, "tolist") else given  # an array
+        return self._made(parts, parts, self.part.read)
 
     def parse(self, given: str) -> Any:
         """The values of a text with commas between them."""

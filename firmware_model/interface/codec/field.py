@@ -22,7 +22,7 @@ from enum import IntEnum
 from functools import partial
 from typing import Self, SupportsFloat
 
-from cubestack.firmware_model.values import Declaration
+from cubestack.firmware_model.values import FLAG, NUMBER, WHOLE, Declaration
 
 #: A field's value: bool for bool1, bytes for bytesN, a number for all others.
 Value = int | float | bool | bytes
@@ -106,6 +106,9 @@ class Field(Declaration):
             raise InterfaceError(f"field {self.name}: scale must be positive, not {self.scale}")
         if self.reset is None:
             object.__setattr__(self, "reset", self.decode(0))
+        number = NUMBER if self.type == "f32" or self.scale != 1 else WHOLE
+        object.__setattr__(self, "kind", FLAG if self.type == "bool1" else number)
+        object.__setattr__(self, "default", self.reset)
 
     @property
     def bits(self) -> int:
