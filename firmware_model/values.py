@@ -302,7 +302,7 @@ Keys = Mapping[str, Declaration]
 """The keys of a table, by name."""
 
 
-def named(keys: Keys) -> dict[str, Declaration]:
+def _named(keys: Keys) -> dict[str, Declaration]:
     """Declarations with their names, and the units that end the names of numbers."""
     return {
         name: replace(one, name=name, unit=one.unit or _unit(name)) for name, one in keys.items()
@@ -318,12 +318,13 @@ def _unit(name: str) -> str:
 
 def described(keys: Keys) -> dict[str, dict[str, Any]]:
     """What each key is, as JSON has it."""
-    return {name: one.described() for name, one in keys.items()}
+    return {name: one.described() for name, one in _named(keys).items()}
 
 
 def read_table(given: Mapping[str, Any], keys: Keys) -> dict[str, Any]:
     """The checked values of a table; ValueError for an unknown, wrong or missing key."""
     values: dict[str, Any] = {}
+    keys = _named(keys)
     now = {one.formerly: name for name, one in keys.items()}
     for word, value in given.items():
         name = now.get(word, word)
@@ -379,7 +380,7 @@ def table(default: Any, meaning: str, keys: Any, make: Any = None, **more: Any) 
     if isinstance(keys, type):
         owner: Any = keys
         keys, make = owner.declared(), make or (lambda values: owner(**values))
-    return TableDeclaration(default=default, meaning=meaning, keys=named(keys), make=make, **more)
+    return TableDeclaration(default=default, meaning=meaning, keys=_named(keys), make=make, **more)
 
 
 class DeclaredValues:
@@ -395,7 +396,7 @@ class DeclaredValues:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         own = {name: one for name, one in vars(cls).items() if isinstance(one, Declaration)}
-        cls._declared = {**cls._declared, **named(own)}
+        cls._declared = {**cls._declared, **_named(own)}
         for name, one in own.items():
             setattr(cls, name, field() if one.default is REQUIRED else field(default=one.default))
 

@@ -4,21 +4,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from cubestack.firmware_model.values import DeclaredValues, named, number, positive
+from cubestack.firmware_model.values import DeclaredValues, number, positive
 
 LONGEST_S = 1e9
 """Latest time and longest duration."""
 
-TIMES = named(
-    {
-        "at_s": number(
-            None, "virtual time since power-up; now unless given", 0, LONGEST_S, formerly="at"
-        ),
-        "for_s": positive(
-            None, "how long; until it is cleared unless given", high=LONGEST_S, formerly="for"
-        ),
-    }
-)
+TIMES = {
+    "at_s": number(None, "virtual time; now by default", 0, LONGEST_S, "s", formerly="at"),
+    "for_s": positive(None, "default: until cleared", high=LONGEST_S, unit="s", formerly="for"),
+}
 """When a fault begins, and how long it lasts."""
 
 

@@ -22,10 +22,10 @@ from typing import Any
 
 from cubestack.emulator.faults.declaration import TIMES, Fault, FaultError
 from cubestack.emulator.faults.table import make_fault
-from cubestack.firmware_model.values import REQUIRED, named, read_table, text, whole
+from cubestack.firmware_model.values import REQUIRED, read_table, text, whole
 
 _SEED = whole(0, "seed of the random numbers", 0)
-_OWN = named({"kind": text(REQUIRED, "kind of fault"), "target": text(None, "target"), **TIMES})
+_OWN = {"kind": text(REQUIRED, "kind of fault"), "target": text(None, "target"), **TIMES}
 
 
 @dataclass(frozen=True)

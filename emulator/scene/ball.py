@@ -17,22 +17,20 @@ from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import EARTH_RADIUS_KM
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import SceneError
-from cubestack.firmware_model.values import named, number, positive, vector, whole
+from cubestack.firmware_model.values import number, positive, vector, whole
 
 RADIUS_MM = 300.0
 DISTANCE_MM = 35.2
 """Distance of the camera from the ball's surface."""
 
-BALL = named(
-    {
-        "angle_deg": vector(2, (0.0, 0.0), "alpha and beta of the stage"),
-        "radius_mm": positive(RADIUS_MM, "of the ball"),
-        "distance_mm": positive(DISTANCE_MM, "of the ball's surface from the stage's axis"),
-        "offset_mm": vector(3, (0.0, 0.0, 0.0), "of the optic point from the stage's axis"),
-        "unevenness": number(0.0, "of the ball's brightness, relative", 0, 10),
-        "seed": whole(0, "of the ball's surface", 0),
-    }
-)
+BALL = {
+    "angle_deg": vector(2, (0.0, 0.0), "alpha and beta of the stage"),
+    "radius_mm": positive(RADIUS_MM, "of the ball", unit="mm"),
+    "distance_mm": positive(DISTANCE_MM, "of the ball's surface from the stage's axis", unit="mm"),
+    "offset_mm": vector(3, (0.0, 0.0, 0.0), "of the optic point from the stage's axis"),
+    "unevenness": number(0.0, "of the ball's brightness, relative", 0, 10),
+    "seed": whole(0, "of the ball's surface", 0),
+}
 """Arguments of `ball_scene` in scene files."""
 
 

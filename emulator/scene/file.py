@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from cubestack.firmware_model.values import named, read_table, text
+from cubestack.firmware_model.values import read_table, text
 
 V = TypeVar("V")
 
@@ -28,7 +28,7 @@ def device_keys(path: Path) -> dict[str, str]:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    keys = named(dict.fromkeys(DEVICE_KEYS, text(None, "of the device")))
+    keys = dict.fromkeys(DEVICE_KEYS, text(None, "of the device"))
     try:
         return read_table({key: table[key] for key in DEVICE_KEYS if key in table}, keys)
     except ValueError as error:

@@ -43,7 +43,6 @@ from cubestack.firmware_model.values import (
     TableDeclaration,
     flag,
     moment,
-    named,
     number,
     read_table,
     table,
@@ -92,16 +91,14 @@ def _lines(value: tuple[str, str]) -> Satrec:
 
 
 _QUATERNION = vector(4, REQUIRED, "ICRS to body, scalar last")
-_POINT = named({"at_s": number(REQUIRED, "after the start", 0, 1e9), "quaternion": _QUATERNION})
-_INERTIAL = named(
-    {
-        "ra_deg": number(None, "of the boresight", -360, 360),
-        "dec_deg": number(None, "of the boresight", -90, 90),
-        "roll_deg": number(0.0, "of the picture", -360, 360),
-        "quaternion": replace(_QUATERNION, default=None),
-        "rate_deg_s": vector(3, (0.0, 0.0, 0.0), "body rate", -100, 100),
-    }
-)
+_POINT = {"at_s": number(REQUIRED, "after the start", 0, 1e9), "quaternion": _QUATERNION}
+_INERTIAL = {
+    "ra_deg": number(None, "of the boresight", -360, 360),
+    "dec_deg": number(None, "of the boresight", -90, 90),
+    "roll_deg": number(0.0, "of the picture", -360, 360),
+    "quaternion": replace(_QUATERNION, default=None),
+    "rate_deg_s": vector(3, (0.0, 0.0, 0.0), "body rate", -100, 100),
+}
 
 
 def _inertial(pose: dict[str, Any]) -> Attitude:
@@ -149,24 +146,22 @@ def _mountings(given: dict[str, Any]) -> dict[str, Mounting]:
     return read_table(given, dict.fromkeys(given, mounting))
 
 
-_KEYS = named(
-    {
-        "start": moment(REQUIRED, "virtual time 0", make=_start),
-        "tle": ListDeclaration(
-            part=Declaration(kind=TEXT), count=2, default=None, meaning="elements", make=_lines
-        ),
-        "circular": table(
-            None,
-            "a circular orbit instead of elements",
-            {
-                "altitude_km": number(REQUIRED, "above the Earth", 160, 40_000),
-                "inclination_deg": number(REQUIRED, "of the orbit", 0, 180),
-                "node_deg": number(REQUIRED, "right ascension of the ascending node", -360, 360),
-                "along_deg": number(0.0, "angle from the node at the start", -360, 360),
-            },
-        ),
-        "hazards": flag(True, "Earth, Sun and Moon disturb cameras that look at the sky"),
-        "attitude": Declaration(kind=TABLE, default=None, make=_attitude),
-        "mountings": Declaration(kind=TABLE, default=None, make=_mountings),
-    }
-)
+_KEYS = {
+    "start": moment(REQUIRED, "virtual time 0", make=_start),
+    "tle": ListDeclaration(
+        part=Declaration(kind=TEXT), count=2, default=None, meaning="elements", make=_lines
+    ),
+    "circular": table(
+        None,
+        "a circular orbit instead of elements",
+        {
+            "altitude_km": number(REQUIRED, "above the Earth", 160, 40_000),
+            "inclination_deg": number(REQUIRED, "of the orbit", 0, 180),
+            "node_deg": number(REQUIRED, "right ascension of the ascending node", -360, 360),
+            "along_deg": number(0.0, "angle from the node at the start", -360, 360),
+        },
+    ),
+    "hazards": flag(True, "Earth, Sun and Moon disturb cameras that look at the sky"),
+    "attitude": Declaration(kind=TABLE, default=None, make=_attitude),
+    "mountings": Declaration(kind=TABLE, default=None, make=_mountings),
+}

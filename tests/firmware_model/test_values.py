@@ -25,7 +25,6 @@ from cubestack.firmware_model.values import (
     choice,
     described,
     flag,
-    named,
     number,
     positive,
     read_table,
@@ -122,7 +121,7 @@ def test_reads_texts_of_command_lines(name: str, given: str, value: Any) -> None
 
 
 def test_a_table_has_the_declared_keys() -> None:
-    keys = {**KEYS, **named({"needed": whole(REQUIRED, "is needed")})}
+    keys = {**KEYS, "needed": whole(REQUIRED, "is needed")}
     assert read_table({"count": 1, "needed": 2}, keys) == {"count": 1, "needed": 2}
     for table, message in (
         ({}, "needs the key needed"),

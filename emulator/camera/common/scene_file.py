@@ -48,7 +48,6 @@ from cubestack.firmware_model.values import (
     choice,
     described,
     moment,
-    named,
     number,
     read_table,
     table,
@@ -86,26 +85,17 @@ def _with_defaults(keys: Keys, owner: Any) -> Keys:
 _OPTICS: Keys = {
     name: one for name, one in Optics.declared().items() if name not in ("columns", "rows")
 }
-ANGLES: Keys = named(
-    {
-        "ra_deg": number(None, "right ascension of the boresight", -360, 360, role="ra"),
-        "dec_deg": number(None, "declination of the boresight", -90, 90, role="dec"),
-        "roll_deg": number(
-            0.0, "angle of the picture's up direction, east of north", -360, 360, role="roll"
-        ),
-    }
-)
+ANGLES: Keys = {
+    "ra_deg": number(None, "right ascension of the boresight", -360, 360, role="ra"),
+    "dec_deg": number(None, "declination of the boresight", -90, 90, role="dec"),
+    "roll_deg": number(
+        0.0, "angle of the picture's up direction, east of north", -360, 360, role="roll"
+    ),
+}
 _ATTITUDE: Keys = {
     **ANGLES,
-    **named(
-        {
-            "quaternion": vector(
-                4,
-                None,
-                "attitude, inertial to camera, scalar last; or the angles",
-                instead=tuple(ANGLES),
-            )
-        }
+    "quaternion": vector(
+        4, None, "attitude, inertial to camera, scalar last; or the angles", instead=tuple(ANGLES)
     ),
 }
 _LATER: Keys = {**_ATTITUDE, **Pose.declared()}
@@ -142,32 +132,26 @@ def _sky_keys(condition: SkyCondition, uncertain: Mapping[str, float], seed: int
     optics = {**_with_defaults(_OPTICS, condition.optics), "drawn": drawn}
     return {
         **_POSE,
-        **named(
-            {
-                "mount": choice(
-                    False, "earth: the camera turns with the Earth", {"sky": False, "earth": True}
-                ),
-                "poses": table((), "later poses, in order of time", _LATER, array=True),
-                "atmosphere": table(
-                    None, "the atmosphere between camera and stars", _AIR, _atmosphere
-                ),
-                **SkyScene.declared(),
-                **_with_defaults(SkyCondition.declared(), condition),
-                "seed": whole(0, "of noise, atmosphere, false stars and hot pixels", 0),
-                "optics": table(None, "values of the lens that differ", optics, lens),
-                "hazards": hazard_tables(SKY_HAZARDS, seed),
-            }
+        "mount": choice(
+            False, "earth: the camera turns with the Earth", {"sky": False, "earth": True}
         ),
+        "poses": table((), "later poses, in order of time", _LATER, array=True),
+        "atmosphere": table(None, "the atmosphere between camera and stars", _AIR, _atmosphere),
+        **SkyScene.declared(),
+        **_with_defaults(SkyCondition.declared(), condition),
+        "seed": whole(0, "of noise, atmosphere, false stars and hot pixels", 0),
+        "optics": table(None, "values of the lens that differ", optics, lens),
+        "hazards": hazard_tables(SKY_HAZARDS, seed),
     }
 
 
 def _picture_keys(condition: SkyCondition) -> Keys:
     temperature = {"temperature_c": SkyCondition.declared()["temperature_c"]}
     return {
-        **named({"file": text(REQUIRED, "PNG, JPEG or TIFF")}),
+        "file": text(REQUIRED, "PNG, JPEG or TIFF"),
         **PictureScene.declared(),
         **_with_defaults(temperature, condition),
-        **named({"hazards": hazard_tables({})}),
+        "hazards": hazard_tables({}),
     }
 
 

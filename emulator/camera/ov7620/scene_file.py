@@ -43,7 +43,6 @@ from cubestack.firmware_model.values import (
     REQUIRED,
     Keys,
     described,
-    named,
     read_table,
     table,
     vector,
@@ -96,21 +95,19 @@ def _own_lens(camera: str) -> Any:
 
 def _scene_keys(seed: int = 0) -> Keys:
     """``seed`` as of `hazard_tables`."""
-    return named(
-        {
-            **EarthSunScene.declared(),
-            "nadir_deg": vector(2, None, "its angles in the nadir camera", instead=("nadir",)),
-            "sun_deg": vector(2, None, "its angles in the Sun camera", instead=("sun",)),
-            "nadir_camera": table(None, "its mounting; if omitted, +z", Mounting),
-            "sun_camera": table(None, "its mounting; if omitted, -z", Mounting),
-            "nadir_lens": _own_lens("nadir"),
-            "sun_lens": _own_lens("sun"),
-            "reflections": table((), "false lights", _REFLECTION, _reflection, array=True),
-            **FisheyeCondition.declared(),
-            "seed": whole(0, "of noise, surface and hot pixels", 0),
-            "hazards": hazard_tables({**SKY_HAZARDS, **EARTH_HAZARDS}, seed),
-        }
-    )
+    return {
+        **EarthSunScene.declared(),
+        "nadir_deg": vector(2, None, "its angles in the nadir camera", instead=("nadir",)),
+        "sun_deg": vector(2, None, "its angles in the Sun camera", instead=("sun",)),
+        "nadir_camera": table(None, "its mounting; if omitted, +z", Mounting),
+        "sun_camera": table(None, "its mounting; if omitted, -z", Mounting),
+        "nadir_lens": _own_lens("nadir"),
+        "sun_lens": _own_lens("sun"),
+        "reflections": table((), "false lights", _REFLECTION, _reflection, array=True),
+        **FisheyeCondition.declared(),
+        "seed": whole(0, "of noise, surface and hot pixels", 0),
+        "hazards": hazard_tables({**SKY_HAZARDS, **EARTH_HAZARDS}, seed),
+    }
 
 
 _SCENE = _scene_keys()
