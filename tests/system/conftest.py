@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.bus.uart import Uart
+from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import main
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
@@ -151,6 +152,17 @@ class Ear:
 
     def framing_error(self, time_ps: int) -> None:
         self.errors.append(time_ps)
+
+
+def compile_c(source: Path, folder: Path) -> Path:
+    """Compiles a C program without warnings; skips if there is no compiler."""
+    compiler = find_c_compiler()
+    if compiler is None:
+        pytest.skip("no C compiler")
+    program = folder / source.stem
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o", program]
+    subprocess.run([*compiler, *flags, source], check=True, timeout=120)
+    return program
 
 
 @pytest.fixture

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.experiments.attitude import errors
-from tests.system.conftest import ROOT
+from tests.system.conftest import ROOT, compile_c
 
 HERE = ROOT / "examples"
 PLUGIN = "cubestack.host.pytest_plugin"
@@ -27,13 +26,7 @@ def device() -> Any:
 
 @pytest.fixture(scope="session")
 def flight_driver(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    compiler = find_c_compiler()
-    if compiler is None:
-        pytest.skip("no C compiler")
-    program = tmp_path_factory.mktemp("flight") / "flight_driver"
-    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o", program]
-    subprocess.run([*compiler, *flags, HERE / "flight_driver.c"], check=True, timeout=TIMEOUT_S)
-    return program
+    return compile_c(HERE / "flight_driver.c", tmp_path_factory.mktemp("flight"))
 
 
 def run(*command: str | Path, cwd: Path | None = None) -> "subprocess.CompletedProcess[str]":

@@ -1,16 +1,15 @@
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cubestack.emulator.camera.ov7620.view import EarthSunView, FisheyeCondition
-from cubestack.emulator.i2cdev.preload.shim import find_c_compiler
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Interface
 from cubestack.host.emulation.emulated import AnyEmulated, open_device
 from cubestack.host.shell.language import Shell
 from cubestack.host.targets import Target
+from tests.system.conftest import compile_c
 from tests.system.cubesense.conftest import FACING
 
 #: Pictures without noise are the same again.
@@ -24,13 +23,7 @@ COUNTING = {"Runtime", "RuntimeSeconds", "RuntimeMilliseconds", "TcmdCount", "Tl
 
 @pytest.fixture(scope="session")
 def outsider(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    compiler = find_c_compiler()
-    if compiler is None:
-        pytest.skip("no C compiler")
-    program = tmp_path_factory.mktemp("outsider") / "outsider"
-    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-o", program]
-    subprocess.run([*compiler, *flags, SOURCE], check=True, timeout=120)
-    return program
+    return compile_c(SOURCE, tmp_path_factory.mktemp("outsider"))
 
 
 def measure(device: AnyEmulated) -> None:

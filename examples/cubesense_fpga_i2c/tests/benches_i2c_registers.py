@@ -104,7 +104,7 @@ async def any_transfer(dut: Any) -> None:
 
 
 @timed_test
-async def refusals(dut: Any) -> None:
+async def unwritable_registers_and_unknown_addresses(dut: Any) -> None:
     """What can not be written is not acknowledged, nor what follows; nor an unknown address."""
     async with registers(dut) as bench:
         mcu = bench.mcu
@@ -123,7 +123,7 @@ async def refusals(dut: Any) -> None:
 
 
 @timed_test
-async def transfers_that_are_given_up(dut: Any) -> None:
+async def aborted_transfers(dut: Any) -> None:
     """Inside of a byte, by START or by STOP: nothing is taken, and the next transfer is whole.
 
     After a STOP clocks without a START are nothing.
@@ -146,7 +146,7 @@ async def transfers_that_are_given_up(dut: Any) -> None:
 
 
 @timed_test
-async def a_bus_that_an_fpga_holds_is_freed_by_nine_clocks(dut: Any) -> None:
+async def held_bus_is_freed_by_nine_clocks(dut: Any) -> None:
     """The microcontroller restarts while an FPGA sends; STOP and START are possible again."""
     async with registers(dut) as bench:
         mcu = bench.mcu

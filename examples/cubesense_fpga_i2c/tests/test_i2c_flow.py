@@ -53,7 +53,7 @@ def test_proof(name: str) -> None:
     assert prove(PROOFS[name], planted=True).counterexample
 
 
-def test_command_line_knows_these_designs_alone() -> None:
+def test_command_line_rejects_other_designs() -> None:
     command = [sys.executable, "-m", "cubesense_fpga_i2c", "verilog", "cubestar"]
     done = subprocess.run(command, cwd=EXAMPLES, capture_output=True, text=True, check=False)
     assert done.returncode == 2

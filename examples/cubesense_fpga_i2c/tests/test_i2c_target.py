@@ -60,7 +60,7 @@ def test_pair_has_every_pin_but_the_links() -> None:
         (lambda: I2cTarget(0x31, 0x30, number_bits=9), r"number_bits must be in 1\.\.8, not 9"),
     ],
 )
-def test_impossible_designs_are_refused(make: Callable[[], Component], error: str) -> None:
+def test_rejects_invalid_designs(make: Callable[[], Component], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         make()
     gc.collect()  # what was refused is never elaborated; have Amaranth say so here
@@ -76,7 +76,7 @@ def rows(heading: str) -> list[list[str]]:
     return cells[2:]
 
 
-def test_documented_registers_are_the_declared_ones() -> None:
+def test_documented_registers() -> None:
     wanted = [
         [
             f"0x{r.address:X}",
@@ -93,7 +93,7 @@ def test_documented_registers_are_the_declared_ones() -> None:
     assert rows("Registers") == wanted
 
 
-def test_documented_commands_are_the_declared_ones() -> None:
+def test_documented_commands() -> None:
     for byte, *names in rows("Commands"):
         found = command_of(int(byte, 16))
         assert [found.sun.name.lower(), found.nadir.name.lower()] == names
@@ -114,7 +114,7 @@ def milliseconds(text: str) -> float:
     return float(number) * {"us": 1e-3, "ms": 1.0, "s": 1e3}[unit]
 
 
-def test_documented_times_are_the_bus_own() -> None:
+def test_documented_times() -> None:
     """Periods exactly; times as rounded there."""
     size = FULL_SIZE
     wanted = {

@@ -29,19 +29,19 @@ STANDBY = Actions(Action.STANDBY, Action.STANDBY)
 BOTH_READ = Actions(Action.READ, Action.READ)
 
 
-def test_addresses_are_three_and_none_is_reserved() -> None:
+def test_three_addresses_and_none_is_reserved() -> None:
     addresses = {*ADDRESSES.values(), GROUP_ADDRESS}
     assert len(addresses) == 3
     assert all(0x08 <= address <= 0x77 for address in addresses)
 
 
-def test_each_register_is_declared_once_and_all_fit() -> None:
+def test_each_register_is_declared_once() -> None:
     assert [register.address for register in REGISTERS] == sorted(Register)
     assert [register.name for register in REGISTERS] == [register.name for register in Register]
     assert max(Register) == (1 << REGISTER_BITS) - 1 == Register.DATA
 
 
-def test_pointer_and_data_follow_each_other() -> None:
+def test_pointer_and_data_are_adjacent() -> None:
     """So that one transfer sets the address and the next byte is the pixel."""
     names = [Register.POINTER_HIGH, Register.POINTER_MID, Register.POINTER_LOW, Register.DATA]
     assert [*range(names[0], names[0] + 4)] == names
@@ -53,7 +53,7 @@ def test_bits_are_single_and_lowest(bits: type[StatusBits | CommandBits]) -> Non
     assert sorted(bit.value for bit in bits) == [1, 2, 4, 8]
 
 
-def test_commands_are_those_of_the_pins() -> None:
+def test_commands_match_the_pins() -> None:
     """Every value: what the lines of table 6.4 do at these levels, EDGE low."""
     for byte in range(256):
         bits = CommandBits(byte & 0xF)
@@ -67,7 +67,7 @@ def test_commands_are_those_of_the_pins() -> None:
         assert command_of(byte) == wanted, hex(byte)
 
 
-def test_command_bytes_come_back() -> None:
+def test_command_bytes_round_trip() -> None:
     for row in I2C_COMMANDS:
         assert command_of(command_byte(row.actions)) == row.actions
     assert command_byte(STANDBY) == RESET_COMMAND
@@ -78,7 +78,7 @@ def test_only_edge_rows_are_left_out() -> None:
     assert left_out == {row.actions for row in COMMANDS if row.edge}
 
 
-def test_impossible_command_is_named() -> None:
+def test_rejects_invalid_commands() -> None:
     with pytest.raises(ValueError, match="no command for SEND_PICTURE and SEND_PICTURE; the rows"):
         command_byte(Actions(Action.SEND_PICTURE, Action.SEND_PICTURE))
 

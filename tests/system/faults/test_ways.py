@@ -87,7 +87,7 @@ def plan(seed: int, entries: list[dict[str, Any]]) -> str:
 def test_plan_injects_every_kind(bench: Bench) -> None:
     entries = [
         {"kind": kind, "target": target, "at_s": 0.5}
-        | ({} if FAULTS[kind].momentary else {"for": 0.25})
+        | ({} if FAULTS[kind].momentary else {"for_s": 0.25})
         | given(kind, bench.board)
         for kind, targets in bench.faults.kinds().items()
         for target in targets
@@ -124,7 +124,7 @@ def all_kinds(bench: Bench) -> tuple[list[dict[str, Any]], float]:
             entry["at_s"] = at_s
             at_s += STEP_S[bench.name]
             if not FAULTS[kind].momentary:
-                entry["for"] = 0.9 * STEP_S[bench.name]
+                entry["for_s"] = 0.9 * STEP_S[bench.name]
         entries.append(entry)
     return entries, at_s
 
