@@ -16,8 +16,8 @@ from cubestack.emulator.scene.angles import angles_from_vector, vector_from_angl
 from cubestack.emulator.scene.attitude import matrix_from_quaternion, propagate
 from cubestack.emulator.scene.earth import Earth, angular_radius_deg
 from cubestack.emulator.scene.file import SceneError
-from cubestack.emulator.scene.hazards import Clouds, EarthHazard
 from cubestack.emulator.scene.hazards.contract import SkyHazard, check_hazards
+from cubestack.emulator.scene.hazards.earth_below import Clouds, EarthHazard
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.values import (
     REQUIRED,
@@ -112,14 +112,7 @@ class SensorTruth:
 
 @dataclass(frozen=True, eq=False)
 class EarthSunScene(DeclaredValues):
-    """Surroundings of a satellite with a sun and a nadir camera; directions are in scene axes.
-
-    Attributes:
-        moon: the Sun's direction gives its phase.
-        nadir_camera, sun_camera: their mountings.
-        reflections: false lights.
-        hazards: other sources of light; some also place Earth and Sun.
-    """
+    """Surroundings of a satellite with a sun and a nadir camera; directions are in scene axes."""
 
     error = SceneError
 
@@ -128,12 +121,16 @@ class EarthSunScene(DeclaredValues):
     )
     sun: ArrayLike = vector(3, (0.0, 0.0, -1.0), "direction of the Sun", role="direction")
     moon: ArrayLike | None = vector(
-        3, None, "direction of the Moon; if omitted, there is none", role="direction"
+        3,
+        None,
+        "direction of the Moon, whose phase follows from the Sun; if omitted, none",
+        role="direction",
     )
     altitude_km: float = positive(750.0, "of the satellite", high=HIGHEST_KM)
     rate_deg_s: ArrayLike = vector(
         3, (0.0, 0.0, 0.0), "body rate in body axes", -FASTEST_DEG_S, FASTEST_DEG_S
     )
+    # their mountings
     nadir_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, 1.0)))
     sun_camera: Mounting = field(default_factory=lambda: Mounting((0.0, 0.0, -1.0)))
     unevenness: float = number(
@@ -142,8 +139,8 @@ class EarthSunScene(DeclaredValues):
     glow_km: float = number(
         10.0, "scale height of the glow above the limb; 0 for none (assumed)", 0, 1000
     )
-    reflections: tuple[Reflection, ...] = ()
-    hazards: tuple[SkyHazard, ...] = ()
+    reflections: tuple[Reflection, ...] = ()  # false lights
+    hazards: tuple[SkyHazard, ...] = ()  # other sources of light; some also place Earth and Sun
     seed: int = whole(0, "of the Earth's surface", 0)
 
     def __post_init__(self) -> None:

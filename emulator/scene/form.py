@@ -9,8 +9,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.scene.hazards import Hazard
 from cubestack.emulator.scene.hazards.contract import Body, SkyHazard
+from cubestack.emulator.scene.hazards.hazard import Hazard
 from cubestack.firmware_model.values import plain
 
 Matrix = NDArray[np.float64]

@@ -57,21 +57,14 @@ class Pose(DeclaredValues):
 
 @dataclass(frozen=True, eq=False)
 class SkyScene(DeclaredValues):
-    """The night sky.
-
-    Attributes:
-        quaternion: attitude (4,) at time 0, scalar last, inertial (ICRS at ``epoch``) to camera.
-        rate_deg_s: body rate (3,) in camera axes.
-        poses: later poses, each valid from its time on; in order of time.
-        atmosphere: between camera and stars, but no other lights; None in space.
-        hazards: what else gives light, or covers stars.
-    """
+    """The night sky."""
 
     error = SceneError
 
+    # attitude (4,) at time 0, scalar last, inertial (ICRS at ``epoch``) to camera
     quaternion: ArrayLike
-    rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)
-    poses: tuple[Pose, ...] = ()
+    rate_deg_s: ArrayLike = (0.0, 0.0, 0.0)  # body rate (3,) in camera axes
+    poses: tuple[Pose, ...] = ()  # later poses, each valid from its time on; in order of time
     epoch: float = number(
         DEFAULT_EPOCH, "Julian year to which proper motion moves the stars", *EPOCHS
     )
@@ -82,8 +75,9 @@ class SkyScene(DeclaredValues):
     false_star_mag: tuple[float, float] = vector(
         2, (2.0, 3.8), "range of their V, brightest first", *MAGNITUDES
     )
+    # between camera and stars, but no other lights; None in space
     atmosphere: Atmosphere | None = None
-    hazards: tuple[SkyHazard, ...] = ()
+    hazards: tuple[SkyHazard, ...] = ()  # what else gives light, or covers stars
     still: bool = flag(
         False, "stars do not move during an exposure: each stays where it is in the middle of it"
     )

@@ -13,13 +13,9 @@ from cubestack.emulator.camera.common.view import SkyView
 from cubestack.emulator.camera.ov7620.light import fisheye_state
 from cubestack.emulator.camera.ov7620.view import EarthSunView
 from cubestack.emulator.scene.earth_sun import CameraTarget
-from cubestack.emulator.scene.hazards import (
-    EARTH_HAZARDS,
-    SKY_HAZARDS,
-    CameraState,
-    EarthHazard,
-    SkyHazard,
-)
+from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
+from cubestack.emulator.scene.hazards.contract import CameraState, SkyHazard
+from cubestack.emulator.scene.hazards.earth_below import EarthHazard
 from cubestack.emulator.scene.hazards.hazard import Hazard
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import REQUIRED, ValueKind, declare, many, number

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.camera.mlx75412.lens import LENS
-from cubestack.emulator.scene.hazards import Hazard
+from cubestack.emulator.scene.hazards.hazard import Hazard
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.values import (
     FLAG,

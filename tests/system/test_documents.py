@@ -14,7 +14,8 @@ from cubestack.emulator.ports.tcp import REFUSAL
 from cubestack.emulator.scene.atmosphere import Atmosphere
 from cubestack.emulator.scene.earth_sun import EarthSunScene
 from cubestack.emulator.scene.file import DEVICE_KEYS
-from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS, Hazard
+from cubestack.emulator.scene.hazards import EARTH_HAZARDS, SKY_HAZARDS
+from cubestack.emulator.scene.hazards.hazard import Hazard
 from cubestack.emulator.scene.sky import SceneError, SkyScene
 from cubestack.firmware_model.cubesense.memory import Memory, budget, used
 from cubestack.firmware_model.interface.aramis import Reason

@@ -39,8 +39,9 @@ from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s, sidereal_deg
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.file import SceneError, read_scene_file, values_for
-from cubestack.emulator.scene.hazards import SKY_HAZARDS, Hazard, SkyHazard
-from cubestack.emulator.scene.hazards.hazard import HazardTables
+from cubestack.emulator.scene.hazards import SKY_HAZARDS
+from cubestack.emulator.scene.hazards.contract import SkyHazard
+from cubestack.emulator.scene.hazards.hazard import Hazard, HazardTables
 from cubestack.emulator.scene.sky import PictureScene, Pose, SkyScene
 from cubestack.firmware_model.values import (
     REQUIRED,

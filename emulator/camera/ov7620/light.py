@@ -31,8 +31,15 @@ from cubestack.emulator.camera.ov7620.luminance import SPOT_PX
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.earth import angular_radius_deg
 from cubestack.emulator.scene.earth_sun import CameraTarget, EarthSunScene
-from cubestack.emulator.scene.hazards import CameraState, Ghosts, Moon, SkyHazard
-from cubestack.emulator.scene.hazards.contract import EARTH_RADIANCE, Depth, Vectors
+from cubestack.emulator.scene.hazards.contract import (
+    EARTH_RADIANCE,
+    CameraState,
+    Depth,
+    SkyHazard,
+    Vectors,
+)
+from cubestack.emulator.scene.hazards.ghosts import Ghosts
+from cubestack.emulator.scene.hazards.moon import Moon
 from cubestack.emulator.sim.virtual_time import PS_PER_S
 from cubestack.firmware_model.interface.cameras.ov7620 import COLUMNS, EXPOSURE_LINES, ROWS
 

@@ -29,6 +29,7 @@
 #include <sys/sysmacros.h>
 #include <sys/uio.h>
 #include <sys/un.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #define HIGH_NUMBER 500 /* first descriptor of our connections, above those that programs expect */
@@ -60,19 +61,13 @@ static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static int channel = -1;
 static ino_t channel_inode;
 
-static int (*real_open)(const char *, int, ...);
-static int (*real_openat)(int, const char *, int, ...);
-static int (*real_ioctl)(int, unsigned long, ...);
-static ssize_t (*real_read)(int, void *, size_t);
-static ssize_t (*real_write)(int, const void *, size_t);
-static FILE *(*real_fopen)(const char *, const char *);
-static int (*real_fstat)(int, struct stat *);
-static int (*real_fstatat)(int, const char *, struct stat *, int);
-static int (*real_statx)(int, const char *, int, unsigned, struct statx *);
-static int (*real_access)(const char *, int);
-static int (*real_faccessat)(int, const char *, int, int);
-static ssize_t (*real_getxattr)(const char *, const char *, void *, size_t);
-static ssize_t (*real_lgetxattr)(const char *, const char *, void *, size_t);
+/* The functions of the C library that are overridden here. */
+#define OVERRIDDEN(X) \
+    X(open) X(openat) X(ioctl) X(read) X(write) X(fopen) X(fstat) X(fstatat) X(statx) X(access) \
+    X(faccessat) X(getxattr) X(lgetxattr)
+#define DECLARE(name) static __typeof__(name) *real_##name;
+#define LOOK_UP(name) real_##name = dlsym(RTLD_NEXT, #name);
+OVERRIDDEN(DECLARE)
 
 static int inode_of(int fd, ino_t *inode, mode_t *mode)
 {
@@ -123,19 +118,7 @@ __attribute__((constructor)) static void prepare(void)
 {
     if (config.ready) return;
     config.ready = true;
-    real_open = dlsym(RTLD_NEXT, "open");
-    real_openat = dlsym(RTLD_NEXT, "openat");
-    real_ioctl = dlsym(RTLD_NEXT, "ioctl");
-    real_read = dlsym(RTLD_NEXT, "read");
-    real_write = dlsym(RTLD_NEXT, "write");
-    real_fopen = dlsym(RTLD_NEXT, "fopen");
-    real_fstat = dlsym(RTLD_NEXT, "fstat");
-    real_fstatat = dlsym(RTLD_NEXT, "fstatat");
-    real_statx = dlsym(RTLD_NEXT, "statx");
-    real_access = dlsym(RTLD_NEXT, "access");
-    real_faccessat = dlsym(RTLD_NEXT, "faccessat");
-    real_getxattr = dlsym(RTLD_NEXT, "getxattr");
-    real_lgetxattr = dlsym(RTLD_NEXT, "lgetxattr");
+    OVERRIDDEN(LOOK_UP)
     const char *bus = getenv("CUBESTACK_I2C_BUS"), *path = getenv("CUBESTACK_I2C_SOCKET");
     if (!bus || !path || strlen(path) >= sizeof config.socket) return;
     config.bus = atoi(bus);

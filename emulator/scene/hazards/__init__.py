@@ -5,7 +5,7 @@ Earth below the satellite.
 """
 
 from cubestack.emulator.scene.hazards.aberration import Aberration
-from cubestack.emulator.scene.hazards.contract import CameraState, Lights, SkyHazard
+from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.hazards.debris import Debris
 from cubestack.emulator.scene.hazards.earth_below import (
     Clouds,
@@ -16,34 +16,10 @@ from cubestack.emulator.scene.hazards.earth_below import (
 from cubestack.emulator.scene.hazards.earth_limb import EarthLimb
 from cubestack.emulator.scene.hazards.ghosts import Ghosts
 from cubestack.emulator.scene.hazards.glint import Glint
-from cubestack.emulator.scene.hazards.hazard import Hazard, Strength
 from cubestack.emulator.scene.hazards.moon import Moon
 from cubestack.emulator.scene.hazards.planets import Planets
 from cubestack.emulator.scene.hazards.sky_glow import SkyGlow
 from cubestack.emulator.scene.hazards.sun_glare import SunGlare
-
-__all__ = [
-    "EARTH_HAZARDS",
-    "SKY_HAZARDS",
-    "Aberration",
-    "CameraState",
-    "Clouds",
-    "Debris",
-    "EarthHazard",
-    "EarthInSunCamera",
-    "EarthLimb",
-    "Ghosts",
-    "Glint",
-    "Hazard",
-    "Lights",
-    "Moon",
-    "Planets",
-    "SkyGlow",
-    "SkyHazard",
-    "Strength",
-    "SunGlare",
-    "Terminator",
-]
 
 SKY_HAZARDS: dict[str, type[SkyHazard]] = {
     kind.name: kind

@@ -5,7 +5,7 @@ Earth's motion around the Sun causes 20.5 arcsec of it, a satellite's motion aro
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -35,9 +35,8 @@ class Aberration(SkyHazard):
         "direction of that: three numbers, or right ascension and declination in deg",
     )
 
-    name: ClassVar[str] = "aberration"
-    meaning: ClassVar[str] = "stars shifted by the observer's speed"
-    strength: ClassVar[Strength] = Strength("speed", "km/s", (0.0, 7.6, 15.0, 22.0, 30.0, 38.0))
+    meaning = "stars shifted by the observer's speed"
+    strength = Strength("speed", "km/s", (0.0, 7.6, 15.0, 22.0, 30.0, 38.0))
 
     def __post_init__(self) -> None:
         super().__post_init__()

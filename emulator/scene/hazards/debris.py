@@ -6,7 +6,7 @@ passes at 0.1 to 2 deg/s and has V 0 to 6 (assumed; a passing satellite has V 4 
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -40,12 +40,9 @@ class Debris(SkyHazard):
     v_mag: float = number(2.0, "its magnitude", -10, 10)
     at_s: float = number(0.0, "time when it is at `direction`", -1e6, 1e6, formerly="time_s")
 
-    name: ClassVar[str] = "debris"
-    meaning: ClassVar[str] = "an object that crosses the field"
-    strength: ClassVar[Strength] = Strength(
-        "v_mag", "mag", (8.0, 6.0, 4.0, 2.0, 0.0, -2.0, -4.0), 0
-    )
-    depth: ClassVar[Depth] = Depth.ORBIT
+    meaning = "an object that crosses the field"
+    strength = Strength("v_mag", "mag", (8.0, 6.0, 4.0, 2.0, 0.0, -2.0, -4.0), 0)
+    depth = Depth.ORBIT
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -47,10 +47,9 @@ class Clouds(EarthHazard):
     contrast: float = number(1.0, "1: white clouds on a dark sea; 0: uniform", 0, 1)
     cover: float = number(0.5, "share of the surface under clouds", 0.01, 0.99)
 
-    name: ClassVar[str] = "clouds"
-    meaning: ClassVar[str] = "clouds on the Earth below"
-    strength: ClassVar[Strength] = Strength("contrast", "", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
-    depth: ClassVar[Depth] = Depth.EARTH
+    meaning = "clouds on the Earth below"
+    strength = Strength("contrast", "", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
+    depth = Depth.EARTH
 
     def shine(self, places: NDArray[np.float32]) -> NDArray[np.float32]:
         """Brightness (n,) of the surface relative to its mean.
@@ -88,12 +87,9 @@ class Terminator(EarthHazard):
     )
     towards_deg: float = number(0.0, "direction of the Sun around the nadir", -360, 360)
 
-    name: ClassVar[str] = "terminator"
-    meaning: ClassVar[str] = "night on a part of the Earth below"
-    strength: ClassVar[Strength] = Strength(
-        "phase_deg", "deg", (0.0, 30.0, 60.0, 90.0, 110.0, 130.0, 150.0), 90.0
-    )
-    depth: ClassVar[Depth] = Depth.EARTH
+    meaning = "night on a part of the Earth below"
+    strength = Strength("phase_deg", "deg", (0.0, 30.0, 60.0, 90.0, 110.0, 130.0, 150.0), 90.0)
+    depth = Depth.EARTH
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:
@@ -116,13 +112,10 @@ class EarthInSunCamera(EarthHazard):
     above_deg: float = number(5.0, "of the Sun above the limb; negative: it has set", -90, 120)
     towards_deg: float = number(0.0, "direction of the Earth around the Sun", -360, 360)
 
-    cameras: ClassVar[tuple[str, ...]] = ("sun",)
-    name: ClassVar[str] = "earth-in-sun-camera"
-    meaning: ClassVar[str] = "the Earth beside the Sun, or in front of it"
-    strength: ClassVar[Strength] = Strength(
-        "above_deg", "deg", (60.0, 20.0, 5.0, 1.0, 0.3, -1.0), 1.0
-    )
-    depth: ClassVar[Depth] = Depth.EARTH
+    cameras = ("sun",)
+    meaning = "the Earth beside the Sun, or in front of it"
+    strength = Strength("above_deg", "deg", (60.0, 20.0, 5.0, 1.0, 0.3, -1.0), 1.0)
+    depth = Depth.EARTH
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:

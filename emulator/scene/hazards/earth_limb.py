@@ -14,7 +14,7 @@ stars of the picture.
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,12 +78,9 @@ class EarthLimb(SkyHazard):
     airglow: float = number(1.0, "airglow relative to the published one", 0, 100)
     scatter: float = number(0.0, "share of its light that the lens scatters", 0, 0.2)
 
-    name: ClassVar[str] = "earth-limb"
-    meaning: ClassVar[str] = "the Earth's limb near the boresight or across the picture"
-    strength: ClassVar[Strength] = Strength(
-        "boresight to limb", "deg", (45.0, 30.0, 20.0, 15.0, 10.0, 5.0, 0.0), 5.0
-    )
-    depth: ClassVar[Depth] = Depth.EARTH
+    meaning = "the Earth's limb near the boresight or across the picture"
+    strength = Strength("boresight to limb", "deg", (45.0, 30.0, 20.0, 15.0, 10.0, 5.0, 0.0), 5.0)
+    depth = Depth.EARTH
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:

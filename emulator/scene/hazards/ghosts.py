@@ -7,7 +7,7 @@ widths of ghosts are random (assumed). Only a Sun within the field makes them.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -49,12 +49,11 @@ class Ghosts(SkyHazard):
     count: int = whole(5, "ghosts, each with half the light of the previous one", 0, 50)
     scatter: float = number(SHARE, "share of the Sun's light that the lens scatters", 0, 0.2)
 
-    name: ClassVar[str] = "ghosts"
-    meaning: ClassVar[str] = "reflections of the Sun in the lens, and its glare"
-    strength: ClassVar[Strength] = Strength(
+    meaning = "reflections of the Sun in the lens, and its glare"
+    strength = Strength(
         "share", "of the Sun's light", (1e-7, 1e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3), 1e-4
     )
-    depth: ClassVar[Depth] = Depth.LENS
+    depth = Depth.LENS
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:

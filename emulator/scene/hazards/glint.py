@@ -7,7 +7,6 @@ and widths are random (assumed).
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -40,12 +39,11 @@ class Glint(SkyHazard):
     surface: float = number(1e-4, "brightness relative to the Sun's surface", 0, 1)
     count: int = whole(2, "patches", 0, 50)
 
-    name: ClassVar[str] = "glint"
-    meaning: ClassVar[str] = "sunlit structure at the border of the field"
-    strength: ClassVar[Strength] = Strength(
+    meaning = "sunlit structure at the border of the field"
+    strength = Strength(
         "surface", "of the Sun's surface", (1e-7, 1e-6, 1e-5, 1e-4, 1e-2, 0.1, 1.0), 1e-4
     )
-    depth: ClassVar[Depth] = Depth.LENS
+    depth = Depth.LENS
 
     def glow(self, state: CameraState, vectors: Vectors) -> Brightness:
         """The patches, each with an edge one pixel wide."""

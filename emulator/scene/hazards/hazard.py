@@ -4,6 +4,7 @@ A hazard is a frozen dataclass of declared values, the keys of its table ``[haza
 files.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -52,12 +53,18 @@ def heading(default: Any, meaning: str) -> Any:
 class Hazard(DeclaredValues):
     """Something that makes pictures hard to use; SceneError for a value out of its range."""
 
-    name: ClassVar[str]  #: of its table in scene files and on the command line
+    #: of its table in scene files and on the command line; by default from the class's name
+    name: ClassVar[str]
     meaning: ClassVar[str]  #: what it is, one phrase
     strength: ClassVar[Strength]  #: the scale on which experiments vary it
 
     error = SceneError
     seed: int = whole(0, "of everything random in it", 0, 2**63 - 1)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "name" not in vars(cls):
+            cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", cls.__name__).lower()
 
     @classmethod
     def refusal(cls, name: str, text: str) -> SceneError:

@@ -8,7 +8,7 @@ earthshine (ten thousand times fainter), parallax.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,10 +52,9 @@ class Moon(SkyHazard):
     )
     scatter: float = number(SHARE, "share of its light that the lens scatters", 0, 0.2)
 
-    name: ClassVar[str] = "moon"
-    meaning: ClassVar[str] = "the Moon in the field"
-    strength: ClassVar[Strength] = Strength("lit", "", (0.01, 0.05, 0.2, 0.5, 0.8, 1.0))
-    depth: ClassVar[Depth] = Depth.MOON
+    meaning = "the Moon in the field"
+    strength = Strength("lit", "", (0.01, 0.05, 0.2, 0.5, 0.8, 1.0))
+    depth = Depth.MOON
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:

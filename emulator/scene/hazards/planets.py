@@ -6,7 +6,7 @@ replaces the difference of longitudes, which is nearly the same.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -50,10 +50,9 @@ class Planets(SkyHazard):
     )
     v_mag: float = number(-2.5, "magnitude of that planet", -5.0, 10.0)
 
-    name: ClassVar[str] = "planets"
-    meaning: ClassVar[str] = "planets among the stars"
-    strength: ClassVar[Strength] = Strength("v_mag", "mag", (6.0, 4.0, 2.0, 0.0, -2.5, -4.5), -2.5)
-    depth: ClassVar[Depth] = Depth.PLANETS
+    meaning = "planets among the stars"
+    strength = Strength("v_mag", "mag", (6.0, 4.0, 2.0, 0.0, -2.5, -4.5), -2.5)
+    depth = Depth.PLANETS
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:

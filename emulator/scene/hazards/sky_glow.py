@@ -10,7 +10,7 @@ deg of the equator. Clouds, rifts and catalogue stars are not included.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,9 +82,8 @@ class SkyGlow(SkyHazard):
     zodiacal: float = number(1.0, "zodiacal light relative to the published one", 0, 100)
     milky_way: float = number(1.0, "Milky Way relative to the published one", 0, 100)
 
-    name: ClassVar[str] = "sky-glow"
-    meaning: ClassVar[str] = "zodiacal light and Milky Way"
-    strength: ClassVar[Strength] = Strength(
+    meaning = "zodiacal light and Milky Way"
+    strength = Strength(
         "longitude from the Sun", "deg", (180.0, 90.0, 60.0, 45.0, 30.0, 20.0, 15.0)
     )
 

@@ -11,7 +11,7 @@ angle from the source, to 1/e in ``slope_deg``.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -51,12 +51,9 @@ class SunGlare(SkyHazard):
     decade_deg: float = number(15.0, "angle over which that falls to a tenth", 1, 180)
     slope_deg: float = number(30.0, "angle across the picture over which it falls to 1/e", 1, 1e6)
 
-    name: ClassVar[str] = "sun-glare"
-    meaning: ClassVar[str] = "stray light of the Sun beside the field"
-    strength: ClassVar[Strength] = Strength(
-        "angle", "deg", (90.0, 70.0, 60.0, 50.0, 45.0, 40.0, 35.0), 45.0
-    )
-    depth: ClassVar[Depth] = Depth.LENS
+    meaning = "stray light of the Sun beside the field"
+    strength = Strength("angle", "deg", (90.0, 70.0, 60.0, 50.0, 45.0, 40.0, 35.0), 45.0)
+    depth = Depth.LENS
 
     @classmethod
     def sample(cls, strength: float, state: CameraState, generator: np.random.Generator) -> Self:

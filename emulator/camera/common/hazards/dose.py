@@ -15,7 +15,6 @@ Ionisation: more generation at interfaces, the same in all pixels (Goiffon et al
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +44,8 @@ SURFACE_RISE_PER_KRAD = 0.3  # of the sensor's own dark current, assumed
 class Dose(SensorHazard):
     """A sensor after a total dose; its hot pixels are in the same places in every frame."""
 
-    name: ClassVar[str] = "dose"
-    meaning: ClassVar[str] = "hot pixels and dark current after a total dose, by temperature"
-    strength: ClassVar[Strength] = Strength("krad", "krad", (0, 0.3, 1, 3, 5, 10), 5)
+    meaning = "hot pixels and dark current after a total dose, by temperature"
+    strength = Strength("krad", "krad", (0, 0.3, 1, 3, 5, 10), 5)
 
     krad: float = number(5.0, "total ionising dose in silicon", 0, 30, "krad")
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.polynomial.legendre import leg2poly
@@ -28,9 +28,8 @@ class Defocus(SensorHazard):
     spot gets that standard deviation, but its shape is Gaussian.
     """
 
-    name: ClassVar[str] = "defocus"
-    meaning: ClassVar[str] = "a lens out of focus, by temperature or by the spot's width"
-    strength: ClassVar[Strength] = Strength("sigma_px", "px", (1, 1.5, 2, 3, 4, 6), 3)
+    meaning = "a lens out of focus, by temperature or by the spot's width"
+    strength = Strength("sigma_px", "px", (1, 1.5, 2, 3, 4, 6), 3)
 
     sigma_px: float | None = number(None, "standard deviation of the whole spot", 0.3, 20)
     um_per_k: float = number(0.5, "if omitted: shift of the focus in um per K from 20 C", -50, 50)
@@ -46,9 +45,8 @@ class Defocus(SensorHazard):
 class FocalLength(SensorHazard):
     """A picture that is larger or smaller about its principal point, distortion included."""
 
-    name: ClassVar[str] = "focal-length"
-    meaning: ClassVar[str] = "another focal length than calibrated"
-    strength: ClassVar[Strength] = Strength("percent", "%", (0, 0.1, 0.3, 0.5, 1, 3), 1)
+    meaning = "another focal length than calibrated"
+    strength = Strength("percent", "%", (0, 0.1, 0.3, 0.5, 1, 3), 1)
 
     percent: float = number(0.0, "increase at 20 C, per cent", -10, 10)
     ppm_per_k: float = number(20.0, "increase per K above 20 C, millionths", -500, 500)
@@ -72,9 +70,8 @@ class LensResiduals(SensorHazard):
     They are Legendre polynomials: on average over the sensor they do not shift, scale or turn it.
     """
 
-    name: ClassVar[str] = "lens-residuals"
-    meaning: ClassVar[str] = "a smooth distortion that the calibration lacks"
-    strength: ClassVar[Strength] = Strength("rms_px", "px", (0, 0.1, 0.2, 0.5, 1, 2), 0.5)
+    meaning = "a smooth distortion that the calibration lacks"
+    strength = Strength("rms_px", "px", (0, 0.1, 0.2, 0.5, 1, 2), 0.5)
 
     rms_px: float = number(0.3, "root of the mean squared displacement over the sensor", 0, 10)
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -21,9 +20,8 @@ DUST_SHARE = 5.0
 class HotPixels(SensorHazard):
     """More hot pixels, of the same kind as those of the condition's key ``hot_pixels``."""
 
-    name: ClassVar[str] = "hot-pixels"
-    meaning: ClassVar[str] = "pixels made hot by radiation"
-    strength: ClassVar[Strength] = Strength("count", "", (0, 300, 1000, 3000, 10_000, 20_000))
+    meaning = "pixels made hot by radiation"
+    strength = Strength("count", "", (0, 300, 1000, 3000, 10_000, 20_000))
 
     count: int = whole(1000, "number of hot pixels beside those of the key `hot_pixels`", 0, 75_000)
 
@@ -38,9 +36,8 @@ class Response(SensorHazard):
     Image sensors have about 1 % between pixels (EMVA standard 1288, photo response non-uniformity).
     """
 
-    name: ClassVar[str] = "response"
-    meaning: ClassVar[str] = "uneven response of pixels and columns, shadows of dust"
-    strength: ClassVar[Strength] = Strength("percent", "%", (0, 0.5, 1, 2, 4, 8), 4)
+    meaning = "uneven response of pixels and columns, shadows of dust"
+    strength = Strength("percent", "%", (0, 0.5, 1, 2, 4, 8), 4)
 
     percent: float = number(1.0, "standard deviation of the pixels' gain, per cent", 0, 30)
     columns_percent: float | None = number(

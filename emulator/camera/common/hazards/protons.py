@@ -11,7 +11,6 @@ reactions, ions heavier than protons.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,9 +68,8 @@ PACKETS_PER_PX = 64  # of a track's charge
 class Protons(SensorHazard):
     """Tracks of protons, new ones in each frame."""
 
-    name: ClassVar[str] = "protons"
-    meaning: ClassVar[str] = "tracks of protons, new ones in each exposure"
-    strength: ClassVar[Strength] = Strength("hits", "a frame", (0, 3, 10, 30, 100, 300), 100)
+    meaning = "tracks of protons, new ones in each exposure"
+    strength = Strength("hits", "a frame", (0, 3, 10, 30, 100, 300), 100)
 
     orbit: str = choice(
         "anomaly", "quiet, over the South Atlantic anomaly, or in a solar event", tuple(ORBITS)

@@ -6,7 +6,7 @@ These hazards add their declared grey values whatever the exposure and the gain.
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -19,9 +19,8 @@ from cubestack.firmware_model.values import number
 class Gradient(SensorHazard):
     """A slope of light from one corner or edge to the opposite one."""
 
-    name: ClassVar[str] = "gradient"
-    meaning: ClassVar[str] = "a slope of stray light across the picture"
-    strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 60), 60)
+    meaning = "a slope of stray light across the picture"
+    strength = Strength("counts", "counts", (0, 5, 10, 20, 40, 60), 60)
 
     counts: float = number(30.0, "grey values at its bright end; 0 at the other end", 0, 255)
 
@@ -36,9 +35,8 @@ class Gradient(SensorHazard):
 class Background(SensorHazard):
     """A uniform level, with more noise than its own shot noise."""
 
-    name: ClassVar[str] = "background"
-    meaning: ClassVar[str] = "a uniform level of stray light, and noise"
-    strength: ClassVar[Strength] = Strength("counts", "counts", (0, 5, 10, 20, 40, 80), 20)
+    meaning = "a uniform level of stray light, and noise"
+    strength = Strength("counts", "counts", (0, 5, 10, 20, 40, 80), 20)
 
     counts: float = number(20.0, "grey values added", 0, 255)
     sigma: float = number(4.0, "standard deviation of the additional noise, grey values", 0, 100)

@@ -9,7 +9,8 @@ from cubestack.emulator.camera.common.glow import brightness, glow_electrons
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
-from cubestack.emulator.scene.hazards import SKY_HAZARDS, Moon, SkyHazard, SunGlare
+from cubestack.emulator.scene.hazards import SKY_HAZARDS, Moon, SunGlare
+from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.sky import SkyScene
 from tests.emulator.scene.hazards.looks import ORION, SHUTTER
 from tests.tiers import quick

@@ -5,8 +5,8 @@ import pytest
 
 from cubestack.emulator.scene.angles import vector_from_angles
 from cubestack.emulator.scene.form import bodies_of
-from cubestack.emulator.scene.hazards import CameraState, Ghosts, Glint
-from cubestack.emulator.scene.hazards.contract import SUN_V
+from cubestack.emulator.scene.hazards import Ghosts, Glint
+from cubestack.emulator.scene.hazards.contract import SUN_V, CameraState
 from cubestack.emulator.scene.hazards.glare import aureole
 from cubestack.emulator.scene.hazards.glint import SUN_SURFACE
 

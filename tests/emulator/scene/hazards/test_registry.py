@@ -9,7 +9,8 @@ from cubestack.emulator.camera.common.scene_file import hazard_tables
 from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.camera.mt9m001.lens import double_gauss
 from cubestack.emulator.scene.file import SceneError
-from cubestack.emulator.scene.hazards import SKY_HAZARDS, SkyHazard
+from cubestack.emulator.scene.hazards import SKY_HAZARDS
+from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.sky import SkyScene
 from tests.emulator.scene.hazards.looks import NOW, ORION, SHUTTER
 from tests.tiers import quick
