@@ -10,6 +10,17 @@ All arrays are float64.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cubestack.firmware_model.values import Keys, number
+
+ANGLES: Keys = {
+    "ra_deg": number(None, "right ascension of the boresight", -360, 360, role="ra"),
+    "dec_deg": number(None, "declination of the boresight", -90, 90, role="dec"),
+    "roll_deg": number(
+        0.0, "angle of the picture's up direction, east of north", -360, 360, role="roll"
+    ),
+}
+"""Keys of an attitude by where the boresight points."""
+
 
 def unit_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
     """``quaternion`` scaled to length 1, shape (4,); ValueError if that is not possible."""

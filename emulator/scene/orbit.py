@@ -30,6 +30,7 @@ from cubestack.emulator.scene.hazards import SKY_HAZARDS
 from cubestack.emulator.scene.hazards.contract import SkyHazard
 from cubestack.emulator.scene.hazards.ephemeris import AU_KM, J2000, OBLIQUITY_RAD, heliocentric
 from cubestack.emulator.scene.sky import Pose, SkyScene
+from cubestack.firmware_model.values import DeclaredValues, vector
 
 SUN_RADIUS_KM = 696_000.0
 GM_KM3_S2 = 398_600.8
@@ -97,12 +98,15 @@ def hidden_share(radius: float, other: float, apart: float) -> float:
 
 
 @dataclass(frozen=True)
-class Inertial:
+class Inertial(DeclaredValues):
     """A fixed attitude, or a constant body rate."""
 
-    # (4,) at the start, scalar last, ICRS to body
-    quaternion: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
-    rate_deg_s: tuple[float, ...] = (0.0, 0.0, 0.0)  # body rate (3,)
+    error = SceneError
+
+    quaternion: tuple[float, ...] = vector(
+        4, (0.0, 0.0, 0.0, 1.0), "at the start, ICRS to body, scalar last"
+    )
+    rate_deg_s: tuple[float, ...] = vector(3, (0.0, 0.0, 0.0), "body rate", -100, 100)
 
     def matrix(self, surroundings: Surroundings) -> Vector:
         turned = propagate(self.quaternion, self.rate_deg_s, surroundings.time_s)
@@ -110,10 +114,14 @@ class Inertial:
 
 
 @dataclass(frozen=True)
-class NadirPointing:
+class NadirPointing(DeclaredValues):
     """Body z to the Earth's centre, body y opposite to the orbit's normal, then an offset."""
 
-    offset_deg: tuple[float, ...] = (0.0, 0.0, 0.0)  # rotation vector (3,) in body axes
+    error = SceneError
+
+    offset_deg: tuple[float, ...] = vector(
+        3, (0.0, 0.0, 0.0), "rotation vector in body axes", -360, 360
+    )
 
     def matrix(self, surroundings: Surroundings) -> Vector:
         z = surroundings.nadir

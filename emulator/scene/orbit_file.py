@@ -16,14 +16,13 @@ boresight = [0.0, -1.0, 0.0]
 right = [1.0, 0.0, 0.0]
 """
 
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from sgp4.api import Satrec
 
-from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.attitude import ANGLES, quaternion_from_pointing
 from cubestack.emulator.scene.earth_sun import Mounting
 from cubestack.emulator.scene.file import SceneError, read_file
 from cubestack.emulator.scene.orbit import (
@@ -92,17 +91,10 @@ def _lines(value: tuple[str, str]) -> Satrec:
 
 _QUATERNION = vector(4, REQUIRED, "ICRS to body, scalar last")
 _POINT = {"at_s": number(REQUIRED, "after the start", 0, 1e9), "quaternion": _QUATERNION}
-_INERTIAL = {
-    "ra_deg": number(None, "of the boresight", -360, 360),
-    "dec_deg": number(None, "of the boresight", -90, 90),
-    "roll_deg": number(0.0, "of the picture", -360, 360),
-    "quaternion": replace(_QUATERNION, default=None),
-    "rate_deg_s": vector(3, (0.0, 0.0, 0.0), "body rate", -100, 100),
-}
 
 
 def _inertial(pose: dict[str, Any]) -> Attitude:
-    ra, dec, roll = (pose.pop(key, None) for key in ("ra_deg", "dec_deg", "roll_deg"))
+    ra, dec, roll = (pose.pop(key, None) for key in ANGLES)
     if ("quaternion" in pose) == (ra is not None) or (ra is None) != (dec is None):
         raise SceneError("attitude needs either quaternion, or ra_deg and dec_deg")
     if ra is not None:
@@ -111,17 +103,9 @@ def _inertial(pose: dict[str, Any]) -> Attitude:
 
 
 _ATTITUDES: dict[str, TableDeclaration] = {
-    "nadir": table(
-        None,
-        "body z to the Earth's centre",
-        {"offset_deg": vector(3, (0.0, 0.0, 0.0), "rotation vector", -360, 360)},
-        lambda values: NadirPointing(**values),
-    ),
+    "nadir": table(None, "body z to the Earth's centre", NadirPointing),
     "inertial": table(
-        None,
-        "at a fixed place of the sky, or turning from there at a constant rate",
-        _INERTIAL,
-        _inertial,
+        None, "a fixed attitude or body rate", {**ANGLES, **Inertial.declared()}, _inertial
     ),
     "waypoints": table(
         None,

@@ -37,7 +37,7 @@ from cubestack.emulator.camera.common.hazards.contract import SensorHazard
 from cubestack.emulator.camera.common.optics import Optics
 from cubestack.emulator.camera.common.view import SkyCondition, SkyView
 from cubestack.emulator.scene.atmosphere import Atmosphere, earth_rate_deg_s, sidereal_deg
-from cubestack.emulator.scene.attitude import quaternion_from_pointing
+from cubestack.emulator.scene.attitude import ANGLES, quaternion_from_pointing
 from cubestack.emulator.scene.file import SceneError, read_scene_file, values_for
 from cubestack.emulator.scene.hazards import SKY_HAZARDS
 from cubestack.emulator.scene.hazards.contract import SkyHazard
@@ -85,13 +85,6 @@ def _with_defaults(keys: Keys, owner: Any) -> Keys:
 #: Keys of the table "optics"; the device gives the sensor's size.
 _OPTICS: Keys = {
     name: one for name, one in Optics.declared().items() if name not in ("columns", "rows")
-}
-ANGLES: Keys = {
-    "ra_deg": number(None, "right ascension of the boresight", -360, 360, role="ra"),
-    "dec_deg": number(None, "declination of the boresight", -90, 90, role="dec"),
-    "roll_deg": number(
-        0.0, "angle of the picture's up direction, east of north", -360, 360, role="roll"
-    ),
 }
 _ATTITUDE: Keys = {
     **ANGLES,
