@@ -38,7 +38,7 @@ help:
 	@echo "make firmware  set up, then build CubeStar's program in C with arm-none-eabi-gcc"
 	@echo "make mutants   set up, then count the wrong gates that the gateware's testbenches notice; takes long"
 	@echo "make docs      set up, then build the documents as a site in out/site"
-	@echo "make lint      ruff and mypy"
+	@echo "make lint      ruff, mypy, and a check of the prose"
 	@echo "make wheels    set up, then build the source distribution and the wheels of all platforms into dist/"
 	@echo "make bench     measure the cost of the hot paths"
 	@echo "make bench-engines  compare the simulators that can run the gateware"
@@ -82,6 +82,7 @@ test-hdl: .venv/ready-dev
 lint: .venv/ready-dev
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
+	@$(BIN)/python -m tests.prose
 	@./typecheck.sh
 
 bench: .venv/ready-run
