@@ -26,7 +26,7 @@ IMAGES = Path(__file__).parent / "images"
 
 
 class Run(NamedTuple):
-    """What a device sees (a scene file) and is told, and how long it is watched after that."""
+    """Scene file and requests of a device, and how long it is recorded after them."""
 
     device: str
     command: str

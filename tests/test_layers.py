@@ -23,7 +23,7 @@ BELOW = {"hdl": TABLES, "firmware_model": (), "emulator": ("hdl", "firmware_mode
 #: Parts of ``host`` that use the other packages; each is loaded only when it is needed.
 USING = ("cli", "emulation", "experiments", "ground", "native", "studies")
 #: Parts that may import the other packages inside of functions only: listing devices, opening a
-#: real device and asking for help load no emulator.
+#: real device and printing help load no emulator.
 LAZY = ("api", "devices", "pytest_plugin", "sensors", "targets")
 
 #: Sub-packages of each package from the ground up; those of one line do not import each other.

@@ -28,7 +28,7 @@ from cubestack.firmware_model.mcu.requests import Pay, ReadTimer, Routine
 
 T = TypeVar("T")
 
-#: With a local threshold so many times MaxStars are kept: half of them may be no stars.
+#: With a local threshold, number of candidates per MaxStars: half of them may be no stars.
 HALF_FALSE = 2
 
 

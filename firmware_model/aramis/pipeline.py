@@ -42,8 +42,8 @@ STEP = 2  #: distance of the background's samples in px
 #: In 1/16 count: the converter's steps hide less, and levels near 0 are cut off there.
 LEAST_NOISE = 19
 
-BLIND = 240  #: level from which on no star can be told from its surroundings
-SPIKE_SIGMAS = 8.0  #: a pixel is far above its surroundings from so many standard deviations on
+BLIND = 240  #: level from which no star differs from its surroundings
+SPIKE_SIGMAS = 8.0  #: lowest excess of a spike over its surroundings, in standard deviations
 
 
 #: Share of hit pixels: one in a window of 25, which distinguishes a spike from a star.
@@ -232,7 +232,7 @@ def detect_locally(
 
 
 def is_hit(stars: StarList, field: CameraField) -> bool:
-    """Whether a picture has so many hits that no star in it is reliable."""
+    """Whether the image has too many particle hits for reliable stars."""
     return stars.light is not None and stars.light.spikes > MOST_HIT * field.pixels
 
 

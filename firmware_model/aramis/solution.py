@@ -43,7 +43,7 @@ class Profile(DeclaredValues):
     )
     identities: Literal["section-5.8", "appendix-e", "either"] = choice(
         "either",
-        "how stars are told apart; either: where the sides are checked, by section 5.8's criteria",
+        "separation of stars; either: where the sides are checked, by section 5.8's criteria",
         ("section-5.8", "appendix-e", "either"),
     )
     verify: bool = flag(

@@ -27,7 +27,7 @@ class FieldOfView:
     """The field of a camera."""
 
     #: (3, 2, 2, 1) coefficients of 1, t, t^2 of the sides' tangents: left and upper, then right and
-    #: lower one; x is told by y, y by x
+    #: lower one; x as a function of y, y of x
     sides: Floats
     #: cosine of the angle between the boresight and the farthest corner
     smallest_cosine: np.float32

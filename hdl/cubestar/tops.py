@@ -15,7 +15,7 @@ from cubestack.hdl.flow.top import Block, Clock, Top, TopTable
 
 _PIXCLK = Clock(PIXCLK, 100, "image sensor at 10 MHz")
 _DCLK = Clock(DCLK, 770.8, "37 cycles (fitted) of the microcontroller's 48 MHz")
-_ENABLE = Clock(ENABLE, 1000, "microcontroller, a few times a second; latches BANK")
+_ENABLE = Clock(ENABLE, 1000, "microcontroller, a few times per second; latches BANK")
 _ALE = Clock(ALE, 83, "bus accesses of four cycles at 48 MHz")
 
 #: Recorded area of the designs: output of ``cubestack hdl area --ice40 --fmax --json``.
@@ -29,7 +29,7 @@ TOPS: TopTable = {
     "cubestar-double": Top(
         CubeStarDouble,
         "CubeStar, two SRAMs in turn",
-        (_PIXCLK, _ALE, Clock(RNW, 1000, "microcontroller, a few times a second; latches INTO")),
+        (_PIXCLK, _ALE, Clock(RNW, 1000, "microcontroller, a few times per second; latches INTO")),
     ),
     "cubestar-boards": Top(
         CubeStarTwoBoards,

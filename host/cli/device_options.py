@@ -75,7 +75,7 @@ def chosen_options(args: argparse.Namespace, device: AnyDevice) -> dict[str, Any
 def show_notices(
     device: AnyDevice, options: Mapping[str, Any], tell: Callable[[str], None]
 ) -> None:
-    """Tell what a user must know of the chosen ``options``."""
+    """Print notices about the chosen ``options``."""
     for option in device.all_options:
         notice = option.notice(options[option.name]) if option.name in options else None
         if notice is not None:
@@ -85,7 +85,7 @@ def show_notices(
 def inject_plan(
     faults: "Faults", path: Path | None, told: Callable[[str], None] | None = None
 ) -> None:
-    """Inject the plan in ``path``, if one is given; ``told`` is told what each fault does.
+    """Inject the plan in ``path``, if one is given; ``told`` receives a line per effect of a fault.
 
     Raises FaultError (a ValueError) for a plan that makes no sense.
     """
@@ -171,7 +171,7 @@ def insight(
 def record(
     args: argparse.Namespace, emulated: AnyEmulated, stack: ExitStack, setup: "Setup | None" = None
 ) -> "Recorder | None":
-    """Start what the options ask for; ``stack`` ends it. Before any port is opened.
+    """Start the requested recording and trace before any port is opened; ``stack`` ends them.
 
     ``setup`` is for the recording's header. Returns what records, if anything. Raises ValueError
     for a file that can not be written.

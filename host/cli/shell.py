@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the commands, or ask for them."""
+    """Run the given commands, or prompt for them."""
     lines = _lines(args)
     target = open_any_target(args.target, args)
     try:
@@ -102,7 +102,7 @@ def _show_text(result: CommandResult) -> None:
 
 
 def _interactive(shell: Shell, show: Callable[[CommandResult], None]) -> int:
-    """Ask for commands until the end of the input; errors are told and change nothing else."""
+    """Prompt for commands until the end of the input, and print errors."""
     say(f"{shell.target.interface.name} at {shell.target.name}; Tab completes, help lists")
     with _line_editor(shell):
         while True:

@@ -163,9 +163,9 @@ class Device(Generic[BoardT_co, ClientT_co]):
         interface: its messages, registers and service port.
         client: makes the device's client from a client of its node.
         open_board: powers a board up: (scene, *, seed, engine), ``switches`` where there are any,
-            and, where they are chosen, baud (bits a second), kernel and i2c_bus (of a board beside
-            it) and what ``options`` names; so each of these needs a default. ValueError for what
-            can not be.
+            and, if given, baud (bits per second), kernel and i2c_bus (of a board beside it) and
+            what ``options`` names; so each of these needs a default. Raises ValueError for
+            invalid values.
         load_scene: reads a scene file; ValueError names the key that is wrong.
         default_scene: what it looks at when nothing is said.
         default_scene_title: that, for the help.

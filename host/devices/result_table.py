@@ -54,7 +54,7 @@ def scatter(lines: Sequence[Columns]) -> dict[str, tuple[float, float, int]]:
     """Trend of each angle by its column: (deg/s, standard deviation in deg, number of lines).
 
     Of the straight line through it, whatever turns it makes, and of what is left; by the time of
-    the pictures where the device tells that. Angles with less than three values are left out.
+    the images if the device reports it. Angles with less than three values are left out.
     """
     found = {}
     for column in dict.fromkeys(name for line in lines for name in line if name.endswith(ANGLE)):

@@ -26,7 +26,7 @@ def cosmos(interface: Interface) -> str:
 def _packet(target: str, message: Message) -> Iterator[str]:
     name, meaning = message.name.upper(), _quoted(message.meaning)
     if message.kind is MessageKind.TELEMETRY:
-        yield f"COMMAND {target} REQUEST_{name} LITTLE_ENDIAN {_quoted(f'Ask for {message.name}')}"
+        yield f"COMMAND {target} REQUEST_{name} LITTLE_ENDIAN {_quoted(f'Request {message.name}')}"
         yield _id(message)
         yield f"TELEMETRY {target} {name} LITTLE_ENDIAN {meaning}"
         for field in message.fields:

@@ -9,8 +9,8 @@ from cubestack.firmware_model.interface.codec.message import Interface, Message,
 _HEAD = '''\
 """{name}, interface version {version}: its messages as dataclasses. Generated; needs Python 3.11.
 
-A telecommand goes out by ``frame()``, a telemetry frame is asked for by ``request()`` and
-comes back as data for ``decode()``. Values are in their units, rounded to the nearest count.
+A telecommand goes out by ``frame()``, ``request()`` requests a telemetry frame, and
+``decode()`` decodes its data. Values are in their units, rounded to the nearest count.
 """
 
 import dataclasses
@@ -99,7 +99,7 @@ class Telemetry(Message):
 
     @classmethod
     def request(cls) -> bytes:
-        """What asks for it on the serial line."""
+        """The bytes that request it on the serial line."""
         return frame(bytes([cls.MESSAGE_ID]))
 '''
 

@@ -61,7 +61,7 @@ local function show(message, data, tree)
     end
 end
 
--- Number of a packet to what it asks for, and to what an answer in it is one to.
+-- By packet number: the requested message, and the request of an answer.
 local asked, answers
 
 function proto.init()

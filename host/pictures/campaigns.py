@@ -70,7 +70,7 @@ def error_curves(
 
     Args:
         name: of the error, with its unit behind the last underscore.
-        errors: sizes, rising, by what the point is told as.
+        errors: rising sizes by the name of the point.
         marks: published values, with what they are.
     """
     drawn = figure(6, 3.4)

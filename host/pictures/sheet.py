@@ -103,7 +103,7 @@ class Sheet:
     def mark(
         self, shape: Shape, place_px: Pixels, colour: Colour, size: float = 0.6, name: str = ""
     ) -> None:
-        """Draw a mark of radius ``size``, in heights of the text, and ask for its label."""
+        """Draw a mark of radius ``size``, in heights of the text, and request its label."""
         at, radius = self._at(place_px), size * self.em
         if not self._within(at):
             return
@@ -125,7 +125,7 @@ class Sheet:
         self._draw.line([*at, at[0]], fill=colour, width=self._line)
 
     def save(self, path: Path, title: str, told: str, legend: Sequence[Entry]) -> None:
-        """Write it as a PNG with labels, and below ``title``, what is ``told``, and a legend."""
+        """Write it as a PNG with labels, with ``title``, the text ``told``, and a legend below."""
         self.finished(title, told, legend).save(path)
 
     def finished(self, title: str, told: str, legend: Sequence[Entry]) -> Image.Image:

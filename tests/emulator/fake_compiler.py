@@ -1,4 +1,4 @@
-"""A compiler that does as it is told, for tests of what calls one."""
+"""A fake compiler with configurable results."""
 
 from pathlib import Path
 

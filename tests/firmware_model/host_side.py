@@ -91,7 +91,7 @@ class HostSide:
         return dict(message.unpack(answer))
 
     def run(self) -> None:
-        """Let the program do what it was told."""
+        """Let the program execute its requests."""
 
     # --- I2C --------------------------------------------------------------------------------------
 

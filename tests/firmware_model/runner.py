@@ -1,7 +1,7 @@
 """Runs firmware programs without an emulator: performs their requests in virtual time.
 
 A request is performed as a whole; only a sleep can be left half-way, so that a test can do
-something at any time of it. What hangs on the pins is a subclass' to fake: set_pin, get_pin,
+something at any time of it. A subclass simulates the devices on the pins: set_pin, get_pin,
 await_pin, strobe, access and transfer, as far as its programs use them.
 """
 

@@ -11,14 +11,14 @@ from cubestack.firmware_model.mcu.costs import Meter
 from .operations import as_on_record
 
 NOT_COMPARED = {"Identification", "ExtendedIdentification", "SerialNumber"}
-"""Telemetry that tells a version, which is told elsewhere."""
+"""Telemetry with a version, which other tests check."""
 
 Step = tuple[str, dict[str, Any]]
 
 
 def as_recorded(unit: Any, name: str, steps: Iterable[Step]) -> None:
     """Send each telecommand of ``steps``, with values other than those after a reset, and let the
-    program of the harness ``unit`` execute or refuse it; then ask for all telemetry."""
+    program of the harness ``unit`` execute or refuse it; then request all telemetry."""
     as_on_record(f"{name}: before", unit.meter, [unit.now_us])
     for number, (command, values) in enumerate(steps):
         before, began_us = unit.meter.counts.copy(), unit.now_us

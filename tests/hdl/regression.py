@@ -43,7 +43,7 @@ if SIMULATOR not in ("icarus", "verilator"):
 BASE_SEED = int(os.environ.get("HDL_SEED", "0"))
 FULL = os.environ.get("HDL_TIER") == "full"
 
-#: What the compilers are told. tests/hdl/test_verilog_file.py has Verilator's opinion of the text.
+#: Arguments of the compilers. tests/hdl/test_verilog_file.py has Verilator's opinion of the text.
 ARGUMENTS = {
     "icarus": ["-Wall", "-Wno-timescale"],
     "verilator": ["-Wno-fatal", "-Wno-lint", "-CFLAGS", "-std=c++20"],
@@ -262,7 +262,7 @@ def simulate(
 ) -> Outcome:
     """Run cocotb ``modules`` on what :func:`build` made; the same seed gives the same run.
 
-    Stops after so many ``failures`` unless that is 0; runs but one test with ``only``. Writes all
+    Stops after ``failures`` failures unless that is 0; runs but one test with ``only``. Writes all
     signals to the VCD file ``waveform`` when the design was built as traced.
     """
     folder.mkdir(parents=True, exist_ok=True)

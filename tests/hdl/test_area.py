@@ -115,7 +115,7 @@ def test_no_top_grows_unnoticed_on_ice40(name, design, file):
         flow_checks.area_is_as_recorded(name, design, file, ice40=True)
 
 
-def test_growth_is_told_in_words():
+def test_reports_growth_in_words():
     file = cubestar.AREA_FILE
     before = recorded_areas(file)["cubestar"]
     most, lut4 = int(before["tiles"] * 1.05), before["ice40"]["lut4"]

@@ -64,7 +64,7 @@ def test_tier_passes_and_stops_at_the_first_failure(verilog: Path, tmp_path: Pat
     assert outcome.error
 
 
-def test_what_does_not_compile_is_told(tmp_path: Path) -> None:
+def test_reports_compile_errors(tmp_path: Path) -> None:
     (tmp_path / "dut.v").write_text("module dut(", encoding="utf-8")
     outcome = run_tier("cubestar", tmp_path / "dut.v", tmp_path / "tier")
     assert outcome.problem == "does not compile"

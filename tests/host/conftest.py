@@ -68,7 +68,7 @@ class FakeNode:
         return AckError.OK
 
     def execute(self, name: str, values: dict[str, Any]) -> None:
-        """Do what an accepted telecommand asks for."""
+        """Execute an accepted telecommand."""
 
     def telemetry(self, name: str) -> dict[str, Any]:
         """The fields of a telemetry frame that differ from their reset value."""

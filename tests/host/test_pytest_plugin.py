@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 @pytest.fixture
 def run(tmp_path: Path) -> Run:
     """Runs pytest on the text of a test file."""
-    # An installation that is older than the entry point has to be told.
+    # An installation older than the entry point needs the plugin by name.
     installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
 
     def run(text: str, *options: str) -> "subprocess.CompletedProcess[str]":

@@ -18,8 +18,7 @@ from tests.mutation.plugin import COLLECTED, DURATIONS, KNOWN, PLUGIN, without_g
 FOLDER = Path("out/mutation")
 DATA, TIMES, SETTINGS = "coverage.data", "durations.json", "coverage.ini"
 BUDGET_S, MOST_TESTS = 25.0, 250
-"""What a mutant has to face: so many seconds of tests at most, and so many tests; those of
-`DOCUMENTS` besides."""
+"""Limits of the tests per mutant: seconds, and their number, without those of `DOCUMENTS`."""
 
 SITE = """
 import os

@@ -37,7 +37,7 @@ STEPPING = (
 START_S = 0.05
 """Until a program listens after power-up."""
 
-#: What tells when a picture was taken, and not what is on it.
+#: Fields with the time of an image, not its content.
 OF_TIME = {"FrameCounter", "ImageTime"}
 
 Telemetry = list[tuple[str, dict[str, Any]]]

@@ -89,7 +89,7 @@ def test_driver_suite_passes(tmp_path: Path) -> None:
     suite = tmp_path / "test_my_driver.py"
     shutil.copy(HERE / suite.name, suite)
     report = tmp_path / "report.xml"
-    # An installation that is older than the entry point has to be told.
+    # An installation older than the entry point needs the plugin by name.
     installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
     plugin = [] if installed else ["-p", PLUGIN]
     command = (sys.executable, "-m", "pytest", *plugin, "-q", f"--junitxml={report}", suite)

@@ -102,7 +102,7 @@ def test_every_published_value_is_decoded(outsider: Path, name: str) -> None:
     scene = () if name == "cubestar" else (QUIET,)
     with open_device(name, *scene, seed=4, profile="extended") as device:
         measure(device)
-        for _ in range(1 if scene else 2):  # the first asks for 138, which raises a flag
+        for _ in range(1 if scene else 2):  # the first requests 138, which raises a flag
             done = device.run(outsider, "{port}", name)
         assert (done.returncode, done.stderr) == (0, "")
         interface, node = device.device.interface, device.client.client

@@ -31,7 +31,7 @@ ALL = (*ADDRESSES.values(), GROUP_ADDRESS)
 
 @asynccontextmanager
 async def registers(dut: Any) -> AsyncIterator[I2cBench]:
-    """A bench whose cameras rest, once they have given both halves a Sun to tell of."""
+    """A bench with idle cameras, after both halves have received an image of the Sun."""
     bench = await I2cBench.start(dut, speed=FAST)
     for side in SIDES:
         content = bytearray(picture())

@@ -31,7 +31,7 @@ async def read_at(bench: I2cBench, side: str, x: int, y: int, count: int, down: 
 
 @contextmanager
 def takes(bench: I2cBench, periods: Fraction, what: str) -> Iterator[None]:
-    """So many SCL periods, and the bus free between transfers."""
+    """Checks a duration in SCL periods, with the bus free between transfers."""
     before, bench.mcu.free_ps = now(), 0
     yield
     taken = now() - before - bench.mcu.free_ps

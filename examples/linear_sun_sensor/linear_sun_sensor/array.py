@@ -28,7 +28,7 @@ DARK_DN, NOISE_DN = 6.0, 0.8
 
 
 class LinearArray:
-    """A ``PixelSource`` whose row comes when the FPGA asks for it.
+    """A ``PixelSource`` that sends a row when the FPGA requests it.
 
     Attributes:
         powered: whether it has its supply.

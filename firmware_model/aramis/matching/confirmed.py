@@ -38,7 +38,7 @@ LENS_PX = 0.1
 
 FLOOR_PX = 0.01  #: error of a star's place beside its centroid's: catalogue (assumed)
 
-#: How much residuals count beyond so many declared variances, which chance seldom gives: chosen so
+#: Weight of residuals beyond ``BEYOND`` declared variances, which are rare by chance: chosen so
 #: that the claimed sigmas hold with lens residuals, which move neighbouring stars alike.
 EXCESS, BEYOND = 4.0, 2.0
 

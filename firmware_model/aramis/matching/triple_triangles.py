@@ -44,8 +44,8 @@ STRETCH = 0.035  #: largest change of the focal length
 MOST_STRETCHED_TRIPLES = 80  #: tried with other ones
 MOST_STRETCHED = 120_000  #: as `MOST_LISTED`, where the focal length may be another
 
-#: Of the triangles within the bounds of area and moment, at most so many agree in their sides by
-#: chance: 0.0006 to 0.004 at errors of 0.05 to 1 px (measured with mirrored stars).
+#: Of the triangles within the bounds of area and moment, the largest share that agrees in the sides
+#: by chance: 0.0006 to 0.004 at errors of 0.05 to 1 px (measured with mirrored stars).
 WRONG_SHARE = 0.005
 
 SMALLEST_AREA = 2e-4  #: of chords: flatter triples leave the sense of rotation and the turn open

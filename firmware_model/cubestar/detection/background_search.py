@@ -164,7 +164,7 @@ def _areas(
         (y, charges.TEST, 1),
         (y[~sharp], charges.PIXEL, 1),
         (left.begins // width, charges.RUN, 1),
-        (y[~sharp], charges.AREA, 1 / FEWEST_PIXELS),  # so many areas at most
+        (y[~sharp], charges.AREA, 1 / FEWEST_PIXELS),  # upper bound of the areas
     )
     done = charges.rows_in_time(rows_of, height, limit - meter.total, meter)
     left, in_time = left[left.begins < done * width], y < done

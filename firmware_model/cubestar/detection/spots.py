@@ -31,8 +31,8 @@ ROUNDS = 4
 #: in one of 0.45 px, and more in what particles and hot pixels leave; chosen.
 SHARPEST = 0.6
 
-#: So many of the brightest round spots tell the usual width, and share of them that have at most
-#: it: chosen.
+#: Number of brightest round spots that define the usual width, and share of them that have at
+#: most this width: chosen.
 MOST_WIDTHS, USUAL_SHARE = 24, 0.6
 
 #: Share of a spot that may stand out above the Gaussian of its own width where it tells the usual

@@ -18,7 +18,7 @@ from cubestack.firmware_model.cubestar.processing.identify import Results
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker.quality import Rating
 
-CENTROID_ERROR_PX = 0.2  #: of a search that does not tell what errors to expect
+CENTROID_ERROR_PX = 0.2  #: of a search without error estimates
 
 #: Difference of the focal length from the one that is set, from which on the identification's
 #: estimate of it counts; below, it is left to the fit.

@@ -47,7 +47,7 @@ def _field(opened: CubeStarOpener, frames: int, **how: Any) -> Figures:
 
 
 def _slew(opened: CubeStarOpener, frames: int, rate_deg_s: float) -> Figures:
-    """Rates in percent of pictures a second apart, and the median error in degrees."""
+    """Rates in percent of images 1 s apart, and the median error in degrees."""
     shots = list(slewing_shots(opened, frames, rate_deg_s))
     cross = [shot.cross_deg for shot in shots if shot.right]
     return {
@@ -140,7 +140,7 @@ def _centroids(opened: CubeStarOpener, frames: int) -> Figures:
 
 
 def _loop(opened: CubeStarOpener, frames: int) -> Figures:
-    """Phases of the 1 Hz loop's last turn in ms; over so many its power in mW, and ages in ms."""
+    """Phases of the 1 Hz loop's last turn in ms, its power in mW over ``frames``, ages in ms."""
     with opened(None, seed=0) as device:
         device.client.client.command("Trigger")
         begun, *found = attitudes_of_loop(device.board, frames)
@@ -192,7 +192,7 @@ def _power(_opened: CubeStarOpener, _frames: int) -> Figures:
 
 
 def _rates(opened: CubeStarOpener, _frames: int) -> Figures:
-    """Frames a second for each setting of the register, of captures one frame apart; exposures."""
+    """Frames per second and exposure for each setting of the register, from successive captures."""
     figures = {}
     with opened(None, seed=0) as device:
         for register in REGISTERS:

@@ -51,5 +51,5 @@ class Rig:
     #: of its FPGAs, for the names of their registers; the same object for the same ones
     wiring: Callable[[], Wiring]
     phases: tuple[str, ...]  #: of a loop, those that there always are
-    memories: tuple[str, ...]  #: of the board, by name, that are hit unless others are asked for
+    memories: tuple[str, ...]  #: of the board, by name, that are hit by default
     board: Mapping[str, Any] = field(default_factory=dict)  #: keywords that choose it

@@ -75,7 +75,7 @@ def _report(found: list[Speed], missing: dict[str, str]) -> dict[str, object]:
 
 def _table(found: list[Speed], engines: list[str]) -> Table:
     table = Table(
-        title="pixel clocks a second, none skipped; x: compiled makes so many times as many",
+        title="pixel clocks per second, none skipped; x: speed of compiled relative to it",
         box=SIMPLE,
         padding=0,
     )

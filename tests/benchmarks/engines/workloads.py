@@ -1,6 +1,6 @@
 """What every engine is measured with: each top stores a frame, its pins driven the same way.
 
-A sample is the blanking before the frame and so many of its first lines; it counts only when the
+A sample is the blanking before the frame and its first lines; it counts only when the
 memories then hold these lines.
 """
 

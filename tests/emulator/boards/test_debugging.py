@@ -1,4 +1,4 @@
-"""What a debugger is told of the part's memories, and of what is beside them."""
+"""The part's memory map in the debugger."""
 
 import itertools
 from types import SimpleNamespace

@@ -72,7 +72,7 @@ class Bus:
         self.wire = CameraWire(self.camera, SDA)
 
     def say(self, kind: OutgoingKind, value: int = 0, unit: int = SDA << 8 | 1) -> Any:
-        """What the machine is told of it; nothing for nothing."""
+        """The inputs that the machine receives."""
         del self.machine.given[:]
         self.wire.handle(self.machine, Outgoing(kind, unit, value, 0, 5))
         assert len(self.machine.given) <= 1

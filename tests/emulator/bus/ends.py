@@ -1,4 +1,4 @@
-"""What hangs on a bus in tests: a UART on record, a target that writes down its calls."""
+"""Bus members for tests: a recorded UART, a target that records its calls."""
 
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.sim.virtual_time import Kernel

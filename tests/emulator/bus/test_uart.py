@@ -53,7 +53,7 @@ def test_device_sends_while_it_receives(desk):
     assert bytes(byte for _, byte in desk.delivered) == b"xxyy"
 
 
-def test_every_pause_is_told_once(desk):
+def test_reports_every_pause_once(desk):
     for _ in range(3):
         desk.uart.host_writes(b"a")
         desk.kernel.advance_to(desk.kernel.now + 20 * BYTE)

@@ -164,7 +164,7 @@ def test_a_plan_brings_its_seed(desk: Desk) -> None:
     assert desk.deaf
 
 
-def test_what_there_is_to_hit(desk: Desk) -> None:
+def test_lists_fault_targets(desk: Desk) -> None:
     kinds = desk.faults.kinds()
     assert kinds["uart-drop"] == ("uart",)
     assert kinds["latch-up"] == ("memory", "imager")

@@ -90,7 +90,7 @@ class Engine:
         return 4
 
 
-def test_a_lost_acknowledge_is_told_once_however_often_it_is_looked_at():
+def test_reports_lost_acknowledge_once():
     told = []
 
     def report(_time_ps, injection, text):

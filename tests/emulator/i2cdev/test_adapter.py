@@ -18,7 +18,7 @@ BIT_PS = 2_500_000
 AGAIN = -errno.EAGAIN
 
 
-def test_ends_are_told_in_virtual_time(kernel, adapter):
+def test_reports_ends_in_virtual_time(kernel, adapter):
     told: list[tuple[int, int]] = []
     for _ in range(2):
         adapter.submit([I2cMessage(0x1A, read=1)], lambda result: told.append((result, kernel.now)))

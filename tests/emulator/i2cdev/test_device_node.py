@@ -76,7 +76,7 @@ class _Statx(ctypes.Structure):
     )
 
 
-def test_statx_tells_of_a_device_what_the_kernel_tells_of_one() -> None:
+def test_statx_equals_that_of_a_real_device() -> None:
     real, made = _Statx(), _Statx.from_buffer_copy(NODE.statx())
     basic = 0x7FF
     assert ctypes.CDLL(None).statx(-100, b"/dev/null", 0, basic, ctypes.byref(real)) == 0

@@ -11,7 +11,7 @@ LIBRARY = b"\x7fELF and so on" * 1000
 
 
 def build(_compiler: Compiler, _scratch: Path, _log: Path) -> Path:
-    raise AssertionError("nothing has to be built")
+    raise AssertionError("nothing must be built")
 
 
 RECIPE = cache.recipe("a design", "design", [], build)

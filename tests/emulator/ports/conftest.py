@@ -50,7 +50,7 @@ class Device:
             self.uart.send(bytes([byte]) * self.answers)
 
     def advance(self, byte_times: int) -> int:
-        """Let so many byte times pass, with all that happens at the last instant; the time then."""
+        """Advance by byte times, the events of the last instant included; returns the time."""
         self.kernel.advance_to(self.kernel.now + byte_times * self.uart.byte_ps)
         while self.kernel.horizon() == self.kernel.now:
             self.kernel.step()
@@ -62,7 +62,7 @@ class Device:
         port.exchange(self.advance(len(data)))
 
     def hears(self, port: Endpoint, count: int) -> bytes:
-        """Serve until so many bytes have come."""
+        """Serve until ``count`` bytes have arrived."""
         self.wait_for(
             lambda: len(self.received) >= count,
             doing=lambda: (wait_ready(port.watched(), 0.01), port.exchange(self.advance(100))),

@@ -63,7 +63,7 @@ def test_an_act_is_done_in_the_emulation_s_thread(running: Running) -> None:
     assert running.ask(threading.get_ident) == running.thread.ident
 
 
-def test_what_goes_wrong_is_told_to_who_asked(running: Running) -> None:
+def test_call_raises_its_error_in_the_caller(running: Running) -> None:
     with pytest.raises(ZeroDivisionError):
         running.ask(lambda: 1 // 0)
     assert running.ask(lambda: 7) == 7
@@ -165,7 +165,7 @@ def test_speeds_have_limits(running: Running, speed: float) -> None:
         running.ask(lambda: running.port.set_pace("real", speed))
 
 
-def test_who_holds_it_besides_is_told(running: Running) -> None:
+def test_reports_other_holders(running: Running) -> None:
     running.ask(lambda: running.kernel.hold("debugger"))
     with pytest.raises(ValueError, match="held by the debugger"):
         running.ask(running.port.step)
@@ -173,7 +173,7 @@ def test_who_holds_it_besides_is_told(running: Running) -> None:
     assert running.ask(lambda: running.port.held)
 
 
-def test_after_the_end_who_asks_is_told() -> None:
+def test_call_after_the_end_raises() -> None:
     running = Running()
     waiting = running.port.call(lambda: 1)  # nobody serves
     running.port.close()

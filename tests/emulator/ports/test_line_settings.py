@@ -63,7 +63,7 @@ strict = pytest.mark.parametrize("desk", [True], indirect=True)
 
 
 @pytest.mark.parametrize("form", WRONG)
-def test_a_wrong_format_is_told_once_for_each_client(desk, form):
+def test_reports_wrong_format_once_per_client(desk, form):
     for count in (1, 2):
         with desk.client(**WRONG[form]) as client:
             assert len(desk.told) == count - 1  # nothing was said so far

@@ -36,7 +36,7 @@ def test_a_speed_holds_from_its_change_on(speed: float) -> None:
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0, 0.5, 3.7])
-def test_both_directions_agree_and_no_time_is_told_too_early(speed: float) -> None:
+def test_conversions_agree_and_never_round_early(speed: float) -> None:
     desk = Desk()
     desk.kernel.run(until=12_345)
     desk.pace.change("real", speed)

@@ -148,7 +148,7 @@ def test_what_a_client_writes_comes_at_the_time_of_its_writing(bench):
     assert bench.port.exchanges[4] / PS_PER_MS == pytest.approx(before + 11, abs=0.5)
 
 
-def test_lag_is_told(bench):
+def test_reports_lag(bench):
     """A device that costs twice the time it simulates: after 10 s, 5 s are missing."""
     bench.tick(PS_PER_MS, cost_ns=2 * NS_PER_MS)
     bench.run("real", 10_100)

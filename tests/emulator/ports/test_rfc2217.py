@@ -110,7 +110,7 @@ def test_impossible_rate_leaves_the_old_one(port, device, connect, baud):
     assert received_until(client, answer)
 
 
-def test_line_errors_are_told_to_who_asks(port, device, connect):
+def test_reports_line_errors_on_request(port, device, connect):
     client = connect()
     serve(port, device, client, option(telnet.SET_LINESTATE_MASK, b"\x0c"))
     serve(port, device, client, option(telnet.SET_PARITY, b"\3"))

@@ -54,7 +54,7 @@ def test_without_a_compiler_only_auto_goes_on_and_says_so(engines: dict[str, Any
     assert make("python")[0] == "python"
 
 
-def test_a_compiler_that_fails_is_told(engines: dict[str, Any]) -> None:
+def test_reports_failed_compiler(engines: dict[str, Any]) -> None:
     engines["fails"] = CompilerError("broken")
     with pytest.raises(CompilerError, match="broken"):
         make("auto")

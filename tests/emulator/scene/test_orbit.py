@@ -274,7 +274,7 @@ def test_only_what_is_near_disturbs_the_sky() -> None:
     assert not replace(own, hazards=False).sky(0.0, SkyScene([0, 0, 0, 1]), "camera").hazards
 
 
-def test_elements_that_hold_no_more_are_told() -> None:
+def test_reports_decayed_elements() -> None:
     lines = (
         "1 28350U 04020A   06167.21788666  .16154492  76267-5  18678-3 0  8894",
         "2 28350  64.9977 345.6130 0024870 260.7578  99.9590 16.47856722116490",

@@ -245,13 +245,13 @@ def test_program_that_returns(desk_of):
 # --- sleep -------------------------------------------------------------------------------------
 
 
-def test_wake_at_the_deadline_is_told_once(desk_of):
+def test_reports_wake_at_the_deadline_once(desk_of):
     desk = desk_of(script(sleep(500), sleep(900)))
     desk.at(500, desk.processor.wake)
     assert sorted(answer for _, answer in desk.run().log) == [False, True]
 
 
-def test_activity_is_told(desk_of):
+def test_reports_activity(desk_of):
     desk = desk_of(script(sleep(500), sleep(900))).run()
     assert desk.activity == [
         (-BOOT_US, True), (0, False), (500, True), (500, False), (900, True), (900, False)

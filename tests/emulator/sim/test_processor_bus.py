@@ -109,7 +109,7 @@ def test_an_interrupt_reads_while_the_program_waits_for_the_fpga() -> None:
     assert loaded == {bytes([129, 130, 131])}
 
 
-def test_use_of_the_bus_is_told_once() -> None:
+def test_reports_bus_use_once() -> None:
     request, _ = read(4)
     desk = desk_with(request, request, request, Pay(), request).run(1000)
     assert desk.accessing == [True, False, True, False]

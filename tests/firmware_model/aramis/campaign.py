@@ -33,7 +33,7 @@ def rates(
     stars_per_field: int = 6,
     seed: int = 0,
 ) -> dict[str, float]:
-    """Parts of so many poses: right, wrong, ambiguous, none; `far` are wrong in the thesis' sense.
+    """Shares of the poses: right, wrong, ambiguous, none; `far` are wrong in the thesis' sense.
 
     `misnamed` counts stars a pose, `ms` is the mean time on the processor.
     """

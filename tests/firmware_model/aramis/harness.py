@@ -19,7 +19,7 @@ class Harness(Runner, HostSide):
 
     Attributes:
         registers: of the camera; None while it does not answer.
-        captures: where frames were asked for.
+        captures: addresses of requested frames.
         stopped: how often one was given up.
     """
 

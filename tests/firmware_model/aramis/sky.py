@@ -45,7 +45,7 @@ class Light:
         mag_limit: fainter stars do not show.
         false_stars: lights that are no stars, anywhere in the field.
         false_mags: their magnitudes.
-        most: so many of the brightest are in the list.
+        most: number of brightest stars in the list.
     """
 
     noise_px: float = 0.1

@@ -128,7 +128,7 @@ def test_a_frame_that_is_not_as_programmed(desk: Desk, end: FrameEnd) -> None:
     assert desk.camera.latest is None
 
 
-def test_a_frame_that_was_asked_for_before_is_waited_for(desk: Desk) -> None:
+def test_waits_for_frame_requested_before(desk: Desk) -> None:
     desk.start()
     desk.camera.expose()
     desk.camera.frame_ended(FrameEnd.STORED)

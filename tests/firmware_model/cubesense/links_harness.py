@@ -87,7 +87,7 @@ class Links(Runner, HostSide):
         self.woken += 1
 
     def adc_counts(self, monitor: pins.Monitor) -> int:
-        raise AssertionError("asked for through the supply")
+        raise AssertionError("must be requested through the supply")
 
     # --- supply, cameras, acquisition, measurement ------------------------------------------------
 
@@ -139,7 +139,7 @@ class Links(Runner, HostSide):
     # --- main loop --------------------------------------------------------------------------------
 
     def run(self, jobs: int | None = None) -> int | None:
-        """Execute what waits, or so many jobs of it; the cause of a reset, if one was asked for."""
+        """Execute all waiting jobs, or ``jobs`` of them; returns the cause of a requested reset."""
         while self.queue and jobs != 0:
             jobs = None if jobs is None else jobs - 1
             cause = self.perform(self.commands.execute(self.queue.pop()))

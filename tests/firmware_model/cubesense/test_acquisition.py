@@ -141,7 +141,7 @@ def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
 
 
 def latch_after(unit: Harness, sram: Sram, strobed: int) -> None:
-    """Let ``sram`` latch up once so many bytes were read."""
+    """Let ``sram`` latch up after ``strobed`` bytes were read."""
     seen = 0
 
     def count(request: Request) -> None:

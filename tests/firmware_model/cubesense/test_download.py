@@ -154,7 +154,7 @@ def test_the_square_is_padded_and_thinned(size: codes.ImageSize) -> None:
     np.testing.assert_array_equal(thumbnail(picture, size), canvas[::step, ::step])
 
 
-def test_what_does_not_exist_is_told() -> None:
+def test_rejects_missing_frames() -> None:
     for frame in (-1, 32):
         with pytest.raises(ValueError, match=f"SIDE_64 has frames 0 to 31, not {frame}"):
             frame_pixels(codes.ImageSize.SIDE_64, frame)

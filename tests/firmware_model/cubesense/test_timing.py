@@ -19,7 +19,7 @@ IMAGING_S = 0.048
 
 
 def bright(pixels: int) -> NDArray[np.uint8]:
-    """A window with so many Sun pixels, in no shape."""
+    """A window with this number of Sun pixels."""
     data = np.zeros(window_bytes(), np.uint8)
     data[:4] = (100, 1, 100, 0)
     data[4 : 4 + pixels] = 255
@@ -55,7 +55,7 @@ def published_nadir(meter: Meter) -> NadirConfig:
     return NadirConfig(byte_table(meter), Projection.EQUIDISTANT, checked=False)
 
 
-def test_the_sun_time_hangs_on_the_number_of_its_pixels(published_sun: SunConfig) -> None:
+def test_sun_time_depends_on_the_number_of_its_pixels(published_sun: SunConfig) -> None:
     times = [
         IMAGING_S + sun_seconds(PIC18F45K20, bright(pixels), published_sun)
         for pixels in (43, 69, 109)

@@ -77,7 +77,7 @@ def test_every_step_can_fail(unit: Harness, change: bool, step: int) -> None:
         unit.command("CaptureImage")
         assert len(written(unit)) == step + 8 + 2  # all of it again
         return
-    # Half of it may be written: the old setting has to be written too when it comes back.
+    # Half of it may be written: the old setting must be written too on recovery.
     unit.command("SetFrameRate", FrameRate=7)
     unit.command("CaptureImage")
     assert unit.camera_value("FRAMES_PER_SECOND") == 7

@@ -1,4 +1,4 @@
-"""How a recorded device was made: what is written is read, and what makes no sense is told."""
+"""The set-up of a recorded device: round trip, and errors."""
 
 import io
 

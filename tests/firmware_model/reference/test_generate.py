@@ -1,4 +1,4 @@
-"""The files of the reference firmware's build, as its Makefile asks for them."""
+"""The files that the reference firmware's Makefile generates."""
 
 import runpy
 import sys

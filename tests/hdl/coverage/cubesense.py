@@ -101,7 +101,7 @@ def _sending(window: Window, camera: Sequence[Clock]) -> str:
 
 
 def _reading(side: str, action: Action, count: int) -> str:
-    """How far so many data clocks come."""
+    """How far ``count`` data clocks read."""
     if action is Action.PASS_EDGE:
         return "passing"
     if action is Action.TAKE_ADDRESS:

@@ -88,7 +88,7 @@ def states_of(side: str, action: Action) -> tuple[str, ...]:
 class Group:
     """Points of one kind; ``meaning`` is what a point is.
 
-    ``axes`` are the names of its parts, and what each can be; ``possible`` tells whether a
+    ``axes`` are the names of its parts, and what each can be; ``possible`` returns whether a
     combination, given by these names, can happen at all.
     """
 

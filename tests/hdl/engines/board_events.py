@@ -32,7 +32,7 @@ COLUMNS, ROWS = 18, 5
 #: One more than the memories on the bus have.
 ADDRESS_BITS = 10
 
-#: Wait so many ps, then drive a pin.
+#: Wait in ps, then the pin to drive and its level.
 Step = tuple[int, str, int]
 Rng = np.random.Generator
 Script = Callable[[Rng], Iterator[Step]]
@@ -42,7 +42,7 @@ Script = Callable[[Rng], Iterator[Step]]
 class Board:
     """A small top with what its surroundings do."""
 
-    wiring: Callable[[bool], Wiring]  # of the top, one column less wide when asked for
+    wiring: Callable[[bool], Wiring]  # of the top, on request one column narrower
     columns: int
     rows: int
     gap: int  # clocks between two frames at least

@@ -1,4 +1,4 @@
-"""A cocotb test that fails, and one whose background task does: both have to be noticed."""
+"""A cocotb test that fails, and one whose background task does: both must be noticed."""
 
 from typing import Any
 

@@ -50,7 +50,7 @@ async def _stands_still(name: str, signal: Any) -> None:
 async def disturb_in_standby(
     dut: Any, outputs: Iterable[str], inputs: Sequence[str], moments: Sequence[int], times: int
 ) -> None:
-    """Random levels on the ``inputs``, so many times: no output may move, not even for a glitch.
+    """Drive random levels on the ``inputs`` repeatedly: no output may move, not even for a glitch.
 
     Each comes at most one of the ``moments`` (ps) after the one before.
     """

@@ -1,4 +1,4 @@
-"""Simulates mutants, proves what can not be told apart, and keeps the results in a file.
+"""Simulates mutants, proves equivalent ones, and keeps the results in a file.
 
 A mutant is killed when a simulation fails, also by hanging; equivalent when a proof says so; else
 it survived. The file has one JSON object a line. What it has of killed and equivalent mutants of
@@ -18,7 +18,7 @@ from tests.hdl.mutants.netlist import Mutant, Netlist, mutants, netlist, selecta
 from tests.hdl.mutants.suites import Stage, Suite
 from tests.hdl.regression import Outcome, build, simulate
 
-#: A simulation hangs after so many times its duration without a mutant, and at least so many s.
+#: A simulation hangs after this multiple of its duration without a mutant, and at least 120 s.
 PATIENCE, SHORTEST = 20, 120
 
 #: Mutants in one compiled file.

@@ -41,7 +41,7 @@ def test_csv_and_parquet_tables_are_equal(chromium: Any, tmp_path: Path) -> None
     with station("emulated:cubestar", "--seed", "5") as address, shown(chromium, address) as page:
         line(page, "write setDetectionThresholds 33 34")
         line(page, "write CaptureAndProcess")
-        page.locator("#attitude-status").filter(has_text="answer").wait_for()
+        page.locator("#attitude-status").filter(has_text="measured").wait_for()
         page.uncheck("#results-on")
         for name, buttons in (
             ("results", ("#save", "#save-parquet")),

@@ -60,7 +60,7 @@ def fill(page: Any, message: Message, values: Any) -> None:
 
 
 def sent(page: Any, message: Message, values: Any) -> str:
-    """What the page tells of a telecommand that was sent by its form."""
+    """Send a telecommand by its form; returns its entry in the log."""
     page.select_option("#command", message.name)
     fill(page, message, values)
     before = page.locator(ENDED).count()
@@ -88,7 +88,7 @@ def test_every_telecommand_is_sent_from_its_form(opened: Opened) -> None:
             pytest.fail(told)
     if STREAMS in offered:
         told = sent(page, interface.telecommand(STREAMS), {})
-        assert "has 128 bytes" in told  # of a picture, which comes without being asked for
+        assert "has 128 bytes" in told  # of an image, which comes without a request
         page.wait_for_function(
             "() => document.querySelector('#state').textContent.startsWith('waiting for the host')"
         )

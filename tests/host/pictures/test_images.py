@@ -27,7 +27,7 @@ def marked(sheet: object, colour: tuple[int, int, int]) -> NDArray[np.bool_]:
 
 
 def told_of(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> tuple[str, list[str]]:
-    """What is told below a picture, and the texts of its legend."""
+    """The text below an image, and the texts of its legend."""
     seen: list[tuple[str, list[str]]] = []
     whole = Sheet.finished
 

@@ -168,7 +168,7 @@ def test_a_lens_of_nearly_the_usual_field_has_the_usual_catalogue(
     assert asked == [CatalogueParameters(fov_deg=made_for_deg)]
 
 
-def test_progress_is_told() -> None:
+def test_reports_progress() -> None:
     seen: dict[str, int] = {}
 
     def watch(items: Iterable[int], total: int, label: str) -> list[int]:

@@ -179,7 +179,7 @@ def test_power_follows_what_runs(desk: Desk) -> None:
     assert desk.board.power.charge_mas() / desk.now_s > resting_ma + 200 / ARAMIS_POWER.volts
 
 
-def test_the_truth_is_that_of_the_frame_asked_for() -> None:
+def test_truth_is_that_of_the_requested_frame() -> None:
     desk = Desk(scene(rate_deg_s=(0.0, 0.5, 0.0)))
     assert desk.board.truth() is None
     desk.aramis.activate()

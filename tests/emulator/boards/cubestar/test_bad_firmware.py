@@ -1,4 +1,4 @@
-"""Bad firmware on the board: what happened is told in one screen, and time goes on."""
+"""Bad firmware on the board: a report of one screen, and time continues."""
 
 import numpy as np
 import pytest

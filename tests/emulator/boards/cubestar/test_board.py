@@ -52,7 +52,7 @@ def test_truth_is_that_of_the_stored_frame(monkeypatch: pytest.MonkeyPatch) -> N
         for enable_ms, release_ms in ((75, 170), (75, 500), (100, 500))
     )
     np.testing.assert_array_equal(late, first)
-    # The reset value of the rate register gives 11.11 frames a second.
+    # The reset value of the rate register gives 11.11 frames per second.
     assert attitude_error_deg(next_one, first)[0] == pytest.approx(1 / 11.11, rel=1e-3)
 
 

@@ -81,7 +81,7 @@ def test_night_side_is_dark_and_the_terminator_divides_the_picture() -> None:
 
 
 @pytest.mark.parametrize("bloom_px", [4.0, 6.0, 7.0, 8.0])
-def test_sun_has_the_size_asked_for_on_the_boresight(bloom_px: float) -> None:
+def test_sun_has_the_requested_size_on_the_boresight(bloom_px: float) -> None:
     picture = levels(EarthSunScene(), SUN, bloom_px)
     size, centre = bright(picture)
     assert size == pytest.approx(bloom_px, abs=0.25)

@@ -183,7 +183,7 @@ def test_automatic_functions_after_reset_bring_the_mean_to_their_level() -> None
 
 
 def test_automatic_exposure_of_a_frame_is_the_same_whenever_somebody_asks() -> None:
-    """Before its first row too, and though nobody asked for the frame before."""
+    """Before its first row too, and without a request of the previous frame."""
     turning = EarthSunScene(rate_deg_s=(0, 900, 0), unevenness=0)
     followed = quiet(turning)
     frames = [followed.frame_from(int((k - Fraction(1, 2)) * FRAME_PS)) for k in range(1, 4)]

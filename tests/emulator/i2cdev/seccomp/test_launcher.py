@@ -49,7 +49,7 @@ def test_the_kernel_gets_the_steps_and_gives_a_listener(
     assert libc.calls == [(38, 1, 0, 0, 0), *((CALL, 1, flag, STEPS) for flag in tried)]
 
 
-def test_what_the_kernel_refuses_is_told() -> None:
+def test_reports_kernel_errors() -> None:
     with pytest.raises(OSError, match="can not set no_new_privs") as caught:
         install(Libc("prctl"))
     assert caught.value.errno == errno.EACCES

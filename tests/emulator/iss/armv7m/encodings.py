@@ -25,7 +25,7 @@ class Encoding:
     Attributes:
         name: mnemonic and number.
         template: its bits.
-        valid: tells whether the instruction with these fields is predictable.
+        valid: returns whether the instruction with these fields is predictable.
         moves: the most bytes by which write-back changes register ``p``.
         results: written fields besides ``d``.
         in_it: allowed in an IT block.

@@ -80,7 +80,7 @@ def test_agrees_with_the_literal_search_in_roughness(meter: Meter, seed: int) ->
     assert edges.full == (len(expected) > MAX_EDGES)
 
 
-def test_the_buffer_asks_for_64_pixels_and_32_at_a_column_s_end(meter: Meter) -> None:
+def test_buffer_requests_64_pixels_and_32_at_the_end_of_a_column(meter: Meter) -> None:
     lines = NadirLines(EdgeConfig(), meter)
     asked = []
     while lines.wanted:

@@ -155,7 +155,7 @@ def test_short_bright_tracks_are_no_stars() -> None:
     assert told(found).aligned < 0.5
 
 
-def test_streaks_of_stars_are_told_by_their_common_direction() -> None:
+def test_recognises_star_streaks_by_their_common_direction() -> None:
     _, places = sky(7)
     steps = np.arange(-5, 6)[:, None, None] * [0.6, 0.8]
     image = spots((places + steps).reshape(-1, 2), np.full(11 * 18, 100.0))

@@ -232,7 +232,7 @@ def test_a_region_beyond_the_picture_is_refused() -> None:
 
 
 def growing(areas: int, pixels: int) -> Counter[str]:
-    """What the search of a dark picture with so many bars of so many pixels is charged."""
+    """Charges of the search of a dark image with bars; ``pixels`` is the size of each."""
     image = np.zeros((90, 90), np.uint8)
     for number in range(areas):
         image[9 + 9 * number, 10 : 10 + pixels] = 100

@@ -23,7 +23,7 @@ NEAR_PX = 1.0
 
 
 def limb(angle_deg: float, height_px: float = 5.0) -> tuple[NDArray[np.float64], Places]:
-    """Light beyond a line through the middle, which falls by 1/e in so many px above it, and
+    """Light beyond a line through the middle, which falls by 1/e in ``height_px`` above it, and
     places that are from 2.5 to 8 times as far from where it is at the end of the scale."""
     angle = np.radians(angle_deg)
     along = np.array([-np.sin(angle), np.cos(angle)])

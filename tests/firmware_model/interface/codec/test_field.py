@@ -129,7 +129,7 @@ def test_counts_without_a_scale_stay_integers() -> None:
     assert bool1("x", "").decode(1) is True
 
 
-def test_a_limit_may_hang_on_another_field() -> None:
+def test_limit_may_depend_on_another_field() -> None:
     field = u16("x", "", high=100, high_by=("size", {0: 100, 1: 50}))
     assert field.allows(100, {"size": 0})
     assert not field.allows(51, {"size": 1})

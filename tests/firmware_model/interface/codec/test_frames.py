@@ -100,7 +100,7 @@ def test_bytes_outside_of_a_frame_are_a_protocol_error(stray: str) -> None:
 @pytest.mark.parametrize(
     ("received", "unfinished"), [("", False), ("1F", True), ("1F7F80", True), ("1F7F801FFF", False)]
 )
-def test_a_silence_tells_whether_a_frame_was_unfinished(received: str, unfinished: bool) -> None:
+def test_silence_reports_unfinished_frame(received: str, unfinished: bool) -> None:
     decoder = FrameDecoder(LIMIT)
     events(decoder, bytes.fromhex(received))
     assert decoder.reset() is unfinished

@@ -53,7 +53,7 @@ def test_the_boards_switch_is_shown_and_stays() -> None:
 
 
 @pytest.mark.parametrize("switches", [PUBLISHED, EXTENDED, Own(lens="drawn", star_limit="all")])
-def test_what_is_shown_is_what_there_is(switches: Own) -> None:
+def test_frame_shows_the_switches(switches: Own) -> None:
     values = SHOWN.unpack(SHOWN.pack(**shown_values(switches)))
     assert read_switches(Own, values) == switches
     with pytest.raises(ValueError, match="switch fit must be one of all, some-of-them, not '9'"):

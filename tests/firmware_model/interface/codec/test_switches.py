@@ -35,7 +35,7 @@ def test_they_know_which_profile_they_are() -> None:
         (("published", "limit"), "set: 'limit' is not SWITCH=VALUE; switches: rounds, limit"),
     ],
 )
-def test_what_there_is_not_is_refused_by_name(given: tuple[str, str], text: str) -> None:
+def test_rejects_unknown_names(given: tuple[str, str], text: str) -> None:
     with pytest.raises(ValueError, match=r"switch|profile|SWITCH") as refused:
         Some.of(*given)
     assert str(refused.value) == text

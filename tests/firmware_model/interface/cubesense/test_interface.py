@@ -160,7 +160,7 @@ def test_coefficients_keep_their_digits(value: float) -> None:
     assert codes.coefficient(mantissa, exponent) == pytest.approx(value, rel=1.6e-4)
 
 
-def test_coefficients_that_do_not_fit_are_told() -> None:
+def test_rejects_coefficients_out_of_range() -> None:
     for value in (32768.0, -1e9, math.inf, math.nan):
         with pytest.raises(ValueError, match="within \\+-32767"):
             codes.split_coefficient(value)

@@ -26,7 +26,7 @@ def dark() -> list[list[int]]:
 
 
 def with_runs(*runs: tuple[int, int, int]) -> list[list[int]]:
-    """Dark, but for so many bright pixels from (x, y) on, within the row."""
+    """A dark image with runs of bright pixels from (x, y) on, within the row."""
     picture = dark()
     for x, y, length in runs:
         for column in range(x, min(x + length, COLUMNS)):

@@ -16,7 +16,7 @@ COLUMNS, ROWS = GEOMETRY
 
 
 def rows_of(sizes: Iterable[int]) -> list[Tick]:
-    """Lines of so many random pixels."""
+    """Lines of random pixels."""
     return flat(line(random.randbytes(size)) for size in sizes)
 
 

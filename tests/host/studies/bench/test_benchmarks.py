@@ -23,7 +23,7 @@ from tests.conftest import Run
 
 
 class Clock:
-    """Wall time, that passes when it is told to."""
+    """Simulated wall time."""
 
     def __init__(self) -> None:
         self.now_s = 100.0

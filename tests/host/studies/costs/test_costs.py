@@ -70,7 +70,7 @@ BUILDS = [
 
 @pytest.fixture
 def report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Any]:
-    """A device whose costs are known; how they were asked for."""
+    """A device with known costs; yields the requests for them."""
     asked = list[Any]()
 
     def measure(levels: Sequence[str], precisions: Sequence[str]) -> Iterator[CostMeasurement]:

@@ -16,7 +16,7 @@ GOOD = {0: CALM, 2: (0.03, 0.01, 0.1, 0.5), 5: (0.02, 0.04, 0.02, 0.9)}
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Scenes that were looked at, and how lines of a log were asked for."""
+    """The scenes, and the requests for lines of a log."""
     seen = list[Any]()
 
     def log_lines(_client: object, _clock: object, *, count: int, interval_s: float) -> Any:

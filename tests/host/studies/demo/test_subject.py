@@ -58,7 +58,7 @@ def opened(path: Path) -> NDArray[np.uint8]:
 
 
 def errors_told(text: str) -> list[float]:
-    """Sizes of all errors that were told, in their own units."""
+    """Sizes of all printed errors, in their own units."""
     told = re.findall(r"error:? ([\d.]+)(?:°| arcsec across, [+-]([\d.]+) arcsec about)", text)
     return [float(size) for sizes in told for size in sizes if size]
 

@@ -92,7 +92,7 @@ def test_waits_of_the_memories_cost_cycles(shot: NDArray[np.uint8]) -> None:
 
 
 @needs_compiler
-def test_a_call_that_faults_or_is_none_is_told(fast: Calls) -> None:
+def test_reports_faulting_and_unknown_calls(fast: Calls) -> None:
     with pytest.raises(KeyError):
         fast.call("no_such_function")
     with pytest.raises(CallError, match="fault"):

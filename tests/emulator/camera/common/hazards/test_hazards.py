@@ -143,7 +143,7 @@ def test_a_frame_with_it_takes_little_longer(name: str) -> None:
 
 
 def test_the_mean_dark_rise_is_the_dark_rows_too() -> None:
-    # 10 krad: four times 1008 counts of 12 bits a second, at 65 C in 0.3856 s.
+    # 10 krad: four times 1008 counts of 12 bits per second, at 65 C in 0.3856 s.
     like = replace(cubestar.CONDITION, hazards=(Dose(krad=10.0),), temperature_c=65.0)
     imager = Mlx75412Imager(1)
     raw, corrected = (
