@@ -1,6 +1,7 @@
 """Backtrace from registers and stack, by call frame information or else by a stack scan.
 
-A stack scan searches for the next return address: a word that points behind a call in the program.
+A stack scan searches for the next return address: a word that points to the instruction after a
+call in the program.
 Frames found that way are marked.
 """
 
@@ -112,18 +113,18 @@ def _apply(rules: Mapping[Any, Any], state: dict[int, int], read: Read) -> bool:
 
 
 def _scan(symbols: Symbols, state: dict[int, int], read: Read) -> bool:
-    """Find the next word on the stack that points behind a call."""
+    """Find the next word on the stack that points to the instruction after a call."""
     stack = read(state[SP], 4 * SCANNED_WORDS)
     for index in range(len(stack) // 4):
         word = int.from_bytes(stack[4 * index : 4 * index + 4], "little")
-        if word & 1 and symbols.function_at(word & ~1) and _behind_call(word & ~1, read):
+        if word & 1 and symbols.function_at(word & ~1) and _after_call(word & ~1, read):
             state[SP] += 4 * (index + 1)
             state[PC] = state[LR] = word
             return True
     return False
 
 
-def _behind_call(address: int, read: Read) -> bool:
+def _after_call(address: int, read: Read) -> bool:
     """Whether a BL or BLX ends at ``address``: ARMv7-M ARM, A7.7.18 and A7.7.19."""
     code = read(address - 4, 4)
     if len(code) < 4:

@@ -119,7 +119,7 @@ void System::exception_taken(uint32_t exc_return) {
     event = true;
     if (number >= HARD_FAULT && number <= USAGE_FAULT) note_fault(number, exc_return);
     priority_changed();
-    // DEMCR.VC_*, C1.6.5, by exception; INTERR and the kinds of UsageFault are not told apart.
+    // DEMCR.VC_*, C1.6.5, by exception; INTERR and the kinds of UsageFault are not distinguished.
     const uint32_t catching = number == HARD_FAULT    ? 1u << 10
                               : number == MEM_MANAGE  ? 1u << 4
                               : number == BUS_FAULT   ? 1u << 8

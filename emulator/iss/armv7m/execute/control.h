@@ -76,7 +76,7 @@ leave_exception:
     }
 TABLE_BRANCH(TBB, uint8_t)
 TABLE_BRANCH(TBH, uint16_t)
-// Folded into a 16-bit instruction before it: no cycle of its own (TRM 3.3.1).
+// Folded into a 16-bit instruction before it: no extra cycle (TRM 3.3.1).
 HANDLE(IT) {
     const uint32_t pc = PC;
     it = (uint8_t)op->value;
@@ -104,7 +104,7 @@ HANDLE(MSR) {
     NEXT(2);
 }
 
-// Instructions that call System with r[15] behind them.
+// Instructions that call System; r[15] is the next address.
 #define HAND_OVER(call) \
     do { \
         now += 1; \

@@ -30,7 +30,7 @@ void Cpu::FreeCode::operator()(Operation *operations) const { std::free(operatio
 Cpu::Code *Cpu::code_of(const Region &region) {
     for (Code &code : codes)
         if (code.host == region.host && code.size >= region.size) return &code;
-    // calloc: untouched pages take no memory. Two markers behind the end stop even a 32-bit
+    // calloc: untouched pages take no memory. Two markers after the end stop even a 32-bit
     // instruction in the last half-word.
     const size_t count = region.size / 2 + 2;
     auto *operations = (Operation *)std::calloc(count, sizeof(Operation));

@@ -10,7 +10,7 @@
 //  - An exception that can be taken calls cpu.attention(), which ends the inner loop after the
 //    running instruction. The outer loop then calls service(), which takes at most one exception.
 //  - An instruction that cannot complete calls fault() and leaves the program counter on itself;
-//    SVC calls svc() with the program counter behind itself. Both end in service().
+//    SVC calls svc() with the program counter after itself. Both end in service().
 //  - SysTick wraps at next_cycle(): the inner loop must not run beyond it.
 
 #pragma once
@@ -109,8 +109,8 @@ public:
     // completes (a store through the write buffer; its fault comes later).
     bool fault(Fault kind, uint32_t address = 0);
 
-    void svc();                                    // the program counter is behind the SVC
-    bool bkpt(uint32_t immediate);                 // true: done (semihosting), continue behind it
+    void svc();                                    // the program counter is after the SVC
+    bool bkpt(uint32_t immediate);                 // true: done (semihosting), continue after it
     void exception_return(uint32_t exc_return);    // written to PC in Handler mode
     void wfi();
     void wfe();

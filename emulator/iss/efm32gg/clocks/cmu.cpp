@@ -123,7 +123,7 @@ void Cmu::command_oscillators(uint32_t value) {
                 switch_on(n);
         } else if (value >> (2 * n + 1) & 1) {
             if (n == selected) {
-                part.log_once("CMU: the oscillator of HFCLK can not be switched off");
+                part.log_once("CMU: the oscillator of HFCLK cannot be switched off");
                 continue;
             }
             part.cancel(oscillators[n].started);

@@ -151,7 +151,7 @@ void Dma::consider() {
     part.schedule(serve, part.now() + delay(ROUND));
 }
 
-// The previous round is over, the next begins.
+// Ends the previous round and begins the next.
 void Dma::on_serve(int64_t time) {
     if (done) {
         reg(IF) |= done;

@@ -78,7 +78,7 @@ public:
     // -- clocks --
     const Rate &rate(Clock clock) const { return rates[(int)clock]; }
     int64_t hertz(Clock clock) const { return rate(clock).whole_hertz(); }
-    // The unit's clock: HFPERCLK with its enable bit, LFA or LFB behind its prescaler, or
+    // The unit's clock: HFPERCLK with its enable bit, LFA or LFB after its prescaler, or
     // HFCORECLK. It is stopped when the unit is not enabled.
     Rate unit_rate(const Instance &instance) const;
     // Whether the unit's registers can be accessed.

@@ -49,7 +49,7 @@ public:
         return hertz ? (int64_t)((__int128)numerator * n / denominator) : NEVER;
     }
 
-    // The clock behind a divider that starts at `start`.
+    // The clock after a divider that starts at `start`.
     Rate divided(int64_t by, int64_t start) const { return {hertz, divider * by, start}; }
 
     bool same_frequency(const Rate &other) const {

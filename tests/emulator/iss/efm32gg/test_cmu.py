@@ -77,7 +77,7 @@ def test_oscillator_of_the_core_cannot_be_switched_off() -> None:
     bench = Bench()
     bench.command("CMU.OSCENCMD.HFRCODIS")
     assert bench.is_set("CMU.STATUS.HFRCORDY")
-    assert "can not be switched off" in bench.log()
+    assert "cannot be switched off" in bench.log()
 
 
 def test_dividers() -> None:
