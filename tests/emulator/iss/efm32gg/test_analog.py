@@ -33,7 +33,8 @@ def convert(bench: Bench, word: int) -> int:
 
 @pytest.mark.parametrize("channel", range(8))
 @pytest.mark.parametrize(
-    ("reference", "full"), [(V1_25, 1.25), (V2_5, 2.5), (SUPPLY, 3.3), (SUPPLY_TWICE, 6.6)]
+    ("reference", "full"),
+    [(V1_25, 1.25), (V2_5, 2.5), (SUPPLY, 3.3), (V5_DIFF, 5.0), (SUPPLY_TWICE, 6.6)],
 )
 def test_voltage_is_converted_to_its_code(channel: int, reference: int, full: float) -> None:
     bench = adc()

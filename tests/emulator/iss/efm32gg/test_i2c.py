@@ -260,6 +260,9 @@ def test_slave_acknowledges_by_command() -> None:
     command(bench, "NACK")
     assert machine.i2c_slave_poll(0) == 0
     assert machine.i2c_slave_write(0, 0x33) == 0
+    bench["I2C0.RXDATA"]
+    assert machine.i2c_slave_start(0, ADDRESS | 1) is None
+    assert state(bench) == 0x75  # transmitter
 
 
 def test_slave_read_waits_for_data() -> None:

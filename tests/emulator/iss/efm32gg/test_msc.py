@@ -80,10 +80,9 @@ def test_sequence_of_words_fills_consecutive_addresses() -> None:
 
 def test_write_needs_wren_and_unlocked_registers() -> None:
     bench = Bench()
-    write = ("MSC.WDATA", 0), ("MSC.WRITECMD", 8)
-    for name, value in write:
+    for name, value in (("MSC.WDATA", 0), ("MSC.WRITECMD", 8)):
         bench[name] = value
-    assert "WREN" in bench.log()
+        assert f"{name[4:]} without WRITECTRL.WREN" in bench.log()
     bench["MSC.LOCK"] = 0
     assert bench["MSC.LOCK"] == 1
     write_word(bench, PAGE, 0)
