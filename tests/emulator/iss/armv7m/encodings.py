@@ -8,7 +8,7 @@ mnemonic and the number of the encoding there. A template has fixed bits and the
 - ``p``: a register with an address of RAM, ``q``: with one of a word, ``x``: with a small index;
 - ``name:bits``: any value.
 
-Registers have 4 bits; with ``l`` behind them 3, as low registers; ``dH`` and ``dL`` are the high
+Registers have 4 bits; with the suffix ``l`` 3, as low registers; ``dH`` and ``dL`` are the high
 bit and the low bits of one.
 """
 

@@ -10,7 +10,7 @@ END = 0x2000
 
 RAM = 0x2000_0000
 RAM_BYTES = 0x4000
-_LOW, _HIGH = 0x1400, 0x2700  # range of pointers, such that all accesses are in RAM
+_LOW, _HIGH = 0x1400, 0x2700  # range of pointers with which all accesses are in RAM
 
 INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x7FFFFFFF,
                0x80000000, 0x80000001, 0xFFFF8000, 0xFFFFFF80, 0xFFFFFFFE, 0xFFFFFFFF)  # fmt: skip

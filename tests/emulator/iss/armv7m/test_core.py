@@ -271,7 +271,7 @@ MIXED = """
     bne 1b
 2:  b 2b
     .p2align 2
-    adds r4, #0  @ never run, but the load behind it looks as if it had to wait for it
+    adds r4, #0  @ never executed; the next load seems to depend on it
 3:  ldr.w r3, [r4, #12]
     movs r2, #5
     udiv r2, r0, r2

@@ -22,14 +22,14 @@ def cycles(code: bytes) -> int:
     program.nop(12)
     for at in range(0, len(code), 2):
         program.half(int.from_bytes(code[at : at + 2], "little"))
-    behind = program.nop(8)
+    after = program.nop(8)
     program.str(6, 6)
     program.forever()
     bench = Bench(program.finish())
     registers = (DATA, DATA + 0x100, 4, DATA + 0x200, 5, 0x12345678, LOG, 3, 0xFFFFFFFF, 1)
-    for number, value in enumerate((*registers, DATA + 0x50, behind | 1, 0)):
+    for number, value in enumerate((*registers, DATA + 0x50, after | 1, 0)):
         bench[f"r{number}"] = value
-    bench.ram[0x1040:0x1044] = list((behind | 1).to_bytes(4, "little"))
+    bench.ram[0x1040:0x1044] = list((after | 1).to_bytes(4, "little"))
     bench.ram[0x1050:0x1054] = list((DATA + 0x80).to_bytes(4, "little"))
     bench.run(2000)
     return bench.log[0].cycle
@@ -39,7 +39,7 @@ def cycles(code: bytes) -> int:
 def test_sequence_takes_the_published_cycles(sequence: Sequence):
     taken = cycles(bytes.fromhex(sequence.code)) - cycles(b"")
     assert sequence.least * (1 - TOLERANCE) <= taken <= sequence.most * (1 + TOLERANCE), (
-        f"{taken} cycles; {sequence.source} says {sequence.least} to {sequence.most}"
+        f"{taken} cycles; {sequence.source}: {sequence.least} to {sequence.most}"
     )
 
 

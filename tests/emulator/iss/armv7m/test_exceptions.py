@@ -90,8 +90,7 @@ def test_stkalign_aligns_the_frame_to_eight_bytes(aligned):
     assert bench["sp"] == TOP - 4 - 32 - 4 * aligned
     assert bench.word(bench["sp"] + 28) >> 9 & 1 == aligned
     bench.run(40)
-    assert bench["sp"] == TOP - 4
-    assert bench["xpsr"] & 0x200 == 0
+    assert (bench["sp"], bench["xpsr"] & 0x200) == (TOP - 4, 0)
 
 
 def test_tail_chaining_takes_6_cycles_without_unstacking():
@@ -189,8 +188,7 @@ def test_svc_returns_to_the_next_instruction_and_pendsv_is_taken_before():
     bench["primask"] = 0
     bench["SHPR3"] = 0xE0 << 16
     bench.run(200)
-    assert numbers(bench) == [14, 11]
-    assert bench.word(TOP - 32 + 24) == after
+    assert (numbers(bench), bench.word(TOP - 32 + 24)) == ([14, 11], after)
     assert bench["pc"] == after
 
 
@@ -221,8 +219,7 @@ def test_nmi_preempts_the_hard_fault_handler():
     assert (bench.ipsr, bench["priority"]) == (3, 0xFFFF_FFFF)
     bench.at(bench.cycles, NMI)
     bench.run(50)
-    assert bench.log[0].exception == 2
-    assert bench.ipsr == 3
+    assert (bench.log[0].exception, bench.ipsr) == (2, 3)
 
 
 def test_exception_of_an_unprivileged_thread_uses_the_main_stack():
@@ -231,8 +228,7 @@ def test_exception_of_an_unprivileged_thread_uses_the_main_stack():
     bench["control"] = 3
     main = bench["msp"]
     pulse(bench, (0, 3), run=13)
-    assert bench["lr"] == 0xFFFF_FFFD
-    assert bench["sp"] == main
+    assert (bench["lr"], bench["sp"]) == (0xFFFF_FFFD, main)
     assert bench["psp"] == TOP - 0x1000 - 32
     assert bench["control"] == 1  # privileged by mode; SPSEL is clear in a handler
     bench.run(50)
@@ -267,8 +263,7 @@ def test_pendsv_switches_tasks():
         bench.ram[at : at + 4] = list(word.to_bytes(4, "little"))
     bench["r6"] = LOG
     bench.run(300)
-    assert bench.log[-1].value == 2
-    assert bench["sp"] == 0x2000_5000
+    assert (bench.log[-1].value, bench["sp"]) == (2, 0x2000_5000)
 
 
 def test_vector_table_moves():
@@ -311,8 +306,7 @@ def test_exception_counter_and_cycle_counter():
     bench["CYCCNT"] = 0
     bench["DWT"] = 1 | 1 << 18
     begin = pulse(bench, (0, 3), run=100)
-    assert bench["CYCCNT"] == bench.cycles - begin
-    assert bench["EXCCNT"] == 22
+    assert (bench["CYCCNT"], bench["EXCCNT"]) == (bench.cycles - begin, 22)
     bench["DEMCR"] = 0  # stops without TRCENA
     stopped = bench["CYCCNT"]
     bench.run(10)

@@ -47,7 +47,7 @@ def run(
     enabled: bool = True,
     interrupt_at: int | None = None,
 ) -> Bench:
-    """Run what ``write`` assembles, with looping fault handlers behind it."""
+    """Run what ``write`` assembles, followed by fault handlers that loop."""
     code = Program(stack)
     write(code)
     bench = prepare(with_handlers(code), enabled=enabled, interrupt_at=interrupt_at)
@@ -175,8 +175,7 @@ def test_store_through_the_write_buffer_faults_later_and_waits_while_masked(mask
     after = code.forever()
     bench = prepare(with_handlers(code))
     bench.run(100)
-    assert bench.ipsr == BUS_FAULT
-    assert bench["CFSR"] == IMPRECISERR
+    assert (bench.ipsr, bench["CFSR"]) == (BUS_FAULT, IMPRECISERR)
     stacked = bench.word(TOP - 32 + 24)
     assert stacked == after if masked else store < stacked < after
 
@@ -231,15 +230,13 @@ def test_unusable_vector_table_locks_up():
 
 def test_handler_runs_although_stacking_failed():
     bench = run(halves(0xDE00), 1000, stack=NOWHERE, enabled=False)
-    assert bench.ipsr == HARD_FAULT
-    assert bench["CFSR"] == UNDEFINSTR | STKERR
+    assert (bench.ipsr, bench["CFSR"]) == (HARD_FAULT, UNDEFINSTR | STKERR)
     assert bench.fault.frame == 0
 
 
 def test_stack_overflow_is_a_stacking_error():
     bench = run(Program.forever, stack=RAM + 16, interrupt_at=20)
-    assert bench.ipsr == BUS_FAULT
-    assert bench["CFSR"] == STKERR
+    assert (bench.ipsr, bench["CFSR"]) == (BUS_FAULT, STKERR)
     assert bench["ISPR"] == 1  # the interrupt still waits, its number is higher
 
 
@@ -253,8 +250,7 @@ def test_more_urgent_exception_is_entered_despite_a_stacking_error():
     bench = prepare(code, interrupt_at=20)
     bench["SHPR1"] = 0x80 << 8
     bench.run(100)
-    assert bench.log[0].exception == 16
-    assert bench.ipsr == BUS_FAULT
+    assert (bench.log[0].exception, bench.ipsr) == (16, BUS_FAULT)
     assert bench["CFSR"] == STKERR
 
 
@@ -264,8 +260,7 @@ def test_unstacking_error():
         60,
         interrupt_at=5,
     )
-    assert bench["CFSR"] & ~STKERR == UNSTKERR
-    assert bench.ipsr == BUS_FAULT
+    assert (bench["CFSR"] & ~STKERR, bench.ipsr) == (UNSTKERR, BUS_FAULT)
     assert bench["sp"] == NOWHERE
     assert bench["lr"] == 0xFFFF_FFF9  # of the return that failed
 
@@ -274,13 +269,12 @@ def test_unreadable_vector_is_a_hard_fault():
     code = Program()
     code.forever()
     bench = Bench(with_handlers(code).finish())
-    bench.ram[0xFF80:] = bench.code[:0x80]  # the memory ends behind exception 31
+    bench.ram[0xFF80:] = bench.code[:0x80]  # the memory ends after exception 31
     bench["VTOR"] = RAM + 0xFF80
     bench["ISER"] = 1 << 16
     bench.at(bench.cycles + 5, PULSE, 16)
     bench.run(60)
-    assert bench["HFSR"] == VECTTBL
-    assert bench.ipsr == HARD_FAULT
+    assert (bench["HFSR"], bench.ipsr) == (VECTTBL, HARD_FAULT)
 
 
 @pytest.mark.parametrize(
@@ -294,9 +288,7 @@ def test_unreadable_vector_is_a_hard_fault():
 )
 def test_wrong_return_value_is_a_usage_fault(value):
     bench = run(in_handler(jump(value)), interrupt_at=5)
-    assert bench.ipsr == USAGE_FAULT
-    assert bench["CFSR"] == INVPC
-    assert bench["lr"] == value
+    assert (bench.ipsr, bench["CFSR"], bench["lr"]) == (USAGE_FAULT, INVPC, value)
     assert bench["sp"] == TOP - 32  # tail-chained: no new frame
 
 
@@ -326,8 +318,7 @@ def test_return_to_thread_from_a_nested_handler(allowed):
 def test_frame_with_another_exception_number_is_a_usage_fault():
     load, store = halves(0x9807), halves(0x9007)  # LDR, STR r0, [sp, #28]
     bench = run(in_handler(load, lambda code: code.adds(0, 1), store, Program.bx), interrupt_at=5)
-    assert bench.ipsr == USAGE_FAULT
-    assert bench["CFSR"] == INVPC
+    assert (bench.ipsr, bench["CFSR"]) == (USAGE_FAULT, INVPC)
 
 
 def test_return_of_an_inactive_exception_is_a_usage_fault():
@@ -339,8 +330,7 @@ def test_return_of_an_inactive_exception_is_a_usage_fault():
     bench = Bench(code.finish())
     bench["ICSR"] = 1 << 26
     bench.run(100)
-    assert bench.ipsr == USAGE_FAULT
-    assert bench["CFSR"] == INVPC
+    assert (bench.ipsr, bench["CFSR"]) == (USAGE_FAULT, INVPC)
 
 
 def test_bfhfnmign_ignores_bus_faults_in_the_hard_fault_handler():

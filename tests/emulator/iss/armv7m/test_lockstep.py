@@ -6,7 +6,7 @@ Left out because unicorn differs from a Cortex-M3 (sections of the ARMv7-M ARM):
 
 - SP with bits 1:0 set: they are 0 (B1.4.1), QEMU keeps them;
 - BASEPRI: it has the part's priority bits (B1.4.3), QEMU's all eight;
-- YIELD, a NOP (A7.7.263), ends unicorn's run; WFI and WFE would wait for ever in both;
+- YIELD, a NOP (A7.7.263), ends unicorn's run; WFI and WFE would wait forever in both;
 - ISB in an IT block: unicorn runs the rest of the block unconditionally, against A7.3;
 - STREX to another address than LDREX, or after another store: the part's monitor has no address
   (A3.4.1 allows both), QEMU's compares address and content;

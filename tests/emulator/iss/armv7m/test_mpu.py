@@ -148,8 +148,7 @@ def test_stacking_is_checked_with_the_rights_of_the_interrupted_code():
     bench.run(60)
     assert bench.ipsr == 4
     bench["control"] = 0
-    assert bench["CFSR"] == MSTKERR
-    assert bench["psp"] == 0x2000_3000 - 32
+    assert (bench["CFSR"], bench["psp"]) == (MSTKERR, 0x2000_3000 - 32)
 
 
 def test_unstacking_is_checked():
@@ -193,8 +192,7 @@ def test_registers():
     bench.write(RBAR, 0x2000_0010 | 3)
     assert (bench.read(RNR), bench.read(RBAR)) == (3, 0x2000_0003)
     bench.write(RASR + 8, 0xFFFF_FFFF)  # an alias
-    assert bench.read(RASR) == 0x173F_FF3F
-    assert bench.read(RBAR + 8) == 0x2000_0003
+    assert (bench.read(RASR), bench.read(RBAR + 8)) == (0x173F_FF3F, 0x2000_0003)
     bench.reset()
     assert (bench.read(CTRL), bench.read(RASR)) == (0, 0)
     assert bench["ICSR"] == 1 << 11

@@ -13,8 +13,7 @@ HFXO, LFRCO, LFXO = 2, 3, 4
 
 def test_part_starts_at_14_mhz() -> None:
     bench = Bench()
-    assert bench.machine.hz == 14_000_000
-    assert bench["CMU.STATUS"] == 0x403
+    assert (bench.machine.hz, bench["CMU.STATUS"]) == (14_000_000, 0x403)
 
 
 @pytest.mark.parametrize(

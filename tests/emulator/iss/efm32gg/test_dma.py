@@ -190,8 +190,7 @@ def test_peripheral_scatter_gather_waits_for_requests() -> None:
         assert bench["DMA.IF"] == 0
         receive(bench, byte)
     assert bench.machine.peek(TARGET, 2) == b"\x11\x22"
-    assert bench.machine.peek(TARGET + 0x100, 2) == b"\x33\x44"
-    assert bench["DMA.IF"] == 1
+    assert (bench.machine.peek(TARGET + 0x100, 2), bench["DMA.IF"]) == (b"\x33\x44", 1)
 
 
 @pytest.mark.parametrize("bad", ["source", "target", "descriptor"])

@@ -40,8 +40,7 @@ def test_memory_access_in_all_modes_and_sizes(mode: int) -> None:
     assert machine.write(BANK + 8, 0xABCD, 2)
     assert machine.write(BANK + 11, 0xEF, 1)
     assert bytes(machine.external[4:12]) == bytes.fromhex("78563412cdab00ef")
-    assert machine.read(BANK + 4) == 0x1234_5678
-    assert machine.read(BANK + 6, 2) == 0x1234
+    assert (machine.read(BANK + 4), machine.read(BANK + 6, 2)) == (0x1234_5678, 0x1234)
     assert machine.read(BANK + 11, 1) == 0xEF
     assert machine.read(0x1200_0004) == 0x1234_5678  # code space
     assert machine.peek(BANK + 4, 4) == bytes.fromhex("78563412")

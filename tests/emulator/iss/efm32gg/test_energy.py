@@ -81,8 +81,7 @@ def test_part_wakes_on_the_hfrco() -> None:
     fall_asleep(bench)
     assert bench.machine.hz == 0
     wake(bench)
-    assert bench.machine.hz == 14_000_000
-    assert bench.peek("CMU.STATUS") & 0x40F == 0x403
+    assert (bench.machine.hz, bench.peek("CMU.STATUS") & 0x40F) == (14_000_000, 0x403)
 
 
 def test_em2block_limits_sleep_to_em1() -> None:
@@ -148,8 +147,7 @@ def test_reset_request_resets_registers_but_not_the_ram() -> None:
     bench["RMU.CMD"] = 1
     bench.machine.write(AIRCR, 0x05FA_0004)
     bench.run_for(MS)
-    assert bench["RMU.RSTCAUSE"] == SYSTEM_REQUEST
-    assert bench["CMU.HFPERCLKEN0"] == 0
+    assert (bench["RMU.RSTCAUSE"], bench["CMU.HFPERCLKEN0"]) == (SYSTEM_REQUEST, 0)
     assert bench.machine.read(0x2000_0100) == 0x1234_5678
 
 

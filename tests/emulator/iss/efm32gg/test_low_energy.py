@@ -125,8 +125,7 @@ def test_rtc_counts_like_a_stepped_counter(
             top = compare0 if is_top else 0xFF_FFFF
             value = 0 if value == top else value + 1
             flags |= (2 if value == compare0 else 0) | (4 if value == compare1 else 0)
-        assert bench["RTC.CNT"] == value
-        assert bench["RTC.IF"] == flags
+        assert (bench["RTC.CNT"], bench["RTC.IF"]) == (value, flags)
 
 
 # -- LETIMER --
@@ -298,8 +297,7 @@ def test_dma_reads_characters_in_em2_with_rxdmawu() -> None:
         bench.machine.uart_receive(LEUART0, byte)
         bench.run_for(MS)
     assert bench.machine.energy_mode == 2
-    assert bench.machine.peek(0x2000_1000, 4) == b"abcd"
-    assert bench["DMA.IF"] == 1
+    assert (bench.machine.peek(0x2000_1000, 4), bench["DMA.IF"]) == (b"abcd", 1)
 
 
 # -- BURTC --
@@ -358,8 +356,7 @@ def test_burtc_interrupts_at_its_compare_value() -> None:
     bench.run_for(8 * MS)
     assert not bench.peek("BURTC.IF")
     bench.run_for(4 * MS)
-    assert bench.peek("BURTC.IF") == 2
-    assert bench.pending() == [BURTC_IRQ]
+    assert (bench.peek("BURTC.IF"), bench.pending()) == (2, [BURTC_IRQ])
 
 
 def test_burtc_prescaler_and_lock() -> None:

@@ -24,7 +24,7 @@ ALL, INTERFACES = (
     for units in (None, UNITS)
 )
 MOST_STOPS = 2000
-"""Of a run of 50 ms; more stops mean that time stands still."""
+"""Of a run of 50 ms; more stops mean that time does not advance."""
 PATIENCE_S = 20
 
 
@@ -36,7 +36,7 @@ def run_until(bench: Bench, until_ps: int) -> None:
         bench.machine.run(until_ps)
         list(bench.machine.outbox())
         assert bench.now >= before
-    pytest.fail(f"stands still at {bench.now} ps")
+    pytest.fail(f"time stays at {bench.now} ps")
 
 
 @pytest.mark.parametrize("seed", range(8))

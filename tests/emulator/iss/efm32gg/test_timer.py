@@ -93,8 +93,7 @@ def test_counts_like_a_stepped_counter(
         bench.run_until(origin + (2 * count + 1) * (1 << prescaler) * S // (2 * HZ))
         for _ in range(wait):
             oracle.tick()
-        assert bench["TIMER0.CNT"] == oracle.value
-        assert bench["TIMER0.IF"] == oracle.flags
+        assert (bench["TIMER0.CNT"], bench["TIMER0.IF"]) == (oracle.value, oracle.flags)
         if mode == UP_DOWN:
             assert bench.is_set("TIMER0.STATUS.DIR") == oracle.down
 
@@ -114,8 +113,7 @@ def test_overflow_interrupts_at_its_time() -> None:
     bench.run_until(origin + 1000 * S // HZ - ACCESS)
     assert not bench.peek("TIMER0.IF")
     bench.run_until(origin + 1000 * S // HZ + ACCESS)
-    assert bench.peek("TIMER0.IF") == OF
-    assert bench.pending() == [TIMER0_IRQ]
+    assert (bench.peek("TIMER0.IF"), bench.pending()) == (OF, [TIMER0_IRQ])
     bench["TIMER0.IFC"] = OF
     assert bench["TIMER0.IF"] == 0
 

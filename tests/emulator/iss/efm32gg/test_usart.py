@@ -178,8 +178,7 @@ def test_double_registers_hold_two_characters() -> None:
     assert sent(bench) == [0x41, 0x42]
     bench.machine.uart_receive(UART0, 0x31)
     bench.machine.uart_receive(UART0, 0x32)
-    assert bench["UART0.RXDOUBLEXP"] == 0x32_0031
-    assert bench["UART0.RXDOUBLE"] == 0x3231
+    assert (bench["UART0.RXDOUBLEXP"], bench["UART0.RXDOUBLE"]) == (0x32_0031, 0x3231)
 
 
 def test_loopback() -> None:

@@ -35,10 +35,10 @@ class Scene:
         self.symbols = symbols
         self.registers = dict.fromkeys(range(16), 0) | {PC: 0x110, SP: STACK, LR: 0}
 
-    def call(self, behind: int, code: int = BL) -> int:
-        """Put a call before the address ``behind``; returns the return address."""
-        self.words[behind - 4] = code
-        return behind | 1
+    def call(self, after: int, code: int = BL) -> int:
+        """Put a call before the address ``after``; returns the return address."""
+        self.words[after - 4] = code
+        return after | 1
 
     def push(self, *words: int, at: int = STACK) -> None:
         for index, word in enumerate(words):
@@ -132,7 +132,7 @@ def test_backtrace_has_at_most_24_frames(scene: Scene) -> None:
 def test_exception_is_followed_by_the_interrupted_function(
     scene: Scene, value: int, aligned: int
 ) -> None:
-    """EXC_RETURN tells the stack: bit 2 is the process stack (ARMv7-M ARM, table B1-8)."""
+    """EXC_RETURN selects the stack: bit 2 is the process stack (ARMv7-M ARM, table B1-8)."""
     scene.rules(0x100, 8, r14=-4)
     scene.registers[PSP] = OTHER_STACK
     scene.push(0xAAAA, value)

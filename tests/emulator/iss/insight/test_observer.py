@@ -93,8 +93,7 @@ def test_cycles_of_an_exception_are_not_those_of_the_interrupted_function(
 ) -> None:
     handler = calls(observer, "SysTick_Handler")
     assert handler.exception
-    assert handler.site == 15
-    assert handler.count == value(observer, "ticks")
+    assert (handler.site, handler.count) == (15, value(observer, "ticks"))
     start = calls(observer, "main")
     assert start.cycles == self_cycles(observer, "main") + calls(observer, "work").cycles
 
@@ -113,8 +112,7 @@ def test_observed_machine_behaves_as_one_that_is_not(machine: Machine, observer:
     other.load(machine.image)
     other.reset()
     run(other, RUN_PS)
-    assert other.cycles == machine.cycles
-    assert other.registers() == machine.registers()
+    assert (other.cycles, other.registers()) == (machine.cycles, machine.registers())
     assert (other.ram == machine.ram).all()
     other.close()
 

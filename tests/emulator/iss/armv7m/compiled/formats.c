@@ -1,4 +1,4 @@
-/* printf, scanf and the conversions behind them. */
+/* printf, scanf and their conversions. */
 #include "report.h"
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
 /* Start-up, system calls and output of the compiled test programs. What they print is kept in RAM;
-   a program is over at `finished`. */
+   a program ends at `finished`. */
 
 #include <stdint.h>
 #include <string.h>
