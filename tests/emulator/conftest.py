@@ -166,7 +166,6 @@ class Desk:
         self.kernel.timeout(delay).callbacks.append(lambda _event: action())
 
     def ack_at(self, *us: int) -> None:
-        """ACK rises and falls at these times."""
         times = [(time + BOOT_US) * PS_PER_US for time in us]
         self.engine.ack = [(time, 1 - index % 2) for index, time in enumerate(times)]
 

@@ -90,8 +90,7 @@ class HostSide:
         (answer,) = self.frames(bytes([message.id]))
         return dict(message.unpack(answer))
 
-    def run(self) -> None:
-        """Let the program execute its requests."""
+    def run(self) -> None: ...
 
     # --- I2C --------------------------------------------------------------------------------------
 

@@ -103,7 +103,6 @@ class Runner:
     # --- what a subclass has -------------------------------------------------------------------
 
     def start(self) -> requests.Routine[None]:
-        """A new life of the program."""
         raise AssertionError("there is no whole program here")
 
     @property

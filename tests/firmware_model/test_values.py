@@ -55,8 +55,6 @@ NEEDED: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Some(DeclaredValues):
-    """A value of each kind."""
-
     angle_deg: float = number(1.0, "an angle", -3, 4, formerly="angle")
     rate_km_s: float = positive(2.0, "a rate")
     count: int = whole(3, "how many", high=9)

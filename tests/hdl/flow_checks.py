@@ -18,14 +18,12 @@ TIMEOUT_S = 300
 
 
 def written(name: str, top: Top, folder: Path) -> Path:
-    """A top's Verilog file, by the name of its module."""
     path = folder / f"{name.replace('-', '_')}.v"
     path.write_text(verilog_file(name, top), encoding="utf-8")
     return path
 
 
 def said(*command: object) -> str:
-    """What a program prints that does not fail."""
     words = [str(word) for word in command]
     done = subprocess.run(words, capture_output=True, text=True, timeout=TIMEOUT_S)
     assert done.returncode == 0, done.stdout + done.stderr

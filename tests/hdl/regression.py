@@ -98,7 +98,6 @@ class Tier:
         return {**frame_environment(self.columns, self.rows), **self.further, "HDL_COVERAGE": ""}
 
     def make(self) -> Component:
-        """The top, of a small picture."""
         return self.design(self.columns, self.rows)
 
 
@@ -111,7 +110,6 @@ ANY_TOP, RATES = "tests.hdl.harness.any_top", "tests.hdl.harness.rates"
 
 
 def modules(package: str, *names: str) -> tuple[str, ...]:
-    """Full names of a sensor's cocotb modules."""
     return tuple(f"{package}.testbenches.{name}" for name in names)
 
 
@@ -119,7 +117,6 @@ PAIR_MODULES = modules(PAIR, "modes", "read", "store", "failures")
 
 
 def pair_environment(read_out: ReadOut, mcu_addressing: bool = False) -> dict[str, str]:
-    """What the modules of CubeSense's folder read."""
     return {
         "READ_OUT": json.dumps(asdict(read_out)),
         "MCU_ADDRESSING": str(int(mcu_addressing)),

@@ -11,7 +11,6 @@ SOURCES, GATES = 4, 7
 
 
 def network(rng: random.Random) -> tuple[GateNetwork, list[int]]:
-    """A network of random gates, and the signals that are wanted."""
     net = GateNetwork()
     signals = [net.source() for _ in range(SOURCES)]
     for _ in range(GATES):

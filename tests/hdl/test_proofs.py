@@ -49,8 +49,6 @@ def test_it_is_the_bug_that_is_found_and_not_the_small_picture(name: str) -> Non
 
 
 class Counter(Component):
-    """A matrix counter that always steps."""
-
     address: Out(4)
     enable: In(1)
 

@@ -13,7 +13,6 @@ SHAPES = {"cubestar": (512, 1024), "cubesense": (480, 640), "aramis": (1024, 128
 
 
 def take(name: str, emulated: AnyEmulated) -> None:
-    """Have a device take pictures."""
     client: Any = emulated.client
     if name == "cubesense":
         for camera, memory in zip(Camera, Sram, strict=True):

@@ -26,7 +26,6 @@ class Desk:
 
     @property
     def data(self) -> bytes:
-        """What the device received."""
         return bytes(byte for _, byte in self.received)
 
 

@@ -16,7 +16,6 @@ def save(folder: Path, text: str) -> Path:
 
 
 def check_refused(load: Callable[[Path], Any], path: Path, complaint: str) -> None:
-    """One line names the file and what is wrong with it."""
     with pytest.raises(SceneError) as caught:
         load(path)
     message = str(caught.value)

@@ -6,7 +6,6 @@ from cubestack.emulator.camera.common.stream import StreamSegment
 
 
 def segments(camera: Any, start_ps: int, count: int) -> list[StreamSegment]:
-    """Consecutive segments from a time on."""
     found = []
     for _ in range(count):
         segment = camera.segment_at(start_ps)

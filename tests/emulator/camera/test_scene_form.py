@@ -56,7 +56,6 @@ def load(path: Path) -> Any:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two things are alike, part by part, but for rounding."""
     if is_dataclass(one):
         names = [entry.name for entry in fields(one) if entry.init]
         return type(one) is type(other) and all(

@@ -35,7 +35,6 @@ class Desk:
         self.kernel.advance_to(round(seconds * PS_PER_S))
 
     def say(self, data: bytes) -> bytes:
-        """What of it gets through."""
         del self.heard[:]
         self.uart.host_writes(data)
         self.kernel.advance_to(self.kernel.now + (len(data) + 2) * BYTE_PS)

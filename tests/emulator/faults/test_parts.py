@@ -28,7 +28,6 @@ class Part:
         self.log.append((time_ps, text))
 
     def run(self, seconds: float) -> int:
-        """How many bits are turned over after so long."""
         self.kernel.advance_to(self.kernel.now + round(seconds * PS_PER_S))
         return int(np.unpackbits(self.memory).sum())
 

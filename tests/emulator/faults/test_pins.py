@@ -70,8 +70,6 @@ def test_a_wait_ends(waiting, faults):
 
 
 class Engine:
-    """Takes note of what reaches it."""
-
     now_ps, running, driver = 5, 0, "driver"
 
     def __init__(self) -> None:

@@ -89,7 +89,6 @@ def adapter(kernel: Kernel, bus: I2cBus) -> I2cAdapter:
 
 
 def packed(call: Call, body: bytes, key: int = 0) -> bytes:
-    """A request as it goes over the socket."""
     data = request(key, call, body)
     return LENGTH.pack(len(data)) + data
 

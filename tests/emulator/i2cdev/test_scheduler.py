@@ -71,8 +71,6 @@ class World:
 
 @dataclass
 class Port(Endpoint):
-    """Where all calls come from."""
-
     world: World
 
     def exchange(self, now_ps: int) -> None:
@@ -83,20 +81,15 @@ class Port(Endpoint):
 
 @dataclass
 class GuestProcess:
-    """Calls again and again, as often as it has messages.
-
-    Attributes:
-        calls: that are left.
-        times: wall time before and after each call, as the program sees it, in ns.
-        ends: virtual time of the ends, in ps.
-    """
+    """Calls again and again, as often as it has messages."""
 
     bench: "ScheduledWorld"
     think_ns: int
-    calls: int
+    calls: int  #: that are left
     message: Callable[[], list[I2cMessage]]
+    #: wall time before and after each call, as the program sees it, in ns
     times: list[tuple[int, int]] = field(default_factory=list)
-    ends: list[int] = field(default_factory=list)
+    ends: list[int] = field(default_factory=list)  #: virtual time of the ends, in ps
 
     def next(self, now_ns: int) -> None:
         began_ns = now_ns + self.think_ns
@@ -127,8 +120,6 @@ class GuestProcess:
 
 
 class ScheduledWorld:
-    """Both schedulers in a world."""
-
     def __init__(
         self,
         patch: pytest.MonkeyPatch,
@@ -180,8 +171,6 @@ class ScheduledWorld:
 
 
 class AtWork:
-    """Stands in for Watch."""
-
     def __init__(self, ports: list[Port], *, always_asleep: bool) -> None:
         assert not always_asleep
         self._ports = ports

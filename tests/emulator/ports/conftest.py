@@ -95,14 +95,12 @@ class Client:
         return data
 
     def read_now(self) -> bytes:
-        """What is there."""
         try:
             return os.read(self.fd, 1 << 16)
         except BlockingIOError:
             return b""
 
     def write(self, data: bytes) -> int:
-        """As much as there is room for."""
         try:
             return os.write(self.fd, data)
         except BlockingIOError:
@@ -128,20 +126,17 @@ def open_port(kind: str, path: Path, uart: Uart) -> Any:
 
 
 def open_client(port: Any) -> Client:
-    """Whoever serves the port may notice."""
     if isinstance(port, PtyEndpoint):
         return Client(os.open(port.name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK))
     return Client(socket.create_connection(port.address, TIMEOUT_S))
 
 
 def ready(port: Endpoint) -> list[int]:
-    """Which of the port's descriptors would wake the scheduler at once."""
     return [fd for fd, events in port.watched() if poll_now(fd, events)]
 
 
 @contextlib.contextmanager
 def served(device: Any, endpoint: Endpoint, pace: Any) -> Iterator[None]:
-    """The endpoint is served by a scheduler in a thread."""
     scheduler = RealtimeScheduler(
         device.kernel, [endpoint], lambda: device.uart.busy, Pace(device.kernel, pace)
     )

@@ -33,7 +33,6 @@ def assert_transparent(port, device, client) -> None:
 
 
 def assert_fresh(port, device, client) -> None:
-    """What the device says now is all that it gets."""
     device.sends(port, b"fresh")
     assert client.read(5) == b"fresh"
 

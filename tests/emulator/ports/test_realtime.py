@@ -75,7 +75,6 @@ class TimedPort:
         self.busy: Callable[[], bool] = lambda: False
 
     def run(self, pace: Any, wall_ms: float) -> "TimedPort":
-        """Let the scheduler serve for so long on the test's clock."""
         scheduler = RealtimeScheduler(
             self.kernel,
             [self.port],

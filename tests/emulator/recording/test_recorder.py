@@ -45,7 +45,6 @@ class Device:
 
 @contextmanager
 def recorded(path: Path, device: Device) -> Iterator[Recorder]:
-    """What happens to a device meanwhile comes on record."""
     uarts = {"uart": device.uart}
     with path.open("w") as stream, closing(Recorder(stream, "cubesense", uarts)) as recorder:
         recorder.listen(device.bus)

@@ -18,8 +18,6 @@ BAUD = 57_600
 
 
 def received(levels: list[tuple[int, object]]) -> bytes:
-    """What a receiver makes of drawn levels."""
-
     def level(time_ns: float) -> int:
         return int([value for then, value in levels if then <= time_ns][-1])
 

@@ -88,7 +88,6 @@ class CommandedIcarus:
     def _events(
         self, cameras: Mapping[str, ListCamera], commands: Sequence[Command]
     ) -> Iterator[PinEvent]:
-        """In the order that they have at one instant."""
         for pins in self._wiring.cameras:
             if pins.name in cameras:
                 yield from camera_events(pins, cameras[pins.name])

@@ -47,14 +47,12 @@ def transactions(addresses, data=None, **options) -> Transactions:
 
 
 def controls(wiring: Wiring) -> list[str]:
-    """Pins of the microcontroller that are not the bus's."""
     assert wiring.bus is not None
     mine = {*wiring.bus.selects, "AD_HIGH", "AD_LOW_I", "ALE", "RE_N", "WE_N"}
     return [pin for pin in wiring.mcu_pins if pin not in mine]
 
 
 def random_access(rng: np.random.Generator, wiring: Wiring) -> tuple[Transactions, int]:
-    """Any transactions, and time for some or all of them."""
     assert wiring.bus is not None
     count = int(rng.integers(0, 12))
     addresses = rng.integers(0, 1 << 24 if rng.random() < 0.1 else 4 * COLUMNS * ROWS, count)
@@ -76,7 +74,6 @@ def accessed(engine: RtlEngine, made: Transactions, reach_ps: int) -> tuple[int,
 
 
 def random_step(rng: np.random.Generator, wiring: Wiring) -> Step:
-    """What a microcontroller might do, at any moment."""
     kind = rng.random()
     if kind < 0.3:
         pin, level = str(rng.choice(controls(wiring))), int(rng.random() < 0.6)

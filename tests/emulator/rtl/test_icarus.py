@@ -33,7 +33,6 @@ class Star(NamedTuple):
     camera: ListCamera
 
     def outcome(self, commands: list[Command]) -> Outcome:
-        """Which is the same on both."""
         cameras = {self.wiring.cameras[0].name: self.camera}
         engine = make_engine(self.wiring, "compiled")
         compiled = run_engine(engine, cameras, commands, STROBE_PERIOD)

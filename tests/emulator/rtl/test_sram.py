@@ -19,7 +19,6 @@ START = 1_000_000
 
 
 def make(*driven: tuple[int, SramPins]) -> Sram:
-    """Its pins driven at these times."""
     sram = Sram(np.arange(64, dtype=np.uint8))
     for time_ps, pins in driven:
         sram.drive(time_ps, pins)

@@ -41,8 +41,7 @@ class Pins:
     def couple(self, record: Any, _wires: Any) -> None:
         self.access = record.slow_external
 
-    def stop(self) -> None:
-        """Something was raised."""
+    def stop(self) -> None: ...
 
 
 def test_banks_lead_to_the_chip_selects_that_they_are_wired_to() -> None:

@@ -77,7 +77,6 @@ def test_writes_are_in_memory() -> None:
 
 
 def load(desk: Desk, address: int, count: int) -> bytes:
-    """What an interrupt does."""
     desk.meter.charge(ebi_read=count)
     return desk.processor.load(0, address, count, CYCLES)
 

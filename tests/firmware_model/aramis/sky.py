@@ -26,34 +26,23 @@ _build = lru_cache(maxsize=4)(build_database)
 
 
 def meter() -> Meter:
-    """A fresh one of AraMiS' processor."""
     return Meter(BLACKFIN_BF533)
 
 
 def database(parameters: CatalogueParameters | None = None) -> Database:
-    """Built once in a test run."""
     return _build(parameters or CatalogueParameters())
 
 
 @dataclass(frozen=True)
 class Light:
-    """What a picture has beside the field.
+    """What a picture has beside the field."""
 
-    Attributes:
-        noise_px: standard deviation of a centroid in x and in y.
-        mag_noise: standard deviation of a magnitude.
-        mag_limit: fainter stars do not show.
-        false_stars: lights that are no stars, anywhere in the field.
-        false_mags: their magnitudes.
-        most: number of brightest stars in the list.
-    """
-
-    noise_px: float = 0.1
-    mag_noise: float = 0.1
-    mag_limit: float = 6.0
-    false_stars: int = 0
-    false_mags: tuple[float, float] = (4.5, 6.0)
-    most: int = 30
+    noise_px: float = 0.1  #: standard deviation of a centroid in x and in y
+    mag_noise: float = 0.1  #: standard deviation of a magnitude
+    mag_limit: float = 6.0  #: fainter stars do not show
+    false_stars: int = 0  #: lights that are no stars, anywhere in the field
+    false_mags: tuple[float, float] = (4.5, 6.0)  #: their magnitudes
+    most: int = 30  #: number of brightest stars in the list
 
 
 @dataclass(frozen=True)
@@ -91,7 +80,6 @@ def within(points: Array, field: CameraField) -> NDArray[np.bool_]:
 
 
 def picture(rng: np.random.Generator, field: CameraField, light: Light | None = None) -> Picture:
-    """The sky in a random attitude."""
     light = light or Light()
     sky = load_sky(mag_limit=light.mag_limit)
     attitude = Rotation.random(random_state=rng)
@@ -134,7 +122,6 @@ def is_right(solution: Solution, truth: Rotation) -> bool:
 
 
 def misnamed(solution: Solution, made: Picture, database: Database) -> int:
-    """Stars that were given another star's number."""
     named = solution.stars != NONE
     return int(np.sum(database.numbers[solution.stars[named]] != made.hip[named]))
 

@@ -55,7 +55,6 @@ def end_of(solution: Solution) -> tuple[MeasurementOutcome, Reason]:
 
 
 def distances_px(found: StarList, made: Picture) -> NDArray[np.float32]:
-    """From each star found to the nearest true one."""
     apart = np.linalg.norm(found.centroids[:, None] - made.stars.centroids[None], axis=2)
     return np.asarray(apart.min(axis=1))
 

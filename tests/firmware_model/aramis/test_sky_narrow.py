@@ -32,7 +32,6 @@ ONBOARD = CatalogueParameters(fov_deg=18, epoch=2014.8)
 
 
 def solved(path: Path, configuration: Configuration, aided: bool) -> tuple[Solution, Rotation]:
-    """What becomes of a picture, and the truth."""
     image = json.loads((FOLDER / "truth.json").read_text())["images"][path.name]
     truth = Rotation.from_quat(image["quaternion_xyzw_inertial_to_camera"])
     with Image.open(path) as opened:

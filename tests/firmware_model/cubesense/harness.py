@@ -109,7 +109,6 @@ class Harness(Runner, HostSide):
         self.power_on()
 
     def power_on(self) -> None:
-        """Power up, or off and on again."""
         self.memories = {sram: np.full((ROWS, COLUMNS), LOST, np.uint8) for sram in Sram}
         self.latched: set[Sram] = set()
         self.cameras = {camera: SccbCamera() for camera in Camera}
@@ -161,7 +160,6 @@ class Harness(Runner, HostSide):
     # --- what a test uses -----------------------------------------------------------------------
 
     def letters(self, data: bytes) -> None:
-        """Bytes arrive at the bench protocol's port."""
         for byte in data:
             self.program.bench.uart_byte(byte)
 
@@ -191,7 +189,6 @@ class Harness(Runner, HostSide):
         self.on_request = latch
 
     def cut(self) -> set[Sram]:
-        """Memories whose supply is off."""
         return {sram for sram in Sram if not self.pins[pins.SRAM_POWER[sram]]}
 
     # --- pins -----------------------------------------------------------------------------------

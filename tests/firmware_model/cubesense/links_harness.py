@@ -174,7 +174,6 @@ class Links(Runner, HostSide):
     # --- bench protocol ---------------------------------------------------------------------------
 
     def letters(self, data: bytes) -> bytes:
-        """Send letters, run, and return what the bench computer got."""
         for byte in data:
             self.bench.uart_byte(byte)
         self.run()

@@ -128,7 +128,6 @@ def sun(
 
 
 def chequered() -> NDArray[np.uint8]:
-    """Every sample differs from its neighbours."""
     rows, columns = np.mgrid[:ROWS, :COLUMNS]
     return np.where((rows // 64 + columns // 64) % 2, 200, 0).astype(np.uint8)
 
@@ -148,7 +147,6 @@ def _digital(light: NDArray[np.float64], rng: np.random.Generator | None) -> NDA
 
 @lru_cache(maxsize=64)
 def _scan_order(read_out: ReadOut) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Flat index of each clock's pixel, and which clocks present one."""
     # Beyond the picture a memory holds anything; here the first row's end.
     at = [None if a is None else (min(a[0], read_out.columns - 1), a[1]) for a in read_out.scan()]
     flat = np.array(
@@ -158,7 +156,6 @@ def _scan_order(read_out: ReadOut) -> tuple[NDArray[np.int64], NDArray[np.bool_]
 
 
 def scan(picture: NDArray[np.uint8], read_out: ReadOut = FULL_SIZE) -> NDArray[np.uint8]:
-    """The byte of each clock of the nadir scan."""
     flat, presented = _scan_order(read_out)
     return np.where(presented, picture.reshape(-1)[flat], 0).astype(np.uint8)
 

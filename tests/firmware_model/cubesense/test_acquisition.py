@@ -26,8 +26,6 @@ from .scenery import COLUMNS, ROWS, earth, edges_in, sun, window
 
 
 class Rig(Harness):
-    """Acquisition alone, on a harness."""
-
     def __init__(self, *, mcu_addressing: bool = False) -> None:
         super().__init__(mcu_addressing=mcu_addressing)
         supply = Supply(self, self.meter, State())

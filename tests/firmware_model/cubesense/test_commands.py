@@ -38,7 +38,6 @@ def result(unit: Harness, camera: codes.Camera) -> dict[str, float]:
 
 
 def measured(unit: Harness, camera: codes.Camera) -> tuple[codes.DetectResult, float, float]:
-    """What a measurement finds."""
     unit.command("CaptureAndDetect", Camera=camera, Sram=camera)
     found = result(unit, camera)
     return codes.DetectResult(int(found["Detect"])), found["Alpha"], found["Beta"]

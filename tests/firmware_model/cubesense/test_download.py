@@ -16,7 +16,6 @@ def ready(node: Links) -> int:
 
 
 def shown(node: Links, number: int) -> bytes:
-    """The frame, which must be ready."""
     assert ready(node) == number
     return bytes(node.telemetry("ImageFrame")["Frame"])
 

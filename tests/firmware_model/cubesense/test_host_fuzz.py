@@ -58,7 +58,6 @@ def letters(unit: Harness, rng: np.random.Generator) -> None:
 
 
 def i2c(unit: Harness, rng: np.random.Generator) -> None:
-    """A transfer to either address."""
     registers = bool(rng.integers(0, 2))
     pointer = [None, int(rng.integers(0, 256)), IMAGE, int(rng.integers(0, 20))][rng.integers(0, 4)]
     if rng.random() < 0.5:
@@ -91,7 +90,6 @@ def latch_up(unit: Harness, rng: np.random.Generator) -> None:
 
 
 def stays_sane(unit: Harness) -> None:
-    """All three protocols still do what they should."""
     link, registers = unit.program.node, unit.program.registers
     link.uart_silence()
     link.i2c_stop()

@@ -19,7 +19,6 @@ IMAGING_S = 0.048
 
 
 def bright(pixels: int) -> NDArray[np.uint8]:
-    """A window with this number of Sun pixels."""
     data = np.zeros(window_bytes(), np.uint8)
     data[:4] = (100, 1, 100, 0)
     data[4 : 4 + pixels] = 255
@@ -34,7 +33,6 @@ def sun_seconds(table: CostTable, data: NDArray[np.uint8], config: SunConfig) ->
 
 
 def nadir_seconds(table: CostTable, config: NadirConfig, edges: EdgeConfig) -> float:
-    """Mean over a few attitudes."""
     times = []
     for alpha, beta in ((0, 0), (10, 0), (0, 10), (7, -9), (20, 5)):
         meter = Meter(table)

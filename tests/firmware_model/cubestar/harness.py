@@ -145,7 +145,6 @@ class Harness(Runner, HostSide):
         return {name for name, up in self.telemetry("ErrorFlags").items() if up}
 
     def camera_value(self, register: str) -> int:
-        """What a register of the camera holds."""
         addresses = REGISTERS[register].addresses
         return int.from_bytes(bytes(self.camera[address] for address in addresses), "big")
 

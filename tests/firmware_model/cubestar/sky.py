@@ -22,7 +22,6 @@ PEAK_DN = 150.0
 
 
 def meter() -> Meter:
-    """A fresh one of CubeStar's processor."""
     return Meter(CORTEX_M3)
 
 

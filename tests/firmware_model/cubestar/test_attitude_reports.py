@@ -81,7 +81,6 @@ def test_results_and_performance_count_the_same(unit: Harness, sky: Sky) -> None
 
 
 def outcome(unit: Harness) -> set[str]:
-    """Names of the bits of PerformanceParameters that are set."""
     return {
         name for name, value in unit.telemetry("PerformanceParameters").items() if value is True
     }

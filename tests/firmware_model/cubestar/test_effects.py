@@ -33,7 +33,6 @@ POINT = ("X_CorrectedCoordinate", "Y_CorrectedCoordinate")
 
 
 def first(unit: Harness, sky: Sky, *fields: str, frame: str = "StarPositions") -> np.ndarray:
-    """Values of the first star that is detected."""
     unit.picture = sky.picture
     unit.command("CaptureImage", "DetectStars")
     values = unit.telemetry(frame)

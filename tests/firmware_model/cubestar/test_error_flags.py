@@ -62,7 +62,6 @@ def test_every_flag_is_raised_by_its_cause(name: str, unit: Harness, sky: Sky) -
         return  # the next test raises it
 
     def repeated() -> None:
-        """Other telemetry shows the same flags."""
         flags = unit.flags()
         log, performance = unit.telemetry("LogStatus"), unit.telemetry("PerformanceParameters")
         shown = {f.name: f.flag in flags for f in INTERFACE.telemetry("LogStatus").fields if f.flag}
@@ -112,8 +111,6 @@ def test_flags_that_this_hardware_can_not_raise() -> None:
 
 
 def overflow(send: Callable[[Harness], object]) -> Act:
-    """One telecommand more than the queue holds."""
-
     def fill(unit: Harness, _: Sky) -> None:
         for _ in range(QUEUE_DEPTH + 1):
             send(unit)

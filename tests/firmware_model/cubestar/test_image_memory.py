@@ -70,7 +70,6 @@ class Board(Runner):
         return count
 
     def _open(self, select: int, address: int) -> bool:
-        """Whether the pins give that memory to the bus."""
         if self.layout is Layout.TWO_BOARDS:
             board = f"BOARD{select + 1}_"
             return bool(self.pins[f"{board}ENABLE"] and self.pins[f"{board}RNW"])
@@ -80,7 +79,6 @@ class Board(Runner):
         return bool(self.pins["ENABLE"] and reached)
 
     def stored(self, picture: NDArray[np.uint8]) -> None:
-        """The FPGA stores a picture where the pins say."""
         self.perform(self.image_memory.begin())
         select, place = 0, self.pins.get("BANK", 0)
         if self.layout is Layout.TWO_MEMORIES:

@@ -9,7 +9,6 @@ from .harness import CAMERA_BYTE_US, Harness
 
 
 def written(unit: Harness) -> list[str]:
-    """Names of the registers of all messages."""
     registers = [REGISTERS.at(int.from_bytes(data[:2], "big")) for data in unit.camera_writes]
     return [register.name if register else "" for register in registers]
 

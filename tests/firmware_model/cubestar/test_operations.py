@@ -25,7 +25,6 @@ Y, X = np.mgrid[0:512, 0:1024]
 
 
 def large_lights() -> NDArray[np.uint8]:
-    """A Moon, a streak, a hot pixel and a star."""
     image = spots(np.array([[700.0, 300.0], [60.2, 60.4]]), np.array([900.0, 20_000.0]))
     image[(X - 300) ** 2 + (Y - 200) ** 2 < 40**2] += 200
     image[400, 100:400] += 120
@@ -62,7 +61,6 @@ def test_detection(picture: str, search: str) -> None:
 
 
 def numbers(found: Identification) -> list[float]:
-    """What became of it."""
     return [
         [*MatchOutcome].index(found.outcome),
         *found.stars.tolist(),

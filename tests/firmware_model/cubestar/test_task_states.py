@@ -42,7 +42,6 @@ def failing(*names: str, dead: bool = False, cut: bool = False, **values: object
 
 
 def latch_up_once(unit: Harness, request: Request) -> None:
-    """At the first piece of work."""
     if isinstance(request, Pay) and not unit.program.supply.cut:
         unit.on_request = lambda _request: None
         unit.program.supply.overcurrent("memory")

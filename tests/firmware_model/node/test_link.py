@@ -76,20 +76,13 @@ class Canned(Runner, HostSide):
 
 @dataclass
 class Node:
-    """A node, and what differs in its dialect.
+    """A node, and what differs in its dialect."""
 
-    Attributes:
-        make: its link, alone.
-        interface: what it serves.
-        buffer: what its UART may still have to send.
-        refused: a telecommand with a parameter out of range.
-        flags: names of its error flags, as ``LinkFlags`` and ``BusFlags`` name what they stand for.
-    """
-
-    make: Callable[[], Any]
-    interface: Interface
-    buffer: int
-    refused: tuple[str, dict[str, Any]]
+    make: Callable[[], Any]  #: its link, alone
+    interface: Interface  #: what it serves
+    buffer: int  #: what its UART may still have to send
+    refused: tuple[str, dict[str, Any]]  #: a telecommand with a parameter out of range
+    #: names of its error flags, as ``LinkFlags`` and ``BusFlags`` name what they stand for
     flags: dict[str, set[str]]
 
 
@@ -168,7 +161,6 @@ def packed(message: Message, **values: object) -> bytes:
 
 
 def good(node: Node) -> bytes:
-    """A telecommand that is accepted at any time."""
     return packed(next(m for m in node.interface.telecommands if 0 < m.length < 5 and m.id > 1))
 
 

@@ -24,7 +24,6 @@ def settings(node: tuple[Interface, tuple[str, ...]]) -> Settings:
 
 
 def change(settings: Settings, interface: Interface, commands: tuple[str, ...], seed: int) -> None:
-    """Put random bits in every parameter."""
     rng = np.random.default_rng(seed)
     for name in commands:
         message = interface.telecommand(name)

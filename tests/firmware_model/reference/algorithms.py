@@ -100,7 +100,6 @@ class Algorithms:
             getattr(self.library, name).restype = c_float
 
     def call(self, name: str, *arguments: float) -> np.float32:
-        """A function of floats."""
         return np.float32(getattr(self.library, name)(*map(c_float, arguments)))
 
     def detect(self, picture: NDArray[np.uint8], config: DetectionConfig) -> Found:
@@ -133,7 +132,6 @@ class Algorithms:
         return out
 
     def field_cosine(self, camera: CameraParameters) -> np.float32:
-        """Cosine of the field's corner."""
         c_camera = _Camera(*(getattr(camera, field) for field, _ in _Camera._fields_))
         return np.float32(self.library.field_cosine(byref(c_camera)))
 
@@ -150,7 +148,6 @@ class Algorithms:
         return ascension.value, declination.value
 
     def identify(self, directions: Floats, boresight: Floats | None, margin: float) -> Identified:
-        """Lost in space or assisted."""
         result, near = Identified(), None if boresight is None else _floats(boresight)
         self.library.identify(
             byref(result), _floats(directions), len(directions), near, c_float(margin)
@@ -164,14 +161,12 @@ class Algorithms:
         return result
 
     def best_stars(self, result: Identified, intensities: NDArray[np.uint16]) -> list[int]:
-        """Up to three of the identified."""
         best = (c_uint8 * 3)()
         pointer = intensities.ctypes.data_as(POINTER(c_uint16))
         count: int = self.library.best_stars(byref(result), pointer, best)
         return list(best[:count])
 
     def confidence(self, result: Identified, star: int) -> np.float32:
-        """Of one centroid."""
         return np.float32(self.library.confidence(byref(result), star))
 
     def count_near(self, boresight: Floats, least: np.float32) -> int:

@@ -88,7 +88,6 @@ def assert_same_identities(found: Identified, expected: Identification) -> None:
 def solve(
     program: Algorithms, vectors: Floats, expected: Identification, listed: StarCatalogue
 ) -> None:
-    """The attitude of both, and the three best stars."""
     kept = expected.matched
     reference, weights = listed.vectors[expected.stars[kept]], expected.votes[kept].astype("f4")
     found = program.quest(vectors[kept], reference, weights)

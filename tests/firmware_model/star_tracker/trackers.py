@@ -51,23 +51,19 @@ class Found:
 
 
 class Tracker(ABC):
-    """One sensor's search."""
-
     limit_s: float
     fewest: int
     edge: tuple[float, float]
     """Tangents of the field angles within which all places are in the field."""
 
     @abstractmethod
-    def sky(self, rng: np.random.Generator, false_stars: int = 0) -> Sky:
-        """A random sky."""
+    def sky(self, rng: np.random.Generator, false_stars: int = 0) -> Sky: ...
 
     @abstractmethod
     def meter(self) -> Meter: ...
 
     @abstractmethod
-    def identify(self, rays: Rays, meter: Meter | None = None, hint: Any = None) -> Found:
-        """Identify stars, the brightest first."""
+    def identify(self, rays: Rays, meter: Meter | None = None, hint: Any = None) -> Found: ...
 
     def false_rays(self, rng: np.random.Generator, count: int) -> Rays:
         """Unit vectors (count, 3) of stars that do not exist."""

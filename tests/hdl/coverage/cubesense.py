@@ -23,7 +23,6 @@ def sample(
     controls: Sequence[Controls],
     data_clocks: Sequence[int],
 ) -> None:
-    """All rows of the table, and all actions of both FPGAs."""
     if TOP is None:
         return
     _rows(controls)
@@ -101,7 +100,6 @@ def _sending(window: Window, camera: Sequence[Clock]) -> str:
 
 
 def _reading(side: str, action: Action, count: int) -> str:
-    """How far ``count`` data clocks read."""
     if action is Action.PASS_EDGE:
         return "passing"
     if action is Action.TAKE_ADDRESS:

@@ -34,7 +34,6 @@ def hit(group: str, **parts: object) -> None:
 
 
 def merged(folder: Path) -> dict[str, set[Point]]:
-    """What all processes noted, by group."""
     found: dict[str, set[Point]] = {name: set() for name in GROUPS}
     for path in folder.glob("*.txt"):
         for line in path.read_text(encoding="utf-8").splitlines():
@@ -44,7 +43,6 @@ def merged(folder: Path) -> dict[str, set[Point]]:
 
 
 def missed(found: Mapping[str, set[Point]]) -> list[tuple[str, Point]]:
-    """Declared points that were not reached."""
     return [(name, p) for name, g in GROUPS.items() for p in g.points() if p not in found[name]]
 
 

@@ -70,7 +70,6 @@ def row_of(*levels: int, mcu_addressing: bool) -> str:
 
 
 def states_of(side: str, action: Action) -> tuple[str, ...]:
-    """What an FPGA can be doing when it leaves an action."""
     of_sun = (side == "sun") == (action is Action.EDGE)
     return {
         **dict.fromkeys((Action.STORE, Action.STORE_OTHER), STORE_STATES),

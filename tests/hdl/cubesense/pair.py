@@ -49,7 +49,6 @@ def gap() -> list[Tick]:
 
 
 def frame(content: bytes) -> list[Tick]:
-    """A gap between frames, then all lines."""
     return [*gap(), *flat(lines(content))]
 
 
@@ -63,7 +62,6 @@ def with_sun(x: int, y: int) -> bytes:
 
 
 def window_of(content: bytes, x: int, y: int) -> bytes:
-    """The window around a first Sun pixel, row by row."""
     size, (left, top) = READ_OUT.window, READ_OUT.window_origin(x, y)
     starts = (row * GEOMETRY.columns + left for row in range(top, top + size))
     return b"".join(content[start:][:size] for start in starts)
@@ -103,11 +101,9 @@ class CubeSenseMcu(Processor[Controls]):
         await self._enable(SUNEN=sunen, NADEN=naden)
 
     async def standby(self) -> None:
-        """From anywhere."""
         await self._enable(SUNEN=1, NADEN=1)
 
     async def _enable(self, **enables: int) -> None:
-        """Both at once, or one after the other."""
         if random.getrandbits(1):
             await self.set(**enables)
         else:

@@ -113,7 +113,6 @@ def link_clocks(sending: Sequence[Window], camera: Sequence[Clock]) -> list[Cloc
 
 
 def store(half: Half, window: Window, clocks: Sequence[Clock], of_sun: bool) -> None:
-    """One picture is stored, or a part of one."""
     clocks = [clock for clock in clocks if window.start < clock.rise < window.end]
     clocks = clocks[2:]  # the reset is released through two flip-flops
     levels = vsync([clock.pins.hsync for clock in clocks])

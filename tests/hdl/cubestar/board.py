@@ -79,14 +79,12 @@ class CubeStarTestbench(Testbench[int]):
 
     @classmethod
     async def start(cls, dut: Any, timing: Timing = ANY) -> Self:
-        """In standby, with the camera's clock running."""
         bench = await cls.without_camera(dut, timing)
         cocotb.start_soon(bench.camera.run())
         return bench
 
     @classmethod
     async def without_camera(cls, dut: Any, timing: Timing = ANY) -> Self:
-        """In standby, with the camera's clock still."""
         bench = cls(dut, timing=timing)  # type: ignore[call-arg]
         await Timer(1, unit="ns")
         bench.in_standby()
@@ -97,8 +95,7 @@ class CubeStarTestbench(Testbench[int]):
         bench.watch()
         return bench
 
-    def watch(self) -> None:
-        """Start what else is looked at in the background."""
+    def watch(self) -> None: ...
 
     def in_standby(self) -> None:
         """AssertionError unless all outputs have their levels of standby; but for the bank."""
@@ -121,7 +118,6 @@ class CubeStarTestbench(Testbench[int]):
         return mcu
 
     def control(self, place: int) -> Mcu:
-        """Who drives the pins that lead to a place."""
         return self.mcus[place % len(self.mcus)]
 
     def storing(self) -> set[int]:

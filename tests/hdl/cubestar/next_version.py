@@ -26,8 +26,6 @@ class Window(NamedTuple):
 
 
 class BusTestbench(CubeStarTestbench):
-    """Adds the bus."""
-
     WINDOWS: ClassVar[tuple[Window, ...]]
     SELECTS: ClassVar[tuple[str, ...]] = ("CS_N",)
     QUIET = ("AD_LOW_OE",)
@@ -41,7 +39,6 @@ class BusTestbench(CubeStarTestbench):
         self.bus.start()
 
     def place_of(self, address: int, select: str) -> int:
-        """Of an access on the bus."""
         return address // MEMORY
 
     def _situation(self, address: int, select: str) -> tuple[int, str]:
@@ -58,7 +55,6 @@ class BusTestbench(CubeStarTestbench):
         return super().pixel_clock(memory) if stores else 0
 
     def window(self, place: int) -> Window:
-        """The one with a place."""
         return next(w for w in self.WINDOWS if self.srams[w.memory] is self.memory_of(place)[0])
 
     async def open(self, place: int = 0) -> None:
@@ -120,7 +116,6 @@ class DoubleTestbench(BusTestbench):
         return {self._into} if self.mcu.storing else set()
 
     async def command(self, place: int) -> None:
-        """From standby, or from where the bus has both."""
         if not self.mcu.controls[-1].enable:
             await self.open()
         await self.mcu.set(BANK=place)

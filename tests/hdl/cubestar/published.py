@@ -13,8 +13,6 @@ from tests.hdl.harness.watching import Levels, watch
 
 
 class PublishedTestbench(CubeStarTestbench):
-    """A place is a bank."""
-
     TOP = "published"
     LOW = ("ENABLE", "RNW", "BANK", "DCLK")
     QUIET = ("ACK", "DATA", "SRAM_D_O")

@@ -60,7 +60,6 @@ def test_bus_needs_no_initial_values(icarus: Any, top: str) -> None:
 
 
 def with_board(wrapper: AsPublished, name: str) -> str:
-    """The wrapper and the board in it."""
     board = wrapper.design(wrapper.columns, wrapper.rows)
     return verilog_text(wrapper, name) + verilog_text(board, "board")
 

@@ -94,7 +94,6 @@ def _camera(board: Board, pins: CameraPins, rng: Rng) -> Iterator[Step]:
 
 
 def _pause(rng: Rng) -> int:
-    """From a moment to two frames."""
     return int(np.exp(rng.uniform(np.log(1_000), np.log(14_000_000))))
 
 

@@ -113,7 +113,6 @@ class IcarusBoard:
 
 
 def _driven(wiring: Wiring) -> dict[str, str]:
-    """What events drive, and its variable in Verilog."""
     supplies = {f"power {m.name}": f"powered_{n}" for n, m in enumerate(wiring.memories)}
     return {name: name for name in wiring.initial} | supplies
 

@@ -21,7 +21,6 @@ NEVER = 1 << 62
 
 
 def picture() -> bytes:
-    """A random picture, row by row."""
     return random.randbytes(GEOMETRY.pixels)
 
 
@@ -49,7 +48,6 @@ def flat(parts: Iterable[Iterable[T]]) -> list[T]:
 
 
 def frame(content: bytes) -> list[Tick]:
-    """VSYNC low, then all lines."""
     return [*vsync(), *flat(lines(content))]
 
 
@@ -88,7 +86,6 @@ class Camera:
         return len(self.clocks)
 
     async def sent(self) -> None:
-        """Wait for the rising edge of the last tick sent."""
         while self.busy:
             await RisingEdge(self._dut.PIXCLK)
 
@@ -113,7 +110,6 @@ class Camera:
             await FallingEdge(self._dut.PIXCLK)
 
     def stop(self) -> None:
-        """At whatever level the clock has."""
         self._running.clear()
 
     def go(self) -> None:

@@ -38,7 +38,6 @@ class Ebi:
         cocotb.start_soon(never_high(self._dut.AD_LOW_OE, both, unless=lambda: not self.drives))
 
     async def address(self, address: int) -> None:
-        """The first half of an access."""
         address |= random.getrandbits(24 - USED_BITS) << USED_BITS
         self.drives = True
         self._dut.AD_HIGH.value = random.getrandbits(8)  # ALE does not wait for the lines

@@ -16,19 +16,16 @@ class Geometry(NamedTuple):
 
     @property
     def position_bits(self) -> int:
-        """Address bits below the bank."""
         return (self.columns - 1).bit_length() + (self.rows - 1).bit_length()
 
     @property
     def bank_size(self) -> int:
-        """Addresses from one bank to the next."""
         return 1 << self.position_bits
 
     def address(self, column: int, row: int, bank: int = 0) -> int:
         return bank * self.bank_size + (row << (self.columns - 1).bit_length()) + column
 
     def addresses(self, bank: int = 0) -> list[int]:
-        """Of all pixels, row by row."""
         return [self.address(x, y, bank) for y in range(self.rows) for x in range(self.columns)]
 
 

@@ -48,7 +48,6 @@ class Sram:
         cocotb.start_soon(self._offer())
 
     def picture(self, bank: int = 0) -> bytes:
-        """What is stored in a bank, row by row."""
         return bytes(self.memory[address] for address in GEOMETRY.addresses(bank))
 
     def _level(self, name: str) -> int:

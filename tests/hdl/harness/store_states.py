@@ -76,7 +76,6 @@ def steps(ticks: Sequence[Tick], gaps: bool = False) -> Iterator[Step]:
 
 
 def read_state(count: int) -> str:
-    """How far ``count`` data clocks of an image's read-out come."""
     if count >= GEOMETRY.pixels:
         return "last pixel" if count == GEOMETRY.pixels else "wrapped"
     if not count:

@@ -30,32 +30,27 @@ class Testbench(ABC, Generic[P]):
 
     @classmethod
     @abstractmethod
-    async def start(cls, dut: Any, timing: Timing = ANY) -> Self:
-        """In standby, with the camera's clock running."""
+    async def start(cls, dut: Any, timing: Timing = ANY) -> Self: ...
 
     @abstractmethod
-    def camera_of(self, place: P) -> Camera:
-        """Where its picture comes from."""
+    def camera_of(self, place: P) -> Camera: ...
 
     @abstractmethod
-    def memory_of(self, place: P) -> tuple[Sram, int]:
-        """Memory and bank."""
+    def memory_of(self, place: P) -> tuple[Sram, int]: ...
 
     @abstractmethod
     def frame(self, content: bytes) -> list[Tick]:
         """A frame as the cameras send it, with what comes before it."""
 
     @abstractmethod
-    async def command(self, place: P) -> None:
-        """From standby to storing, without waiting for the camera."""
+    async def command(self, place: P) -> None: ...
 
     @abstractmethod
     async def acknowledged(self, place: P, patience: int | None = None) -> bool:
         """Wait for ACK, for as long as the picture may take, or for ``patience`` ps."""
 
     @abstractmethod
-    async def standby(self) -> None:
-        """At any moment, from any state."""
+    async def standby(self) -> None: ...
 
     @abstractmethod
     async def fetch(self, place: P) -> bytes:
@@ -85,7 +80,6 @@ class Testbench(ABC, Generic[P]):
         return content
 
     def stored(self, place: P) -> bytes:
-        """The picture in a memory, row by row."""
         sram, bank = self.memory_of(place)
         return sram.picture(bank)
 

@@ -71,5 +71,4 @@ def pin(dut: Any, path: str) -> Any:
 
 
 def levels(dut: Any, names: Iterable[str]) -> dict[str, int]:
-    """Levels of ports by their names."""
     return {name: int(pin(dut, name).value) for name in names}

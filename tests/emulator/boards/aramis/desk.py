@@ -44,7 +44,6 @@ class Desk:
         return self.board.kernel.now / PS_PER_S
 
     def command(self, name: str, **values: Any) -> None:
-        """A telecommand, and time for it to be processed."""
         self.client.command(name, **values)
         self.client.wait_processed(5)
 

@@ -56,8 +56,6 @@ def endpoint(board: CubeStarFirmwareBoard) -> GdbEndpoint:
 
 
 def send_bytes(board: CubeStarFirmwareBoard, data: bytes, period_ms: int = 5) -> None:
-    """A host that writes a byte now and then."""
-
     def write() -> Any:
         for byte in data:
             yield board.kernel.timeout(period_ms * PS_PER_MS)

@@ -35,7 +35,6 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Image]:
 
 
 def powered(image: Image, **options: Any) -> CubeStarFirmwareBoard:
-    """A board whose camera sends frames already."""
     board = CubeStarFirmwareBoard(SKY, image, seed=3, **options)
     assert board.camera.i2c_write(REGISTERS.i2c_address, b"\x81\x00\x21", 0)
     return board

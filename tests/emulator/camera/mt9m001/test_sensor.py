@@ -47,12 +47,10 @@ def get(camera: Mt9m001, name: str) -> int:
 
 
 def starts(segments: list[tuple[int, int, int, int]]) -> list[int]:
-    """When FRAME_VALID rises."""
     return [start for start, clocks, *_ in segments if clocks == 242]
 
 
 def stream(camera: Mt9m001, start_ps: int, until_ps: int) -> list[tuple[int, int, int, int]]:
-    """Start, clocks, FRAME_VALID and rows of each segment."""
     segments, now = [], start_ps
     while now < until_ps:
         segment = camera.segment_at(now)
@@ -62,7 +60,6 @@ def stream(camera: Mt9m001, start_ps: int, until_ps: int) -> list[tuple[int, int
 
 
 def frame(camera: Mt9m001, after_ps: int) -> np.ndarray:
-    """The first whole picture after a time."""
     pieces, now, low = [], after_ps, False
     while len(pieces) < 2:
         segment = camera.segment_at(now)

@@ -45,7 +45,6 @@ def picture(camera: Ov7620, frame: int = 3) -> np.ndarray:
 
 
 def light(camera: Ov7620, frame: int = 3) -> np.ndarray:
-    """Its picture above black."""
     return picture(camera, frame).astype(int) - 34
 
 

@@ -103,8 +103,6 @@ class Kernel:
 
 
 class Program:
-    """Makes system calls by name."""
-
     def __init__(self, numbers: range = range(900, 904)) -> None:
         abi = native_abi()
         assert abi is not None
@@ -142,7 +140,6 @@ class Program:
         return self.kernel.answers.get(self._count)
 
     def opened(self) -> int:
-        """A descriptor of the device file."""
         *_, fd = self("openat", -100, self.memory(b"/dev/i2c-7\0"), os.O_RDWR)
         return int(fd)
 

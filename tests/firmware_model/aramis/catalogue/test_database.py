@@ -20,12 +20,10 @@ def image() -> bytes:
 
 
 def sealed(image: bytes) -> bytes:
-    """The image with a checksum that fits."""
     return image[:-4] + struct.pack("<I", crc32(image[:-4]))
 
 
 def place(image: bytes, wanted: str) -> int:
-    """Where an array starts."""
     parts = Database.unpack(image).sizes
     return sum(list(parts.values())[: list(parts).index(wanted)])
 

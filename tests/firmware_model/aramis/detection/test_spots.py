@@ -22,7 +22,6 @@ def spots(
     level: object = 6.0,
     seed: int = 0,
 ) -> NDArray[np.uint8]:
-    """Gaussian spots on a noisy sky."""
     image = np.random.default_rng(seed).normal(0, NOISE, Y.shape) + level
     for x, y in places:
         part = np.s_[int(y) - 40 : int(y) + 41, int(x) - 40 : int(x) + 41]

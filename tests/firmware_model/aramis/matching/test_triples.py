@@ -25,7 +25,6 @@ def directions(made: Picture) -> Vectors:
 
 
 def match(vectors: Vectors, pivots: Sequence[int], sigma: float, enough: int = 1) -> Match:
-    """Of the three brightest stars."""
     return match_triple(vectors, (0, 1, 2), pivots, sigma, database(), None, meter(), enough)
 
 

@@ -23,7 +23,6 @@ def unit() -> Harness:
 
 
 def said(unit: Harness, *message: int) -> bytes:
-    """What is answered at once."""
     for byte in message:
         unit.program.backup.uart_byte(byte)
     answer = bytes(unit.sent)

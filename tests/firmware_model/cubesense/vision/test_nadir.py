@@ -142,7 +142,6 @@ def test_half_a_limb_is_enough(ours: NadirConfig, turn_deg: int) -> None:
 
 
 def intruder(rng: np.random.Generator, picture: NDArray[np.uint8]) -> None:
-    """Add a bar or a disc, dark or bright, anywhere."""
     rows, columns = np.mgrid[:ROWS, :COLUMNS]
     x, y = rng.uniform(150, 590), rng.uniform(20, 460)
     turn, long, wide = rng.uniform(0, 3.1), rng.uniform(3, 60), rng.uniform(2, 12)

@@ -52,7 +52,6 @@ def table(projection: Projection) -> RadiusTable:
 
 
 def numbers(found: Any) -> list[float]:
-    """Of a result, reasons among them."""
     return [float(getattr(value, "value", value)) for value in vars(found).values()]
 
 

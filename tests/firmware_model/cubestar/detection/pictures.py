@@ -61,7 +61,6 @@ def drawn(
 
 
 def errors(found: Detection, true: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Centroid minus the nearest true star, for each centroid."""
     nearest = [np.argmin(np.hypot(*(true - place).T)) for place in found.centroids]
     assert len(set(nearest)) == len(nearest)
     return np.asarray(found.centroids - true[nearest], dtype=np.float64)

@@ -45,7 +45,6 @@ def sky(seed: int, count: int = 18, faintest: float = 300.0) -> tuple[Image, Pla
 
 
 def missing(found: Detection, places: Places, within: float = 0.5) -> int:
-    """How many of the places have no centroid."""
     if not len(found.centroids):
         return len(places)
     away = np.hypot(*(places[:, None] - found.centroids[None]).transpose(2, 0, 1))

@@ -107,7 +107,6 @@ def same(found: Detection, expected: Detection) -> None:
 
 
 def crowded(rng: np.random.Generator, rows: int, columns: int) -> NDArray[np.uint8]:
-    """Noise, lines that touch the edges, and blobs of all sizes."""
     image = rng.integers(0, 9, (rows, columns)).astype(float)
     y, x = np.mgrid[0:rows, 0:columns]
     for _ in range(rng.integers(0, 12)):

@@ -24,7 +24,6 @@ Shoot = Callable[..., Any]
 
 
 def check(found: Identification, stars: NDArray[np.int64]) -> tuple[bool, int]:
-    """Whether it is solved, and how many kept identities are wrong."""
     matched = found.matched
     wrong = int((found.stars[matched] != stars[matched]).sum())
     assert (found.outcome is MatchOutcome.IDENTIFIED) == (len(matched) > 0)

@@ -33,7 +33,6 @@ def hint(unit: Harness, attitude: Rotation) -> None:
 
 
 def turned(pose: Rotation, degrees: float) -> Rotation:
-    """The camera turned about its x axis."""
     return Rotation.from_euler("x", degrees, degrees=True) * pose
 
 

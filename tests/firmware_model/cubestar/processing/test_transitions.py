@@ -37,7 +37,6 @@ def seen(unit: Harness, pose: Rotation | None, wait_s: float = 0.0) -> tuple[Mat
 
 
 def two_stars() -> np.ndarray:
-    """Spots that no search makes an attitude of."""
     picture = DARK.copy()
     picture[100:104, 100:104] = picture[300:304, 700:704] = 80
     return picture

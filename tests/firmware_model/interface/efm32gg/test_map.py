@@ -53,7 +53,6 @@ def test_interrupts_have_the_manual_s_numbers() -> None:
 
 
 def structs() -> dict[str, list[tuple[str, int]]]:
-    """Words of each struct of the header, with their offsets."""
     found: dict[str, list[tuple[str, int]]] = {}
     sizes = {"uint32_t": 4}
     for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", TEXT, re.DOTALL):

@@ -25,7 +25,6 @@ def any_pixel() -> tuple[int, int]:
 
 
 async def each_side(bench: PairTestbench) -> AsyncIterator[str]:
-    """Ready to take an address, and from there to standby."""
     for side in SIDES:
         await bench.mcu.open_address(side)
         yield side

@@ -50,7 +50,6 @@ async def sends(bench: PairTestbench, way: tuple[str, str], ticks: Sequence[Tick
 
 
 def rows_of(sizes: Sequence[int]) -> list[Tick]:
-    """Lines of random pixels, without a gap between them."""
     return flat(list(line(random.randbytes(size), random.randrange(1, GAP))) for size in sizes)
 
 

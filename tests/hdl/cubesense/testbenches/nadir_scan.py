@@ -12,7 +12,6 @@ COLUMNS, ROWS = READ_OUT.columns, READ_OUT.rows
 
 
 def pixels_by_hand() -> list[tuple[int, int] | None]:
-    """The scan in the words of its source, once through."""
     rows = range(READ_OUT.first_row, ROWS, READ_OUT.scan_step)
     columns = range(READ_OUT.first_column, COLUMNS, READ_OUT.scan_step)
     along_rows = [(x, y) for y in rows for x in range(COLUMNS)]

@@ -50,7 +50,6 @@ def row_with(side: str, action: Action) -> Sequence[int]:
 
 
 async def leave_store(bench: PairTestbench, side: str, action: Action, state: str) -> None:
-    """From standby there, and out."""
     camera = bench.cameras[side if action is Action.STORE else OTHER[side]]
     await bench.mcu.command(*row_with(side, action))
     if state != "reset":
@@ -69,7 +68,6 @@ async def leave_sending(bench: PairTestbench, side: str, state: str) -> None:
 
 
 def clocks_to(state: str, window: bool) -> int:
-    """Data clocks after which a read-out is there."""
     rows, clocks = 1 + len(READ_OUT.scan_rows) * COLUMNS, READ_OUT.scan_clocks
     after, pixels = 4 + READ_OUT.window**2, GEOMETRY.pixels
     scan = {"A": range(1, rows), "B": range(rows, rows + 1), "C": range(rows + 1, clocks)}
@@ -138,7 +136,6 @@ async def every_row_in_every_order_of_the_enables(bench: PairTestbench) -> None:
 
 
 def irregular(case: str) -> list[Tick]:
-    """A whole picture, irregular but for a gap before it."""
     rows = lines(picture())
     number = random.randrange(ROWS - 2)
     match case:

@@ -35,7 +35,6 @@ def with_runs(*runs: tuple[int, int, int]) -> list[list[int]]:
 
 
 async def start(dut: Any, reset: bool = True) -> None:
-    """A reset and a gap, or a gap alone."""
     if reset:
         await clock(dut, "pix", reset=1, start=1, store=0)
         await clock(dut, "pix", start=1)
@@ -59,7 +58,6 @@ async def write(dut: Any, picture: Sequence[Sequence[int]], pixels: int | None =
 
 
 async def finds(dut: Any, picture: list[list[int]], reset: bool = True) -> tuple[int, int]:
-    """Search one picture and compare."""
     await start(dut, reset)
     await write(dut, picture)
     assert found(dut) == first_sun(picture)

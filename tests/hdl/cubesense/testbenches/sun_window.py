@@ -24,7 +24,6 @@ def origin_by_hand(x: int, y: int) -> tuple[int, int]:
 
 
 async def presents(dut: Any, x: int, y: int, clocks: int) -> None:
-    """Checks the outputs for ``clocks`` clocks."""
     await clock(dut, "window", reset=1, x=x, y=y)
     for pin, value in expected(x, y, clocks):
         assert int(dut.coordinate.value) == (pin == "byte")

@@ -16,7 +16,6 @@ COLUMNS, ROWS = GEOMETRY
 
 
 def rows_of(sizes: Iterable[int]) -> list[Tick]:
-    """Lines of random pixels."""
     return flat(line(random.randbytes(size)) for size in sizes)
 
 

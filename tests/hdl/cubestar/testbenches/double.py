@@ -11,7 +11,6 @@ from tests.hdl.harness.testbench import checked_test
 
 
 async def fills(bench: DoubleTestbench, memory: int) -> None:
-    """To ACK, and back to the bus."""
     content = picture()
     await bench.begin(memory, content)
     assert await bench.acknowledged(memory), "no ACK"

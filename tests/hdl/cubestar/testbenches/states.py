@@ -39,7 +39,6 @@ def ticks_to(state: str) -> tuple[list[Tick], list[Tick]]:
 
 
 async def leave(bench: CubeStarTestbench, place: int, state: str, pins: dict[str, int]) -> None:
-    """From standby to there, and out."""
     await bench.command(place)
     if state != "reset":
         await bench.camera.started()
