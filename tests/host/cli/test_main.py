@@ -110,24 +110,16 @@ def test_wrong_arguments_are_one_line(
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("kind = sky", ("not a TOML file",)),
-        ('kind = "sea"', ("kind", "sky", "sea")),
-        ('kind = "sky"\nra_deg = 1.0', ("dec_deg",)),
-        ('kind = "sky"\nra_deg = 1.0\ndec_deg = 2.0\ncolour = 3', ("colour", "mag_limit")),
-        ('kind = "sky"\nra_deg = "east"\ndec_deg = 2.0', ("ra_deg", "number")),
-        ('kind = "picture"', ("file",)),
-        ('kind = "picture"\nfile = "none.png"', ("none.png",)),
-    ],
+    ("text", "said"),
+    [("kind = sky", "not a TOML file"), ('kind = "picture"\nfile = "none.png"', "none.png")],
 )
 @pytest.mark.parametrize("command", ["measure", "emulate"])
 def test_rejects_invalid_scene_files(
-    run: Run, tmp_path: Path, command: str, text: str, words: tuple[str, ...]
+    run: Run, tmp_path: Path, command: str, text: str, said: str
 ) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(text, encoding="utf-8")
-    check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", *words)
+    check_one_line(run(command, "cubestar", "--scene", scene), "scene.toml", said)
 
 
 @pytest.mark.parametrize(
@@ -154,34 +146,16 @@ def test_rejects_other_picture_formats(run: Run, tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{}", ("f_px",)),
-        (
-            '{"f_px": 1071, "cx_px": 512, "cy_px": 256, '
-            '"images": {"sky.png": {"quaternion_xyzw_inertial_to_camera": [1, 2]}}}',
-            ("sky.png", "four"),
-        ),
-    ],
-)
-def test_rejects_invalid_camera_files(
-    run: Run, tmp_path: Path, text: str, words: tuple[str, ...]
-) -> None:
+def test_rejects_invalid_camera_files(run: Run, tmp_path: Path) -> None:
     picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
-    camera.write_text(text, encoding="utf-8")
+    camera.write_text("{}", encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera)
-    check_one_line(outcome, "camera.json", *words)
+    check_one_line(outcome, "camera.json", "f_px")
 
 
-@pytest.mark.parametrize("images", ["[]", "{}", '{"sky.png": 1}', '{"other.png": {}}'])
-def test_camera_file_without_the_picture_has_no_truth(
-    run: Run, tmp_path: Path, images: str
-) -> None:
+def test_camera_file_without_the_picture_has_no_truth(run: Run, tmp_path: Path) -> None:
     picture, camera = dark_picture(tmp_path / "sky.png"), tmp_path / "camera.json"
-    camera.write_text(
-        f'{{"f_px": 1071, "cx_px": 512, "cy_px": 256, "images": {images}}}', encoding="utf-8"
-    )
+    camera.write_text('{"f_px": 1071, "cx_px": 512, "cy_px": 256}', encoding="utf-8")
     outcome = run("measure", "cubestar", "--image", picture, "--camera", camera, "--json")
     assert outcome.code == FAILED  # the picture is black
     assert json.loads(outcome.out)["truth"] is None

@@ -40,10 +40,6 @@ FAILED, WRONG_CALL = 1, 2
             "can not listen on 192.0.2.1:0: Cannot assign requested address; choose another port",
         ),
         (
-            ("emulate", "aramis", "--tcp", "0", "--listen", "0.0.0.0"),
-            "0.0.0.0 is open to other machines; use 127.0.0.1 or --allow-remote",
-        ),
-        (
             ("emulate", "aramis", "--control", "0", "--listen", "0.0.0.0"),
             "0.0.0.0 can be reached from other machines: take 127.0.0.1, or give --allow-remote",
         ),

@@ -35,6 +35,13 @@ def test_truth_is_read_from_the_camera_file(tmp_path: Path) -> None:
     assert _picture_truth(Path("other.png"), camera) is None
 
 
+@pytest.mark.parametrize("images", [[], {}, {"sky.png": 1}, {"other.png": {}}])
+def test_camera_file_without_the_picture_has_no_truth(images: object, tmp_path: Path) -> None:
+    camera = tmp_path / "camera.json"
+    camera.write_text(json.dumps({"images": images}), encoding="utf-8")
+    assert _picture_truth(Path("sky.png"), camera) is None
+
+
 @pytest.mark.parametrize("quaternion", [[0, 0, 1], [0, 0, 0, 0, 1], [0, 0, 0.1, 1], [1, 0, 0, 1]])
 def test_rejects_truth_that_is_no_unit_quaternion(quaternion: list[float], tmp_path: Path) -> None:
     with pytest.raises(CameraFileError, match=r"sky\.png's quaternion must be four of unit"):
