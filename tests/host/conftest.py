@@ -1,4 +1,4 @@
-"""Nodes in memory, driven by the interface tables: what host code talks to in these tests."""
+"""Fake nodes that are driven by the interface tables."""
 
 from collections import defaultdict, deque
 from collections.abc import Callable
@@ -81,7 +81,7 @@ class FakeNode:
 
 
 class FakeCubeStar(FakeNode):
-    """Stores what is uploaded in ``memory``."""
+    """Stores uploads in ``memory``."""
 
     def __init__(self) -> None:
         super().__init__(INTERFACE)
@@ -172,7 +172,7 @@ class FakeCubeSense(FakeNode):
 
 
 class Line:
-    """A host reads what is ``pending``, in pieces of ``chunk`` bytes; empty reads are noted."""
+    """Returns ``pending`` in pieces of ``chunk`` bytes and counts empty reads."""
 
     def __init__(self) -> None:
         self.pending = bytearray()
@@ -192,7 +192,7 @@ class Line:
 
 
 class LetterLine(Line):
-    """A serial line on which each letter has its answer."""
+    """A serial line with an answer for each letter."""
 
     def __init__(self, **answers: bytes) -> None:
         super().__init__()
@@ -248,7 +248,7 @@ class I2cLink:
 
 
 class Slave:
-    """Registers behind a pointer, as the protocol is described, with smbus2's ``i2c_rdwr``."""
+    """Registers with an address pointer and smbus2's ``i2c_rdwr``."""
 
     def __init__(self) -> None:
         self.content: dict[int, bytes] = {}
@@ -279,7 +279,7 @@ class Slave:
 
 
 def over_i2c(node: FakeNode) -> I2cClient:
-    """A client of ``node`` on its bus, which does not wait."""
+    """A client of ``node`` on an I2C bus; does not wait."""
     return I2cClient(
         I2cLink(node, node.interface.i2c_address), node.interface, wait=lambda _s: None
     )

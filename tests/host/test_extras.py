@@ -1,5 +1,3 @@
-"""What is said about packages that are not installed."""
-
 import pytest
 
 from cubestack.host.extras import install_command

@@ -12,7 +12,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "plain_pyserial.py"
 
 
 def run_against(uart: Any) -> "subprocess.CompletedProcess[str]":
-    """Run the example on a socket that ``uart`` answers."""
+    """Runs the example on a socket that ``uart`` answers."""
 
     def serve(server: socket.socket) -> None:
         connection = server.accept()[0]

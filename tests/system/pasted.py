@@ -1,12 +1,11 @@
-"""Pastes the commands of README.md and docs/, in their order, as somebody would who has just come.
+"""Runs the commands of README.md and docs/ in their order, in a fresh clone.
 
-``python -m tests.system.pasted`` makes a fresh clone, and in it runs every block of shell of
-README.md and then of each page, line by line in one shell a document: what one line activates,
-installs or writes, the next one has. What serves until Ctrl-C serves until its document ends, or
-the next one takes its place; scripts of README.md run beside it. The tutorial has an empty folder.
+``python -m tests.system.pasted`` clones the project and runs every shell block of README.md and of
+each page, line by line in one shell per document. A server runs until its document ends or the next
+server starts; scripts of README.md run beside it. The tutorial runs in an empty folder.
 
-It reports for each command how it ended, how long it took, or why it was left out; the exit status
-is 1 when one of them failed. ``--long`` includes those that take minutes to hours.
+Prints the result and duration of each command, or why it was skipped; exit status 1 if one failed.
+``--long`` includes commands that take minutes to hours.
 """
 
 import argparse

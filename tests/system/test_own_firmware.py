@@ -114,7 +114,7 @@ def test_hanging_program_without_a_watchdog_stays_silent(star: AnyEmulated) -> N
 
 def test_polling_program_is_idle_after_a_while(star: AnyEmulated) -> None:
     star.wait(0.02)
-    assert star.board.busy()  # it computes, for all that anybody can tell
+    assert star.board.busy()  # it polls
     star.wait(6.0)
     assert not star.board.busy()
     answer(star, b"h")

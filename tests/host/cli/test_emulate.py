@@ -23,7 +23,7 @@ from tests.conftest import Run
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
 SOON_S = 60.0
-BUS = 213  # nobody's
+BUS = 213  # unused
 
 
 class Serving:

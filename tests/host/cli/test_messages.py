@@ -58,7 +58,7 @@ def test_error_is_one_plain_line(
 
 
 def process(text: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """A Python of its own that runs ``text``."""
+    """A Python process that runs ``text``."""
     return subprocess.run(
         [sys.executable, "-c", text],
         capture_output=True,

@@ -18,7 +18,7 @@ def opened():
 
 
 def emulated(title: str, *lines: tuple[str, str]) -> SimpleNamespace:
-    """What stands for a powered-up device here: its title, and its serial lines."""
+    """A stub of a powered-up device with serial lines."""
     kernel = Kernel()
     return SimpleNamespace(
         device=SimpleNamespace(title=title),

@@ -31,7 +31,7 @@ def recording(tmp_path):
 
 
 def check_same(outcome):
-    """The replay found no difference, and had nothing to tell."""
+    """The replay found no difference and printed no warning."""
     assert (outcome.code, outcome.err) == (0, "")
     assert "no difference" in outcome.out
 
@@ -68,7 +68,7 @@ SESSION = (
 
 @pytest.fixture
 def session(tmp_path, run):
-    """A CubeSense that is mistreated by the shell, its scene files, and what it said."""
+    """A session with faults and two scenes: recording, scene files, output."""
     scenes = [tmp_path / "first.toml", tmp_path / "second.toml"]
     for number, path in enumerate(scenes):
         path.write_text(SUN.format(10 * number))

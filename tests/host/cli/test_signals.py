@@ -20,7 +20,7 @@ def begun(*words: str) -> "subprocess.Popen[str]":
 
 
 def heard() -> None:
-    """Under nohup, and behind a script's &, signals would be ignored from the start."""
+    """Restores the handlers that nohup or a script's & would ignore."""
     for number in (signal.SIGHUP, signal.SIGINT):
         signal.signal(number, signal.SIG_DFL)
 
@@ -68,7 +68,7 @@ def test_signal_ends_the_emulation_process(
 
 
 def children(process: int) -> set[int]:
-    """Processes that any thread of ``process`` has begun."""
+    """Child processes of all threads of ``process``."""
     tasks = Path(f"/proc/{process}/task").glob("*/children")
     return {int(one) for task in tasks for one in task.read_text("utf-8").split()}
 

@@ -29,7 +29,7 @@ from tests.conftest import Run
 
 @pytest.fixture
 def ending(monkeypatch: pytest.MonkeyPatch) -> list[BaseException | int | None]:
-    """What `bench` ends with: an exception, or its exit status."""
+    """How `bench` ends: an exception or its exit status."""
     ends = list[BaseException | int | None]()
 
     def run(_args: argparse.Namespace) -> int | None:
@@ -280,7 +280,7 @@ def test_list_shows_the_strengths_of_each_hazard(run: Run) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    """A campaign that costs nothing: what its rows are, and what becomes of them."""
+    """A stub of a campaign with given rows and results."""
     ended = {(("stars", 3),): Counter(right=3, wrong=1), (("stars", 9),): Counter(refused=4)}
     made = SimpleNamespace(
         path=tmp_path / "c",

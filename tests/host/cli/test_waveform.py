@@ -19,7 +19,7 @@ ABOUT = {
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Two waveforms: of a counter on ``DATA`` and a wire inside, and an empty one."""
+    """Waveforms of a counter with an internal signal, and an empty one."""
     with (
         (tmp_path / "cubestar_top.stores-8-4-1.whole_frame.vcd").open("w") as file,
         VCDWriter(file, timescale="1 ps") as writer,

@@ -22,7 +22,7 @@ class Clock:
 
 
 class Measured(DeviceClient):
-    """Each result takes 0.3 s; the third does not come."""
+    """Each result takes 0.3 s; the third is lost."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock, self.asked = clock, 0

@@ -130,7 +130,7 @@ def test_devices_on_one_bus_go_back_together(make):
 
 
 class FakeClient(SerialPort):
-    """A port whose client writes and keeps what it gets."""
+    """A port whose client writes ``writes`` and stores answers in ``got``."""
 
     name = "fake"
 

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 @pytest.fixture
 def satellite() -> Iterator[tuple[Any, Any, Any]]:
-    """The orbit, and a star tracker and a sun and nadir sensor on it."""
+    """An orbit with a star tracker and a sun and nadir sensor."""
     orbit = load_orbit(ORBIT)
     with (
         open_device("cubestar", profile="extended") as star,

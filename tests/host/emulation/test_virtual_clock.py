@@ -52,7 +52,7 @@ clocks = [t.time, t.monotonic, t.perf_counter]
 
 @pytest.fixture
 def driver(request: pytest.FixtureRequest) -> Iterator[Any]:
-    """A module that has taken what it needs of ``time`` before there is a device."""
+    """A module that imported names from ``time`` before the device was opened."""
     module = ModuleType("driver_under_test")
     exec(DRIVER, module.__dict__)
     sys.modules[module.__name__] = module

@@ -15,7 +15,7 @@ def measure(device: Any) -> tuple[float | None, float | None, bool]:
 
 
 class Opened(SimpleNamespace):
-    """Stands for a device and for what opens it."""
+    """A stub of an opener and its device."""
 
     def __call__(self, scene: Any, **_options: Any) -> "Opened":
         self.scene = scene

@@ -15,14 +15,14 @@ BELT = (25930, 26311, 26727)
 
 
 def seen(hipparcos: int, off_deg: float = 0.0) -> np.ndarray:
-    """Where a star is in camera axes, moved to the right."""
+    """Direction of a star in camera axes, moved to the right."""
     sky = load_sky()
     vector = matrix_from_quaternion(TRUTH) @ sky.vectors[np.searchsorted(sky.hip, hipparcos)]
     return np.asarray(vector + np.tan(np.radians(off_deg)) * np.array([1.0, 0.0, 0.0]))
 
 
 def cubestar(*off_deg: float, unnamed: int = 1) -> Any:
-    """A CubeStar that has found the belt, each star so far off, and more without a name."""
+    """A CubeStar that found the belt, each star off by an angle, and unnamed stars."""
     stars = [SimpleNamespace(number=n, hipparcos=one) for n, one in enumerate(BELT)]
     stars += [SimpleNamespace(number=3 + n, hipparcos=None) for n in range(unnamed)]
     vectors = [seen(one, off) for one, off in zip(BELT, off_deg, strict=True)]

@@ -1,4 +1,4 @@
-"""Random frames of every interface, and what this project's codec makes of them."""
+"""Random frames of every interface, decoded by this project's codec."""
 
 import random
 import struct
@@ -24,7 +24,7 @@ def messages(interface: Interface, kind: MessageKind) -> list[Message]:
 
 
 def frames(message: Message, count: int) -> Iterator[tuple[bytes, dict[str, Any]]]:
-    """Data and their values; all bits are random, but named numbers are named ones."""
+    """Random frames and their values; named numbers have valid names."""
     rng = random.Random(message.id)
     for _ in range(count):
         data = bytearray(rng.randbytes(message.length))
@@ -38,7 +38,7 @@ def frames(message: Message, count: int) -> Iterator[tuple[bytes, dict[str, Any]
 
 
 def same(field: Field, theirs: Any, ours: Any) -> bool:
-    """Within the rounding of one multiplication where a count is scaled, else exactly."""
+    """Equal, for scaled counts within the rounding of one multiplication."""
     if field.scale != 1:
         return theirs == pytest.approx(ours, rel=1e-15)
     return bool(theirs == ours)

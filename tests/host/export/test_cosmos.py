@@ -27,7 +27,7 @@ class Item:
     modifiers: dict[str, list[list[str]]] = field(default_factory=dict)
 
     def value(self, data: bytes) -> Any:
-        """As COSMOS' accessor takes it: offsets count from the first byte's highest bit."""
+        """As COSMOS reads it: offsets count from the highest bit of the first byte."""
         if self.kind == "BLOCK":
             return data[self.bit // 8 : (self.bit + self.bits) // 8]
         if self.bits < 8:
@@ -48,7 +48,7 @@ Packets = dict[tuple[str, str], dict[str, Item]]
 
 
 def parse(text: str) -> Packets:
-    """Packets by keyword and name; an assertion fails where the grammar is not kept."""
+    """Packets by keyword and name; fails for other grammar."""
     packets: Packets = {}
     for line in text.splitlines():
         words = shlex.split(line, comments=True)

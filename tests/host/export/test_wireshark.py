@@ -94,7 +94,7 @@ class Dissector:
         self.number = 0
 
     def dissect(self, data: bytes, *, to_device: bool, number: int = 0) -> tuple[list[Any], Any]:
-        """What it adds to the tree, and the packet's information."""
+        """The tree that is added, and the packet's information."""
         self.number += 1
         ports = (HOST_PORT, PORT) if to_device else (PORT, HOST_PORT)
         call = self.lua.globals().dissect
@@ -111,7 +111,7 @@ class Dissector:
 
 
 def shown(item: Any) -> Any:
-    """A field's value as Wireshark would take it from its bytes."""
+    """A field's value as Wireshark reads it."""
     data, kind = bytes(item.bytes.values()), item.field.kind
     if kind == "bytes":
         return data

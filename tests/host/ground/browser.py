@@ -1,4 +1,4 @@
-"""The page in a real browser, for the tests about it."""
+"""The page in a real browser."""
 
 import json
 import signal

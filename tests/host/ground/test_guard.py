@@ -101,7 +101,7 @@ def test_survives_noise(controlled: Controlled) -> None:
 
 @pytest.fixture
 def many_files() -> Iterator[None]:
-    """Open in this process: both ends of each connection are its own."""
+    """Allows many open files, because both ends of connections are in this process."""
     usual, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     enough = 65_536
     resource.setrlimit(resource.RLIMIT_NOFILE, (most if 0 < most < enough else enough, most))

@@ -24,7 +24,7 @@ def nothing_ran(page: Any) -> None:
 
 
 def lives(page: Any, change: Change) -> None:
-    """From now on what the server tells by itself is changed."""
+    """Changes all messages that the server sends from now on."""
 
     def connect(socket: Any) -> None:
         server = socket.connect_to_server()

@@ -19,7 +19,7 @@ REGISTERS = device("cubesense").interface.registers
 
 @pytest.fixture(scope="module")
 def address(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Two devices on one bus, one of them twice: by its node's address, and its registers'."""
+    """Two devices on one bus; one has a node address and a register address."""
     folder = tmp_path_factory.mktemp("run")
     environment = {"XDG_RUNTIME_DIR": str(folder)}
     words = ["cubesense", "cubestar", "--i2c", str(BUS), "--pace", "fast"]

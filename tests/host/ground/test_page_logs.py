@@ -31,7 +31,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def same(cell: Any, text: str) -> bool:
-    """Whether a cell of a Parquet file is what a CSV file has."""
+    """Whether a Parquet cell equals a CSV cell."""
     if cell is None or text == "":
         return cell in (None, "") and text == ""
     return float(text) == cell if isinstance(cell, float) else str(cell) == text

@@ -72,7 +72,7 @@ def sent(page: Any, message: Message, values: Any) -> str:
 
 
 def test_every_telecommand_is_sent_from_its_form(opened: Opened) -> None:
-    """With the last values of the tables that it takes in the state that it is in."""
+    """With the last of the values that are allowed in the present state."""
     page, interface = opened
     offered = page.locator("#command option").all_inner_texts()
     known = [one for one in interface.telecommands if one.supported]

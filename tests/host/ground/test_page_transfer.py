@@ -20,14 +20,14 @@ SERVES = re.compile(r" serves on (tcp://\S+?),? ")
 
 @pytest.fixture
 def port(request: pytest.FixtureRequest) -> Iterator[str]:
-    """Where a device is emulated, for one host after the other."""
+    """Port of an emulated device; one client at a time."""
     words = [request.param, "--tcp", "0", "--pace", "fast", "--seed", "3"]
     with emulating(words) as said:
         yield next(found[1] for one in said if (found := SERVES.search(one)))
 
 
 def downloaded(page: Any, path: Path, source: str | None = None) -> bytes:
-    """The file that the page saves of a download."""
+    """The picture file that the page saves."""
     if source is not None:
         page.select_option("#source", source)
     page.click("#download")

@@ -16,7 +16,7 @@ from ..conftest import LetterLine
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A threshold is read, set to 9 at 2 s or later, and read again."""
+    """Reads a threshold, sets it to 9 at 2 s or later, and reads it again."""
     path = tmp_path_factory.mktemp("played") / "a.rec"
     target = open_target("emulated:cubesense", record=path)
     target.node.telemetry("Configuration")

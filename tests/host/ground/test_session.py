@@ -13,7 +13,7 @@ from ..conftest import FakeCubeStar, UartLink
 
 
 class Behind:
-    """A session, and the node at the far end of its line."""
+    """A session and the node of its line."""
 
     def __init__(self) -> None:
         self.node = FakeCubeStar()

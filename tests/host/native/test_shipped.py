@@ -27,7 +27,7 @@ def test_devices_with_the_same_design_share_a_library() -> None:
 
 @pytest.fixture
 def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A compiler, and a cache folder of the test's own."""
+    """A compiler with an empty cache."""
     found = Compiler(("c++",), "c++\nc++ of a test")
     for module in (cache.compilers, shipped):
         monkeypatch.setattr(module, "find_compiler", lambda: found)

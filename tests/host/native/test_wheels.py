@@ -1,4 +1,4 @@
-"""Files of a release: whole, installable, and the same from build to build."""
+"""Release files are complete, installable and reproducible."""
 
 import subprocess
 import sys

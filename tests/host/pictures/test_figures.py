@@ -17,7 +17,7 @@ figure_module = pytest.importorskip("matplotlib.figure")
 
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Figures that were saved, before they are made pixels of."""
+    """Saved figures, before they are rendered."""
     seen = list[Any]()
     monkeypatch.setattr(figure_module.Figure, "savefig", lambda one, *_args, **_: seen.append(one))
     return seen

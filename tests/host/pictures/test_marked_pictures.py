@@ -39,7 +39,7 @@ SENSE = np.full((480, 640), 34, np.uint8)
 
 @pytest.fixture
 def captions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """All texts, in the order in which they are written."""
+    """All texts, in drawing order."""
     seen = list[str]()
     whole = ImageDraw.ImageDraw.text
 
@@ -197,7 +197,7 @@ def test_residuals_are_framed(tmp_path: Path) -> None:
 
 
 def middle(image: NDArray[np.uint8], colour: Colour) -> tuple[float, float]:
-    """Of all ink of a colour, px of the camera's picture."""
+    """Centre of all pixels of a colour, in px of the camera."""
     places = ink(image, colour, 960)
     x, y = (places.min(axis=0) + places.max(axis=0)) / 4 - 0.25
     return float(x), float(y)

@@ -20,7 +20,7 @@ SHAPES: list[Shape] = ["circle", "square", "cross", "line", "ticks"]
 
 @dataclass(frozen=True)
 class Text:
-    """What was written, and the box of its ink."""
+    """A text and the box of its ink."""
 
     text: str
     box: Box
@@ -28,7 +28,7 @@ class Text:
 
 @pytest.fixture
 def written(monkeypatch: pytest.MonkeyPatch) -> list[Text]:
-    """All texts, in the order in which they are written."""
+    """All texts, in drawing order."""
     seen = list[Text]()
     whole = ImageDraw.ImageDraw.text
 
@@ -198,7 +198,7 @@ def test_scale_bar_has_the_length_of_its_angle(f_px: float, written: list[Text])
 
 
 def longest_run(ink: NDArray[np.bool_]) -> tuple[list[int], int, int]:
-    """Rows that have it, its length, and its last column."""
+    """Rows with the longest run of ink, its length, and its last column."""
     best: dict[int, tuple[int, int]] = {}
     for row, line in enumerate(ink):
         changes = np.flatnonzero(np.diff(np.concatenate([[0], line, [0]])))

@@ -16,7 +16,7 @@ ADDRESS = 0x1A
 
 
 class Echo:
-    """Answers with what was written last, again and again."""
+    """Repeats the last written bytes."""
 
     def __init__(self) -> None:
         self.written = bytearray()

@@ -31,7 +31,7 @@ FOUND = Attitude(
 
 
 class Tracker:
-    """Answers each measurement with the next of ``attitudes``; ``near`` is what it was given."""
+    """Returns the next of ``attitudes``; ``near`` is the given hint."""
 
     def __init__(self, *attitudes: Attitude) -> None:
         self.near = list[NDArray[np.float64] | None]()

@@ -1,4 +1,4 @@
-"""Benchmarks on a clock of their own: what a figure is, and what is measured for it."""
+"""Benchmarks on a fake clock."""
 
 import json
 import sys
@@ -66,7 +66,7 @@ class Device:
 
 
 def powered(one: Device, asked: list[dict[str, Any]]) -> Callable[..., Any]:
-    """In place of ``power_up``."""
+    """Replaces ``power_up``."""
 
     @contextmanager
     def power_up(*_given: object, **options: Any) -> Any:
@@ -77,7 +77,7 @@ def powered(one: Device, asked: list[dict[str, Any]]) -> Callable[..., Any]:
 
 
 def built(wiring: Wiring, seconds: float) -> float:
-    """Stands in for `cold_build_s`; Amaranth warns of a design that is never elaborated."""
+    """Replaces `cold_build_s`; Amaranth warns of designs that are not elaborated."""
     Fragment.get(wiring.component, None)
     return seconds
 
@@ -133,7 +133,7 @@ def test_capture_and_transfer_are_timed_separately(clock: Clock) -> None:
     turns = iter([(0.5, 0.2), (0.25, 0.3), (0.4, 0.125), (0.9, 0.9), (0.9, 0.9)])
 
     class Engine:
-        """Strobes take the wall time of the turn."""
+        """Each strobe takes the wall time of its turn."""
 
         def strobe_read(self, out: bytearray, period: int, until_ps: int) -> int:
             clock.now_s += transfer_s / 2
@@ -228,7 +228,7 @@ def test_cubesense_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_aramis_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It takes pictures in its loop, where one that is not active would only refuse to."""
+    """It takes pictures in its loop, which needs activation."""
     monkeypatch.setattr(benchmark, "ROUNDS", 1)
     monkeypatch.setattr(aramis, "LOOP_S", 1)
     found = aramis.BENCHMARK.run(device("aramis"))
@@ -238,7 +238,7 @@ def test_aramis_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Devices whose benchmarks cost nothing, and one that has none."""
+    """Devices with fake benchmarks, and one without any."""
 
     def benchmark_of(name: str) -> Benchmark:
         return Benchmark({name: f"of {name}"}, lambda _one: {name: 1234.5})

@@ -29,7 +29,7 @@ ANGLES = np.array([(a, b) for a in range(-60, 61, 24) for b in range(-50, 51, 20
 
 @pytest.fixture
 def lights(tmp_path: Path) -> Path:
-    """A folder of pictures, one light in each, and angles.csv beside them."""
+    """A folder with pictures of one light each, and angles.csv."""
     rows, columns = np.mgrid[:480, :640]
     lines = ["file,alpha_deg,beta_deg"]
     for number, (angles, (x, y)) in enumerate(zip(ANGLES, TRUE.project(ANGLES), strict=True)):
@@ -132,7 +132,7 @@ def test_rejects_options_that_exclude_each_other(options: dict[str, Any], messag
 
 
 class _Named(type(CUBESTAR)):  # type: ignore[misc]
-    """A unit that names every star before its lens exactly; each picture is of another sky."""
+    """A unit that identifies every star exactly; each picture shows another sky."""
 
     lens = Camera(1120.0, 530.0, 240.0)
 

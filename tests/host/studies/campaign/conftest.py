@@ -1,4 +1,4 @@
-"""A device whose frames cost nothing: what its seed says becomes of them."""
+"""A fake device whose seed determines its results."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from cubestack.host.studies.campaign.plan import CampaignPlan
 
 @dataclass(frozen=True)
 class Seen(Result):
-    """What a frame drew; refused where that is small."""
+    """The number that a frame drew; small ones are refused."""
 
     drawn: float
     false_stars: int

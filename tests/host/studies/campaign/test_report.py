@@ -22,7 +22,7 @@ FRAMES = 120
 
 @pytest.fixture
 def make(tmp_path: Path) -> Make:
-    """Folders with the outcomes of rows that are not right, by block and row as a text."""
+    """Makes folders of given outcomes by block and row; others are right."""
 
     def begun(
         name: str, others: dict[str, str], seed: int = 5, errors: Sequence[str] = ("error_deg",)

@@ -12,7 +12,7 @@ VOLTS = 3.3
 
 
 def measured(monkeypatch: pytest.MonkeyPatch, found: list[Found]) -> LayoutResult:
-    """As if a loop had given ``found``."""
+    """The result of a loop that gave ``found``."""
     table = SimpleNamespace(volts=VOLTS)
     emulated: Any = SimpleNamespace(
         board=SimpleNamespace(
@@ -28,7 +28,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, found: list[Found]) -> LayoutResul
 
 
 def test_age_grows_until_the_next_attitude(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two a second that are 300 ms old when they come, at 100 mA."""
+    """Two attitudes per second with an age of 300 ms, at 100 mA."""
     turns = [Found(n * 10**12 // 2, 50.0 * n, 300.0, right=True) for n in range(5)]
     result = measured(monkeypatch, turns)
     assert (result.attitudes, result.right, result.rate_hz) == (4, 4, 2.0)

@@ -13,7 +13,7 @@ from ....conftest import Run
 
 @pytest.fixture
 def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of devices that are shown; all find what they look for, but the last."""
+    """Names of shown devices; all but the last find their target."""
     seen = list[str]()
 
     def show(one: Any, *_given: object) -> bool:

@@ -19,7 +19,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def emulator(*lines: str, port: Path) -> Callable[[object], object]:
-    """One that says ``lines``; its port is there when it says `SERVES`."""
+    """An emulator that prints ``lines``; its port exists from `SERVES` on."""
 
     @contextmanager
     def emulating(_words: object) -> Iterator[Iterator[str]]:

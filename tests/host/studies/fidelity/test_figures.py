@@ -29,7 +29,7 @@ CHEAP = [
 
 
 def measured_cells(device: str) -> Iterator[tuple[Row, list[str]]]:
-    """Rows, and the page's cells of both profiles."""
+    """Rows, and the cells of both profiles on the page."""
     wanted = fidelity_of(device)
     page = (DOCS / wanted.page).read_text(encoding="utf-8")
     for table, rows in wanted.tables.items():

@@ -130,7 +130,7 @@ PAGE = "above\n<!-- rows: pace -->\nold\n<!-- end of rows -->\nbelow\n"
 
 @pytest.fixture
 def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """The page of a device with one row, which stands in for AraMiS."""
+    """The page of a device with one row, in place of AraMiS."""
     trials = {"walk": Trial(lambda opened, _frames: {"v": 2.5 + len(opened.board["profile"])})}
     walking = Fidelity("page.md", trials, {"pace": (ROW,)})
     sensor = replace(device("aramis"), studies={"fidelity": lambda: walking})

@@ -73,7 +73,7 @@ def test_wrong_answer_is_solved_and_refusal_is_not(
 
 
 class Device:
-    """A device with a loop from 10 to 50 us, of which a test says the answers."""
+    """A device with a loop from 10 to 50 us and given answers."""
 
     def __init__(self, answers: Sequence[Answer]) -> None:
         self.kernel, self.answers = Kernel(10 * PS_PER_US), iter(answers)
@@ -92,7 +92,7 @@ class Device:
         return UpsetVerdict(next(self.answers))
 
     def running(self) -> Running:
-        """In the middle of its loop, which would be right."""
+        """In the middle of a correct loop."""
         engine = SimpleNamespace(
             now_ps=0, run=lambda _until: 0, state=bytes, memories={}, violation_counts={}
         )

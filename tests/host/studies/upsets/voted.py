@@ -6,7 +6,7 @@ from cubestack.hdl.blocks.matrix_counter import MatrixCounter
 
 
 class VotedCounter(MatrixCounter):
-    """Three counters, each of which goes on from what most of them say."""
+    """Three counters that continue from the majority."""
 
     def elaborate(self, platform: object) -> Module:
         m = Module()
