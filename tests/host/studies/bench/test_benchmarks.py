@@ -103,19 +103,6 @@ def test_best_ms_is_the_shortest_of_5_runs(clock: Clock) -> None:
     assert next(times) == 0.0  # five were measured
 
 
-def test_firmware_ratio_is_measured_over_the_loop(
-    clock: Clock, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    one, asked = Device(clock), list[dict[str, Any]]()
-    monkeypatch.setattr(cubestar, "power_up", powered(one, asked))
-    assert cubestar._firmware_ratio(device("cubestar")) == 4.0
-    assert asked == [{"engine": "compiled", "firmware": "reference"}]
-    ((what, begun_s),) = one.said
-    assert what == "Trigger"
-    assert begun_s > 50.0
-    assert one.time_s >= begun_s + benchmark.LOOP_S + 0.9
-
-
 def test_both_sensors_are_read_once_per_second(
     clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -208,9 +195,9 @@ def test_cubestar_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None
         "i2c_seccomp_fast": 7.0,
     }
     assert [what for what, _ in one.said] == ["Trigger", "StopLoop", "Trigger"]
-    begun_s, ended_s = (time_s for _, time_s in one.said[:2])
-    assert ended_s - begun_s >= benchmark.LOOP_S + 0.9
-    assert asked[0] == {"engine": "compiled"}
+    begun_s, ended_s, again_s = (time_s for _, time_s in one.said)
+    assert min(ended_s - begun_s, one.time_s - again_s) >= benchmark.LOOP_S + 0.9
+    assert asked == [{"engine": "compiled"}, {"engine": "compiled", "firmware": "reference"}]
 
 
 def test_cubesense_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -119,11 +119,16 @@ def test_cubestar_errors_count_right_attitudes_and_times_full_pictures() -> None
     assert (found["algorithms_ms"], found["match_ms"], found["quest_ms"]) == (120, 40, 40)
 
 
-def test_cubestar_without_right_attitudes_has_no_errors() -> None:
-    found = cubestar._attitudes([attitude(3.0, right=False)])  # type: ignore[list-item]
-    assert (found["right"], found["off"]) == (0, 100)
-    rest = {name: value for name, value in found.items() if name not in ("right", "off")}
-    assert all(np.isnan(value) for value in rest.values())
+SHARES = {"right", "off", "wrong", "far", "conclusive", "ambiguous", "none"}
+
+
+@pytest.mark.parametrize("module", [cubestar, aramis])
+def test_without_right_attitudes_there_are_no_errors(module: Any) -> None:
+    more = {"far": None, "outcome": "none"} if module is aramis else {}
+    found = module._attitudes([attitude(3.0, right=False, solved=module is cubestar, **more)])
+    assert (found["right"], found["off" if module is cubestar else "none"]) == (0, 100)
+    assert len(found.keys() - SHARES) >= 3
+    assert all(np.isnan(found[name]) for name in found.keys() - SHARES)
 
 
 def test_aramis_errors_are_in_arcsec_and_outcomes_are_counted() -> None:
@@ -140,14 +145,6 @@ def test_aramis_errors_are_in_arcsec_and_outcomes_are_counted() -> None:
     assert found["cross"] == pytest.approx(4.5)
     assert found["cross95"] == pytest.approx(np.quantile(range(10), 0.95))
     assert found["roll95"] == pytest.approx(np.quantile(range(0, 20, 2), 0.95))
-
-
-def test_aramis_without_right_attitudes_has_no_errors() -> None:
-    found = aramis._attitudes(  # type: ignore[list-item]
-        [attitude(1.0, right=False, solved=False, far=None, outcome="none")]
-    )
-    assert (found["right"], found["none"]) == (0, 100)
-    assert all(np.isnan(found[name]) for name in ("cross", "cross95", "roll95"))
 
 
 def test_cubesense_figures_per_axis_and_per_band() -> None:
