@@ -44,7 +44,7 @@ def test_same_text_again_and_in_another_process(text):
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_no_trace_of_where_it_was_made(text):
+def test_output_contains_no_local_paths(text):
     assert str(Path(generate.__file__).parent.parent) not in text(CubeStarTop(8, 4))
 
 

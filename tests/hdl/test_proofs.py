@@ -43,7 +43,7 @@ def test_planted_bug_is_found(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["cubestar-ack", "cubestar-address", "sun-address", "sun-window"])
-def test_it_is_the_bug_that_is_found_and_not_the_small_picture(name: str) -> None:
+def test_counterexample_is_due_to_the_bug_not_the_image_size(name: str) -> None:
     proof = PROOFS[name]
     assert prove(replace(proof, make=lambda _: proof.make(True))).proved
 
@@ -69,7 +69,7 @@ def below(limit: int, wires: dict[str, str] | None = None, fault: str = "counter
 
 
 @pytest.mark.parametrize(("limit", "proved"), [(3, False), (16, True)])
-def test_what_is_true_is_proved_and_what_is_false_refuted(limit: int, proved: bool) -> None:
+def test_true_properties_are_proved_and_false_ones_refuted(limit: int, proved: bool) -> None:
     outcome = prove(below(limit))
     assert (outcome.proved, outcome.counterexample) == (proved, not proved)
 

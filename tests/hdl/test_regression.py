@@ -71,7 +71,7 @@ def test_reports_compile_errors(tmp_path: Path) -> None:
     assert "syntax error" in outcome.log
 
 
-def test_what_hangs_is_ended(verilog: Path, tmp_path: Path) -> None:
+def test_hanging_simulation_is_terminated(verilog: Path, tmp_path: Path) -> None:
     text = verilog.read_text(encoding="utf-8")
     loop = "reg loop = 0;\n  always @(posedge PIXCLK) forever loop = ~loop;\n"
     head, tail = text.split("module dut(", 1)

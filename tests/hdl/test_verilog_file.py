@@ -71,7 +71,7 @@ def test_core_stores_and_reads(icarus: Any) -> None:
     icarus.run(CubeStarTop, 8, 4, *modules(STAR, "store", "read"), seed=1, text=core)
 
 
-def test_wrapper_lets_go_of_its_pins(tmp_path: Path) -> None:
+def test_wrapper_releases_its_pins(tmp_path: Path) -> None:
     file = flow_checks.written("cubesense-sun", TOPS["cubesense-sun"], tmp_path)
     bench, program = Path(__file__).with_name("tri_state.v"), tmp_path / "all.vvp"
     assert not said("iverilog", "-g2005", "-s", "bench", "-o", program, file, bench)

@@ -70,7 +70,7 @@ def probed(board: Board, name: str) -> list[tuple[int, object]]:
     return found
 
 
-def test_boards_that_share_a_kernel_do_what_they_do_alone(stack: ExitStack) -> None:
+def test_boards_sharing_a_kernel_behave_as_they_do_alone(stack: ExitStack) -> None:
     """Each on a bus of its own: on one bus they would wait for each other."""
     alone = []
     for name, board in powered(stack).items():
@@ -92,7 +92,7 @@ def test_boards_share_a_bus(stack: ExitStack) -> None:
         BOARDS["aramis"](kernel=kernel, i2c_bus=bus)
 
 
-def test_a_bus_of_another_kernel_and_a_kernel_that_is_under_way_are_refused() -> None:
+def test_rejects_foreign_bus_and_running_kernel() -> None:
     with pytest.raises(ValueError, match="needs the kernel of that bus"):
         BOARDS["aramis"](i2c_bus=I2cBus(Kernel()))
     kernel = Kernel()
@@ -122,7 +122,7 @@ def test_lines_and_probes(stack: ExitStack) -> None:
     }
 
 
-def test_what_waits_for_the_end_is_done_before_the_board_is_closed() -> None:
+def test_pending_work_finishes_before_the_board_closes() -> None:
     board, done = BOARDS["cubestar"](), []
     assert board.engine is not None
     close = board.engine.close

@@ -237,7 +237,7 @@ def test_what_arrives_is_received_at_the_line_s_rate(processor: Any) -> None:
     assert processor.calls == ["give", "give"]
 
 
-def test_a_stretched_slave_is_asked_again_about_the_same_byte(processor: Any) -> None:
+def test_stretching_slave_is_polled_for_the_same_byte(processor: Any) -> None:
     slave, machine, unit = SlaveWire(processor, SDA), processor.machine, 0x100 | SDA
     machine.replies += [None, None, 1, 1, 0, 0x5A]
     assert [slave.i2c_address(0x1A, True) for _ in range(3)] == [None, None, True]
@@ -255,7 +255,7 @@ def test_a_stretched_slave_is_asked_again_about_the_same_byte(processor: Any) ->
     assert processor.calls == ["catch_up", "wake"] * 6
 
 
-def test_a_stop_ends_the_question(processor: Any) -> None:
+def test_stop_ends_the_polling(processor: Any) -> None:
     slave, machine, unit = SlaveWire(processor, SDA), processor.machine, 0x100 | SDA
     machine.replies += [None]
     assert slave.i2c_write(7) is None

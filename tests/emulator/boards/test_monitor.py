@@ -22,6 +22,6 @@ def test_pins_are_those_of_the_processor_and_the_outputs() -> None:
     assert monitor(None)(["pins"]) == "no FPGA"
 
 
-def test_what_is_no_command() -> None:
+def test_rejects_unknown_pin_commands() -> None:
     with pytest.raises(ValueError, match="no command 'pin'; known: reset, catch, help, time"):
         monitor(None)(["pin"])

@@ -52,6 +52,6 @@ def test_memories_have_what_was_taken(name: str) -> None:
             assert attitude_columns(truths["attitude"])["dec_deg"] is not None
 
 
-def test_before_a_picture_nothing_is_true() -> None:
+def test_truth_is_empty_before_the_first_image() -> None:
     with open_device("cubestar") as emulated:
         assert emulated.board.truths() == {}

@@ -32,7 +32,7 @@ def test_an_address_is_that_of_its_word(offset: int) -> None:
         assert look(what) == [RegisterValue("20000008", RAM + 8, {})]
 
 
-def test_a_variable_s_words_are_all_that_it_touches() -> None:
+def test_variable_covers_every_word_it_touches() -> None:
     for address, size, words in ((RAM, 4, 1), (RAM + 3, 1, 1), (RAM + 3, 2, 2), (RAM, 9, 3)):
         found = look("it", it=Symbol("it", address, size))
         assert [one.value for one in found] == [RAM + 4 * n for n in range(words)]
@@ -57,7 +57,7 @@ def test_a_register_has_its_fields_and_a_peripheral_all_registers() -> None:
     assert one.text.startswith("400c8000")
 
 
-def test_what_is_not_there() -> None:
+def test_rejects_unknown_addresses_and_names() -> None:
     (one,) = look("0x60000000")
     assert (one.value, one.text) == (None, "can not be read")
     with pytest.raises(ValueError, match="no peripheral, variable or address 'x'; known: "):

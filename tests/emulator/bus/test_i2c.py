@@ -74,7 +74,7 @@ def test_transfer_over_two_targets_stops_the_first_one_at_the_change():
     assert (first.calls, second.calls) == (["write", 1], [2, "stop"])
 
 
-def test_nobody_at_the_address_stops_an_open_target_and_frees_the_bus():
+def test_missing_target_stops_the_open_one_and_frees_the_bus():
     kernel, bus = make(x1A=(target := Memory()))
     nobody = (errno.ENXIO, "no I2C device answers at 0x30")
     assert failure(kernel, bus, I2cMessage(0x30, bytearray([1, 2, 3]))) == nobody
@@ -103,7 +103,7 @@ def test_concurrent_transfers_wait_for_each_other():
 
 
 @pytest.mark.parametrize("granted", [False, True])
-def test_who_gives_up_waiting_holds_up_nobody(granted):
+def test_cancelled_waiter_does_not_block_the_bus(granted):
     kernel, bus = make(x1A=(target := Memory()))
     first = bus.transfer([I2cMessage(0x1A, bytearray([1]))])
     kernel.process(first)
@@ -157,7 +157,7 @@ def test_target_stretches_the_clock_until_it_has_a_byte():
     assert kernel.now == ready + (2 * 9 + 1) * BIT_PS[100_000]
 
 
-def test_clock_held_low_for_ever_ends_the_transfer():
+def test_transfer_times_out_when_the_clock_is_held_low():
     kernel, bus = make(x1A=(target := Memory()))
     target.i2c_read = lambda: None
     held = (errno.ETIMEDOUT, "I2C device 0x1a held the clock low for over 1 s")
@@ -190,7 +190,7 @@ def test_block_brings_its_length(length, rest):
 
 
 @pytest.mark.parametrize("length", [0, 33, 255])
-def test_block_length_must_make_sense(length):
+def test_rejects_block_lengths_outside_1_to_32(length):
     kernel, bus = make(x1A=(target := Memory()))
     target.i2c_read = lambda: length
     wrong = (errno.EPROTO, f"I2C device 0x1a sent block length {length}, not 1..32")

@@ -60,7 +60,7 @@ def test_equal_ends_understand_each_other(data, form):
 
 
 @given(st.binary(max_size=40), st.floats(-0.04, 0.04))
-def test_rates_that_differ_little_do_no_harm(data, difference):
+def test_small_rate_differences_are_tolerated(data, difference):
     near = LineFormat(round(57_600 * (1 + difference)))
     assert [value for value, *_ in heard(data, near, LineFormat(57_600))] == list(data)
 
@@ -93,7 +93,7 @@ def test_stop_bit_is_a_parity_of_1():
     ]
 
 
-def test_noise_leaves_nothing_behind():
+def test_receiver_recovers_after_noise():
     sampler, fast = LineSampler(LineFormat(300)), LineFormat(1_000_000)
     for index in range(10_000):
         start_ps = index * 3 * fast.character_ps
@@ -111,7 +111,7 @@ def test_noise_leaves_nothing_behind():
         ({"baud": 9600, "stop_bits": 3}, "1, 1.5 or 2 stop bits, not 3"),
     ],
 )
-def test_settings_that_can_not_be(settings, text):
+def test_rejects_impossible_line_settings(settings, text):
     with pytest.raises(ValueError, match=text):
         LineFormat(**settings)
 
@@ -162,7 +162,7 @@ def test_break_is_a_framing_error():
     assert (desk.uart.framing_errors, desk.received) == (1, [])
 
 
-def test_what_is_not_on_the_wire_can_be_taken_back():
+def test_unsent_bytes_can_be_purged():
     desk = desk_of(LineFormat(57_600))
     desk.uart.host_writes(b"abc")
     desk.kernel.advance_to(desk.uart.byte_ps // 2)

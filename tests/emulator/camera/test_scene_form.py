@@ -69,7 +69,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 @pytest.mark.parametrize("text", [*EXAMPLES, HARD], ids=lambda text: text.split("\n")[0])
-def test_a_scene_that_is_written_down_is_read_as_the_same(tmp_path: Path, text: str) -> None:
+def test_saved_scene_loads_unchanged(tmp_path: Path, text: str) -> None:
     view = load(save(tmp_path, text))
     form: Any = SKY if hasattr(view.scene, "quaternion") else EARTH
     table = form.table(view)
@@ -82,7 +82,7 @@ def test_a_scene_that_is_written_down_is_read_as_the_same(tmp_path: Path, text: 
     assert set(table) - {"kind"} <= set(form.keys[table["kind"]])
 
 
-def test_only_what_differs_is_written(tmp_path: Path) -> None:
+def test_saves_only_values_that_differ_from_defaults(tmp_path: Path) -> None:
     text = 'kind = "sky"\nra_deg = 84.0\ndec_deg = -1.0\n[optics]\npsf_sigma_px = 2.0'
     assert SKY.table(load(save(tmp_path, text))) == {
         **{"kind": "sky", "ra_deg": 84.0, "dec_deg": -1.0, "roll_deg": 0.0},
@@ -93,7 +93,7 @@ def test_only_what_differs_is_written(tmp_path: Path) -> None:
     }
 
 
-def test_a_photograph_is_written_down_too(tmp_path: Path) -> None:
+def test_saves_photographs_too(tmp_path: Path) -> None:
     from PIL import Image
 
     Image.new("L", (1100, 700), 9).save(tmp_path / "p.png")

@@ -77,7 +77,7 @@ def test_a_fault_acts_for_its_time(desk: Desk) -> None:
     assert desk.deaf
 
 
-def test_what_is_cleared_before_it_begins_never_does(desk: Desk) -> None:
+def test_fault_cleared_before_its_start_never_acts(desk: Desk) -> None:
     desk.faults.inject(UartDrop(), at_s=1.0, for_s=1.0)
     kept = desk.faults.inject("latch-up", target="memory", at_s=1.0)
     desk.faults.clear(kept)
@@ -107,7 +107,7 @@ def test_a_latch_up_happens_at_its_instant(desk: Desk) -> None:
     assert desk.power.current_ma() == pytest.approx(IDLE_MA + 11.0)
 
 
-def test_times_that_may_just_be(desk: Desk) -> None:
+def test_accepts_times_at_the_limits(desk: Desk) -> None:
     desk.to(2)
     latest = desk.faults.inject("uart-drop", at_s=1e9, for_s=1e9)
     assert (latest.start_ps, latest.end_ps) == (10**21, 2 * 10**21)
@@ -126,9 +126,7 @@ def test_times_that_may_just_be(desk: Desk) -> None:
         ({"target": "other"}, "uart-drop: unknown serial line 'other'; known: uart"),
     ],
 )
-def test_what_can_not_be_is_refused_and_nothing_is_left(
-    desk: Desk, arguments: dict[str, Any], words: str
-) -> None:
+def test_rejected_fault_leaves_no_trace(desk: Desk, arguments: dict[str, Any], words: str) -> None:
     desk.to(2)
     with pytest.raises(FaultError, match=words):
         desk.faults.inject("uart-drop", **arguments)
@@ -146,7 +144,7 @@ def test_what_can_not_be_is_refused_and_nothing_is_left(
         (lambda f: f.load(plan("uart-drop", "i2c-stuck")), "p.toml: fault 2: i2c-stuck: this"),
     ],
 )
-def test_faults_that_make_no_sense_here(desk: Desk, call: Any, words: str) -> None:
+def test_rejects_faults_that_do_not_apply(desk: Desk, call: Any, words: str) -> None:
     with pytest.raises(FaultError, match=words):
         call(desk.faults)
 

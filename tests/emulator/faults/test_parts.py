@@ -82,7 +82,7 @@ def test_the_rate_is_that_of_each_bit_and_the_seed_decides() -> None:
 
 
 @pytest.mark.parametrize("rate", [-0.1, 1.1, float("nan")])
-def test_what_is_no_probability_is_refused(rate: float) -> None:
+def test_rejects_invalid_probabilities(rate: float) -> None:
     with pytest.raises(ValueError, match="0 to 1 per bit"):
         flip_bits(np.zeros(1, np.uint8), rate, np.random.default_rng(1))
 
@@ -114,7 +114,7 @@ def test_a_core_s_bit_is_the_one_that_was_named() -> None:
     assert core.told == ["pc[20]", "primask[0]"]
 
 
-def test_a_core_s_bit_is_drawn_from_all_that_there_are() -> None:
+def test_core_bit_is_drawn_from_all_registers() -> None:
     core, again = Core(), Core()
     for seed in range(100):
         core.hit(CoreFlip(), seed)
@@ -140,7 +140,7 @@ def test_a_core_s_upsets_come_at_the_rate_of_its_bits_until_they_end() -> None:
     assert abs(len(core.flipped) - expected) < 5 * np.sqrt(expected)
 
 
-def test_a_register_that_a_core_has_not_is_refused_ahead() -> None:
+def test_rejects_unknown_core_register_before_the_run() -> None:
     core = Core()
     injection = Injection(0, CoreFlip(register="r99"), "core", 0, None, 1)
     with pytest.raises(FaultError, match="no register 'r99', only r0, pc, primask"):

@@ -101,7 +101,7 @@ def test_reports_lost_acknowledge_once():
     assert told == ["begins with the pin at 1", "ACK rise not seen"]
 
 
-def test_what_acts_around_reads_does_so_before_and_after_each():
+def test_hooks_around_reads_run_before_and_after_each():
     """A memory's stuck bits hold whenever the processor takes bytes, and at no other time."""
     engine = Engine()
     pins = PinFaults(Kernel(), lambda _time_ps, _injection, _text: None, engine, "DATA")

@@ -66,12 +66,12 @@ def test_old_names_of_times_still_work_with_a_warning(recwarn: pytest.WarningsRe
         ('[[fault]]\nkind = "ack-lost"\nrate = 1', "unknown parameter 'rate'; known: none"),
     ],
 )
-def test_nonsense_is_refused_with_its_place(text: str, message: str) -> None:
+def test_rejects_invalid_plans_naming_the_place(text: str, message: str) -> None:
     with pytest.raises(FaultError, match=message):
         parse_plan(text)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_reports_missing_file(tmp_path: Path) -> None:
     with pytest.raises(FaultError, match=r"none\.toml: No such file"):
         load_plan(tmp_path / "none.toml")
     (tmp_path / "noise").write_bytes(b"\xff\xfe")
@@ -79,7 +79,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         load_plan(tmp_path / "noise")
 
 
-def test_damaged_plans_raise_nothing_else() -> None:
+def test_damaged_plans_raise_only_plan_errors() -> None:
     generator = random.Random(5)
     for _ in range(2000):
         text = list(PLAN)

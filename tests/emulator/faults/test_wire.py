@@ -76,7 +76,7 @@ def test_bytes_that_begin_in_time_are_hit(fault: Any, change: Change, direction:
     assert len(line.log) == 4 * (2 if direction == "both" else 1)
 
 
-def test_bytes_behind_a_late_one_are_late_too() -> None:
+def test_bytes_after_a_delayed_one_are_delayed_too() -> None:
     line = Line()
     line.inject(UartDelay(delay_ms=2.5), 3, 3.5)
     expected = [(time if time < 4 else max(time, byte + 3.5), byte) for time, byte in CLEAN]
@@ -129,7 +129,7 @@ def test_a_tap_at_the_device_hears_what_the_device_does() -> None:
     assert tapped == [byte ^ 1 for byte in SENT]
 
 
-def test_a_byte_that_began_under_a_fault_is_hit_though_another_one_comes_meanwhile() -> None:
+def test_byte_begun_under_a_fault_is_hit_despite_a_later_byte() -> None:
     line = Line()
     line.inject(UartDrop(direction="to-device"), 0, 0.5)
     line.uart.host_writes(b"a")

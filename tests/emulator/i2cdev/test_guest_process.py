@@ -46,7 +46,7 @@ def test_exit_codes(tmp_path):
         running.close()
 
 
-def test_what_can_not_be_preloaded(tmp_path, monkeypatch):
+def test_rejects_programs_that_cannot_be_preloaded(tmp_path, monkeypatch):
     with pytest.raises(program.RouteError, match="has a blank or colon"):
         program.start_preloaded(["sh"], {}, tmp_path / "a b.so")
     monkeypatch.setattr(program, "is_static", lambda _path: True)

@@ -86,7 +86,7 @@ def test_a_wait_ends_in_time(world, watch):
         assert world.now_ns - began_ns == TIMEOUT_NS
 
 
-def test_who_is_not_alone_sleeps_for_a_while(world, watch):
+def test_waiter_with_peers_sleeps_briefly(world, watch):
     waiting = watch(first=False)
     world.yield_ns = 2 * CROWDED_NS
     for pause_ns, yields in ((0, 1), (0, 1), (ALONE_AGAIN_NS, 2)):
@@ -95,7 +95,7 @@ def test_who_is_not_alone_sleeps_for_a_while(world, watch):
         assert world.yields == yields
 
 
-def test_who_has_priority_never_sleeps_but_always_where_it_is_woken_quickly(world, watch):
+def test_prioritised_waiter_sleeps_only_when_woken_quickly(world, watch):
     world.yield_ns = 2 * CROWDED_NS
     for always_asleep, yields in ((False, 3), (True, 3)):
         waiting = watch(first=True, always_asleep=always_asleep)

@@ -74,7 +74,7 @@ def test_answers_come_in_the_order_of_the_calls(remote):
     assert results == {0x80: -errno.EINVAL, 0x1A: 0, 0x1B: 0}
 
 
-def test_the_emulation_goes(remote):
+def test_client_sees_the_emulation_end(remote):
     file = remote.bus.open()
     replies: list[bytes] = []
     file.perform(linux.Call.READ, linux.pack_read(1), replies.append)
@@ -86,12 +86,12 @@ def test_the_emulation_goes(remote):
     file.close()
 
 
-def test_nobody_serves(tmp_path):
+def test_reports_missing_server(tmp_path):
     with pytest.raises(PortError, match=r"no emulation serves .*start one with cubestack emulate"):
         RemoteBus(tmp_path / "bus")
 
 
-def test_closing_leaves_no_descriptor_and_fails_what_waits(served):
+def test_close_releases_descriptors_and_fails_pending_calls(served):
     before = set(os.listdir("/proc/self/fd"))
     bus = RemoteBus(Path(served.server.name))
     files = [bus.open() for _ in range(3)]
@@ -108,7 +108,7 @@ def test_closing_leaves_no_descriptor_and_fails_what_waits(served):
     assert set(os.listdir("/proc/self/fd")) == before
 
 
-def test_writing_is_waited_for_while_the_other_side_does_not_read():
+def test_write_blocks_while_the_peer_does_not_read():
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     watched: list[int] = []

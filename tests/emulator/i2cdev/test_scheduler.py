@@ -234,7 +234,7 @@ def test_answers_come_in_time_after_virtual_time_was_sent_elsewhere(make, speed)
     assert after.span / 50 == pytest.approx(max(READ_NS / speed, 2 * WAY_NS + 8 * US), rel=0.05)
 
 
-def test_nothing_is_known_of_the_first_call(make):
+def test_first_call_takes_the_full_round_trip(make):
     bench = make()
     program = bench.program(think_ns=1_000 * US, calls=1)
     bench.scheduler.run()
@@ -244,7 +244,7 @@ def test_nothing_is_known_of_the_first_call(make):
 @pytest.mark.parametrize(
     ("think_us", "when_us"), [*((8, 3_000 + step) for step in range(0, 100, 13)), (500, 3_360)]
 )
-def test_a_late_answer_is_made_up_for(make, think_us, when_us):
+def test_late_answer_is_compensated(make, think_us, when_us):
     """Soon a program is where it would be."""
     spans = []
     for stalls in ([], [(make().world.now_ns + when_us * US, 150 * US)]):
@@ -258,7 +258,7 @@ def test_a_late_answer_is_made_up_for(make, think_us, when_us):
 
 @pytest.mark.parametrize("when_us", range(1_000, 1_100, 13))
 @pytest.mark.parametrize("stall_us", [3_000, 20_000])
-def test_what_is_too_late_is_lost(make, when_us, stall_us):
+def test_time_lost_beyond_the_limit_is_not_recovered(make, when_us, stall_us):
     bench = make()
     bench.world.stalls = [(bench.world.now_ns + when_us * US, stall_us * US)]
     program = bench.program(think_ns=8 * US, calls=101)
@@ -318,7 +318,7 @@ def test_as_fast_as_possible_a_transfer_takes_one_visit_but_no_longer_than_that(
     assert program.ends
 
 
-def test_while_somebody_holds_virtual_time_nothing_is_served(make):
+def test_nothing_is_served_while_virtual_time_is_held(make):
     bench = make(fast=True)
     program = bench.program(0, 1)
     bench.world.now_ns += 1_000 * US

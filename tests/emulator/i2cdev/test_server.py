@@ -90,7 +90,7 @@ def test_largest_transfer(served):
     assert linux.LENGTH.unpack_from(received)[0] == 4 + 42 * 8192
 
 
-def test_a_client_that_does_not_read_holds_up_nobody(served):
+def test_client_that_does_not_read_blocks_no_other(served):
     stuck, other = served.connect(), served.connect()
     for _ in range(3):
         stuck.send(linux.Call.RDWR, LARGEST)
@@ -115,7 +115,7 @@ class Babbler:
         return len(data)
 
 
-def test_a_client_that_never_pauses_is_left_for_the_next(adapter):
+def test_busy_client_yields_to_the_next(adapter):
     babbler = Babbler()
     client = _Client(babbler, adapter, {}, lambda _events: None)
     client.exchange(hung_up=False)
@@ -184,7 +184,7 @@ def test_a_client_that_dies_in_its_transfer(served, registers):
         linux.LENGTH.pack(20) + bytes(8) + bytes([linux.Call.RDWR]) + b"\xff" * 11,
     ],
 )
-def test_nonsense_is_hung_up_on(served, data):
+def test_invalid_message_closes_the_connection(served, data):
     client, other = served.connect(), served.connect()
     client.socket.sendall(data)
     served.serve()
@@ -194,7 +194,7 @@ def test_nonsense_is_hung_up_on(served, data):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
 @given(st.binary(min_size=1, max_size=200))
-def test_no_bytes_harm(served, data):
+def test_arbitrary_bytes_do_not_harm_the_server(served, data):
     client = served.connect()
     client.socket.sendall(linux.LENGTH.pack(len(data)) + data)
     served.serve()
@@ -225,7 +225,7 @@ def test_a_waiting_server_wakes_up(served):
     assert client.receive() == (0, b"")
 
 
-def test_only_a_free_place_in_a_folder_of_ones_own_is_taken(served, tmp_path, serve_at):
+def test_socket_path_must_be_free_in_a_private_folder(served, tmp_path, serve_at):
     bus = Path(served.server.name)
     assert stat.S_IMODE(bus.parent.stat().st_mode) == 0o700
     (tmp_path / "open").mkdir()

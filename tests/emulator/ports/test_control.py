@@ -69,7 +69,7 @@ def test_call_raises_its_error_in_the_caller(running: Running) -> None:
     assert running.ask(lambda: 7) == 7
 
 
-def test_time_stands_while_it_is_held(running: Running) -> None:
+def test_time_stops_while_held(running: Running) -> None:
     port = running.port
     held_ps = running.ask(lambda: (port.pause(), running.kernel.now)[1])
     looks = [running.ask(lambda: (port.held, running.kernel.now)) for _ in range(20)]
@@ -94,7 +94,7 @@ def test_steps_have_a_limit(running: Running, events: int) -> None:
         running.ask(lambda: running.port.step(events))
 
 
-def test_it_runs_to_a_time_and_stands_there(running: Running) -> None:
+def test_runs_to_a_time_and_stops(running: Running) -> None:
     goal_ps = 30 * PS_PER_S  # far more than passes on the wall
     arrived: Future[int] = running.ask(lambda: running.port.run_to(goal_ps))
     assert arrived.result(SOON_S) == goal_ps
@@ -104,7 +104,7 @@ def test_it_runs_to_a_time_and_stands_there(running: Running) -> None:
         running.ask(lambda: running.port.run_to(PS_PER_S))
 
 
-def test_on_its_way_it_lets_the_other_ports_in_every_20_ms(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_serves_other_ports_every_20_ms_during_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a wall clock that goes on by 6 ms with each event; nobody serves but the test."""
     wall_ns = itertools.count(0, 6_000_000)
     monkeypatch.setattr(control, "time", SimpleNamespace(monotonic_ns=lambda: next(wall_ns)))
@@ -121,14 +121,14 @@ def test_on_its_way_it_lets_the_other_ports_in_every_20_ms(monkeypatch: pytest.M
     port.close()
 
 
-def test_another_wish_ends_a_run(running: Running) -> None:
+def test_new_request_ends_a_run(running: Running) -> None:
     arrived: Future[int] = running.ask(lambda: running.port.run_to(10**9 * PS_PER_S))
     running.ask(running.port.pause)
     with pytest.raises(RuntimeError, match="the run was held before its end"):
         arrived.result(SOON_S)
 
 
-def test_after_a_jump_nothing_is_made_up_for() -> None:
+def test_no_catching_up_after_a_jump() -> None:
     running = Running("real")
     running.thread.start()
     arrived: Future[int] = running.ask(lambda: running.port.run_to(1000 * PS_PER_S))
@@ -140,7 +140,7 @@ def test_after_a_jump_nothing_is_made_up_for() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.5, 20.0])
-def test_a_speed_is_kept_on_a_wall_clock_of_our_own(speed: float) -> None:
+def test_speed_is_kept_on_a_simulated_wall_clock(speed: float) -> None:
     wall, kernel = [10**15], Kernel()
 
     def wait(_watched: Any, timeout_s: float) -> None:

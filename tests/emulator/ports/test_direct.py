@@ -40,7 +40,7 @@ def test_read_returns_what_has_arrived_up_to_its_limit(device, serial):
     assert device.kernel.now == 5 * BYTE
 
 
-def test_nothing_comes(device, serial):
+def test_read_times_out_without_data(device, serial):
     assert serial.read(10, 0.5) == b""
     assert device.kernel.now == PS_PER_S // 2
 

@@ -43,7 +43,7 @@ def test_transparent_both_ways(port, device, connect):
 
 @pytest.mark.parametrize("leave", ["close", "reset"])
 @pytest.mark.parametrize("unread", [1, 100, 60_000, 500_000])
-def test_client_gets_nothing_that_the_one_before_left(port, device, connect, unread, leave):
+def test_client_receives_no_data_of_its_predecessor(port, device, connect, unread, leave):
     first = connect()
     for _ in range(0, unread, 10_000):
         device.sends(port, b"stale" * min(unread, 2000))

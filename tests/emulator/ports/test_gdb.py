@@ -32,6 +32,6 @@ def test_writing_is_waited_for_while_something_is_unsent() -> None:
 
 
 @pytest.mark.parametrize("port", [-1, 65_536])
-def test_ports_that_are_none(port: int) -> None:
+def test_rejects_invalid_ports(port: int) -> None:
     with pytest.raises(PortError, match=f"TCP port {port} is not in 0..65535"):
         GdbEndpoint(port, FakeTarget())  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ def make() -> tuple[Kernel, Uart, HostLine]:
     st.lists(st.binary(max_size=6), max_size=5),
     st.lists(st.tuples(st.integers(0, 3 * BYTE), st.none() | st.integers(0, 4)), max_size=30),
 )
-def test_however_it_is_taken(blocks, takes):
+def test_receives_in_any_chunk_size(blocks, takes):
     """Oracle: byte i of an unbroken stream arrives after i + 1 byte times."""
     _, uart, line = make()
     for block in blocks:

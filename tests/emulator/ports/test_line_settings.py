@@ -90,7 +90,7 @@ def test_the_devices_own_format_and_none_at_all_are_good(desk):
 
 
 @pytest.mark.parametrize("settings", [{"parity": "E"}, {"bytesize": 7}])
-def test_what_the_kernel_hides_is_not_told(desk, settings):
+def test_settings_hidden_by_the_kernel_are_not_reported(desk, settings):
     with desk.client(**settings) as client:
         client.write(b"hidden")
         assert desk.serve() == b"hidden"

@@ -133,7 +133,7 @@ def test_scheduler_sleeps_until_a_byte_is_due(bench):
     assert bench.wall.waits[1] == pytest.approx(0.002, abs=0.0002)
 
 
-def test_virtual_time_starts_where_it_stands(bench):
+def test_virtual_time_continues_from_its_current_value(bench):
     bench.kernel.advance_to(77 * PS_PER_S)
     bench.run("real", 1000)
     assert bench.kernel.now == pytest.approx(78 * PS_PER_S, abs=0.05 * PS_PER_S)
@@ -164,14 +164,14 @@ def test_ports_are_served_while_the_machine_lags(bench):
     assert len(bench.port.exchanges) >= 1 / (2 * SLICE_S)
 
 
-def test_lag_is_caught_up_and_not_told_any_more(bench):
+def test_lag_that_was_recovered_is_not_reported(bench):
     bench.tick(PS_PER_MS, cost_ns=3 * NS_PER_MS, until_ps=2 * PS_PER_S)
     bench.run("real", 20_000)
     assert [text for time, text in bench.reports if time > 6500] == []
     assert bench.kernel.now / PS_PER_MS == pytest.approx(20_000, abs=50)
 
 
-def test_short_hiccup_is_not_told(bench):
+def test_short_delay_is_not_reported(bench):
     bench.tick(7 * PS_PER_S, cost_ns=300 * NS_PER_MS)
     bench.run("real", 30_000)
     assert not bench.reports
@@ -209,7 +209,7 @@ def test_bytes_on_the_wire_are_brought_to_their_end(bench):
     assert 5 * PS_PER_S <= bench.kernel.now < 5.6 * PS_PER_S
 
 
-def test_far_event_is_not_jumped_to_for_the_sake_of_bytes_on_the_wire(bench):
+def test_bytes_on_the_wire_do_not_trigger_a_jump_to_a_far_event(bench):
     bench.kernel.timeout(3600 * PS_PER_S)
     bench.port.releases = [i * PS_PER_MS for i in range(1, 101)]
     bench.busy = lambda: bool(bench.port.releases)
@@ -234,7 +234,7 @@ def test_slow_client_holds_virtual_time_back(bench):
     assert bench.kernel.now / PS_PER_MS == pytest.approx(1000, abs=50)
 
 
-def test_busy_device_without_events_does_not_make_the_scheduler_spin(bench):
+def test_scheduler_sleeps_while_a_busy_device_has_no_events(bench):
     bench.busy = lambda: True
     bench.run("fast", 1000)
     assert min(bench.wall.waits) == IDLE_S

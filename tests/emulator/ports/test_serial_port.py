@@ -86,7 +86,7 @@ def test_slow_client_keeps_the_newest_bytes(port, device):
     assert not port.congested
 
 
-def test_next_client_gets_nothing_of_what_the_last_one_left(port, device):
+def test_next_client_receives_no_stale_output(port, device):
     connect(port, device, Client(appetite=0))
     device.uart.send(b"stale")
     port.exchange(device.advance(5))
@@ -98,7 +98,7 @@ def test_next_client_gets_nothing_of_what_the_last_one_left(port, device):
     assert client.read == b"fresh"
 
 
-def test_what_arrived_before_a_client_came_is_not_for_it(port, device):
+def test_client_does_not_receive_earlier_bytes(port, device):
     device.uart.send(b"stale")
     device.advance(5)
     client = connect(port, device, Client())
@@ -107,7 +107,7 @@ def test_what_arrived_before_a_client_came_is_not_for_it(port, device):
     assert client.read == b"fresh"
 
 
-def test_what_is_on_the_wire_when_a_client_comes_is_for_it(port, device):
+def test_client_receives_bytes_still_on_the_wire(port, device):
     device.uart.send(b"answer")
     device.advance(2)
     client = connect(port, device, Client())

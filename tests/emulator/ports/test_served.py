@@ -49,7 +49,7 @@ def test_plain_file_on_a_pty(port, device, pace):
         assert terminal.read(256) == ALL_BYTES
 
 
-def test_fast_pace_loses_nothing_to_a_client_slower_than_the_emulator(port, device):
+def test_fast_pace_loses_no_bytes_to_a_slow_client(port, device):
     """Virtual time waits for it: 400 kB come while it reads a few bytes at a time."""
     sent = bytes(i * 37 % 251 for i in range(400_000))
     device.uart.on_byte = lambda _byte: device.uart.send(sent)

@@ -73,7 +73,7 @@ WRITES = st.lists(st.tuples(st.integers(0, 10**10), st.binary(max_size=300)), ma
 
 
 @given(WRITES)
-def test_same_device_says_the_same(tmp_path_factory, writes):
+def test_replay_on_the_same_device_has_no_differences(tmp_path_factory, writes):
     recording = record(tmp_path_factory.getbasetemp() / "a.rec", writes)
     sent = b"".join(data for _, data in writes)
     assert recording.sent("uart", "host")[0] == sent
@@ -129,7 +129,7 @@ def test_delay_is_named(tmp_path):
     assert difference.endswith("same bytes, +1000.000 us in time")
 
 
-def test_failed_transfer_is_on_record(tmp_path):
+def test_failed_transfer_is_recorded(tmp_path):
     device, path = Device(), tmp_path / "a.rec"
     transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
     with recorded(path, device), pytest.raises(I2cError):
@@ -146,7 +146,7 @@ def test_recording_of_other_ports(tmp_path):
         device.replay(recording)
 
 
-def test_framing_errors_are_on_record_and_their_characters_dropped_again(tmp_path):
+def test_framing_errors_are_recorded_and_replayed(tmp_path):
     device, path = Device(), tmp_path / "a.rec"
     with recorded(path, device):
         device.uart.host_writes(b"a")
@@ -174,7 +174,7 @@ class Losing:
             receive(byte, start_ps)
 
 
-def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
+def test_bytes_lost_by_a_fault_are_recorded_and_lost_in_replay(tmp_path):
     device, path = Device(), tmp_path / "a.rec"
     device.uart.fault_hook = Losing()
     with recorded(path, device):
@@ -189,7 +189,7 @@ def test_what_a_fault_loses_is_on_record_and_lost_again(tmp_path):
     assert len(Device().replay(recording)) == 1
 
 
-def test_what_was_done_meanwhile_is_done_again(tmp_path):
+def test_replay_repeats_recorded_actions(tmp_path):
     device, path = Device(), tmp_path / "a.rec"
     with recorded(path, device) as recorder:
         device.kernel.advance_to(PS_PER_MS)
@@ -206,7 +206,7 @@ def test_what_was_done_meanwhile_is_done_again(tmp_path):
         Device().replay(recording)
 
 
-def test_a_transfer_that_fails_in_another_way_is_named(tmp_path):
+def test_reports_transfer_that_fails_differently(tmp_path):
     device, path = Device(), tmp_path / "a.rec"
     transfer = device.bus.transfer([I2cMessage(0x1B, bytearray(b"\xee"))])
     with recorded(path, device), pytest.raises(I2cError):

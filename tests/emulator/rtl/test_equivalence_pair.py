@@ -175,7 +175,7 @@ def test_low_lines_and_unused_cameras_are_really_skipped():
     assert quick.rendered == []
 
 
-def test_skipped_clocks_are_made_after_all_when_the_other_camera_stops_the_run():
+def test_skipped_clocks_run_when_the_other_camera_stops_the_run():
     """The nadir's gap is skipped when the sun acknowledges in it, and then cut by standby."""
     size = SIZES[0]
     sun = plain_camera(size.columns, size.rows, frames=1, blank=20)

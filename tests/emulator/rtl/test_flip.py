@@ -81,7 +81,7 @@ def test_what_is_no_register_bit_is_refused_with_those_there_are(engine: Compile
             engine.flip(register, bit)
 
 
-def test_the_simulator_says_that_it_can_not() -> None:
+def test_simulator_reports_unsupported_bit_flips() -> None:
     engine = SimulatedEngine(cubestar_wiring())
     assert engine.registers == {}
     with pytest.raises(ValueError, match="only the compiled engine"):

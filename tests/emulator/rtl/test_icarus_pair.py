@@ -89,7 +89,7 @@ def test_random_lives(board, seed):
     assert run("python", WIRINGS[size], cameras, commands, watched) == expected[watched]
 
 
-def test_random_lives_are_worth_it():
+def test_random_runs_cover_all_stores_and_memories():
     """Nearly all store a picture; every way to store and every memory occurs."""
     seen: Counter[str] = Counter()
     for size in SIZES:

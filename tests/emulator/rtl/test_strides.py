@@ -130,7 +130,7 @@ def test_a_memory_that_is_too_slow_breaks_its_rules_alike(timing: SramTiming) ->
         assert engines[0].violation_counts
 
 
-def test_switched_off_they_are_not_made() -> None:
+def test_strides_can_be_switched_off() -> None:
     source = camera(np.random.default_rng(0), 4)
     with both(cubestar_wiring()) as (engine, _):
         engine.use_strides(False)

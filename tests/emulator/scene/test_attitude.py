@@ -85,6 +85,6 @@ def test_errors_of_known_turns() -> None:
 
 
 @pytest.mark.parametrize("bad", [[0, 0, 0, 0], [1, 2, 3], [np.nan, 0, 0, 1], [np.inf, 0, 0, 1]])
-def test_what_is_no_attitude_is_refused(bad: list[float]) -> None:
+def test_rejects_invalid_attitudes(bad: list[float]) -> None:
     with pytest.raises(ValueError, match="a quaternion"):
         attitude.unit_quaternion(bad)

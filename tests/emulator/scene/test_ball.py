@@ -42,7 +42,7 @@ def test_it_is_lit_and_nothing_glows() -> None:
     assert ball_scene(unevenness=0.1, seed=3).earth.unevenness == 0.1
 
 
-def test_places_that_can_not_be() -> None:
+def test_rejects_impossible_places() -> None:
     with pytest.raises(SceneError, match="distance_mm must be above 0 mm, not 0"):
         ball_scene(distance_mm=0)
     with pytest.raises(SceneError, match="offset_mm must leave the camera outside the ball"):

@@ -128,7 +128,7 @@ def test_turning_everything_changes_nothing() -> None:
     assert np.abs(radiance(body, vectors, 0.4, NADIR, sun, turn.as_matrix()) - before).max() > 0.1
 
 
-def test_uneven_surface_is_seeded_and_as_uneven_as_asked() -> None:
+def test_surface_roughness_is_seeded_and_of_the_requested_size() -> None:
     # From far away, so that many waves fit in.
     vectors = np.concatenate([fan(np.linspace(0, 8, 400), phi) for phi in range(0, 360, 10)])
     even = radiance(earth(altitude_km=36_000.0), vectors)

@@ -82,6 +82,6 @@ def test_earth_is_seen_while_any_of_it_is_in_the_field() -> None:
         assert EarthSunScene.facing(nadir_deg=(theta, 0)).truth(NADIR, 0, 95).visible is visible
 
 
-def test_what_is_no_hazard_is_refused() -> None:
+def test_rejects_unknown_hazards() -> None:
     with pytest.raises(SceneError, match="hazards must be hazards of light, not 5"):
         EarthSunScene(hazards=(5,))  # type: ignore[arg-type]

@@ -180,7 +180,7 @@ def test_the_shadow_lasts_as_long_as_geometry_says() -> None:
 @pytest.mark.parametrize(
     ("apart", "share"), [(3.0, 0.0), (3.1, 0.0), (1.0, 1.0), (0.0, 1.0), (2.0, None)]
 )
-def test_how_much_of_a_disc_is_hidden(apart: float, share: float | None) -> None:
+def test_hidden_fraction_of_a_disc(apart: float, share: float | None) -> None:
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (200_000, 2))
     points = points[np.hypot(*points.T) < 1]

@@ -78,7 +78,7 @@ def test_each_attitude(tmp_path: Path) -> None:
         ("not toml", "is not a TOML file"),
     ],
 )
-def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
+def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     with pytest.raises(SceneError) as caught:
         load(tmp_path, text)
     assert str(caught.value).startswith(str(tmp_path / "orbit.toml"))
@@ -86,6 +86,6 @@ def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) 
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_reports_missing_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="can not be read"):
         load_orbit(tmp_path / "none.toml")

@@ -40,7 +40,7 @@ def test_sixteen_bits_give_their_upper_eight_and_colours_their_luma(tmp_path: Pa
     assert np.all(np.abs(load_picture(tmp_path / "b.png").astype(int) - expected) <= 1)
 
 
-def test_crops_that_do_not_fit(tmp_path: Path) -> None:
+def test_rejects_crops_outside_the_image(tmp_path: Path) -> None:
     Image.new("L", (1024, 600)).save(tmp_path / "small.png")
     message = "small.png is 1024 x 600 pixels; with crop 0,100 it must be at least 1024 x 612"
     with pytest.raises(SceneError, match=f"^{message}$"):

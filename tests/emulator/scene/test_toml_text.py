@@ -30,6 +30,6 @@ def test_a_moment_becomes_one() -> None:
 
 
 @pytest.mark.parametrize("value", [None, float("inf"), float("nan"), object(), [None], [{}, 1]])
-def test_what_toml_has_not_is_refused(value: Any) -> None:
+def test_rejects_values_that_toml_cannot_store(value: Any) -> None:
     with pytest.raises(SceneError, match="a scene file can not contain the value"):
         toml_text({"key": value})

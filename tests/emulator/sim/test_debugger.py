@@ -16,7 +16,7 @@ BKPT, MOVS_R1_5, MOVS_R1_6, UNDEFINED = 0xBE00, 0x2105, 0x2106, 0xDE00
 
 
 @pytest.mark.parametrize("attached", [False, True])
-def test_a_machine_stands_where_it_is_while_the_kernel_is_held(attached: bool) -> None:
+def test_machine_stops_while_the_kernel_is_held(attached: bool) -> None:
     bench, kernel = Bench(), Kernel()
     debugger = Debugger(kernel, bench.machine, bench.reset, ())
     if attached:
@@ -65,7 +65,7 @@ def test_a_step_at_a_breakpoint_of_the_program_is_that_behind_it(debugger: Debug
     assert debugger.halted is not None
 
 
-def test_from_a_place_that_the_debugger_has_chosen_it_goes_on_there(debugger: Debugger) -> None:
+def test_continues_from_the_address_set_by_the_debugger(debugger: Debugger) -> None:
     debugger.set_register("pc", CODE)
     run_on(debugger)
     debugger.set_register("pc", CODE + 6)

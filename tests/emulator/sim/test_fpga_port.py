@@ -58,7 +58,7 @@ def test_the_first_of_them_are_the_same_memory() -> None:
         ({"cycles": EBI.cycles - 1}, f"takes {EBI.cycles} cycles, not {EBI.cycles - 1}"),
     ],
 )
-def test_what_can_not_be(changes: dict[str, Any], words: str) -> None:
+def test_rejects_impossible_arguments(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         made(**changes)
     assert made(cycles=EBI.cycles).cycles == EBI.cycles

@@ -133,7 +133,7 @@ def test_switching_off_ends_a_latch_up_but_a_lasting_one_comes_back(
     assert tripped == [(TRIP_PS, "memory"), (again_ps + TRIP_PS, "memory")]
 
 
-def test_current_that_ends_before_the_comparator_answers_is_not_told(kernel, power, tripped):
+def test_current_shorter_than_the_comparator_delay_is_not_reported(kernel, power, tripped):
     power.latch_up("imager")
     kernel.advance_to(TRIP_PS - 1)
     power.switch("imager", False)
@@ -214,7 +214,7 @@ def test_published_power_of_cubesense(kernel, published_mw, processor, memories,
     assert power.current_ma() * CUBESENSE_POWER.volts == pytest.approx(published_mw, rel=0.06)
 
 
-def test_channel_without_a_comparator_is_never_told(kernel):
+def test_channel_without_a_comparator_is_never_reported(kernel):
     power = PowerModel(kernel, CUBESENSE_POWER)
     power.on_overcurrent = lambda channel: pytest.fail(f"{channel} has no comparator")
     power.latch_up("SRAM1")

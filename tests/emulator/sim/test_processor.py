@@ -133,7 +133,7 @@ def test_other_events_do_not_move_the_poll(desk_of, other_us):
     assert happened == [other_us]
 
 
-def test_event_may_take_the_level_away(desk_of):
+def test_event_can_remove_the_level_before_the_poll(desk_of):
     """A supply that is cut when ACK rises: the program sees no ACK before the next one."""
     desk = desk_of(script(awaiting()))
     desk.ack_at(100)
@@ -218,7 +218,7 @@ def test_hanging_program_serves_interrupts_until_it_is_reset(desk_of):
         (req.Sleep(None, wakeable=False), "give a deadline or make it wakeable"),
     ],
 )
-def test_request_that_can_not_be(desk_of, step, text):
+def test_rejects_invalid_requests(desk_of, step, text):
     with pytest.raises(RequestError, match=text):
         desk_of(script(step)).run()
 

@@ -122,7 +122,7 @@ def test_a_picture_of_nothing_but_edges_is_given_up() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_dice_give_no_attitude(seed: int) -> None:
+def test_random_stars_give_no_attitude(seed: int) -> None:
     image = np.random.default_rng(seed).integers(0, 256, (FIELD.rows, FIELD.columns))
     assert solve(image.astype(np.uint8)).outcome is MeasurementOutcome.NONE
 

@@ -118,7 +118,7 @@ def stays_sane(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize(("seed", "mcu_addressing"), [(0, False), (1, True)])
-def test_nonsense_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) -> None:
+def test_random_bytes_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) -> None:
     unit = Harness(mcu_addressing=mcu_addressing)
     rng = np.random.default_rng(seed)
     turns: tuple[Turn, ...] = (uart, framed, framed, letters, i2c, i2c, transitions, latch_up)
@@ -129,7 +129,7 @@ def test_nonsense_on_every_bus_at_any_time(seed: int, mcu_addressing: bool) -> N
 
 
 @pytest.mark.parametrize("seed", quick(range(2), 1))
-def test_nonsense_in_the_middle_of_anything(seed: int) -> None:
+def test_random_bytes_during_any_operation(seed: int) -> None:
     """Interrupts come at every request of the program, not only where it sleeps."""
     unit = Harness()
     rng = np.random.default_rng(100 + seed)

@@ -43,7 +43,7 @@ def test_the_published_program_takes_less_ram_and_its_table_needs_flash() -> Non
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_what_shares_a_place_fits_into_it(profile: Profile) -> None:
+def test_overlaid_buffers_fit_their_shared_memory(profile: Profile) -> None:
     buffers = budget(CubeSenseSwitches.of(profile))
     size = {buffer.name: buffer.size for buffer in buffers}
     for name in {buffer.inside for buffer in buffers} - {""}:

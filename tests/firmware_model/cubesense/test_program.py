@@ -19,7 +19,7 @@ def test_memories_come_on_before_cameras_and_both_are_ready_soon(unit: Harness) 
     assert unit.program.idle
 
 
-def test_nothing_runs_by_itself(unit: Harness) -> None:
+def test_nothing_starts_without_a_command(unit: Harness) -> None:
     unit.log.clear()
     unit.run(until_us=unit.now_us + 1_000_000)
     requests = [request for _, request in unit.log]
@@ -84,7 +84,7 @@ def test_a_reset_lets_the_acknowledge_out_but_not_for_ever(unit: Harness, stuck:
     assert waited_us == pytest.approx(DRAIN_US if stuck else 4_500, abs=2_000)
 
 
-def test_two_lives_are_alike(unit: Harness) -> None:
+def test_two_runs_are_identical(unit: Harness) -> None:
     unit.scenes[codes.Camera.NADIR] = earth(-8, 3)
     results = []
     for _ in range(2):

@@ -86,7 +86,7 @@ def outcome(unit: Harness) -> set[str]:
     }
 
 
-def test_how_far_a_picture_came(lit: Harness) -> None:
+def test_performance_counts_the_stage_reached(lit: Harness) -> None:
     reached: set[str] = set()
     assert outcome(lit) == reached
     for name, bit in (

@@ -66,7 +66,7 @@ def test_what_is_written_is_read(tmp_path_factory, events):
         ("\x00\xff\n" * 3, "line 1: "),
     ],
 )
-def test_what_is_no_recording(tmp_path, text, reason):
+def test_rejects_files_that_are_not_recordings(tmp_path, text, reason):
     path = tmp_path / "some.rec"
     path.write_text(text)
     with pytest.raises(recording.RecordingError, match=reason) as raised:

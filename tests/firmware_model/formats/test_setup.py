@@ -24,7 +24,7 @@ def test_what_is_written_is_read(tmp_path_factory, setup):
     assert load_recording(path).setup == setup
 
 
-def test_a_real_device_was_not_made():
+def test_recording_of_a_real_device_has_no_setup():
     setup = Setup("1.0", target="/dev/ttyUSB0", seed=3)
     assert setup.to_json() == {"version": "1.0", "target": "/dev/ttyUSB0"}
     assert Setup.from_json(setup.to_json()) == Setup("1.0", target="/dev/ttyUSB0")
@@ -42,6 +42,6 @@ def test_a_real_device_was_not_made():
         ({"options": {"x": []}}, '"options" must be an object'),
     ],
 )
-def test_what_makes_no_sense(content, reason):
+def test_rejects_inconsistent_setups(content, reason):
     with pytest.raises(ValueError, match=reason):
         Setup.from_json(content)

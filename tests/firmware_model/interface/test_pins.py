@@ -32,7 +32,7 @@ def test_what_changes_keeps_the_rest() -> None:
     assert [port.name for port in pin.copy(width=4).ports] == ["X_I", "X", "X_OE"]
 
 
-def test_a_name_with_what_is_known_of_it() -> None:
+def test_pin_is_its_name_and_keeps_its_details() -> None:
     pin = Pin("X", "input", "a pin")
     assert pin == "X"
     assert {"X": 1}[pin] == 1

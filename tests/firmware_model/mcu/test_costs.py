@@ -174,7 +174,7 @@ def test_nothing_is_fitted_to_a_published_time() -> None:
     assert not [n for n, c in pic18.PIC18F45K20.operations.items() if c.provenance == "fitted"]
 
 
-def test_what_takes_longer_in_every_library_does() -> None:
+def test_costs_have_the_order_common_to_all_libraries() -> None:
     cycles = {name: cost.cycles for name, cost in pic18.PIC18F45K20.operations.items()}
     order = ["convert", "mul", "div", "sqrt", "atan2"]
     assert [cycles[f"f32_{name}"] for name in order] == sorted(

@@ -323,7 +323,7 @@ def test_half_a_frame_and_silence(node: Node, unit: Any) -> None:
     assert unit.frames(good(node)) == ack(AckError.OK)
 
 
-def test_an_address_alone_does_nothing(unit: Any) -> None:
+def test_address_without_data_has_no_effect(unit: Any) -> None:
     unit.i2c_write(b"")
     assert not unit.state.flags
     assert not unit.queue

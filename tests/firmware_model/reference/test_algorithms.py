@@ -213,7 +213,7 @@ def test_random_centroids_are_identified_alike(
     assert outcomes == set(OUTCOMES)
 
 
-def test_what_is_no_number_harms_neither(program: Algorithms, listed: StarCatalogue) -> None:
+def test_nan_is_handled_alike(program: Algorithms, listed: StarCatalogue) -> None:
     vectors = np.array([[np.nan] * 3, [0, 0, 1], [0.1, 0, 0.995]], np.float32)
     expected = identify(vectors, listed, METER)
     assert_same_identities(program.identify(vectors, None, 0.001), expected)

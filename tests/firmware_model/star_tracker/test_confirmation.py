@@ -57,7 +57,7 @@ def test_the_false_alarms_are_the_inverse_of_the_likelihood_ratio(
     assert false_alarm(7.0, expected, found, chance, meter()) == pytest.approx(7.0 / ratio)
 
 
-def test_chance_reaches_a_ratio_no_more_often_than_said() -> None:
+def test_false_alarm_rate_is_at_most_the_declared_one() -> None:
     expected, chance = 12, 0.05
     odds = [false_alarm(1.0, expected, f, chance, meter()) for f in range(expected + 1)]
     likely = [
@@ -68,7 +68,7 @@ def test_chance_reaches_a_ratio_no_more_often_than_said() -> None:
         assert as_good <= level
 
 
-def test_what_speaks_for_an_attitude_and_what_against() -> None:
+def test_evidence_for_and_against_an_attitude() -> None:
     more_found = [false_alarm(1.0, 10, f, 1e-3, meter()) for f in range(1, 11)]
     assert all(b < a for a, b in pairwise(more_found))
     more_missing = [false_alarm(1.0, 2 + m, 2, 1e-3, meter()) for m in range(10)]

@@ -109,7 +109,7 @@ def test_a_believed_attitude_is_rated(tracker: Tracker) -> None:
 
 
 @pytest.mark.parametrize("count", [12, 24, 60])
-def test_it_ends_in_time(tracker: Tracker, count: int) -> None:
+def test_search_ends_within_its_time_limit(tracker: Tracker, count: int) -> None:
     meter = tracker.meter()
     found = tracker.identify(tracker.false_rays(np.random.default_rng(96), count), meter)
     assert meter.table.seconds(meter.total) <= tracker.limit_s

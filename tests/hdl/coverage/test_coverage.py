@@ -23,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_what_is_hit_is_no_more_missed(folder: Path) -> None:
+def test_covered_points_are_not_missed(folder: Path) -> None:
     everything = [(name, point) for name, group in GROUPS.items() for point in group.points()]
     assert hits.missed(hits.merged(folder)) == everything
     for _ in range(2):

@@ -88,7 +88,7 @@ def test_settled_pin_by_settled_pin(case, seed):
         assert not difference(case.wiring, events, play(make(), events), expected), name
 
 
-def test_the_events_are_worth_it(case):
+def test_random_events_cover_acknowledges_memories_and_outputs(case):
     """Each acknowledge rises, each memory is written and read, each output moves."""
     outputs = np.concatenate(
         [play(CompiledEngine(case.wiring), case.events(s)).outputs for s in SEEDS]

@@ -59,7 +59,7 @@ def test_nothing_is_left_behind() -> None:
     assert verilog_text(TIERS[STAR].make(), "dut") == before
 
 
-def test_text_that_is_not_there_is_an_error() -> None:
+def test_missing_text_is_an_error() -> None:
     bug = Bug("", "", "blocks.frame_writer", "no such text", "", (STAR,))
     with pytest.raises(ValueError, match="has 'no such text' 0 times, not once"):
         wrong_verilog(bug, STAR)

@@ -64,7 +64,7 @@ def test_each_field_keeps_its_brightest() -> None:
     assert set(aramis_catalogue.select_stars(sky, SMALL).tolist()) == expected
 
 
-def test_every_triangle_that_fits_is_there(small: Database) -> None:
+def test_lists_every_triangle_within_the_limits(small: Database) -> None:
     vectors = small.vectors.astype(np.float64)
     near = np.degrees(np.arccos(np.clip(vectors @ vectors.T, -1, 1))) < SMALL.fov_deg
     expected = {
@@ -112,13 +112,13 @@ def test_the_cache_gives_the_same_database(
     assert cached(tmp_path / "new") == small.pack()
 
 
-def test_other_parameters_are_other_files(tmp_path: Path) -> None:
+def test_each_parameter_set_has_its_own_cache_file(tmp_path: Path) -> None:
     cached(tmp_path)
     cached(tmp_path, replace(SMALL, mag_limit=2.9))
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_a_damaged_file_is_built_anew(tmp_path: Path, small: Database) -> None:
+def test_damaged_cache_file_is_rebuilt(tmp_path: Path, small: Database) -> None:
     cached(tmp_path)
     (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:-1] + b"?")
@@ -126,7 +126,7 @@ def test_a_damaged_file_is_built_anew(tmp_path: Path, small: Database) -> None:
     assert file.read_bytes() == small.pack()
 
 
-def test_a_folder_that_can_not_be_made_costs_nothing_else(tmp_path: Path, small: Database) -> None:
+def test_cache_folder_that_cannot_be_created_is_ignored(tmp_path: Path, small: Database) -> None:
     (tmp_path / "file").write_text("in the way")
     assert cached(tmp_path / "file" / "x") == small.pack()
 
@@ -152,7 +152,7 @@ def test_the_databases_of_the_last_two_lenses_are_kept(
     ("off_deg", "made_for_deg"),
     [(0.0, FOV_DEG), (5e-4, FOV_DEG), (-5e-4, FOV_DEG), (2.0, FOV_DEG + 2)],
 )
-def test_a_lens_of_nearly_the_usual_field_has_the_usual_catalogue(
+def test_rounded_default_field_reuses_the_default_catalogue(
     monkeypatch: pytest.MonkeyPatch, small: Database, off_deg: float, made_for_deg: float
 ) -> None:
     """A lens file's rounded field is no reason to build another one."""
@@ -188,6 +188,8 @@ def test_reports_progress() -> None:
         (CatalogueParameters(fov_deg=60, stars_per_field=50, step_deg=10), "more than 1400000"),
     ],
 )
-def test_parameters_that_give_no_database(parameters: CatalogueParameters, words: str) -> None:
+def test_rejects_impossible_catalogue_parameters(
+    parameters: CatalogueParameters, words: str
+) -> None:
     with pytest.raises(ValueError, match=words):
         build_database(parameters)

@@ -64,7 +64,7 @@ class Bench:
         return self.ends
 
 
-def test_the_frame_under_way_is_skipped_and_the_next_one_stored_at_its_last_pixel() -> None:
+def test_skips_the_frame_in_progress_and_stores_the_next() -> None:
     bench = Bench(phase=5)
     bench.ppi.start(bench.target)
     assert bench.ppi.busy
@@ -75,7 +75,7 @@ def test_the_frame_under_way_is_skipped_and_the_next_one_stored_at_its_last_pixe
     assert bench.ppi.stored.readout_ps == (FRAME - 5) * PERIOD
 
 
-def test_only_the_lines_wanted_are_taken() -> None:
+def test_stores_only_the_requested_lines() -> None:
     bench, target = Bench(), np.zeros((2, COLUMNS), np.uint8)
     bench.ppi.start(target)
     assert bench.run(FRAME) == [((BLANK + LINE + COLUMNS) * PERIOD, FrameEnd.STORED)]
@@ -96,7 +96,7 @@ def test_a_short_frame_and_wrong_lines_are_reported() -> None:
     assert (wide[:, COLUMNS:] == 99).all()
 
 
-def test_a_dead_camera_never_ends_a_frame_and_stopping_helps() -> None:
+def test_dead_camera_never_completes_a_frame_and_stop_recovers() -> None:
     bench = Bench()
     bench.ppi.start(bench.target)
     bench.run(BLANK + 2 * LINE)
@@ -111,7 +111,7 @@ def test_a_dead_camera_never_ends_a_frame_and_stopping_helps() -> None:
     assert bench.run(10 * FRAME) == []
 
 
-def test_starting_again_gives_up_the_frame_before() -> None:
+def test_restart_discards_the_frame_in_progress() -> None:
     bench, other = Bench(), np.zeros((ROWS, COLUMNS), np.uint8)
     bench.ppi.start(bench.target)
     bench.run(BLANK + 2 * LINE)
@@ -151,7 +151,7 @@ def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> Non
 
 
 @pytest.mark.parametrize("wrong", range(ROWS))
-def test_one_wrong_line_anywhere_spoils_a_frame_and_not_the_next_one(wrong: int) -> None:
+def test_wrong_line_spoils_only_its_own_frame(wrong: int) -> None:
     """A frame of pieces, one of which has lines of another length; then the frame begins anew."""
     bench = Bench()
     lines = Pieces(wrong)

@@ -19,7 +19,7 @@ def test_flipped_bits_are_corrected_on_activation(desk: Desk) -> None:
     assert desk.aramis.measure().valid
 
 
-def test_a_double_error_is_reported_and_no_attitude_comes_of_it(desk: Desk) -> None:
+def test_double_error_is_reported_and_yields_no_attitude(desk: Desk) -> None:
     desk.flip_flash(4321, 7, 50)
     assert desk.aramis.activate() is CatalogueState.DAMAGED
     found = desk.aramis.measure()
@@ -52,7 +52,7 @@ def test_the_catalogue_is_reloaded_periodically_and_can_be_refreshed(active: Des
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_wrong_attitude_comes_of_heavy_radiation(seed: int) -> None:
+def test_heavy_radiation_never_yields_a_wrong_attitude(seed: int) -> None:
     """At a rate that breaks words, a measurement is right or says why there is none."""
     desk = Desk(seed=seed)
     desk.board.irradiate("flash", [3e-6, 1e-5, 3e-5, 1e-4, 1e-3, 1e-2][seed])

@@ -26,7 +26,7 @@ def test_a_dead_camera_is_reported(active: Desk) -> None:
     assert active.aramis.measure().valid
 
 
-def test_a_window_that_the_program_did_not_set_is_noticed_and_repaired(active: Desk) -> None:
+def test_unexpected_sensor_window_is_detected_and_restored(active: Desk) -> None:
     def write(address: int, value: int) -> None:
         data = bytes([address]) + value.to_bytes(2, "big")
         assert active.board.camera.i2c_write(0x5D, data, active.board.kernel.now)
@@ -52,7 +52,7 @@ def test_exposure_and_gain_reach_the_sensor_and_registers_can_be_read(active: De
         active.aramis.measure()  # which sets the gain up anew
 
 
-def test_pictures_come_down_as_the_camera_took_them(active: Desk) -> None:
+def test_downloaded_images_equal_the_captured_ones(active: Desk) -> None:
     active.aramis.measure()
     star = active.aramis.stars()[0]
     number, column = divmod(1280 * round(star.y_px) + round(star.x_px), 128)
@@ -79,7 +79,7 @@ def test_the_loop_runs_at_1_hz(active: Desk) -> None:
     assert active.client.telemetry("LoopStatus")["Iterations"] == done
 
 
-def test_iterations_that_come_late_are_counted(active: Desk) -> None:
+def test_counts_late_iterations(active: Desk) -> None:
     """A measurement takes longer than the period: no turn but the first is in time."""
     active.command("SetExposure", Rows=16_383)  # 520 ms
     active.client.command("StartLoop", Period=400, Mode=MeasurementMode.LOST_IN_SPACE)
@@ -90,7 +90,7 @@ def test_iterations_that_come_late_are_counted(active: Desk) -> None:
     assert "TimingError" in active.flags()
 
 
-def test_below_a_second_the_next_frame_comes_while_the_last_one_is_worked_on(active: Desk) -> None:
+def test_below_one_second_capture_overlaps_processing(active: Desk) -> None:
     active.client.command("StartLoop", Period=600, Mode=MeasurementMode.LOST_IN_SPACE)
     active.client.pause(6.05)
     assert active.client.telemetry("LoopStatus")["Iterations"] >= 9
@@ -98,7 +98,7 @@ def test_below_a_second_the_next_frame_comes_while_the_last_one_is_worked_on(act
     assert active.error_deg()[0] < 0.01
 
 
-def test_a_turning_satellite_s_attitude_is_that_of_its_image_time() -> None:
+def test_attitude_of_a_rotating_satellite_refers_to_the_image_time() -> None:
     desk = Desk(scene(rate_deg_s=(0.02, 0.1, 0.05)))
     desk.aramis.activate()
     desk.client.command("StartLoop", Period=1000, Mode=MeasurementMode.AIDED)
@@ -108,7 +108,7 @@ def test_a_turning_satellite_s_attitude_is_that_of_its_image_time() -> None:
         assert desk.error_deg()[0] < 0.01
 
 
-def test_a_telecommand_is_refused_on_i2c_too(desk: Desk) -> None:
+def test_telecommand_is_rejected_on_i2c_too(desk: Desk) -> None:
     bus = desk.board.i2c()
     client = I2cClient(bus, INTERFACE, wait=bus.wait)
     assert client.telemetry("Identification")["NodeType"] == 6
@@ -161,7 +161,7 @@ def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
     ("name", "values"),
     [("SetExposure", {"Rows": 99}), ("SetGain", {"Gain": 2.0}), ("ClearConfig", {})],
 )
-def test_other_pictures_than_before_begin_a_new_background(
+def test_changed_image_settings_restart_the_background(
     active: Desk, monkeypatch: pytest.MonkeyPatch, name: str, values: dict[str, Any]
 ) -> None:
     begun: list[Measuring] = []
@@ -191,7 +191,7 @@ def test_truth_is_that_of_the_requested_frame() -> None:
     np.testing.assert_array_equal(desk.board.truth(), two)
 
 
-def test_busy_says_whether_it_waits_for_the_host(active: Desk) -> None:
+def test_busy_is_false_while_waiting_for_the_host(active: Desk) -> None:
     active.client.pause(0.1)
     assert not active.board.busy()
     active.client.command("GetAttitude")

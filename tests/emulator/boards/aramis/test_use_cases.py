@@ -31,7 +31,7 @@ def test_activate_measure_deactivate(desk: Desk) -> None:
     assert desk.flags() == set()
 
 
-def test_a_measurement_without_activation_says_so(desk: Desk) -> None:
+def test_measurement_without_activation_is_reported(desk: Desk) -> None:
     found = desk.aramis.measure()
     assert (found.valid, found.reason, found.quaternion) == (False, Reason.NOT_ACTIVE, None)
     assert desk.flags() == {"NotActive"}
@@ -95,7 +95,7 @@ def test_latch_up_action(active: Desk) -> None:
     assert active.aramis.measure().valid
 
 
-def test_the_supply_is_cut_at_once_even_in_the_middle_of_a_measurement(active: Desk) -> None:
+def test_supply_is_cut_immediately_even_during_a_measurement(active: Desk) -> None:
     active.client.command("GetAttitude")
     before = active.now_s
     active.client.command("LatchUpAction", Step=LatchUpStep.OFF)
@@ -124,7 +124,7 @@ def test_a_catalogue_is_loaded_by_telecommand() -> None:
     assert desk.aramis.activate() is CatalogueState.GOOD
 
 
-def test_a_bad_upload_leaves_the_catalogue_alone(active: Desk) -> None:
+def test_rejected_upload_keeps_the_catalogue(active: Desk) -> None:
     for checksum, numbers in (
         (0xD8EF_0F4A, range(3)),  # any checksum
         (0x6B86_8B3A, range(2)),  # a block is missing

@@ -91,7 +91,7 @@ def test_a_memory_loses_its_content_with_its_supply(board: CubeSenseBoard) -> No
     np.testing.assert_array_equal(board.engine.memories["nadir"], before["nadir"])
 
 
-def test_memories_hold_noise_of_the_seed_after_power_up() -> None:
+def test_memories_hold_seeded_noise_after_power_up() -> None:
     contents = []
     for seed in (1, 1, 2):
         board = CubeSenseBoard(EarthSunScene(), seed=seed)

@@ -29,7 +29,7 @@ def test_every_pair_that_a_picture_can_show_is_listed() -> None:
     assert diagonal < PAIR_LIMIT_DEG == pytest.approx(diagonal, abs=0.1)
 
 
-def test_compiled_the_same_again() -> None:
+def test_compiling_twice_gives_the_same_file() -> None:
     first, again = onboard_catalogue(3.0), onboard_catalogue.__wrapped__(3.0)
     assert first is not again
     np.testing.assert_array_equal(first.vectors, again.vectors)

@@ -99,9 +99,7 @@ def session(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint, script: str) ->
 
 
 @needs_gdb
-def test_a_session_as_a_developer_has_it(
-    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
-) -> None:
+def test_typical_debugging_session(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
     send_bytes(board, b"abc")
     said = session(
         board,
@@ -179,7 +177,7 @@ def test_time_passes_while_gdb_steps_over_a_sleep(
 
 
 @needs_gdb
-def test_a_fault_is_a_signal_when_it_is_to_be_caught(
+def test_caught_fault_is_reported_as_a_signal(
     board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
 ) -> None:
     send_bytes(board, b"a\0")
@@ -208,7 +206,7 @@ def traced(image: Image, debug: Any) -> tuple[str, int]:
     return stream.getvalue(), halts if isinstance(halts, int) else len(halts)
 
 
-def test_a_trace_with_gdb_is_that_without(image: Image) -> None:
+def test_trace_is_identical_with_and_without_gdb(image: Image) -> None:
     """Two seconds: attached and running; and halted at hundreds of breakpoints and watchpoints."""
     alone, _ = traced(image, None)
     assert alone.count("\n") > 1000
@@ -288,7 +286,7 @@ def test_the_port_is_on_this_machine_only(endpoint: GdbEndpoint) -> None:
     assert endpoint.address[0] == "127.0.0.1"
 
 
-def test_a_fault_that_nobody_handles_is_reported_once(board: CubeStarFirmwareBoard) -> None:
+def test_unhandled_fault_is_reported_once(board: CubeStarFirmwareBoard) -> None:
     said: list[str] = []
     board.connect_console(said.append)
     send_bytes(board, b"a\0")
@@ -308,7 +306,7 @@ MONITOR = (
 )
 
 
-def test_whatever_clients_do_the_board_goes_on(
+def test_board_keeps_running_whatever_clients_send(
     board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
 ) -> None:
     """Drawn packets at a board that runs, with clients that come and go."""

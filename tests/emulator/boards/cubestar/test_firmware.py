@@ -57,7 +57,7 @@ def toggled(image: Image, **options: Any) -> tuple[list[int], Any, bytes, int]:
     return seen, violations, memory, board_time
 
 
-def test_fpga_is_the_same_by_driver_by_callbacks_and_simulated(images: dict[str, Image]) -> None:
+def test_fpga_behaves_the_same_by_driver_callbacks_and_simulation(images: dict[str, Image]) -> None:
     compiled = toggled(images["toggle"], engine="compiled")
     assert len(set(compiled[0])) > 20
     assert toggled(images["toggle"], engine="compiled", callbacks=True) == compiled
@@ -82,7 +82,7 @@ def test_other_layouts_are_refused_in_one_line(images: dict[str, Image]) -> None
         powered(images["toggle"], layout=Layout.TWO_BOARDS)
 
 
-def test_faults_at_the_pins_are_seen_and_leave_no_trace(images: dict[str, Image]) -> None:
+def test_pin_faults_are_seen_and_leave_no_residue(images: dict[str, Image]) -> None:
     board = powered(images["toggle"], engine="compiled")
     board.faults.inject("ack-stuck", level=1, for_s=0.001)
     board.kernel.advance_to(PS_PER_MS // 2)
@@ -109,9 +109,7 @@ def test_upsets_of_code_are_executed(images: dict[str, Image]) -> None:
 
 
 @pytest.mark.parametrize(("level", "on"), [(0, False), (1, True), (-1, True)])
-def test_what_is_soldered_to_a_switch_pulls_it_up(
-    images: dict[str, Image], level: int, on: bool
-) -> None:
+def test_floating_switch_pin_is_pulled_up(images: dict[str, Image], level: int, on: bool) -> None:
     """A pin that floats, -1, has the supply on, as before the program began."""
     board = powered(images["toggle"])
     for channel, pin in wired.SWITCHES.items():
@@ -125,7 +123,7 @@ def test_what_is_soldered_to_a_switch_pulls_it_up(
     board.close()
 
 
-def test_a_reset_of_the_camera_cuts_the_picture_where_it_comes(images: dict[str, Image]) -> None:
+def test_camera_reset_truncates_the_image(images: dict[str, Image]) -> None:
     """What was sent before is stored; the sky is dark, the rest of the memory was random."""
     board = powered(images["toggle"], engine="compiled")
     frame = board.camera.frame_from(0)

@@ -49,7 +49,7 @@ def test_the_published_board(enable: int, rnw: int, fpga: str, memory: str, acce
     [(Layout.SHARED, 1, 1), (Layout.TWO_MEMORIES, 1, 2), (Layout.TWO_BOARDS, 2, 2)],
 )
 @pytest.mark.parametrize("accessed", [False, True])
-def test_others_draw_that_of_fpgas_and_memories_each(
+def test_other_layouts_add_the_currents_of_fpgas_and_memories(
     layout: Layout, boards: int, memories: int, accessed: bool
 ) -> None:
     """A published FPGA board has an SRAM in it, idle by standby and used else."""
@@ -75,7 +75,7 @@ def test_others_draw_that_of_fpgas_and_memories_each(
         assert current_ma(board, pins, accessed) == pytest.approx(expected)
 
 
-def test_two_memories_at_one_fpga_need_more_pins_than_there_are() -> None:
+def test_two_memories_at_one_fpga_exceed_its_pins() -> None:
     """Pins and tiles of the AGLN030: 77 and 768 (IGLOO nano handbook)."""
     for layout in Layout:
         fpga = fpga_of(layout)

@@ -279,7 +279,7 @@ def test_still_stars_do_not_streak_and_are_where_they_are_in_the_middle() -> Non
     assert still.max() > 10 * light(replace(scene, mag_limit=0.1)).max()
 
 
-def test_who_looks_knows_the_angles_between_the_picture_s_edges() -> None:
+def test_image_edges_give_the_field_angles() -> None:
     """Half a pixel beyond the outermost pixels' centres."""
     now = camera_state_for([0, 0, 0, 1], LENS)
     ends = {

@@ -60,7 +60,7 @@ def test_another_scene_or_condition_makes_another_picture() -> None:
     assert (sensor.scene, sensor.condition) == ("ground", "good")
 
 
-def test_what_it_can_not_see_changes_nothing() -> None:
+def test_rejected_scene_leaves_the_sensor_unchanged() -> None:
     sensor = Sensor(View("sky", "bad"))
     assert (sensor.scene, sensor.condition) == ("sky", "bad")
     with pytest.raises(TypeError, match="it sees words, not 3"):

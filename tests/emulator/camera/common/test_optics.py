@@ -88,7 +88,7 @@ def test_error_of_the_toolbox_reading_is_as_documented() -> None:
     assert miss_px.max() == pytest.approx(15, abs=0.5)
 
 
-def test_what_the_lens_can_not_see_is_nan() -> None:
+def test_directions_outside_the_lens_are_nan() -> None:
     assert LENS.half_field_deg == pytest.approx(31.4, abs=0.1)
     angles = np.radians([0, 31, 36, 60, 89, 90, 91, 180])
     x, y = -np.cos(0.56), np.sin(0.56)  # towards the farthest corner
@@ -141,7 +141,7 @@ def test_vignetting() -> None:
         ({"k1": 1.5, "distortion": Distortion.TOOLBOX}, "folds the picture within the sensor"),
     ],
 )
-def test_impossible_lenses_are_refused(changes: dict[str, Any], complaint: str) -> None:
+def test_rejects_impossible_lenses(changes: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         replace(LENS, **changes)
 

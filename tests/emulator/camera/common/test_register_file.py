@@ -60,7 +60,7 @@ def test_pointer_wraps(registers: RegisterFile) -> None:
         (0x30, 0x05, logging.WARNING, "wrote 0x05 to 0x0030, where no register is known"),
     ],
 )
-def test_what_is_not_modelled_is_logged(
+def test_logs_writes_to_unmodelled_registers(
     registers: RegisterFile,
     caplog: pytest.LogCaptureFixture,
     address: int,
@@ -74,7 +74,7 @@ def test_what_is_not_modelled_is_logged(
     assert [(r.levelno, r.message) for r in caplog.records] == [(level, f"TEST1: {text}")]
 
 
-def test_reading_what_is_not_modelled_is_logged(
+def test_logs_reads_of_unmodelled_registers(
     registers: RegisterFile, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.INFO):

@@ -46,7 +46,7 @@ def test_what_is_seen_is_displaced_by_what_holds_there() -> None:
     np.testing.assert_allclose(seen - RESIDUAL.at(seen), PIXELS, atol=1e-10)
 
 
-def test_points_that_are_nowhere_stay_there() -> None:
+def test_nan_points_stay_nan() -> None:
     some = PIXELS.copy()
     some[3] = np.nan
     seen = displace(some, (RESIDUAL,))

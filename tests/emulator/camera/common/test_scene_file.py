@@ -122,7 +122,7 @@ PICTURE = 'kind = "picture"\nfile = "x"\n'
         ("kind =", "is not a TOML file"),
     ],
 )
-def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
+def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     check_refused(load, save(tmp_path, text), complaint)
     check_refused(load, tmp_path / "none.toml", "none.toml can not be read: No such file")
 
@@ -176,7 +176,7 @@ def test_a_night_on_the_ground(tmp_path: Path) -> None:
         ("sidereal_deg = 200", 'utc = "now"\nlongitude_deg = 0', "utc must be a date and time"),
     ],
 )
-def test_nights_that_can_not_be(tmp_path: Path, old: str, new: str, wrong: str) -> None:
+def test_rejects_impossible_nights(tmp_path: Path, old: str, new: str, wrong: str) -> None:
     check_refused(load, save(tmp_path, NIGHT.replace(old, new)), wrong)
 
 
@@ -197,7 +197,7 @@ def test_example_scenes_load(path: Path) -> None:
     assert isinstance(load_scene(path, CONDITION, UNCERTAIN).scene, SkyScene)
 
 
-def test_a_lens_drawn_as_its_calibration_knows_it(tmp_path: Path) -> None:
+def test_renders_with_the_calibrated_lens(tmp_path: Path) -> None:
     def drawn(seed: int, more: str = "") -> Optics:
         text = f'kind = "sky"\nra_deg = 1\ndec_deg = 2\n[optics]\ndrawn = {seed}\n{more}'
         return load_scene(save(tmp_path, text), CONDITION, UNCERTAIN).condition.optics

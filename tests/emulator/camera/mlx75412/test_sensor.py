@@ -298,7 +298,7 @@ def test_published_set_up_only_logs_what_is_not_modelled(caplog: pytest.LogCaptu
     ]
 
 
-def test_a_view_brings_its_condition_and_a_scene_leaves_it() -> None:
+def test_view_sets_the_condition_and_scene_keeps_it() -> None:
     camera = Mlx75412(SkyScene([0, 0, 0, 1]))
     assert (camera.condition, camera.temperature_c) == (CONDITION, 20)
     cold = replace(CONDITION, temperature_c=-12.5)

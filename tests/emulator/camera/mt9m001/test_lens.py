@@ -33,7 +33,7 @@ def test_the_shade_ends_the_field() -> None:
 
 
 @pytest.mark.parametrize("field_deg", [4.9, 41.0, float("nan")])
-def test_a_field_out_of_range_is_refused(field_deg: float) -> None:
+def test_rejects_field_of_view_out_of_range(field_deg: float) -> None:
     with pytest.raises(ValueError, match="5 to 40 deg"):
         double_gauss(field_deg)
 

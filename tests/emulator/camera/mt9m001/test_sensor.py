@@ -242,7 +242,7 @@ def test_frames_repeat_with_the_same_seed_and_differ_in_time() -> None:
     assert (frame(one, 0) != frame(other, 0)).any()
 
 
-def test_another_sensor_s_lens_and_what_is_no_sky_are_refused() -> None:
+def test_rejects_foreign_lens_and_scene_without_sky() -> None:
     with pytest.raises(ValueError, match="1280 x 1024 pixels, but the lens is for 1024 x 512"):
         Mt9m001(scene(), condition=other_lens.CONDITION)
     camera = Mt9m001(scene())

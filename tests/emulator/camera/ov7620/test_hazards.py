@@ -60,7 +60,7 @@ def test_without_hazards_the_lens_is_the_unit_s_own() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"dose"}))
-def test_the_worst_strength_shows_and_repeats(name: str) -> None:
+def test_worst_strength_is_visible_and_repeatable(name: str) -> None:
     hazard = HAZARDS[name]
     worst = hazard.sample(hazard.strength.values[-1], None, np.random.default_rng(1))
     one = grey(worst)

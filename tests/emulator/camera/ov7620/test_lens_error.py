@@ -81,7 +81,7 @@ def test_the_rim_stays_where_it_is_published() -> None:
         {"decentring_deg": (30.0, 0.0)},
     ],
 )
-def test_a_lens_that_can_not_be(wrong: dict[str, tuple[float, ...]]) -> None:
+def test_rejects_impossible_lens(wrong: dict[str, tuple[float, ...]]) -> None:
     with pytest.raises(SceneError, match=f"{next(iter(wrong))}.* must"):
         LensError(**wrong)
 

@@ -102,7 +102,7 @@ DISC = f'{KIND}[[reflections]]\ncamera = "sun"\nradius_px = 1\n'
         (f"{DISC}at_deg = [90, 90]\nlevel = 1", "within 95.0 deg of the boresight, not 90.0, 90.0"),
     ],
 )
-def test_one_line_says_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
+def test_errors_are_one_line(tmp_path: Path, text: str, complaint: str) -> None:
     check_refused(load_earth_sun_scene, save(tmp_path, text), complaint)
 
 

@@ -117,7 +117,7 @@ def test_values_wait_for_the_next_frame_and_exposure_one_longer(camera: Ov7620) 
     assert [frame.exposure_lines for frame in frames] == [8, 8, 4]
 
 
-def test_change_is_announced_to_who_has_looked_ahead(camera: Ov7620) -> None:
+def test_changes_are_announced_to_observers_that_looked_ahead(camera: Ov7620) -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     camera.segment_at(5 * MS)
@@ -181,7 +181,7 @@ def test_automatic_functions_after_reset_bring_the_mean_to_their_level() -> None
     assert lines == pytest.approx(8 * 66 / light(make(EarthSunScene())).mean(), abs=1)
 
 
-def test_automatic_exposure_of_a_frame_is_the_same_whenever_somebody_asks() -> None:
+def test_automatic_exposure_of_a_frame_does_not_depend_on_query_time() -> None:
     """Before its first row too, and without a request of the previous frame."""
     turning = EarthSunScene(rate_deg_s=(0, 900, 0), unevenness=0)
     followed = quiet(turning)
@@ -278,7 +278,7 @@ def test_pictures_are_rendered_once_and_noise_belongs_to_the_frame(scene: EarthS
     assert np.all(picture(camera, 4).ravel()[hot] == 255)
 
 
-def test_a_reflection_beyond_the_field_is_refused(scene: EarthSunScene) -> None:
+def test_rejects_reflection_outside_the_field(scene: EarthSunScene) -> None:
     far = Reflection(CameraTarget.SUN, 90, 90, radius_px=1, level=1)
     with pytest.raises(ValueError, match="at_deg must be within 95"):
         make(replace(scene, reflections=(far,)))

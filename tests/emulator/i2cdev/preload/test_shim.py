@@ -65,7 +65,7 @@ def test_compiled_programs(tmp_path, static):
     assert shim.is_static(program) is static
 
 
-def test_what_is_no_static_program(tmp_path):
+def test_rejects_programs_that_are_not_static(tmp_path):
     script = tmp_path / "script"
     script.write_text("#!/bin/sh\n" + "#" * 100)
     for path in (Path(sys.executable), script, tmp_path, tmp_path / "missing"):

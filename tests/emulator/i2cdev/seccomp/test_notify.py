@@ -40,14 +40,14 @@ def test_a_text_is_cut_at_the_limit(end_of_page: int) -> None:
     assert read_text(os.getpid(), end_of_page - 5000, 4999) == b"x" * 4999
 
 
-def test_a_text_that_runs_into_forbidden_memory(end_of_page: int) -> None:
+def test_text_that_crosses_into_unmapped_memory_is_rejected(end_of_page: int) -> None:
     with pytest.raises(OSError, match="process") as caught:
         read_text(os.getpid(), end_of_page - 9, 8192)
     assert caught.value.errno == errno.EFAULT
 
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EBADF])
-def test_a_call_whose_descriptor_can_not_be_put_in_ends_with_the_reason(
+def test_call_fails_with_the_reason_when_its_descriptor_cannot_be_installed(
     monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
     answers: list[tuple[int, ...]] = []

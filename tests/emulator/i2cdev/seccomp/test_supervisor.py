@@ -183,7 +183,7 @@ def test_each_way_to_open(program: Program, name: str, flags: int) -> None:
     assert len(program.files) == 2
 
 
-def test_a_bus_that_has_gone(program: Program) -> None:
+def test_removed_bus_returns_an_error(program: Program) -> None:
     def refuse() -> File:
         raise OSError(errno.ECONNREFUSED, "gone")
 
@@ -261,7 +261,7 @@ def test_looking_at_a_descriptor_by_an_empty_path(
         ("lgetxattr", False, -errno.EOPNOTSUPP),
     ],
 )
-def test_questions_about_the_name(program: Program, name: str, folder: bool, result: int) -> None:
+def test_name_queries(program: Program, name: str, folder: bool, result: int) -> None:
     before = (-100,) if folder else ()
     assert program(name, *before, program.memory(OURS)) == result
     assert program(name, *before, program.memory(OTHER)) == "pass"

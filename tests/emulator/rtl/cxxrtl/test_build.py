@@ -43,7 +43,7 @@ def quick_compiler(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("CXX", str(make_compiler(tmp_path, "quickcc", on_compile)))
 
 
-def test_built_once_then_taken_from_the_cache(quick_compiler, cache, monkeypatch):
+def test_library_is_built_once_and_then_cached(quick_compiler, cache, monkeypatch):
     library = build.library_for(wiring())
     assert library.parent == cache
     monkeypatch.setattr(build, "_compile", lambda *_: pytest.fail("built again"))
@@ -62,7 +62,7 @@ def test_damaged_library_is_built_again(quick_compiler, cache, damage):
 
 
 @pytest.mark.slow
-def test_library_depends_on_all_that_it_is_made_of(quick_compiler, cache, monkeypatch):
+def test_library_depends_on_all_its_sources(quick_compiler, cache, monkeypatch):
     libraries = [build.library_for(wiring()), build.library_for(cubestar_wiring(CubeStarTop(2, 3)))]
     monkeypatch.setattr(compiler, "FLAGS", (*compiler.FLAGS, "-g"))
     libraries.append(build.library_for(wiring()))

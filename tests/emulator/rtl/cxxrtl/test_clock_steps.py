@@ -58,7 +58,7 @@ def test_a_falling_clock_moves_the_write_strobe_alone(star):
         ),
     ],
 )
-def test_what_is_not_understood_is_left_to_eval(star, found, instead):
+def test_unknown_statements_fall_back_to_eval(star, found, instead):
     wiring, text = star
     assert found in text
     assert "return true; }" in steps(wiring, text.replace(found, instead))

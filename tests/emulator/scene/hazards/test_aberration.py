@@ -48,6 +48,6 @@ def test_moves_stars_in_the_picture() -> None:
     assert abs(np.median(after[:, 1] - before[:, 1])) < 0.2 * shift
 
 
-def test_refuses_what_can_not_be() -> None:
+def test_rejects_impossible_values() -> None:
     with pytest.raises(SceneError, match="velocity_km_s of the hazard aberration must be at most"):
         Aberration(velocity_km_s=(3e5, 0.0, 0.0))

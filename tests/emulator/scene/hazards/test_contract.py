@@ -61,7 +61,7 @@ def test_a_direction_is_three_numbers_or_two_angles(values: Any, vector: Any) ->
         ((1, 2, 3, 4), "it must be 3 numbers"),
     ],
 )
-def test_what_is_no_direction(values: Any, words: str) -> None:
+def test_rejects_invalid_directions(values: Any, words: str) -> None:
     with pytest.raises(SceneError, match=words):
         direction("it", values)
 
@@ -103,7 +103,7 @@ def test_beside_and_aside_are_at_the_angle_to_any_side(angle_deg: float) -> None
         assert np.linalg.norm(mean) < 0.2
 
 
-def test_a_hazard_by_itself_is_nothing() -> None:
+def test_plain_hazard_has_no_effect() -> None:
     vectors = np.eye(3)
     nothing = SkyHazard()
     assert nothing.lights(ROUND) is nothing.glow(ROUND, vectors) is None
@@ -120,7 +120,7 @@ def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
     assert np.pi * EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
 
 
-def test_nothing_stands_as_far_as_anything_else() -> None:
+def test_every_depth_is_distinct() -> None:
     """The sky behind the planets, they behind the Moon, and all behind the lens's own light."""
     assert [*map(int, Depth)] == [0, 1, 2, 3, 4, 5]
     assert (min(Depth), max(Depth)) == (Depth.SKY, Depth.LENS)

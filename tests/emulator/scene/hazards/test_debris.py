@@ -51,7 +51,7 @@ def test_streak_is_as_long_as_it_moves() -> None:
     assert spread == pytest.approx(np.hypot(abs(last - first) / np.sqrt(12), 0.95), rel=0.02)
 
 
-def test_stars_are_no_other_than_without() -> None:
+def test_stars_are_unchanged() -> None:
     _, hazard = streak(1.0)
     clean = star_light(ORION, LENS, SHUTTER)
     light = star_light(replace(ORION, hazards=(hazard,)), LENS, SHUTTER)
@@ -60,7 +60,7 @@ def test_stars_are_no_other_than_without() -> None:
     np.testing.assert_array_equal(light[far], clean[far])
 
 
-def test_refuses_a_way_to_nowhere() -> None:
+def test_rejects_path_of_zero_length() -> None:
     with pytest.raises(
         SceneError, match="towards of the hazard debris must not be along direction"
     ):

@@ -136,7 +136,7 @@ def test_is_placed_with_the_limb_at_an_angle(angle_deg: float) -> None:
     assert np.array(hazard.sun) @ NOW.boresight <= 0.5 + 1e-9
 
 
-def test_refuses_what_can_not_be() -> None:
+def test_rejects_impossible_values() -> None:
     with pytest.raises(SceneError, match="sun must be 3 numbers"):
         EarthLimb(sun=(0.0, 0.0, 0.0))
 

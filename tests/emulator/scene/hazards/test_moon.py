@@ -63,7 +63,7 @@ def test_full_moon_is_even_and_3_4_mag_an_arcsec2() -> None:
     assert -2.5 * math.log10(middle / 4.2545e10) == pytest.approx(3.36, abs=0.02)
 
 
-def test_scatters_the_share_that_it_says() -> None:
+def test_scatters_the_declared_share() -> None:
     angles = np.linspace(0, math.radians(44.9), 100_001)
     share = np.trapezoid(aureole(angles, 0.1) * 2 * math.pi * np.sin(angles), angles)
     assert share == pytest.approx(0.1, rel=0.1)
@@ -96,6 +96,6 @@ def test_is_placed_in_the_picture_with_its_phase() -> None:
         ({"direction": (10.0, 20.0), "sun": (1.0,)}, "sun must be 3 numbers"),
     ],
 )
-def test_refuses_what_can_not_be(values: dict, message: str) -> None:
+def test_rejects_impossible_values(values: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         Moon(**values)

@@ -19,7 +19,7 @@ KINDS = list(SKY_HAZARDS.values())
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_says_what_it_is(kind: type[SkyHazard]) -> None:
+def test_hazard_describes_itself(kind: type[SkyHazard]) -> None:
     assert 4 < len(kind.meaning) < 70
     assert 5 <= len(kind.strength.values) <= 7
     assert kind.strength.usual in kind.strength.values
@@ -76,7 +76,7 @@ def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_lights_move_as_fast_as_is_said(kind: type[SkyHazard]) -> None:
+def test_lights_move_at_the_declared_rate(kind: type[SkyHazard]) -> None:
     """By that the renderer knows how often to look at them."""
     now = camera_state(ORION, LENS, SHUTTER)
     hazard = kind.sample(kind.strength.usual, now, np.random.default_rng(3))

@@ -28,7 +28,7 @@ def place(image: bytes, wanted: str) -> int:
     return sum(list(parts.values())[: list(parts).index(wanted)])
 
 
-def test_out_comes_what_went_in(image: bytes) -> None:
+def test_unpacking_restores_what_was_packed(image: bytes) -> None:
     first, second = database(SMALL), Database.unpack(image)
     assert sum(first.sizes.values()) == len(image)
     for name in ("numbers", "vectors", "v_mag", "stars", "faces", "areas", "moments"):

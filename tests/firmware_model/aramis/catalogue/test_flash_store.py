@@ -121,7 +121,7 @@ def test_damaged_ram_is_noticed_before_use_and_loaded_anew(desk: Desk) -> None:
         assert desk.ram.tobytes() == desk.image
 
 
-def test_damaged_ram_and_damaged_flash_leave_nothing(desk: Desk) -> None:
+def test_damaged_ram_and_flash_leave_no_catalogue(desk: Desk) -> None:
     desk.load()
     desk.ram[77] ^= 1
     desk.flip_flash(72 * 300, 72 * 300 + 1)
@@ -130,7 +130,7 @@ def test_damaged_ram_and_damaged_flash_leave_nothing(desk: Desk) -> None:
     assert not desk.unit.perform(desk.store.ensure())
 
 
-def test_a_reload_spares_the_good_copy_what_flash_has_lost(desk: Desk) -> None:
+def test_failed_reload_keeps_the_good_copy(desk: Desk) -> None:
     desk.load()
     database = desk.store.database
     desk.flip_flash(72 * 300, 72 * 300 + 1)

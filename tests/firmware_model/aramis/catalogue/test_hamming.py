@@ -25,7 +25,7 @@ def test_columns_are_distinct_odd_and_none_is_a_check_bit_s() -> None:
 
 
 @given(st.binary(max_size=100))
-def test_what_is_not_damaged_comes_back(data: bytes) -> None:
+def test_undamaged_words_are_unchanged(data: bytes) -> None:
     coded = encode(data)
     assert len(coded) == hamming.coded_size(len(data))
     decoded = decode(coded, meter())

@@ -65,7 +65,7 @@ def test_the_real_lists_against_brute_force(name: str) -> None:
 @pytest.mark.parametrize(
     ("low", "high"), [(2.0, 1.0), (5.0, 6.0), (-2.0, -1.0), (np.nan, 1.0), (0.0, np.nan)]
 )
-def test_ranges_that_hold_nothing(low: float, high: float) -> None:
+def test_empty_ranges(low: float, high: float) -> None:
     assert found(np.array([0, 1, 2, 3], dtype=np.float32), low, high) == []
 
 

@@ -40,7 +40,7 @@ def test_only_the_last_five_count() -> None:
     assert background.mean(meter()) == background.threshold(2, meter()) == 10
 
 
-def test_fewer_pictures_do() -> None:
+def test_background_works_with_fewer_images() -> None:
     assert LevelHistory().mean(meter()) == LevelHistory().threshold(2, meter()) == 0
     assert after(noise(50, 5, 1)).threshold(2, meter()) == pytest.approx(60, abs=1)
 

@@ -90,7 +90,7 @@ def test_all_confirming_stars_make_the_attitude_better() -> None:
     assert np.max(all_stars, axis=0)[0] < 0.01
 
 
-def test_what_a_solution_tells() -> None:
+def test_solution_fields() -> None:
     (made,) = pictures(1, 4)
     solution = run(made)
     expected = MeasurementOutcome.CONCLUSIVE, Reason.CONFIRMED
@@ -139,14 +139,14 @@ def test_stars_that_all_coincide(profile: Profile) -> None:
 
 @PROFILES
 @pytest.mark.parametrize("value", [0.0, np.nan])
-def test_a_direction_that_is_none_gives_nothing(profile: Profile, value: float) -> None:
+def test_invalid_direction_gives_no_solution(profile: Profile, value: float) -> None:
     for made in pictures(5, 11):
         solution = run(made, profile, np.full(3, value, dtype=np.float32))
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
 
 
 @PROFILES
-def test_a_direction_on_the_other_side_of_the_sky_gives_nothing(profile: Profile) -> None:
+def test_opposite_direction_gives_no_solution(profile: Profile) -> None:
     for made in pictures(10, 7):
         solution = run(made, profile, -made.boresight.astype(np.float32))
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE

@@ -72,7 +72,7 @@ def test_an_escape_in_a_frame_number_is_undone(node: Links) -> None:
         ("64 02", AckError.BAD_PARAMETER),
     ],
 )
-def test_what_is_refused(node: Links, payload: str, error: AckError) -> None:
+def test_rejected_commands(node: Links, payload: str, error: AckError) -> None:
     request = bytes.fromhex(payload)
     assert node.frames(request) == [bytes([error])]
     assert not node.queue
@@ -151,7 +151,7 @@ def test_on_i2c_it_does_so_when_the_transfer_has_ended(node: Links, identifier: 
     assert node.done == [("measure", camera, sram, True)]
 
 
-def test_a_schedule_that_is_not_read_is_none(node: Links) -> None:
+def test_read_of_zero_bytes_schedules_nothing(node: Links) -> None:
     node.i2c_write(bytes([0x96]))
     node.i2c_read(0)
     assert not node.queue

@@ -35,7 +35,7 @@ def test_the_fit_minimises_the_algebraic_error(meter: Meter, seed: int) -> None:
     assert circle.power == pytest.approx(best[2], rel=1e-3, abs=5)
 
 
-def test_taking_a_point_out_is_as_never_having_had_it(meter: Meter) -> None:
+def test_removing_a_point_equals_never_adding_it(meter: Meter) -> None:
     rng = np.random.default_rng(7)
     points = (on_circle(rng, 15)[:15] + rng.normal(0, 1, (15, 2))).astype(np.float32)
     equations = LeastSquaresCircle(points, meter)

@@ -82,7 +82,7 @@ def test_other_coefficients(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("coefficients", [(0.0, -1.0), (0.0, 1.0, -0.01), (0.0, 0.0), (0.0, 0.1)])
-def test_what_has_no_inverse_is_refused(meter: Meter, coefficients: tuple[float, ...]) -> None:
+def test_rejects_distortion_without_inverse(meter: Meter, coefficients: tuple[float, ...]) -> None:
     with pytest.raises(DistortionError, match="must"):
         fine_table(meter, Projection.EQUIDISTANT, coefficients)
 

@@ -152,7 +152,7 @@ def intruder(rng: np.random.Generator, picture: NDArray[np.uint8]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lit_deg", [360, 220])
-def test_intruders_move_nothing_that_is_not_said(ours: NadirConfig, lit_deg: int) -> None:
+def test_disturbances_never_move_an_accepted_result(ours: NadirConfig, lit_deg: int) -> None:
     """Bars across the picture, and night up to a straight line: right, unsure, or refused."""
     rng = np.random.default_rng(lit_deg)
     found, inside = 0, []

@@ -110,7 +110,7 @@ def bright(*places: tuple[slice, slice]) -> NDArray[np.uint8]:
     ],
     ids=["pair of stuck pixels", "row of stuck pixels", "reflection below the threshold"],
 )
-def test_what_is_no_sun(
+def test_rejects_lights_that_are_not_the_sun(
     ours: SunConfig, meter: Meter, picture: NDArray[np.uint8], pixels: int
 ) -> None:
     result = find_sun(window(picture), ours, meter)
@@ -165,7 +165,7 @@ def nowhere() -> NDArray[np.uint8]:
         (steps(4), Reason.SHARP),
     ],
 )
-def test_each_reason_has_its_light(
+def test_each_rejection_reason_has_an_example(
     ours: SunConfig, meter: Meter, data: NDArray[np.uint8], reason: Reason
 ) -> None:
     result = find_sun(data, ours, meter)

@@ -59,7 +59,9 @@ def quality(unit: Harness, picture: np.ndarray) -> dict[str, float]:
         ({"elongated": 2, "aligned": 0.9}, Reason.UNCONFIRMED),
     ],
 )
-def test_the_picture_speaks_before_the_failure(measured: dict[str, float], reason: Reason) -> None:
+def test_reason_of_the_image_precedes_that_of_the_failure(
+    measured: dict[str, float], reason: Reason
+) -> None:
     picture = replace(CLEAR, **measured)  # type: ignore[arg-type]
     assert reason_of(picture, MatchOutcome.UNCONFIRMED) is reason
 

@@ -93,7 +93,7 @@ def test_a_hint_is_used_once(tracking: Harness, pose: Rotation) -> None:
     assert seen(tracking, elsewhere) == (LOST, Reason.SOLVED)
 
 
-def test_a_contradiction_needs_a_second_fix(
+def test_contradicting_fix_needs_confirmation(
     tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transitions, "SURE", 0.0)  # nothing is
@@ -161,7 +161,7 @@ def test_commanded_lost_in_space_judges_each_picture_alone(
     assert seen(tracking, turned(pose, 10.2)) == (TRACKING, Reason.SOLVED)
 
 
-def test_nothing_is_known_after_a_power_cycle(
+def test_power_cycle_forgets_the_tracking_history(
     tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transitions, "SURE", 0.0)

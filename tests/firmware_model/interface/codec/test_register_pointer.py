@@ -36,7 +36,7 @@ def test_measurements_saturate_and_writes_do_not() -> None:
         LEVEL.encode(256, saturate=False)
 
 
-def test_what_may_be_written() -> None:
+def test_write_limits() -> None:
     assert [LEVEL.allows(value) for value in (0, 9, 10)] == [True, True, False]
     assert not CENTRE.allows(0)
     assert START.allows(255)

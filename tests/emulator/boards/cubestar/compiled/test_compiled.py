@@ -100,7 +100,7 @@ def test_reports_faulting_and_unknown_calls(fast: Calls) -> None:
 
 
 @needs_compiler
-def test_a_fault_takes_no_stack_from_the_calls_after_it() -> None:
+def test_fault_does_not_consume_stack_of_later_calls() -> None:
     calls = start_program(compile_program(Build("O2"), generated()), Timing())
     calls.call("read_words", 1, 0)
     before = calls.machine.register("sp")
@@ -110,7 +110,7 @@ def test_a_fault_takes_no_stack_from_the_calls_after_it() -> None:
     assert calls.machine.register("sp") == before
 
 
-def test_sources_are_rewritten_as_a_careless_programmer_has_them() -> None:
+def test_sources_are_rewritten_in_the_careless_form() -> None:
     line = "float y = 0.5f * sqrtf(x) + 0x1.8p+1f; // pair_2.0f"
     assert rewrite_source(line, "own") == line
     assert rewrite_source("float y = 0.5f * sqrtf(x);", "literals") == "float y = 0.5 * sqrt(x);"
@@ -154,7 +154,7 @@ def test_the_python_program_charges_what_the_compiled_one_takes(fast: Calls, see
         1,
     ),
 )
-def test_the_part_s_registers_say_the_timing(timing: Timing, mode: int) -> None:
+def test_timing_is_read_from_the_processor_registers(timing: Timing, mode: int) -> None:
     """By the fields' names: MSC, EBI and CMU of the EFM32GG Reference Manual."""
     machine = start_program(compile_program(Build("O2"), generated()), timing).machine
 
@@ -186,7 +186,7 @@ def test_the_part_s_registers_say_the_timing(timing: Timing, mode: int) -> None:
         for bus in ((4, 0, 0, 0), (0, 4, 0, 0), (0, 0, 64, 0), (0, 0, 0, 4), (-1, 0, 0, 0))
     ],
 )
-def test_timings_that_registers_can_not_hold(changes: dict[str, Any]) -> None:
+def test_rejects_timings_that_registers_cannot_hold(changes: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="flash waits are 0 to 2, waits of the bus 0 to 3, 3, 63"):
         Timing(**changes)
     assert str(Timing(0, False, True, (3, 3, 63, 3))) == (

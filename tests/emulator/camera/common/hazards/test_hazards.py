@@ -43,7 +43,7 @@ def picture(
 
 
 @pytest.mark.parametrize("hazard", HAZARDS.values(), ids=list(HAZARDS))
-def test_each_says_what_it_and_its_keys_are(hazard: type[SensorHazard]) -> None:
+def test_each_hazard_describes_itself_and_its_keys(hazard: type[SensorHazard]) -> None:
     assert HAZARDS[hazard.name] is hazard
     assert hazard.meaning
     assert 5 <= len(hazard.strength.values) <= 7
@@ -53,7 +53,7 @@ def test_each_says_what_it_and_its_keys_are(hazard: type[SensorHazard]) -> None:
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("hazard", HAZARDS.values(), ids=list(HAZARDS))
-def test_the_worst_strength_shows_and_repeats(hazard: type[SensorHazard], camera: str) -> None:
+def test_worst_strength_is_visible_and_repeatable(hazard: type[SensorHazard], camera: str) -> None:
     worst = hazard.sample(hazard.strength.values[-1], None, np.random.default_rng(1))
     first = picture(camera, worst)
     np.testing.assert_array_equal(first, picture(camera, worst))
@@ -62,7 +62,7 @@ def test_the_worst_strength_shows_and_repeats(hazard: type[SensorHazard], camera
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", sorted(HAZARDS.keys() - {"defocus", "response"}))
-def test_the_least_strength_is_none(name: str, camera: str) -> None:
+def test_least_strength_has_no_effect(name: str, camera: str) -> None:
     hazard = HAZARDS[name]
     least = hazard.sample(hazard.strength.values[0], None, np.random.default_rng(1))
     np.testing.assert_array_equal(picture(camera, least), picture(camera))
@@ -97,7 +97,7 @@ def test_hot_pixels_are_those_of_the_key_and_stay(camera: str) -> None:
     assert np.sum((as_hazard > 30) & (later > 30)) > 0.8 * np.sum(as_hazard > 30) > 40
 
 
-def test_more_hot_pixels_than_pixels_are_refused() -> None:
+def test_rejects_more_hot_pixels_than_pixels() -> None:
     with pytest.raises(SceneError, match="hot_pixels must be at most 524288, not 524289"):
         replace(cubestar.CONDITION, hazards=(HotPixels(count=289),), hot_pixels=524_000)
 

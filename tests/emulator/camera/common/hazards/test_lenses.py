@@ -22,7 +22,7 @@ def lens(
     return replace(condition, hazards=hazards, temperature_c=celsius).lens
 
 
-def test_without_a_hazard_the_optics_are_the_very_same() -> None:
+def test_optics_are_unchanged_without_hazards() -> None:
     assert CONDITION.lens is LENS
     assert lens(Defocus(), FocalLength()) is LENS  # in focus and as long as it should be at 20 C
 
@@ -77,7 +77,7 @@ def test_residuals_can_be_undone() -> None:
     np.testing.assert_allclose(crooked.project(crooked.unproject(GRID)), GRID, atol=1e-9)
 
 
-def test_hazards_that_go_too_far_together_are_refused() -> None:
+def test_rejects_combined_hazards_beyond_the_limits() -> None:
     with pytest.raises(SceneError, match=r"spot at 60 C must be at most 20 px, not 71"):
         replace(CONDITION, hazards=(Defocus(um_per_k=50.0),), temperature_c=60.0)
     twice = (FocalLength(percent=10.0), FocalLength(percent=5.0))
@@ -87,7 +87,7 @@ def test_hazards_that_go_too_far_together_are_refused() -> None:
         FisheyeCondition(hazards=twice)
 
 
-def test_what_the_lens_can_not_image_stops_no_other_star() -> None:
+def test_star_outside_the_lens_does_not_affect_others() -> None:
     residuals = lens(LensResiduals(rms_px=2.0, seed=1)).residuals
     with_nan = np.concatenate([[[np.nan, np.nan]], GRID])
     np.testing.assert_array_equal(displace(with_nan, residuals)[1:], displace(GRID, residuals))

@@ -60,7 +60,7 @@ def test_slow_protons_free_thousands() -> None:
     assert electrons.min() > 0
 
 
-def test_as_many_hits_as_rate_area_and_exposure_say() -> None:
+def test_number_of_hits_follows_rate_area_and_exposure() -> None:
     # 0.1644 cm2 for 0.3856 s at 500 / (cm2 s), and at 3000 over a pole.
     assert Protons().mean_hits(CUBESTAR) == pytest.approx(31.7, rel=0.01)
     area = 512 * 1024 * 5.6e-4**2
@@ -87,7 +87,7 @@ def test_tracks_are_as_long_as_isotropic_incidence_says() -> None:
     assert np.quantile(lengths, 0.9) == pytest.approx(24, rel=0.25)
 
 
-def test_charge_of_all_tracks_is_what_they_lost() -> None:
+def test_track_charge_equals_the_energy_loss() -> None:
     hits = 3000
     total = charge(Protons(hits=hits)).sum()
     generator = drawn(9)
