@@ -70,6 +70,12 @@ class _Item:
     extra: list[int] = field(default_factory=list)
 
 
+_BRANCHES = {"B T1": 1, "B T2": 1, "B T3": 2, "B T4": 2, "CBZ": 1, "CBNZ": 1, "BL": 2, "BX": 3,
+             "BLX": 3, "MOV PC": 3, "ADD PC": 3, "LDR PC": 6, "POP PC": 4, "LDM PC": 6, "TBB": 5,
+             "TBH": 6, "IT B": 2}  # fmt: skip
+"""Half-words of each kind of branch, with what prepares it."""
+
+
 def wide(value: int) -> list[int]:
     """The half-words of a 32-bit instruction."""
     return [value >> 16, value & 0xFFFF]
@@ -224,9 +230,7 @@ class Generator:
 
     def _branch(self, number: int) -> _Item:
         random = self.random
-        kind = random.choice(["B T1", "B T2", "B T3", "B T4", "CBZ", "CBNZ", "BL", "BX", "BLX",
-                              "MOV PC", "ADD PC", "LDR PC", "POP PC", "LDM PC", "TBB", "TBH",
-                              "IT B"])  # fmt: skip
+        kind = random.choice(list(_BRANCHES))
         if kind == "POP PC" and not self.stack_valid:
             kind = "BX"
         if kind in ("LDM PC", "LDR PC") and self.aligned < 0:
@@ -236,10 +240,7 @@ class Generator:
         item = _Item([], kind, number + random.randint(1, 12), condition=random.randrange(14))
         item.register = random.choice(self.free_low if low else [r for r in self.free if r != 14])
         item.extra = [self.aligned]
-        sizes = {"B T1": 1, "B T2": 1, "B T3": 2, "B T4": 2, "CBZ": 1, "CBNZ": 1, "BL": 2, "BX": 3,
-                 "BLX": 3, "MOV PC": 3, "ADD PC": 3, "LDR PC": 6, "POP PC": 4, "LDM PC": 6,
-                 "TBB": 5, "TBH": 6, "IT B": 2}  # fmt: skip
-        item.halves = [0] * sizes[kind]
+        item.halves = [0] * _BRANCHES[kind]
         return item
 
     def _special(self) -> _Item:
@@ -358,26 +359,22 @@ class Generator:
             case "CBZ" | "CBNZ":
                 base = 0xB100 if item.kind == "CBZ" else 0xB900
                 return [base | (distance >> 6 & 1) << 9 | (distance >> 1 & 31) << 3 | r]
-            case "BX":
-                return [*movw(r, target | 1), 0x4700 | r << 3]
-            case "BLX":
-                return [*movw(r, target | 1), 0x4780 | r << 3]
+            case "BX" | "BLX":
+                return [*movw(r, target | 1), (0x4700 if item.kind == "BX" else 0x4780) | r << 3]
             case "MOV PC":
                 return [*movw(r, target | self.random.getrandbits(1)), 0x4687 | r << 3]
             case "ADD PC":
                 if target < at + 8:
                     return [*movw(r, 0), 0xBF00]
                 return [*movw(r, target - at - 8), 0x4487 | r << 3]
-            case "LDR PC":
-                pointer = item.extra[0]
-                return [*movw(r, target | 1), *wide(0xF8C00008 | pointer << 16 | r << 12),
-                        *wide(0xF8D0F008 | pointer << 16)]  # fmt: skip
+            case "LDR PC" | "LDM PC":
+                store, load = ((0xF8C00008, 0xF8D0F008) if item.kind == "LDR PC"
+                               else (0xF8C00004, 0xE8908000 | 1 << r))  # fmt: skip
+                pointer = item.extra[0] << 16
+                return [*movw(r, target | 1), *wide(store | pointer | r << 12),
+                        *wide(load | pointer)]  # fmt: skip
             case "POP PC":
                 return [*movw(r, target | 1), 0xB400 | 1 << r, 0xBD00]
-            case "LDM PC":
-                pointer = item.extra[0]
-                return [*movw(r, target | 1), *wide(0xF8C00004 | pointer << 16 | r << 12),
-                        *wide(0xE8908000 | pointer << 16 | 1 << r)]  # fmt: skip
             case "TBB" | "TBH":
                 chosen = self.random.getrandbits(1)
                 entry = (target - (at + 6)) >> 1
@@ -387,11 +384,6 @@ class Generator:
                 head = [0x2000 | r << 8 | chosen, *wide(0xE8DFF000 | r)]
                 if item.kind == "TBB":
                     return [*head, entries[0] | entries[1] << 8, 0xBF00]
-                return [*wide_index(head), *entries, 0xBF00]
+                return [*head[:2], head[2] | 0x10, *entries, 0xBF00]
             case _:  # IT B: a branch as last instruction of a block
                 return [0xBF08 | item.condition << 4, 0xE000 | (distance - 2) >> 1 & 0x7FF]
-
-
-def wide_index(head: list[int]) -> list[int]:
-    """TBH of a TBB."""
-    return [head[0], head[1], head[2] | 0x10]

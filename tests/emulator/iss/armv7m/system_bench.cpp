@@ -36,7 +36,7 @@ struct Bench : Bus, SystemListener {
     std::vector<BenchEvent> events;    // the latest first
     std::vector<LogEntry> log;
     std::string text;
-    int32_t resets = 0, lock_ups = 0, exit_code = -1;
+    int32_t resets = 0, exit_code = -1;
 
     explicit Bench(const SystemParameters &parameters)
         : code(CODE_SIZE), ram(RAM_SIZE), cpu(*this), system(cpu, parameters, *this) {
@@ -79,7 +79,6 @@ struct Bench : Bus, SystemListener {
 
     void catch_up() override { fire(); }
     void reset_requested() override { resets++; }
-    void locked_up() override { lock_ups++; }
     int64_t time_ps() override { return cpu.cycles * 20'000; }
     void itm(int port, uint32_t value, int bytes) override {
         text += "<" + std::to_string(port) + ":" + std::to_string(value) + "/" +
@@ -100,8 +99,7 @@ struct Bench : Bus, SystemListener {
             if (exits & ~(ExitDeadline | ExitSleep)) return exits;
             if ((exits & ExitSleep) && !system.wakes()) {
                 const int64_t wake = std::min(system.next_cycle(), next_event());
-                if (wake < until) cpu.cycles = std::max(cpu.cycles, wake);
-                else cpu.cycles = std::max(cpu.cycles, until);
+                cpu.cycles = std::max(cpu.cycles, std::min(wake, until));
             }
             if (cpu.cycles >= until) return exits;
         }
@@ -132,8 +130,6 @@ void bench_reset(Bench *bench, int32_t power_on) {
 uint8_t *bench_code(Bench *bench) { return bench->code.data(); }
 uint8_t *bench_ram(Bench *bench) { return bench->ram.data(); }
 uint32_t bench_run(Bench *bench, int64_t until) { return bench->run(until); }
-
-void bench_steps(Bench *bench, int64_t count) { bench->cpu.steps(count); }
 
 void bench_at(Bench *bench, int64_t cycle, int32_t kind, int32_t number) {
     bench->events.push_back({cycle, kind, number});
