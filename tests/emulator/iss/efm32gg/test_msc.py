@@ -205,17 +205,19 @@ def test_wait_states_cost_nothing_inside_the_cache() -> None:
     assert cycles_of_a_loop(mode=4) == pytest.approx(cycles_of_a_loop(mode=0), rel=1e-3)
 
 
-def test_uncached_code_takes_1_plus_wait_states_per_word() -> None:
-    fast = cycles_of_a_loop(mode=0, disabled=True)
-    slow = cycles_of_a_loop(mode=4, disabled=True)
-    assert fast < 1.1
-    # Two instructions per word, three cycles per word.
-    assert slow == pytest.approx(1.5, rel=0.1)
-
-
-def test_loop_larger_than_512_bytes_misses_the_cache() -> None:
-    assert cycles_of_a_loop(mode=4, nops=500) > 1.3
-    assert cycles_of_a_loop(mode=4, nops=200) < 1.1
+@pytest.mark.parametrize(
+    ("nops", "mode", "disabled", "least", "most"),
+    [
+        pytest.param(40, 0, True, 1, 1.1, id="no cache, no wait states"),
+        pytest.param(40, 4, True, 1.35, 1.65, id="no cache: 3 cycles per word of 2 instructions"),
+        pytest.param(200, 4, False, 1, 1.1, id="loop in the cache"),
+        pytest.param(500, 4, False, 1.3, 1.65, id="loop larger than the cache of 512 bytes"),
+    ],
+)
+def test_cycles_per_instruction(
+    nops: int, mode: int, disabled: bool, least: float, most: float
+) -> None:
+    assert least <= cycles_of_a_loop(mode=mode, disabled=disabled, nops=nops) < most
 
 
 def test_performance_counters_count_hits_and_misses() -> None:
