@@ -5,14 +5,14 @@
  * reset, which discards waiting telecommands. */
 #include "commands.h"
 
-#include "capture.h"
+#include "imaging/capture.h"
 #include "core.h"
 #include "drivers/clock.h"
 #include "drivers/uart.h"
 #include "drivers/watchdog.h"
-#include "frames.h"
-#include "image_sensor.h"
-#include "processing.h"
+#include "link/frames.h"
+#include "imaging/image_sensor.h"
+#include "imaging/processing.h"
 #include "state.h"
 #include "supply_monitor.h"
 

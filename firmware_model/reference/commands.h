@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "queue.h"
+#include "link/queue.h"
 
 extern volatile bool command_running; /* including a requested reset */
 extern uint8_t memory_test;           /* result of the last TestSRAM */

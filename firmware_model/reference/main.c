@@ -4,7 +4,7 @@
  * CubeStar thesis, section 5.3.6 and figure 5.8: while the FPGA stores a new image, the processor
  * works on the previous one; then the image is transferred, and a software reset ends the
  * iteration. As firmware_model/cubestar/program.py. */
-#include "capture.h"
+#include "imaging/capture.h"
 #include "commands.h"
 #include "core.h"
 #include "drivers/camera_bus.h"
@@ -16,11 +16,11 @@
 #include "drivers/reset.h"
 #include "drivers/uart.h"
 #include "drivers/watchdog.h"
-#include "image_sensor.h"
-#include "link.h"
+#include "imaging/image_sensor.h"
+#include "link/link.h"
 #include "pins.h"
-#include "processing.h"
-#include "queue.h"
+#include "imaging/processing.h"
+#include "link/queue.h"
 #include "state.h"
 #include "supply_monitor.h"
 

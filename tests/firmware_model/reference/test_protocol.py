@@ -47,7 +47,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> CDLL:
     folder = tmp_path_factory.mktemp("protocol")
     generate(folder)
     (folder / "cubestar.h").write_text(c_header(INTERFACE))
-    sources = [SOURCES / "tables.c", SOURCES / "frames.c", folder / "cubestar_tables.c"]
+    sources = [SOURCES / "tables.c", SOURCES / "link" / "frames.c", folder / "cubestar_tables.c"]
     built = folder / "protocol.so"
     flags = ["-std=gnu11", "-O1", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-lm"]
     includes = [f"-I{folder}", f"-I{SOURCES}"]
