@@ -161,7 +161,6 @@ class Desk:
         self.log.append((self.us, what))
 
     def at(self, us: float, action: Callable[[], object]) -> None:
-        """Let ``action`` happen ``us`` after the first start of main."""
         delay = round((us + BOOT_US) * PS_PER_US) - self.kernel.now
         self.kernel.timeout(delay).callbacks.append(lambda _event: action())
 

@@ -58,7 +58,6 @@ class Runner:
         self.now_ns = 1000 * now_us
 
     def run(self, until_us: int | None = None) -> None:
-        """Run until ``until_us``; without it, until the program waits for the host."""
         hang_us = self.now_us + self.hang_us
         while until_us is None or self.now_us < until_us:
             assert self.now_us < hang_us, f"still busy: {self._request}"
@@ -107,7 +106,6 @@ class Runner:
 
     @property
     def waiting(self) -> bool:
-        """Whether a sleep with a deadline is one that only the host ends."""
         return False
 
     # --- time -------------------------------------------------------------------------------------

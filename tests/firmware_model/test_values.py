@@ -196,7 +196,6 @@ def scalar(one: Any) -> Any:
 
 
 def filled(one: Declaration, value: Any) -> Any:
-    """``value``, or a list of it where the declaration wants one."""
     if not isinstance(one, ListDeclaration):
         return value
     return [filled(one.part, value)] * (2 if one.count is None else one.count)

@@ -194,7 +194,6 @@ def _text(log: Path) -> str:
 
 
 def frame_environment(columns: int, rows: int) -> dict[str, str]:
-    """What ``harness.geometry`` reads."""
     return {"FRAME_COLUMNS": str(columns), "FRAME_ROWS": str(rows)}
 
 

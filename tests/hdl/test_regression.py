@@ -28,7 +28,6 @@ def verilog(tmp_path: Path) -> Path:
 
 
 def moments(results: Path) -> dict[str, str]:
-    """Simulated time in ns at which each cocotb test ended."""
     return {
         str(case.get("name")): str(part.get("value"))
         for case in ElementTree.parse(results).iter("testcase")

@@ -61,7 +61,6 @@ def test_every_clock_pin_is_constrained(name: str, tmp_path: Path) -> None:
 
 
 def core(component: CubeStarTop, name: str) -> str:
-    """The core alone, as module ``name``."""
     text = verilog_file("x", Top(lambda: component, "", ()))
     return re.sub(r"\bx_core\b", name, text[text.index("module x_core") :])
 

@@ -64,15 +64,12 @@ def processor() -> Any:
 
 
 class Bus:
-    """A machine as the master of a camera's bus."""
-
     def __init__(self) -> None:
         self.machine: Any = Machine()
         self.camera = Mt9m001(SkyScene.pointing(80.0, 0.0))
         self.wire = CameraWire(self.camera, SDA)
 
     def say(self, kind: OutgoingKind, value: int = 0, unit: int = SDA << 8 | 1) -> Any:
-        """The inputs that the machine receives."""
         del self.machine.given[:]
         self.wire.handle(self.machine, Outgoing(kind, unit, value, 0, 5))
         assert len(self.machine.given) <= 1
@@ -138,8 +135,6 @@ def test_others_on_the_bus_and_a_camera_without_power_do_not_answer() -> None:
 
 
 class Line:
-    """A UART between a host and a machine's pins."""
-
     def __init__(self, processor: Any) -> None:
         self.kernel = Kernel()
         self.wire = SerialWire(processor, TX, RX)

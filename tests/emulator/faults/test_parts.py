@@ -14,8 +14,6 @@ BITS = 1 << 20
 
 
 class Part:
-    """A memory with faults, and their log."""
-
     def __init__(self, rate: float, seed: int = 1) -> None:
         self.kernel = Kernel()
         self.memory = np.zeros(BITS // 8, np.uint8)
@@ -88,8 +86,6 @@ def test_rejects_invalid_probabilities(rate: float) -> None:
 
 
 class Core:
-    """A processor's registers, and which bits were turned over."""
-
     def __init__(self) -> None:
         self.registers = {"r0": 32, "pc": 32, "primask": 1}
         self.flipped: list[tuple[str, int]] = []

@@ -37,7 +37,6 @@ class Line:
         return injection
 
     def both(self) -> tuple[list[tuple[float, int]], list[tuple[float, int]]]:
-        """Send ``SENT`` both ways; what the device heard, and what arrived at the host."""
         self.uart.send(SENT)
         self.uart.host_writes(SENT)
         self.kernel.advance_to(self.kernel.now + 100 * BYTE_PS)

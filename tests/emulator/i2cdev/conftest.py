@@ -121,8 +121,6 @@ class Client:
 
 
 class Served:
-    """A server with its kernel, driven by hand."""
-
     def __init__(self, path: Path, adapter: I2cAdapter) -> None:
         self.server = I2cServer(path, adapter)
         self.kernel = adapter.env
@@ -135,7 +133,6 @@ class Served:
         return self.opened[-1]
 
     def serve(self) -> None:
-        """Serve until nothing is under way and nobody has anything to say."""
         while True:
             ready = self._ready()
             self.server.exchange(self.kernel.now)

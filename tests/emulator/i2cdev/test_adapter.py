@@ -73,7 +73,6 @@ def test_a_lost_bus_is_tried_again(kernel, bus, adapter, retries, timeout, tries
 
 
 def outcome(kernel, adapter, registers, run):
-    """Three transfers: their ends, and what came to the target."""
     told: list[tuple[int, int]] = []
     for messages in (
         [I2cMessage(0x1A, bytearray(40)), I2cMessage(0x1A, read=30)],

@@ -60,7 +60,6 @@ class World:
             heapq.heappop(self._arrivals)[2]()
 
     def sleep(self, duration_ns: int) -> bool:
-        """Sleep until something arrives; returns whether it did."""
         end_ns = self.now_ns + duration_ns
         if not self._arrivals or self._arrivals[0][0] > end_ns:
             self.now_ns = max(self.now_ns, end_ns)
@@ -115,7 +114,6 @@ class GuestProcess:
 
     @property
     def span(self) -> int:
-        """From the end of the first call to that of the last one."""
         return self.times[-1][1] - self.times[0][1]
 
 
@@ -158,7 +156,6 @@ class ScheduledWorld:
         *,
         wait_ns: int = 0,
     ) -> GuestProcess:
-        """One that starts after ``wait_ns``."""
         self.running += 1
         made = GuestProcess(self, think_ns, calls, message)
         made.next(self.world.now_ns + wait_ns)

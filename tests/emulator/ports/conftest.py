@@ -57,12 +57,10 @@ class Device:
         return self.kernel.now
 
     def sends(self, port: Endpoint, data: bytes) -> None:
-        """Send ``data`` and let ``port`` hand it over."""
         self.uart.send(data)
         port.exchange(self.advance(len(data)))
 
     def hears(self, port: Endpoint, count: int) -> bytes:
-        """Serve until ``count`` bytes have arrived."""
         self.wait_for(
             lambda: len(self.received) >= count,
             doing=lambda: (wait_ready(port.watched(), 0.01), port.exchange(self.advance(100))),

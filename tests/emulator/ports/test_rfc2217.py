@@ -43,7 +43,6 @@ def received_until(client, end: bytes) -> bytes:
 
 
 def serve(port, device, client, data: bytes, byte_times: int = 100) -> None:
-    """Let the port take all of ``data`` from the client."""
     client.write(data)
     wait_ready(port.watched(), TIMEOUT_S)
     for _ in range(10):

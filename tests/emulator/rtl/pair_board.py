@@ -45,8 +45,6 @@ def pair_camera(rng: np.random.Generator, size: ReadOut, frames: int = 3) -> Lis
 
 
 class Script:
-    """What the microcontroller does, at which times."""
-
     def __init__(self, rng: np.random.Generator) -> None:
         self.commands: list[Command] = []
         self.time_ps = 2_000

@@ -30,7 +30,6 @@ rtlil_text(BOARD.component)  # a design must be used, Amaranth says
 
 
 def random_step(rng: np.random.Generator, camera: object, span_ps: int) -> Step:
-    """What a board might do, or the outside world to it, at any moment."""
     kind = rng.choice(
         ["run", "pins", "await", "read", "camera", "burst"], p=[0.25, 0.35, 0.2, 0.1, 0.05, 0.05]
     )

@@ -55,7 +55,6 @@ def random_command(rng: np.random.Generator) -> Iterator[Step]:
 
 
 def random_steps(rng: np.random.Generator, cameras: dict[str, ListCamera]) -> Iterator[Step]:
-    """What a board might do, or the outside world to it, at any moment."""
     wait = int(rng.integers(0, 15_000_000))
     nudge = int(rng.integers(0, 60_000))
     side, other = rng.permutation(SIDES)

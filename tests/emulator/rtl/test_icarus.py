@@ -26,8 +26,6 @@ COMMANDS = ("ENABLE", "RNW", "BANK", "strobe")
 
 
 class Star(NamedTuple):
-    """A top on both, always with the same camera."""
-
     wiring: Wiring
     icarus: CommandedIcarus
     camera: ListCamera

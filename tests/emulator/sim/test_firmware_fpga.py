@@ -34,8 +34,6 @@ class Memory:
 
 
 class Pins:
-    """A machine, as far as it is coupled."""
-
     hz = 48_000_000
 
     def couple(self, record: Any, _wires: Any) -> None:

@@ -35,8 +35,6 @@ def database(parameters: CatalogueParameters | None = None) -> Database:
 
 @dataclass(frozen=True)
 class Light:
-    """What a picture has beside the field."""
-
     noise_px: float = 0.1  #: standard deviation of a centroid in x and in y
     mag_noise: float = 0.1  #: standard deviation of a magnitude
     mag_limit: float = 6.0  #: fainter stars do not show

@@ -180,8 +180,6 @@ class Harness(Runner, HostSide):
         return data
 
     def latch_on(self, wanted: Request | type, sram: Sram) -> None:
-        """``sram`` latches up at each such request from now on."""
-
         def latch(request: Request) -> None:
             if wanted in (request, type(request)):
                 self.latched.add(sram)

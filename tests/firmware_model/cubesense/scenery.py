@@ -181,7 +181,6 @@ def edges_in(
     config: EdgeConfig | None = None,
     read_out: ReadOut = FULL_SIZE,
 ) -> EdgeList:
-    """What the nadir scan of ``picture`` finds."""
     lines, data = NadirLines(config or EdgeConfig(), meter, read_out), scan(picture, read_out)
     for size in iter(lambda: lines.wanted, 0):
         lines.space[:], data = data[:size], data[size:]

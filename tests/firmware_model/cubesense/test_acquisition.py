@@ -139,7 +139,6 @@ def test_the_suns_window_from_either_memory(rig: Rig, sram: Sram) -> None:
 
 
 def latch_after(unit: Harness, sram: Sram, strobed: int) -> None:
-    """Let ``sram`` latch up after ``strobed`` bytes were read."""
     seen = 0
 
     def count(request: Request) -> None:

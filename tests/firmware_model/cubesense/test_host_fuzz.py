@@ -35,7 +35,6 @@ def uart(unit: Harness, rng: np.random.Generator) -> None:
 
 
 def framed(unit: Harness, rng: np.random.Generator) -> None:
-    """A frame as it should be, with a random ID, length and parameters."""
     unit.program.node.uart_silence()
     identifier = int(rng.integers(0, 256))
     message = INTERFACE.find(identifier)

@@ -43,7 +43,6 @@ RECTANGLE = np.pad(np.full((140, 120), 200, np.uint8), ((200, 140), (300, 220)),
 
 
 def measure(unit: Harness, camera: Camera, sram: Sram | None = None) -> dict[str, Any]:
-    """Capture and detect; the result's telemetry."""
     unit.command("CaptureAndDetect", Camera=camera, Sram=camera if sram is None else sram)
     return result(unit, camera)
 

@@ -120,7 +120,6 @@ class Harness(Runner, HostSide):
         return TaskStatus(self.telemetry("TaskStatus")["taskStatus"])
 
     def shown(self, frame: str, **values: float) -> None:
-        """Telemetry ``frame`` shows exactly these ``values``."""
         found = self.telemetry(frame)
         assert found == pytest.approx(values, rel=1e-6), f"{frame} shows {found}"
 

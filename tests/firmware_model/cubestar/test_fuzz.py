@@ -17,7 +17,6 @@ short_and_long = pytest.mark.parametrize("count", quick([2_000, 10_000], 1))
 
 
 def stays_sane(unit: Harness) -> None:
-    """The node is in command, and a picture still gives an attitude."""
     unit.program.link.uart_silence()
     unit.run(until_us=unit.now_us + 200_000_000)  # what was accepted comes to its end
     unit.received()

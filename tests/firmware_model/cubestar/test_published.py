@@ -30,7 +30,6 @@ def make(catalogue: StarCatalogue) -> Make:
 
 
 def modes(unit: Harness, picture: np.ndarray) -> tuple[int, MatchMode]:
-    """Mode that a picture was matched in, and the flag after it."""
     unit.picture = picture
     unit.command("CaptureAndProcess")
     flag = MatchMode(unit.telemetry("LoopStatus")["ModeFlag"])

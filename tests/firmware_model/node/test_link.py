@@ -76,8 +76,6 @@ class Canned(Runner, HostSide):
 
 @dataclass
 class Node:
-    """A node, and what differs in its dialect."""
-
     make: Callable[[], Any]  #: its link, alone
     interface: Interface  #: what it serves
     buffer: int  #: what its UART may still have to send

@@ -43,8 +43,6 @@ class _Config(Structure):
 
 
 class Found(Structure):
-    """``struct detection``."""
-
     _fields_ = [
         ("count", c_int),
         ("centroids", c_float * (2 * MOST_STARS)),
@@ -58,8 +56,6 @@ class Found(Structure):
 
 
 class Identified(Structure):
-    """``struct identification``."""
-
     _fields_ = [
         ("count", c_int),
         ("stars", ctypes.c_int16 * MOST_STARS),
@@ -174,7 +170,6 @@ class Algorithms:
         return int(self.library.count_near(_floats(boresight), c_float(least)))
 
     def quest(self, measured: Floats, reference: Floats, weights: Floats) -> Floats | None:
-        """Quaternion, or None."""
         out = np.zeros(4, np.float32)
         arrays = map(_floats, (measured, reference, weights))
         return out if self.library.quest(_floats(out), *arrays, len(measured)) else None

@@ -102,7 +102,6 @@ def solve(
 
 
 def skies(listed: StarCatalogue, count: int, seed: int) -> list[tuple[Sky, NDArray[np.uint8]]]:
-    """Made-up skies, with the noise of a camera and lights that are no stars."""
     rng = np.random.default_rng(seed)
     shown = []
     for attitude in Rotation.random(count, rng=rng):

@@ -88,7 +88,6 @@ def test_telemetry_is_packed_as_the_codec_packs_it(library: CDLL, message: Messa
 
 
 def _parameters(message: Message, rng: np.random.Generator) -> bytes:
-    """Random bytes, or plausible ones, each field one of both."""
     data = bytearray(rng.bytes(message.length))
     values = message.reset_values()
     for field in message.fields:

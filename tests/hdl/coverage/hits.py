@@ -47,7 +47,6 @@ def missed(found: Mapping[str, set[Point]]) -> list[tuple[str, Point]]:
 
 
 def table(found: Mapping[str, set[Point]], most: int = 40) -> Iterator[str]:
-    """A line for each group, then the first ``most`` points that were missed."""
     for name, points in _POINTS.items():
         yield f"{name:<18} {len(found[name]):>5} of {len(points):>5}  {GROUPS[name].meaning}"
     wanting = missed(found)

@@ -53,7 +53,6 @@ def frame(content: bytes) -> list[Tick]:
 
 
 def with_sun(x: int, y: int) -> bytes:
-    """A picture whose first Sun pixel is there; a dark one for ``NOT_FOUND``."""
     content = bytearray(random.choices(range(200), k=GEOMETRY.pixels))
     if (x, y) != NOT_FOUND:
         start = y * GEOMETRY.columns + x
@@ -68,7 +67,6 @@ def window_of(content: bytes, x: int, y: int) -> bytes:
 
 
 def coordinates(x: int, y: int) -> bytes:
-    """The bytes before the window."""
     return x.to_bytes(2, "little") + y.to_bytes(2, "little")
 
 
@@ -111,12 +109,10 @@ class CubeSenseMcu(Processor[Controls]):
                 await self.set(**{name: enables[name]})
 
     async def store(self, camera: str, memory: str) -> None:
-        """From standby: a camera's picture to a memory."""
         own = (0, 0, 0, *enables(camera))
         await self.command(*(own if camera == memory else (1, 0, int(camera != "sun"), 0, 0)))
 
     async def read_picture(self, side: str) -> None:
-        """From standby: ready to read a memory's picture."""
         await self.command(0, 0, 1, *enables(side))
 
     async def read_edge(self, sensor: str, memory: str) -> None:
@@ -125,7 +121,6 @@ class CubeSenseMcu(Processor[Controls]):
         await self.command(*(own if sensor == memory else (1, 1, int(sensor != "sun"), 0, 0)))
 
     async def open_address(self, side: str) -> None:
-        """From standby: ready to take an address."""
         await self.command(0, 1, 0, *enables(side))
 
     async def take(self, address: bytes) -> None:

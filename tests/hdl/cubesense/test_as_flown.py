@@ -124,7 +124,6 @@ def test_bright_pixels(pictures: list[list[list[int]]], place: tuple[int, int]) 
 
 
 def window(x: int, y: int) -> list[int]:
-    """Addresses of the window's bytes."""
     block = SunWindow(SMALL)
     clocks = [{"x": x, "y": y}] * (4 + SMALL.window**2)
     seen = simulated(block, "window", clocks, "address", "coordinate")

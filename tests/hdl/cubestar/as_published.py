@@ -32,7 +32,6 @@ class AsPublished(CubeStarTop):
         return board.signature.members
 
     def _instance(self, members: SignatureMembers, levels: Mapping[str, Value]) -> Instance:
-        """The board, with ``levels`` at its ports."""
         ways = {name: "i" if member.flow is In else "o" for name, member in members.items()}
         known = {f"{way}_{name}": levels[name] for name, way in ways.items() if name in levels}
         return Instance(self._board, **known)

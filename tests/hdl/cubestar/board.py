@@ -32,7 +32,6 @@ class Mcu(Processor[Controls]):
         return bool(self._levels["ENABLE"] and not self._levels["RNW"])
 
     async def store(self, bank: int = 0) -> None:
-        """From standby: store the next whole frame."""
         await self.set(BANK=bank)
         if random.random() < 0.5:
             await self.set(RNW=0)

@@ -58,11 +58,9 @@ class BusTestbench(CubeStarTestbench):
         return next(w for w in self.WINDOWS if self.srams[w.memory] is self.memory_of(place)[0])
 
     async def open(self, place: int = 0) -> None:
-        """From standby: the bus has the memory."""
         await self.control(place).open(random.getrandbits(1))
 
     async def open_all(self) -> None:
-        """From standby: the bus has all memories."""
         for place in range(len(self.mcus)):
             await self.open(place)
 

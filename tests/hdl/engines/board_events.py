@@ -40,8 +40,6 @@ Script = Callable[[Rng], Iterator[Step]]
 
 @dataclass(frozen=True)
 class Board:
-    """A small top with what its surroundings do."""
-
     wiring: Callable[[bool], Wiring]  # of the top, on request one column narrower
     columns: int
     rows: int

@@ -24,7 +24,6 @@ STEPS = 400
 
 
 def levels(engine: RtlEngine) -> dict[str, object]:
-    """All that can be seen; data that is not driven is no data."""
     wiring = engine.wiring
     pins = {name: engine.get_pin(name) for name in (*wiring.output_pins, *wiring.mcu_pins)}
     for memory in wiring.memories:

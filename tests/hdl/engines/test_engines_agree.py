@@ -36,8 +36,6 @@ END_PS = 120_000_000
 
 
 class Case(NamedTuple):
-    """A top with what all its tests share."""
-
     name: str
     wiring: Wiring
     icarus: IcarusBoard

@@ -57,7 +57,6 @@ class Ebi:
         await self._strobe("WE_N", select)
 
     async def read(self, address: int, select: str = "") -> int | None:
-        """The byte, or None when nobody drives the bus."""
         self._note("read", address, select)
         await self.address(address)
         self._dut.AD_LOW_I.value = UNKNOWN

@@ -39,8 +39,7 @@ class Testbench(ABC, Generic[P]):
     def memory_of(self, place: P) -> tuple[Sram, int]: ...
 
     @abstractmethod
-    def frame(self, content: bytes) -> list[Tick]:
-        """A frame as the cameras send it, with what comes before it."""
+    def frame(self, content: bytes) -> list[Tick]: ...
 
     @abstractmethod
     async def command(self, place: P) -> None: ...
@@ -66,7 +65,6 @@ class Testbench(ABC, Generic[P]):
         await self.camera_of(place).started()
 
     async def begin(self, place: P, content: bytes) -> None:
-        """From standby: storing begins, and a picture is sent."""
         await self.store(place)
         self.camera_of(place).send(self.frame(content))
 

@@ -64,7 +64,6 @@ async def disturb_in_standby(
 
 
 def pin(dut: Any, path: str) -> Any:
-    """A port of the design, or, with dots, of one of its parts."""
     for name in path.split("."):
         dut = getattr(dut, name)
     return dut

@@ -29,8 +29,6 @@ def scene(**changes: Any) -> SkyScene:
 
 
 class Desk:
-    """A board, and a client on its serial line."""
-
     def __init__(
         self, sky: SkyScene | None = None, *, with_catalogue: bool = True, seed: int = 0
     ) -> None:

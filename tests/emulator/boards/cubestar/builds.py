@@ -26,7 +26,6 @@ needs_toolchain = pytest.mark.skipif(COMPILER is None, reason="needs gcc-arm-non
 
 
 def build(name: str, folder: Path) -> Path:
-    """The ELF file of a program, made in ``folder``."""
     (folder / "processor.h").write_text(processor_header(device("cubestar").processor()))
     target = folder / f"{name}.elf"
     inputs = [PROGRAMS / "start.c", PROGRAMS / f"{name}.c", "-T", PROGRAMS / "board.ld", "-lgcc"]

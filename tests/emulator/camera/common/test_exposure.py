@@ -60,7 +60,6 @@ def vega_at(pixel: tuple[float, float], time_s: float, rate: tuple[float, ...]) 
 
 
 def light_around(image: np.ndarray, x: float, y: float, half: int = 12) -> tuple[float, np.ndarray]:
-    """Sum and centroid (x, y) of the light near a place."""
     row, column = round(y), round(x)
     box = image[row - half : row + half + 1, column - half : column + half + 1].astype(float)
     rows, columns = np.mgrid[row - half : row + half + 1, column - half : column + half + 1]

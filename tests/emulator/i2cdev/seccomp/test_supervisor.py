@@ -47,8 +47,6 @@ def test_an_int_comes_in_the_low_half_of_an_argument(value: int) -> None:
 
 
 class File:
-    """An open file that answers what it was asked."""
-
     def __init__(self) -> None:
         self.asked: list[tuple[linux.Call, bytes]] = []
         self.waiting: list[Callable[[bytes], None]] = []
@@ -123,7 +121,6 @@ class Program:
         return self.files[-1]
 
     def memory(self, data: bytes) -> int:
-        """Where ``data`` is."""
         self._kept.append(ctypes.create_string_buffer(data, len(data)))
         return ctypes.addressof(self._kept[-1])
 

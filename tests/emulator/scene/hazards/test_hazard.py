@@ -9,8 +9,6 @@ from cubestack.firmware_model.values import number, whole
 
 @dataclass(frozen=True, kw_only=True)
 class Fog(Hazard):
-    """A hazard with a key of each kind."""
-
     name: ClassVar[str] = "fog"
     meaning: ClassVar[str] = "water in the air"
     strength: ClassVar[Strength] = Strength("banks", "", (0, 3))

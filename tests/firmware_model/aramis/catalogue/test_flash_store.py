@@ -11,8 +11,6 @@ from ..sky import database
 
 
 class Desk:
-    """A store whose flash holds a catalogue."""
-
     def __init__(self, image: bytes | None = None) -> None:
         self.unit = Harness()
         real = database(CatalogueParameters(step_deg=10, stars_per_field=5)).pack()

@@ -16,7 +16,6 @@ def mode_flag(unit: Harness) -> MatchMode:
 
 
 def process(unit: Harness, picture: np.ndarray) -> dict[str, float]:
-    """Capture and process; telemetry AttitudeQuaternion."""
     unit.command("ClearErrorFlags")
     unit.picture = picture
     unit.command("CaptureAndProcess")

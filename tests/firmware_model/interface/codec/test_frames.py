@@ -12,7 +12,6 @@ PAYLOAD = st.lists(BYTES, max_size=LIMIT).map(bytes)
 
 
 def events(decoder: FrameDecoder, data: bytes) -> list[FrameEvent | bytes]:
-    """What ``data`` brings about; whole frames as their payload."""
     found: list[FrameEvent | bytes] = []
     for byte in data:
         event = decoder.feed(byte)

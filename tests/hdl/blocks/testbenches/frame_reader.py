@@ -10,7 +10,6 @@ from tests.hdl.harness.geometry import GEOMETRY
 
 
 async def clock(dut: Any, memory: bytes, reset: int = 0) -> int:
-    """One data clock with ``memory`` behind the address; DATA after it."""
     dut.dclk_clk.value = 0
     dut.dclk_rst.value = reset
     await Timer(random.randint(1, 50), unit="ns")

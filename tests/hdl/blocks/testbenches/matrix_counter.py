@@ -10,7 +10,6 @@ from tests.hdl.harness.geometry import GEOMETRY
 
 
 async def clock(dut: Any, **pins: int) -> tuple[int, int, int]:
-    """One clock with the given commands; address, last_column and last_row after it."""
     for name in ("next_column", "next_row", "clear", "rst"):
         getattr(dut, name).value = pins.get(name, 0)
     dut.clk.value = 0

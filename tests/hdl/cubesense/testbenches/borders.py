@@ -29,8 +29,6 @@ FRAMES = (
 
 
 class WatchedTestbench(PairTestbench):
-    """The bench, with an eye on the addresses."""
-
     @classmethod
     async def start(cls, dut: Any, *timing: Any, **broken: Any) -> Self:
         bench = await super().start(dut, *timing, **broken)
@@ -40,7 +38,6 @@ class WatchedTestbench(PairTestbench):
 
 
 async def sends(bench: PairTestbench, way: tuple[str, str], ticks: Sequence[Tick]) -> None:
-    """From standby to standby: a camera sends this while it is stored."""
     await bench.store(way)
     source = bench.camera_of(way)
     source.send(ticks)

@@ -27,7 +27,6 @@ PAUSE, PIXEL = Tick(9, 0, 1), Tick(9, 1, 1)
 
 
 def ticks_to(state: str) -> tuple[list[Tick], list[Tick]]:
-    """What a camera sends to get there, and to stay for a while."""
     row = [tick for tick in line(picture()[:COLUMNS]) if tick.hsync]
     before = [*gap(), *flat(lines(picture())[: random.randrange(ROWS - 1)])]
     cut = random.randrange(1, COLUMNS)

@@ -26,7 +26,6 @@ def dark() -> list[list[int]]:
 
 
 def with_runs(*runs: tuple[int, int, int]) -> list[list[int]]:
-    """A dark image with runs of bright pixels from (x, y) on, within the row."""
     picture = dark()
     for x, y, length in runs:
         for column in range(x, min(x + length, COLUMNS)):
@@ -47,7 +46,6 @@ def found(dut: Any) -> tuple[int, int]:
 
 
 async def write(dut: Any, picture: Sequence[Sequence[int]], pixels: int | None = None) -> None:
-    """The first ``pixels`` of a picture, with a pause after each row."""
     for y, row in enumerate(picture):
         for x, value in enumerate(row):
             if pixels is not None and y * COLUMNS + x >= pixels:

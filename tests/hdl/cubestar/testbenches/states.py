@@ -22,7 +22,6 @@ LONG = 40  # clocks for which a state is held
 
 
 def ticks_to(state: str) -> tuple[list[Tick], list[Tick]]:
-    """What a camera sends to get there, and to stay for a while."""
     gap, row = list(vsync()), list(line(picture()[:COLUMNS]))
     before = [*gap, *flat(lines(picture())[: random.randrange(ROWS - 1)])]
     cut = random.randrange(1, COLUMNS)

@@ -18,7 +18,6 @@ TIMES = 4  # repetitions of a case, each with new pictures, blanking and moments
 
 
 async def join(bench: PublishedTestbench, clock: int) -> None:
-    """Enable storing between two rising edges: ``clock`` of them are over."""
     await bench.camera.reach(clock)
     await bench.mcu.set(after=random.randrange(1, bench.camera.period - 10), ENABLE=1)
 
