@@ -165,7 +165,7 @@ class Line:
         (0x3305, 8, "O", 2),
     ],
 )
-def test_a_usart_s_frame_is_the_line_s(
+def test_usart_frame_format(
     processor: Any, frame: int, data: int, parity: Any, stops: float
 ) -> None:
     """EFM32GG Reference Manual, USART_FRAME: DATABITS, PARITY, STOPBITS."""
@@ -181,7 +181,7 @@ def test_a_usart_s_frame_is_the_line_s(
     ("control", "parity", "stops"),
     [(0, "N", 1), (0b10000, "N", 2), (0b01000, "E", 1), (0b11100, "O", 2), (0b00010, "N", 1)],
 )
-def test_a_leuart_s_frame(processor: Any, control: int, parity: Any, stops: float) -> None:
+def test_leuart_frame_format(processor: Any, control: int, parity: Any, stops: float) -> None:
     """LEUART_CTRL: DATABITS, PARITY, STOPBITS."""
     line = Line(processor)
     unit = next(n for n, (_, layout) in enumerate(FRAMES) if layout.name.startswith("LEUART"))
@@ -204,9 +204,7 @@ def test_a_leuart_s_frame(processor: Any, control: int, parity: Any, stops: floa
         (1e9, FASTEST_BAUD),
     ],
 )
-def test_a_rate_close_to_the_host_s_or_the_board_s_is_that(
-    processor: Any, baud: float, taken: int
-) -> None:
+def test_nearby_rate_snaps_to_host_or_board_rate(processor: Any, baud: float, taken: int) -> None:
     line = Line(processor)
     line.uart.host_form = LineFormat(115_200)
     line.send(0x41, 10, baud)

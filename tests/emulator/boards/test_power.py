@@ -28,7 +28,7 @@ def milliwatts(table: PowerTable, on: set[str], **states: str) -> float:
         ({"processor": "run", "memory": "transfer", "fpga": "reading"}, 81.81),
     ],
 )
-def test_cubestar_draws_what_table_6_2_has(states: dict[str, str], ma: float) -> None:
+def test_cubestar_draws_table_6_2(states: dict[str, str], ma: float) -> None:
     found = milliwatts(CUBESTAR_POWER, {"memory", "imager"}, **states)
     assert found == pytest.approx(3.3 * ma, abs=0.01)
 
@@ -62,14 +62,14 @@ NADIR = {"nadir_fpga": "imaging", "sram2": "active"}
         (SRAMS | CAMERAS, SUN | NADIR, 432.4, 1),
     ],
 )
-def test_cubesense_draws_what_table_7_1_has(
+def test_cubesense_draws_table_7_1(
     on: set[str], states: dict[str, str], mw: float, within: float
 ) -> None:
     found = milliwatts(CUBESENSE_POWER, on, **({"processor": "on"} | states))
     assert found == pytest.approx(mw, abs=within)
 
 
-def test_aramis_camera_draws_what_its_sheet_has() -> None:
+def test_aramis_camera_draws_data_sheet_power() -> None:
     """MT9M001: 363 mW working, 294 uW in standby."""
     off = milliwatts(ARAMIS_POWER, set())
     for state, mw in (("working", 363), ("standby", 0.294)):

@@ -170,9 +170,7 @@ def test_lists_fault_targets(desk: Desk) -> None:
     assert desk.faults.targets(Site.FPGA) == ()
 
 
-def test_the_log_is_kept_up_to_its_limit_and_all_is_counted(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_log_is_limited_but_counts_everything(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(injector, "LOG_LIMIT", 3)
     told: list[FaultEvent] = []
     desk.faults.on_event = told.append

@@ -300,9 +300,7 @@ def test_as_fast_as_possible_a_device_at_work_goes_ahead(make):
 
 
 @pytest.mark.parametrize(("stall_ns", "done"), [(0, True), (4_000 * US, True), (6_000 * US, False)])
-def test_as_fast_as_possible_a_transfer_takes_one_visit_but_no_longer_than_that(
-    make, stall_ns, done
-):
+def test_at_full_speed_a_transfer_takes_at_most_one_visit(make, stall_ns, done):
     """A visit may last ``VISIT_NS`` of wall time, 5 ms."""
     bench = make(fast=True)
     program = bench.program(0, 1, lambda: [I2cMessage(0x1A, read=8192)])

@@ -74,9 +74,7 @@ def test_reset_state(engine):
 @pytest.mark.parametrize(
     ("bank", "enabled_ps", "frame"), [(0, 0, 0), (1, 0, 0), (0, (BLANK + 2 * LINE + 3) * PERIOD, 1)]
 )
-def test_next_whole_frame_is_stored_in_its_bank_and_acknowledged_at_the_last_pixel(
-    engine, camera, bank, enabled_ps, frame
-):
+def test_stores_and_acknowledges_the_next_whole_frame(engine, camera, bank, enabled_ps, frame):
     engine.attach(camera)
     engine.run(enabled_ps)
     engine.set_pin("BANK", bank)

@@ -116,9 +116,7 @@ def test_latch_up_trips_its_comparator_once(kernel, power, tripped, channel):
 
 
 @pytest.mark.parametrize("lasting", [False, True])
-def test_switching_off_ends_a_latch_up_but_a_lasting_one_comes_back(
-    kernel, power, tripped, lasting
-):
+def test_lasting_latch_up_returns_after_switching_off(kernel, power, tripped, lasting):
     power.latch_up("memory", lasting=lasting)
     kernel.advance_to(PS_PER_MS)
     power.switch("memory", False)

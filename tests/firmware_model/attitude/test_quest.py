@@ -80,7 +80,7 @@ def test_dcm_is_the_rotation_of_the_quaternion(seed: int) -> None:
     np.testing.assert_allclose(found, attitude_of(quaternion), atol=5e-7)
 
 
-def test_two_stars_are_enough() -> None:
+def test_two_stars_determine_the_attitude() -> None:
     truth = Rotation.random(random_state=5).as_matrix()
     body = in_field(np.random.default_rng(5), 2)
     assert angle_deg(attitude_of(solve(body, body @ truth, np.ones(2))), truth) < 2e-3

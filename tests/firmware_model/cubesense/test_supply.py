@@ -15,9 +15,7 @@ def over_current(unit: Harness) -> set[codes.Sram]:
 
 
 @pytest.mark.parametrize("sram", codes.Sram)
-def test_a_latch_up_while_idle_is_cut_within_one_sample_time(
-    unit: Harness, sram: codes.Sram
-) -> None:
+def test_idle_latch_up_is_cut_within_one_sample(unit: Harness, sram: codes.Sram) -> None:
     unit.log.clear()
     unit.latched.add(sram)
     start_us = unit.now_us
@@ -28,9 +26,7 @@ def test_a_latch_up_while_idle_is_cut_within_one_sample_time(
 
 
 @pytest.mark.parametrize("target", [codes.ResetTarget.CAMERAS, codes.ResetTarget.MCU])
-def test_the_memories_are_watched_through_every_wait(
-    unit: Harness, target: codes.ResetTarget
-) -> None:
+def test_memories_are_monitored_in_every_wait(unit: Harness, target: codes.ResetTarget) -> None:
     """A reset of the cameras waits for 100 ms; one of the program, for the UART."""
     unit.backlog = 200
     latched_us: list[int] = []

@@ -137,9 +137,7 @@ def test_without_supply_there_is_no_way_to_the_picture(board: Board) -> None:
 
 
 @pytest.mark.parametrize("config", [DetectionConfig(), DetectionConfig(background=True)])
-def test_the_search_is_that_in_an_array_and_leaves_the_picture(
-    board: Board, sky: Sky, config: DetectionConfig
-) -> None:
+def test_search_equals_array_search(board: Board, sky: Sky, config: DetectionConfig) -> None:
     """The same stars for the same charge; the accesses are booked, as their time has passed."""
     board.stored(sky.picture)
     own = Meter(CORTEX_M3)

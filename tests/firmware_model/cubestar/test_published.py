@@ -80,9 +80,7 @@ def test_a_worn_page_keeps_its_zeros() -> None:
         assert flash.read("attitude") == kept
 
 
-def test_tracking_looks_at_the_stars_of_a_narrower_catalogue(
-    make: Make, catalogue: StarCatalogue, sky: Sky
-) -> None:
+def test_tracking_uses_narrower_catalogue(make: Make, catalogue: StarCatalogue, sky: Sky) -> None:
     spent = []
     for unit in (make("reduction"), make()):
         unit.command("setIDMode", IdMode=IdMode.TRACKING)

@@ -10,9 +10,7 @@ from .harness import Harness
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
-def test_the_interrupt_opens_the_switch_and_the_main_loop_closes_it(
-    unit: Harness, channel: str
-) -> None:
+def test_interrupt_opens_and_main_loop_closes_the_switch(unit: Harness, channel: str) -> None:
     unit.program.supply.overcurrent(channel)
     other = CHANNELS[1 - CHANNELS.index(channel)]
     assert unit.switches == {channel: False, other: True}  # nothing has run since
@@ -75,9 +73,7 @@ def test_the_memory_channel_loses_the_picture(lit: Harness) -> None:
     ("channel", "moment"),
     [("imager", AwaitPin), ("imager", StrobeRead), ("memory", AwaitPin), ("memory", StrobeRead)],
 )
-def test_a_latch_up_in_a_capture_spoils_it_and_the_next_one_works(
-    lit: Harness, channel: str, moment: type
-) -> None:
+def test_latch_up_spoils_only_its_own_capture(lit: Harness, channel: str, moment: type) -> None:
 
     def strike(request: Request) -> None:
         if isinstance(request, moment):

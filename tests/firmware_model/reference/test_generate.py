@@ -9,9 +9,7 @@ import pytest
 from cubestack.firmware_model.reference import generate, tables
 
 
-def test_the_folder_that_is_named_is_made_and_gets_the_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_creates_named_output_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tables, "header", lambda: "the header")  # all of them take a second
     monkeypatch.setattr(tables, "source", lambda: "the source")
     folder = tmp_path / "build" / "generated"

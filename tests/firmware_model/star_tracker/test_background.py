@@ -40,9 +40,7 @@ def test_a_plane_is_interpolated_and_continued() -> None:
 @BOTH
 @pytest.mark.parametrize("sigma", [0.7, 1.5, 4.0, 9.0])
 @pytest.mark.parametrize("slope", [0.0, 60.0])
-def test_level_and_noise_of_a_noisy_sky(
-    sigma: float, slope: float, step: int, smooth: bool
-) -> None:
+def test_level_and_noise_of_the_sky(sigma: float, slope: float, step: int, smooth: bool) -> None:
     rng = np.random.default_rng(4)
     ramp = slope * np.arange(512)[:, None] / 512
     image = 40.5 + ramp + rng.normal(0, sigma, SHAPE)

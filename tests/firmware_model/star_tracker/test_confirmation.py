@@ -48,9 +48,7 @@ def test_stars_are_matched_as_by_trying_all() -> None:
 
 
 @pytest.mark.parametrize(("expected", "found", "chance"), [(0, 0, 0.1), (9, 3, 1e-3), (5, 5, 1e-4)])
-def test_the_false_alarms_are_the_inverse_of_the_likelihood_ratio(
-    expected: int, found: int, chance: float
-) -> None:
+def test_false_alarm_is_inverse_likelihood_ratio(expected: int, found: int, chance: float) -> None:
     missing = expected - found
     right, _ = quad(lambda s: s**found * (1 - s) ** missing, 0, 1)
     ratio = right / (chance**found * (1 - chance) ** missing)

@@ -65,9 +65,7 @@ def test_too_many_mutants_are_refused(counter: Netlist, every: list[Mutant]) -> 
         selectable(counter, every[:1] * 65536)
 
 
-def test_difference_is_found_and_so_is_what_no_reset_reaches(
-    every: list[Mutant], equivalence: Equivalence
-) -> None:
+def test_finds_differences_and_unreset_state(every: list[Mutant], equivalence: Equivalence) -> None:
     stuck = next(m for m in every if (m.mode, m.wire, m.port) == ("const0", "address[1]", "Q"))
     unreset = next(m for m in every if (m.mode, m.port) == ("const0", "ARST"))
     assert equivalence.compare(stuck)[:2] == (False, 2 * (COLUMNS - 1) + 1)

@@ -102,7 +102,7 @@ def test_a_shorter_side_leaves_fewer_triangles(small: Database) -> None:
     assert len(fewer.numbers) == len(small.numbers)
 
 
-def test_the_cache_gives_the_same_database(
+def test_cache_keeps_database(
     tmp_path: Path, small: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = cached(tmp_path / "new")
@@ -131,9 +131,7 @@ def test_cache_folder_that_cannot_be_created_is_ignored(tmp_path: Path, small: D
     assert cached(tmp_path / "file" / "x") == small.pack()
 
 
-def test_the_databases_of_the_last_two_lenses_are_kept(
-    small: Database, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cache_keeps_the_last_two_lenses(small: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[float] = []
 
     def make(parameters: CatalogueParameters, _progress: object) -> Database:
@@ -188,8 +186,6 @@ def test_reports_progress() -> None:
         (CatalogueParameters(fov_deg=60, stars_per_field=50, step_deg=10), "more than 1400000"),
     ],
 )
-def test_rejects_impossible_catalogue_parameters(
-    parameters: CatalogueParameters, words: str
-) -> None:
+def test_rejects_impossible_parameters(parameters: CatalogueParameters, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         build_database(parameters)

@@ -111,9 +111,7 @@ def test_a_dead_camera_has_no_clock_and_answers_nothing(board: CubeSenseBoard) -
 
 
 @pytest.mark.parametrize("camera", Camera)
-def test_a_camera_s_frames_begin_when_it_is_switched_on(
-    board: CubeSenseBoard, camera: Camera
-) -> None:
+def test_frames_begin_when_the_camera_starts(board: CubeSenseBoard, camera: Camera) -> None:
     """Its first row comes after 45 blank lines of 858 clocks, whatever the FPGAs did before."""
     supply = f"{camera.name.lower()}_camera"
     board.power.switch(supply, False)

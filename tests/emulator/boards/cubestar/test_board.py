@@ -57,9 +57,7 @@ def test_truth_is_that_of_the_stored_frame(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="full frames take minutes in the simulator")
-def test_pixels_sent_before_the_imager_lost_power_are_stored(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_pixels_sent_before_power_loss_are_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     """By the shared memory, which keeps its own supply; the sky is dark, the rest was random."""
 
     def storing() -> Generator[Any, Any, None]:

@@ -155,7 +155,7 @@ def test_typical_debugging_session(board: CubeStarFirmwareBoard, endpoint: GdbEn
 
 
 @needs_gdb
-def test_time_passes_while_gdb_steps_over_a_sleep(
+def test_time_passes_in_a_stepped_sleep(
     board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
 ) -> None:
     said = session(
@@ -177,9 +177,7 @@ def test_time_passes_while_gdb_steps_over_a_sleep(
 
 
 @needs_gdb
-def test_caught_fault_is_reported_as_a_signal(
-    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
-) -> None:
+def test_caught_fault_is_a_signal(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
     send_bytes(board, b"a\0")
     said = session(
         board, endpoint, "monitor catch on\ncontinue\nbacktrace\nmonitor report\nmonitor catch off"
@@ -260,9 +258,7 @@ def test_gdb_waits_for_a_client(image: Image) -> None:
     board.close()
 
 
-def test_a_second_client_is_refused_and_the_next_one_is_served(
-    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
-) -> None:
+def test_second_client_is_rejected(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
     first = socket.create_connection(endpoint.address)
     endpoint.serve(0.1)
     second = socket.create_connection(endpoint.address)
@@ -306,9 +302,7 @@ MONITOR = (
 )
 
 
-def test_board_keeps_running_whatever_clients_send(
-    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
-) -> None:
+def test_board_survives_any_packets(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
     """Drawn packets at a board that runs, with clients that come and go."""
     rng = np.random.default_rng(5)
     debugger: Any = board.processor.debugger

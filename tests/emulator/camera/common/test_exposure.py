@@ -291,9 +291,7 @@ def test_image_edges_give_the_field_angles() -> None:
     np.testing.assert_allclose(now.axes, np.eye(3), atol=1e-15)
 
 
-def test_a_photograph_twice_as_long_is_twice_as_bright_up_to_the_end_of_the_scale(
-    tmp_path: Path,
-) -> None:
+def test_photograph_brightness_is_proportional_to_exposure(tmp_path: Path) -> None:
     pixels = np.array([[0, 1, 100, 127, 128, 255]], np.uint8)
     save_picture(pixels, tmp_path / "sky.png")
     scene = PictureScene(tmp_path / "sky.png", exposure_ms=500 * LONG.exposure_s)

@@ -60,7 +60,7 @@ def test_pointer_wraps(registers: RegisterFile) -> None:
         (0x30, 0x05, logging.WARNING, "wrote 0x05 to 0x0030, where no register is known"),
     ],
 )
-def test_logs_writes_to_unmodelled_registers(
+def test_logs_unmodelled_writes(
     registers: RegisterFile,
     caplog: pytest.LogCaptureFixture,
     address: int,
@@ -74,9 +74,7 @@ def test_logs_writes_to_unmodelled_registers(
     assert [(r.levelno, r.message) for r in caplog.records] == [(level, f"TEST1: {text}")]
 
 
-def test_logs_reads_of_unmodelled_registers(
-    registers: RegisterFile, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_logs_unmodelled_reads(registers: RegisterFile, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO):
         registers.select(0x13)
         assert [registers.read(), registers.read(), registers.read()] == [0, 0x42, 0]
@@ -86,7 +84,7 @@ def test_logs_reads_of_unmodelled_registers(
     ]
 
 
-def test_modelled_accesses_are_silent(
+def test_modelled_access_logs_nothing(
     registers: RegisterFile, caplog: pytest.LogCaptureFixture
 ) -> None:
     with caplog.at_level(logging.DEBUG):

@@ -223,7 +223,7 @@ def stored(camera: Mlx75412, fpga_enable_ps: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("wait_ms", [0, 10, 40, 67])
-def test_capturing_too_early_splits_the_picture(
+def test_early_capture_splits_image(
     photographing: Mlx75412, striped: PictureScene, wait_ms: int
 ) -> None:
     scale = photographing.frame_from(0).relative_exposure
@@ -237,7 +237,7 @@ def test_capturing_too_early_splits_the_picture(
 
 
 @pytest.mark.parametrize("wait_ms", [70, 400], ids=["second frame", "a partial one is dropped"])
-def test_waiting_gives_a_whole_frame(
+def test_wait_yields_whole_frame(
     photographing: Mlx75412, striped: PictureScene, wait_ms: int
 ) -> None:
     np.testing.assert_array_equal(stored(photographing, wait_ms * MS), striped.pixels)

@@ -119,9 +119,7 @@ def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(
 
 
 @pytest.mark.parametrize(("clocks", "counts"), [(-1, True), (0, True), (1, False), (300, False)])
-def test_a_gain_counts_for_frames_that_have_not_begun(
-    camera: Mt9m001, clocks: int, counts: bool
-) -> None:
+def test_gain_applies_from_the_next_frame(camera: Mt9m001, clocks: int, counts: bool) -> None:
     begins = starts(stream(camera, 0, 200 * PS_PER_MS))[1]
     bright = Atmosphere(-1.0, 84.0, sky_mag=12.0)
     camera = Mt9m001(SkyView(scene(mag_limit=-5.0, atmosphere=bright), QUIET))

@@ -40,9 +40,7 @@ def install(libc: Libc) -> int:
 @pytest.mark.parametrize(
     ("flags", "tried"), [((40, 8), [40]), ((8,), [40, 8])], ids=["linux-5.19", "before"]
 )
-def test_the_kernel_gets_the_steps_and_gives_a_listener(
-    flags: tuple[int, ...], tried: list[int]
-) -> None:
+def test_kernel_returns_a_listener(flags: tuple[int, ...], tried: list[int]) -> None:
     """PR_SET_NO_NEW_PRIVS is 38, SECCOMP_SET_MODE_FILTER 1; flags as in linux/seccomp.h."""
     libc = Libc(flags=flags)
     assert install(libc) == 7
@@ -61,9 +59,7 @@ def test_reports_kernel_errors() -> None:
     assert install(zero) == 0
 
 
-def test_the_program_starts_when_the_listener_was_handed_over(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_program_starts_after_listener_handover(monkeypatch: pytest.MonkeyPatch) -> None:
     """The filter comes over the socket; what goes back leads to the same pipe."""
     link, theirs = socket.socketpair()
     reader, listener = os.pipe()

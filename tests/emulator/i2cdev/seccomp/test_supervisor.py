@@ -222,9 +222,7 @@ def test_each_way_to_look(program: Program, name: str, arguments: str, extended:
 
 
 @pytest.mark.parametrize(("name", "flags", "buffer"), [("newfstatat", 3, 2), ("statx", 2, 4)])
-def test_looking_at_a_descriptor_by_an_empty_path(
-    program: Program, name: str, flags: int, buffer: int
-) -> None:
+def test_stat_by_empty_path(program: Program, name: str, flags: int, buffer: int) -> None:
     fd, place = program.opened(), program.memory(bytes(256))
 
     def call(path: bytes, flag: int, fd: int = fd) -> Any:

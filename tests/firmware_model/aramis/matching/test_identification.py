@@ -180,9 +180,7 @@ def test_phases_add_up() -> None:
     ("smear_px", "skew_px", "refused"),
     [(4.1, 4.1, True), (4.1, 3.9, False), (3.9, 4.1, False), (3.9, 3.9, False)],
 )
-def test_stars_drawn_out_and_skewed_too_far_are_refused(
-    smear_px: float, skew_px: float, refused: bool
-) -> None:
+def test_rejects_skewed_star_streaks(smear_px: float, skew_px: float, refused: bool) -> None:
     (made,) = pictures(1)
     found = named(replace(made.stars, smear_px=smear_px, skew_px=skew_px), VERIFIED.profile)
     assert (found.reason is Reason.SMEAR) == refused

@@ -29,9 +29,7 @@ def test_capture_and_detect_is_acknowledged(node: Links) -> None:
     ("request_id", "alpha", "answer"),
     [("96", None, "D204 C9FD 02 07"), ("94", 0x1F1F, "1F1F1F1F C9FD 02 07")],  # escapes doubled
 )
-def test_a_result_is_angles_and_two_codes(
-    node: Links, request_id: str, alpha: int | None, answer: str
-) -> None:
+def test_result_has_two_codes(node: Links, request_id: str, alpha: int | None, answer: str) -> None:
     node.command("CaptureAndDetect")
     if alpha is not None:
         node.state.results[codes.Camera.SUN].alpha = alpha

@@ -95,9 +95,7 @@ def test_results_are_big_endian_and_signed(node: Links) -> None:
 
 
 @pytest.mark.parametrize("selection", codes.SramSelection)
-def test_over_current_flags_are_seen_and_cleared(
-    node: Links, selection: codes.SramSelection
-) -> None:
+def test_over_current_flags_can_be_cleared(node: Links, selection: codes.SramSelection) -> None:
     for bits in range(4):
         node.state.over_current = {sram: bool(bits >> sram & 1) for sram in codes.Sram}
         assert value(node, "OVER_CURRENT") == bits

@@ -82,9 +82,7 @@ def test_a_dip_between_the_tried_radii_is_found() -> None:
 
 
 @pytest.mark.parametrize(("ratio", "expected"), [(2.99, True), (3.01, False)])
-def test_slopes_are_compared_from_the_picture_s_middle_to_its_rim(
-    ratio: float, expected: bool
-) -> None:
+def test_slopes_are_compared_from_centre_to_rim(ratio: float, expected: bool) -> None:
     """A parabola's slope squared rises with the distorted radius: 4 b for a pixel."""
     offset, slope = 8, 0.5
     bend = slope**2 * (ratio**2 - 1) / 4 / (226 - offset + ratio**2 * offset)

@@ -166,9 +166,7 @@ def test_sun(meter: Meter, lookup: list[int], seed: int) -> None:
     assert [found.x, found.y] == calc_sun([int(byte) for byte in data], lookup)
 
 
-def test_costs_are_those_of_the_listing_s_operations(
-    meter: Meter, printed: nadir.NadirConfig
-) -> None:
+def test_costs_equal_the_listing_s_operations(meter: Meter, printed: nadir.NadirConfig) -> None:
     edges = edges_in(earth(3, -8), meter, EdgeConfig(sub_pixel=False))
     n, before = len(edges), Counter(meter.counts)
     nadir.find_nadir(edges, printed, meter)
@@ -185,7 +183,7 @@ def test_costs_are_those_of_the_listing_s_operations(
 
 @pytest.mark.parametrize("first", [(100, 1, 200, 0), (139, 0, 247, 0)], ids=["stuck", "outside"])
 @pytest.mark.parametrize(("printed", "detect"), [(False, "SUN_NOT_FOUND"), (True, "SUCCESS")])
-def test_any_pixel_is_a_sun(
+def test_accepts_any_sun_pixel(
     meter: Meter, printed: bool, detect: str, first: tuple[int, ...]
 ) -> None:
     config = sun_centroid.SunConfig(byte_table(meter), printed=printed)
@@ -197,7 +195,7 @@ def test_any_pixel_is_a_sun(
 
 
 @pytest.mark.parametrize("checked", [True, False])
-def test_any_circle_is_an_earth(
+def test_accepts_any_circle(
     meter: Meter, printed: nadir.NadirConfig, stereographic: RadiusTable, checked: bool
 ) -> None:
     picture = earth(10, 5)

@@ -32,7 +32,7 @@ def test_edges_of_rows(meter: Meter, between: Between, alpha: float, beta: float
 
 
 @pytest.mark.parametrize("between", Between)
-def test_as_good_from_few_pixels(
+def test_accuracy_from_few_pixels(
     stereographic: RadiusTable, between: Between, meter: Meter
 ) -> None:
     rng = np.random.default_rng(5)

@@ -37,9 +37,7 @@ def test_the_goal(ours: SunConfig, bloom_px: float) -> None:
 
 
 @pytest.mark.parametrize("bloom_px", [4.0, 5.0, 6.0])
-def test_a_disc_that_ends_sharply_is_doubtful(
-    ours: SunConfig, meter: Meter, bloom_px: float
-) -> None:
+def test_disc_with_sharp_edge_is_uncertain(ours: SunConfig, meter: Meter, bloom_px: float) -> None:
     """A flat Sun, or structure: the usual image fades over more than a pixel."""
     truth = (20.0, -13.0)
     picture = sun(place(*truth, SUN_BORESIGHT), bloom_px, flat=True)
@@ -50,7 +48,7 @@ def test_a_disc_that_ends_sharply_is_doubtful(
 
 
 @pytest.mark.parametrize("apart", [(8, 7), (-8, 7), (0, 9), (9, 3)], ids=str)
-def test_two_lights_in_a_window_are_no_sun(
+def test_rejects_two_lights_in_a_window(
     ours: SunConfig, meter: Meter, apart: tuple[int, int]
 ) -> None:
     """Neither of them is whole, and the mean is between them."""

@@ -218,9 +218,7 @@ def test_every_ninth_pixel_is_read_and_twice_the_stars_cost_twice_the_growing() 
         ({"y_start": 512}, "y_end must be 513 to 65535 px, not 512"),
     ],
 )
-def test_rejects_settings_that_contradict_each_other(
-    settings: dict[str, int], message: str
-) -> None:
+def test_rejects_contradictory_settings(settings: dict[str, int], message: str) -> None:
     with pytest.raises(DetectionConfigError, match=message):
         replace(DetectionConfig(), **settings)
 

@@ -92,7 +92,7 @@ def test_stars_that_were_tried_in_vain_have_votes(name: Name) -> None:
 
 
 @pytest.mark.parametrize("per_cent", [-3.0, -0.85, -0.35, 0.35, 0.85, 3.0])
-def test_five_stars_are_enough_for_a_lens_up_to_3_per_cent_off(
+def test_five_stars_suffice_at_3_per_cent_lens_error(
     name: Name, shoot: Shoot, per_cent: float
 ) -> None:
     """So few are only found where one of the focal lengths that are tried is nearly right."""

@@ -52,9 +52,7 @@ def algorithm_2(directions: NDArray[Any], catalogue: StarCatalogue) -> dict[int,
 
 
 @pytest.mark.parametrize(("false_stars", "seen"), quick([(10, 20), (0, 20), (10, 5), (3, 20)], 2))
-def test_votes_as_printed(
-    catalogue: StarCatalogue, shoot: Shoot, false_stars: int, seen: int
-) -> None:
+def test_printed_votes(catalogue: StarCatalogue, shoot: Shoot, false_stars: int, seen: int) -> None:
     rng = np.random.default_rng(false_stars)
     same = 0
     for _ in range(25):

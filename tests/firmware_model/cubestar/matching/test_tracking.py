@@ -70,9 +70,7 @@ def test_tracking_loses_a_turn_beyond_its_reach(catalogue: StarCatalogue, shoot:
     assert lost >= 38
 
 
-def test_two_stars_are_enough_where_no_more_are_predicted(
-    catalogue: StarCatalogue, shoot: Shoot
-) -> None:
+def test_two_stars_suffice_when_two_are_predicted(catalogue: StarCatalogue, shoot: Shoot) -> None:
     rng = np.random.default_rng(92)
     shot = next(s for s in (shoot(rng) for _ in range(99)) if len(s.stars) >= 4)
     two = catalogue.vectors[shot.stars[:2]].astype(float)

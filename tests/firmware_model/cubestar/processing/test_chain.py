@@ -207,7 +207,7 @@ def test_tracking_follows_up_to_its_rate(
         assert mode_flag(tracking) is MatchMode.ASSISTED
 
 
-def test_two_stars_are_enough_for_tracking(tracking: Harness, sky: Sky, pose: Rotation) -> None:
+def test_tracking_needs_two_stars(tracking: Harness, sky: Sky, pose: Rotation) -> None:
     process(tracking, sky.picture)
     values = process(tracking, take(tracking.catalogue, pose, most=2).picture)
     assert (values["Valid"], values["Matched"]) == (True, 2)

@@ -19,9 +19,7 @@ CAMERA = CameraParameters(6.28, FOCAL_PX, FOCAL_PX, 511.5, 255.5, 0, 0, 0, 0)
     ("identified", "believed"),
     [(0.997, 0.997), (0.999, 1.0), (1.0, 1.0), (1.001, 1.0), (1.003, 1.003)],
 )
-def test_a_focal_length_that_is_2_per_mille_off_is_believed(
-    identified: float, believed: float
-) -> None:
+def test_accepts_focal_length_error_of_2_per_mille(identified: float, believed: float) -> None:
     """When the identification says so: these four stars alone would never prove it."""
     rng = np.random.default_rng(3)
     tangents = rng.uniform(-0.1, 0.1, (4, 2))

@@ -59,9 +59,7 @@ def quality(unit: Harness, picture: np.ndarray) -> dict[str, float]:
         ({"elongated": 2, "aligned": 0.9}, Reason.UNCONFIRMED),
     ],
 )
-def test_reason_of_the_image_precedes_that_of_the_failure(
-    measured: dict[str, float], reason: Reason
-) -> None:
+def test_image_reason_precedes_failure_reason(measured: dict[str, float], reason: Reason) -> None:
     picture = replace(CLEAR, **measured)  # type: ignore[arg-type]
     assert reason_of(picture, MatchOutcome.UNCONFIRMED) is reason
 

@@ -59,9 +59,7 @@ def hint(unit: Harness, pose: Rotation) -> None:
     )
 
 
-def test_a_fix_leads_to_tracking_and_failures_back_in_steps(
-    tracking: Harness, pose: Rotation
-) -> None:
+def test_mode_steps_up_after_a_fix_and_back_down(tracking: Harness, pose: Rotation) -> None:
     assert seen(tracking, pose) == (LOST, Reason.SOLVED)
     assert mode_flag(tracking) is TRACKING
     assert seen(tracking, turned(pose, 0.2)) == (TRACKING, Reason.SOLVED)
@@ -139,9 +137,7 @@ def test_a_base_contradicts_nothing_after_half_a_turn(
     assert "IDModeError" in tracking.flags()
 
 
-def test_a_base_has_its_age_after_a_reset_on_the_fiftieth_day(
-    tracking: Harness, pose: Rotation
-) -> None:
+def test_base_keeps_its_age_across_a_reset_on_day_50(tracking: Harness, pose: Rotation) -> None:
     """In flash a picture's time has 32 bits, in ms."""
     tracking.run(until_us=1000 << 32)
     seen(tracking, pose, wait_s=1.0)

@@ -129,9 +129,7 @@ def test_a_bad_parameter_names_its_flag(name: str, values: dict[str, float], fla
         ("setDetectionVariables", "MaxInvalidStars", 0, 15, ""),
     ],
 )
-def test_published_ranges_hold_at_their_borders(
-    name: str, field: str, low: int, high: int, flag: str
-) -> None:
+def test_published_ranges_at_limits(name: str, field: str, low: int, high: int, flag: str) -> None:
     message = INTERFACE.telecommand(name)
     step = 1e-4 if message.field(field).type == "f32" else 1
     widest = {"MinPixels": 1, "MaxPixels": 100}

@@ -45,9 +45,7 @@ def fast() -> Calls:
 
 @needs_compiler
 @pytest.mark.parametrize("level", ["O0", "O2", "Os"])
-def test_the_compiled_program_finds_the_same_attitude_to_the_bit(
-    level: str, shot: NDArray[np.uint8]
-) -> None:
+def test_compiled_attitude_is_identical_to_the_bit(level: str, shot: NDArray[np.uint8]) -> None:
     calls = start_program(compile_program(Build(level), generated()), Timing())
     expected = picture.run_model(shot, onboard_catalogue(), Meter(CORTEX_M3))
     found = picture.run(calls, shot)

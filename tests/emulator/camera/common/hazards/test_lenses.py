@@ -46,9 +46,7 @@ def test_focal_lengths_are_placed_on_both_sides() -> None:
 
 
 @pytest.mark.parametrize(("condition", "f", "pitch"), [(CONDITION, 1.256, 5.6), (ARAMIS, 1.2, 5.2)])
-def test_defocus_by_temperature_is_the_cone_s_width(
-    condition: SkyCondition, f: float, pitch: float
-) -> None:
+def test_temperature_defocus_is_cone_width(condition: SkyCondition, f: float, pitch: float) -> None:
     # 40 um before the focus; the standard deviation of an even disc, along one axis: radius / 2.
     blurred = lens(Defocus(um_per_k=1.0), condition=condition, celsius=60)
     disc = 40 / f / 2 / 2 / pitch
