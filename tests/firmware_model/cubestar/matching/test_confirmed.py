@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cubestack.firmware_model.attitude.field_of_view import FieldOfView
 from cubestack.firmware_model.attitude.geometry import scaled
 from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from cubestack.firmware_model.cubestar.matching.confirmed import PairPass, identify
@@ -19,45 +17,27 @@ from cubestack.firmware_model.star_tracker.confirmation import volume
 from cubestack.firmware_model.star_tracker.observation import LARGEST_FALSE_ALARM
 from cubestack.firmware_model.star_tracker.search import MatchOutcome
 
+from ...star_tracker.trackers import PairTracker
 from ..sky import meter, pinhole
 
 Shoot = Callable[..., Any]
-Rays = NDArray[np.float32]
+Name = Callable[..., Identification]
 
 
 @pytest.fixture(scope="module")
-def field() -> FieldOfView:
-    return pinhole()
+def tracker(catalogue: StarCatalogue, shoot: Shoot) -> PairTracker:
+    return PairTracker(catalogue, shoot)
 
 
 @pytest.fixture(scope="module")
-def name(catalogue: StarCatalogue, field: FieldOfView) -> Callable[..., Identification]:
-    def identified(directions: Rays, brightness: Any = None, **more: Any) -> Identification:
-        return identify(directions, brightness, catalogue, field, more.pop("on", meter()), **more)
+def name(tracker: PairTracker) -> Name:
+    def identified(directions: Any, brightness: Any = None, **more: Any) -> Identification:
+        return identify(directions, brightness, tracker.catalogue, tracker.field, meter(), **more)
 
     return identified
 
 
-Name = Callable[..., Identification]
-
-
-def right(found: Identification, stars: NDArray[np.int64]) -> bool:
-    """Whether it is solved; an identity that is wrong fails the test."""
-    matched = found.matched
-    assert (found.outcome is MatchOutcome.IDENTIFIED) == (len(matched) > 0)
-    wrong = int((found.stars[matched] != stars[matched]).sum())
-    # A false star may stand within the margin of a real one's place and be nearer to it.
-    assert wrong <= max(1, len(matched) // 5)
-    return len(matched) > 0
-
-
-def random_rays(rng: np.random.Generator, count: int) -> Rays:
-    """Unit vectors (count, 3) in the field."""
-    rays = np.column_stack([rng.uniform([-0.45, -0.22], [0.45, 0.22], (count, 2)), np.ones(count)])
-    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True), np.float32)
-
-
-def test_three_stars_that_fit_two_places_get_no_identity(field: FieldOfView) -> None:
+def test_three_stars_that_fit_two_places_get_no_identity() -> None:
     rng = np.random.default_rng(80)
     triple = np.array([[0.1, 0.0, 1], [-0.12, 0.05, 1], [0.02, -0.17, 1]])
     triple /= np.linalg.norm(triple, axis=1, keepdims=True)
@@ -65,8 +45,8 @@ def test_three_stars_that_fit_two_places_get_no_identity(field: FieldOfView) -> 
     sky = StarCatalogue.build(np.arange(6), twice, np.ones(6), 3.8, 57.3)
     once = StarCatalogue.build(np.arange(3), triple, np.ones(3), 3.8, 57.3)
     rays = triple.astype(np.float32)
-    assert identify(rays, None, once, field, meter()).outcome is MatchOutcome.IDENTIFIED
-    assert identify(rays, None, sky, field, meter()).outcome is MatchOutcome.AMBIGUOUS
+    assert identify(rays, None, once, pinhole(), meter()).outcome is MatchOutcome.IDENTIFIED
+    assert identify(rays, None, sky, pinhole(), meter()).outcome is MatchOutcome.AMBIGUOUS
 
 
 def test_the_order_of_the_centroids_does_not_matter(name: Name, shoot: Shoot) -> None:
@@ -81,19 +61,16 @@ def test_the_order_of_the_centroids_does_not_matter(name: Name, shoot: Shoot) ->
         assert other.false_alarm == pytest.approx(plain.false_alarm, nan_ok=True)
 
 
-def test_stars_that_were_tried_in_vain_have_votes(name: Name) -> None:
+def test_stars_that_were_tried_in_vain_have_votes(name: Name, tracker: PairTracker) -> None:
     """Six false stars: each was one of a triangle of the catalogue, and none is believed."""
-    rng = np.random.default_rng(11)
-    plane = np.column_stack([rng.uniform([-0.4, -0.2], [0.4, 0.2], (6, 2)), np.ones(6)])
-    rays = (plane / np.linalg.norm(plane, axis=1)[:, None]).astype(np.float32)
-    found = name(rays)
+    found = name(tracker.false_rays(np.random.default_rng(11), 6))
     assert found.outcome is not MatchOutcome.IDENTIFIED
     assert found.votes.any()
 
 
 @pytest.mark.parametrize("per_cent", [-3.0, -0.85, -0.35, 0.35, 0.85, 3.0])
 def test_five_stars_suffice_at_3_per_cent_lens_error(
-    name: Name, shoot: Shoot, per_cent: float
+    tracker: PairTracker, shoot: Shoot, per_cent: float
 ) -> None:
     """So few are only found where one of the focal lengths that are tried is nearly right."""
     rng = np.random.default_rng(86)
@@ -103,7 +80,8 @@ def test_five_stars_suffice_at_3_per_cent_lens_error(
         x, y, z = np.abs(shot.directions.T)
         # Stars at the border would leave the picture.
         if len(shot.stars) == 5 and (x < 0.44 * z).all() and (y < 0.22 * z).all():
-            solved += right(name(scaled(shot.directions, scale, meter())), shot.stars)
+            found = tracker.identify(scaled(shot.directions, scale, meter()))
+            solved += found.is_right(shot.stars)
             tries += 1
     assert solved >= 24
 
@@ -121,7 +99,9 @@ def test_what_the_result_says(name: Name, shoot: Shoot) -> None:
     assert found.scale == pytest.approx(1, abs=0.001)
 
 
-def test_triangles_are_those_that_trying_all_finds(catalogue: StarCatalogue) -> None:
+def test_triangles_are_those_that_trying_all_finds(
+    catalogue: StarCatalogue, tracker: PairTracker
+) -> None:
     rng = np.random.default_rng(97)
     tolerance, count = 0.001, 10
     vectors = catalogue.vectors.astype(float)
@@ -129,7 +109,7 @@ def test_triangles_are_those_that_trying_all_finds(catalogue: StarCatalogue) -> 
     np.fill_diagonal(listed, 9.0)
     chance = seen = 0.0
     for _ in range(12):
-        rays = random_rays(rng, count)
+        rays = tracker.false_rays(rng, count)
         apart = np.arccos(np.clip(rays.astype(float) @ rays.T.astype(float), -1, 1))
         wanted = set()
         for i, j, k in combinations(range(count), 3):
@@ -149,10 +129,12 @@ def test_triangles_are_those_that_trying_all_finds(catalogue: StarCatalogue) -> 
     assert 0.4 < seen / chance < 1.2  # these stars do not cluster
 
 
-def test_few_random_pictures_are_believed_and_no_more_than_said(name: Name) -> None:
+def test_few_random_pictures_are_believed_and_no_more_than_said(
+    name: Name, tracker: PairTracker
+) -> None:
     rng = np.random.default_rng(98)
     believed = 0
     for _ in range(150):
-        loose = name(random_rays(rng, 8), largest_false_alarm=0.05, passes=(PairPass(),))
+        loose = name(tracker.false_rays(rng, 8), largest_false_alarm=0.05, passes=(PairPass(),))
         believed += len(loose.matched) > 0
     assert believed <= 15  # twice what is said
