@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from cubestack.firmware_model.aramis.arrays import Floats, Indices, Mask
 from cubestack.firmware_model.aramis.detection.regions import Regions
 
-MOST_REGIONS = 400  #: regions looked at, the ones with most light first
 RING = 16  #: places around a region where the sky is looked at, each the mean of 3 x 3 pixels
 GAP = 3  #: pixels between a region and the middle of its ring's places
 
@@ -37,8 +36,7 @@ CUT, CUT_AREA, CUT_LEVEL = 1.8, 60.0, 4.0
 
 FULL = 250  #: counts from which a pixel is full, and its region's centroid less sure
 
-#: A region is long whose streak is longer, and whose moments along and across differ so much.
-LONG_PX, LONG_RATIO = 5.0, 2.5
+LONG_RATIO = 2.5  #: of the moments along and across, from which on a region is long
 
 _F = np.float32
 

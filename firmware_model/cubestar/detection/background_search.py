@@ -157,7 +157,7 @@ def _areas(
     runs = Runs.of(bright)
     places = runs[areas.short(runs)].places()
     y, x = np.divmod(places, width)
-    levels, noises = sky.levels_at(y, x), sky.noises_at(y, x)
+    levels, noises = sky.at(y, x)
     sharp = areas.spikes(pixels, places, width, levels, noises)
     left = runs.without(places[sharp])
     rows_of = (
@@ -205,8 +205,8 @@ def _stars(
     x = np.clip(peak_x[:, None] + grid, 0, region.width - 1)[:, None, :]
     read = yield region.look(y, x)
     values = read.reshape(-1, spots.SIDE, spots.SIDE).astype(np.int64)
-    windows = UNIT * values - sky.under(values, peak_y, peak_x)
-    noises = sky.noises_at(peak_y, peak_x)
+    windows = UNIT * values - sky.under(values, y, x, sky.slopes[peak_y, peak_x])
+    _, noises = sky.at(peak_y, peak_x)
     charges.charge_windows_read(len(windows), meter)
     saturated = values[:, spots.HALF, spots.HALF] >= spots.SATURATED_DN
     middles = np.stack([found.moments.x, found.moments.y], axis=1)[candidates]

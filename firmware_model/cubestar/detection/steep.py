@@ -107,39 +107,25 @@ class LocalBackground:
     slopes: Marks
     places: Places
 
-    def levels_at(self, rows: Ints, columns: Ints) -> Ints:
-        return self._known(
-            self.cells.interpolated(self.cells.levels, rows, columns),
-            self.places.levels,
-            rows,
-            columns,
-        )
-
-    def noises_at(self, rows: Ints, columns: Ints) -> Ints:
-        return self._known(
-            self.cells.interpolated(self.cells.noises, rows, columns),
-            self.places.noises,
-            rows,
-            columns,
-        )
-
-    def _known(self, usual: Ints, known: Ints, rows: Ints, columns: Ints) -> Ints:
-        width, places = self.slopes.shape[1], self.places
+    def at(self, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
+        """Levels and noises (n,) of bright pixels."""
+        cells, places, width = self.cells, self.places, self.slopes.shape[1]
+        levels = cells.interpolated(cells.levels, rows, columns)
+        noises = cells.interpolated(cells.noises, rows, columns)
         if not len(places):
-            return usual
-        own, asked = places.rows * width + places.columns, rows * width + columns
-        found = np.minimum(np.searchsorted(own, asked), len(own) - 1)
-        return np.where(own[found] == asked, known[found], usual)
+            return levels, noises
+        known, wanted = places.rows * width + places.columns, rows * width + columns
+        found = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
+        on_slope = known[found] == wanted
+        return (
+            np.where(on_slope, places.levels[found], levels),
+            np.where(on_slope, places.noises[found], noises),
+        )
 
-    def under(self, windows: Ints, rows: Ints, columns: Ints) -> Ints:
-        """Levels of windows (n, 9, 9) about the pixels (n,): on slopes the plane on whose level
-        its outermost pixels are."""
-        grid = np.arange(-HALF, HALF + 1)
-        height, width = self.slopes.shape
-        y = np.clip(rows[:, None] + grid, 0, height - 1)[:, :, None]
-        x = np.clip(columns[:, None] + grid, 0, width - 1)[:, None, :]
+    def under(self, windows: Ints, y: Ints, x: Ints, on_slope: Marks) -> Ints:
+        """Levels of windows (n, 9, 9) at rows and columns, broadcast: ``on_slope`` (n,) the plane
+        through their outermost pixels."""
         levels = self.cells.interpolated(self.cells.levels, y, x)
-        on_slope = self.slopes[rows, columns]
         levels[on_slope] = _planes(UNIT * windows[on_slope])
         return levels
 

@@ -17,12 +17,8 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.firmware_model.star_tracker import confirmation
 
 from ..operations import as_on_record
-from ..registry import registered_in
 
 Floats = NDArray[np.float32]
-Case = Callable[[int, Meter], object]
-CASES: dict[str, Case] = {}
-case = registered_in(CASES)
 
 CAMERA = geometry.CameraParameters(6.28, 1147.5, 1147.4, 512, 256, 0.32, -0.12, -0.004, 0.006)
 
@@ -41,97 +37,44 @@ def sigmas(count: int) -> Floats:
     return np.full(count, 2e-5, np.float32)
 
 
-@case("quest")
-def _(count: int, meter: Meter) -> None:
-    quest(*seen(count), np.ones(count, np.float32), meter)
+def points(count: int) -> Floats:
+    return np.full((count, 2), 300, np.float32)
 
 
-@case("dcm")
-def _(count: int, meter: Meter) -> None:
-    for _ in range(count):
-        dcm(np.array([0, 0, 0, 1], np.float32), meter)
-
-
-@case("covariance")
-def _(count: int, meter: Meter) -> None:
-    covariance(seen(count)[0], sigmas(count), sigmas(count), meter)
-
-
-@case("robust fit")
-def _(count: int, meter: Meter) -> None:
-    robust_fit(*seen(count), sigmas(count), meter, scale=1.0, excess=1.0)
-
-
-@case("robust fit of another focal length")
-def _(count: int, meter: Meter) -> None:
-    robust_fit(*seen(count), sigmas(count), meter, scale=1.001, excess=1.0)
-
-
-@case("matched")
-def _(count: int, meter: Meter) -> None:
-    measured, _ = seen(count)
-    confirmation.matched(measured, measured[::2], 1e-3, meter)
-
-
-@case("false alarm")
-def _(count: int, meter: Meter) -> None:
-    confirmation.false_alarm(1.0, count, count // 2, 1e-3, meter)
-
-
-@case("scaled")
-def _(count: int, meter: Meter) -> None:
-    geometry.scaled(seen(count)[0], 1.01, meter)
-
-
-@case("correction")
-def _(count: int, meter: Meter) -> None:
-    measured, _ = seen(count)
-    confirmation.correction(measured, measured, meter, with_scale=False)
-
-
-@case("correction with scale")
-def _(count: int, meter: Meter) -> None:
-    measured, _ = seen(count)
-    confirmation.correction(measured, measured, meter, with_scale=True)
-
-
-@case("from three")
-def _(count: int, meter: Meter) -> None:
-    measured, reference = seen(count)
-    confirmation.from_three(measured[:3], reference[:3], meter)
-
-
-@case("undistort")
-def _(count: int, meter: Meter) -> None:
-    geometry.undistort(np.full((count, 2), 300, np.float32), CAMERA, meter)
-
-
-@case("unit vectors")
-def _(count: int, meter: Meter) -> None:
-    geometry.unit_vectors(np.full((count, 2), 300, np.float32), CAMERA, meter)
-
-
-@case("direction of")
-def _(count: int, meter: Meter) -> None:
-    geometry.direction_of(1.0, 0.5, meter)
-
-
-@case("angles of")
-def _(count: int, meter: Meter) -> None:
-    geometry.angles_of(seen(count)[0][0], meter)
-
-
-@case("field")
-def _(count: int, meter: Meter) -> None:
-    FIELD.contains(seen(count)[0], meter)
-
-
-@case("field with blind cells")
-def _(count: int, meter: Meter) -> None:
-    FIELD.without(np.eye(4, dtype=np.bool_)).contains(seen(count)[0], meter)
+def measured(count: int) -> Floats:
+    return seen(count)[0]
 
 
 FIELD = field_of_view(CAMERA, 1024, 512)
+BLIND = FIELD.without(np.eye(4, dtype=np.bool_))
+
+CASES: dict[str, Callable[[int, Meter], object]] = {
+    "quest": lambda n, meter: quest(*seen(n), np.ones(n, np.float32), meter),
+    "dcm": lambda n, meter: [dcm(np.array([0, 0, 0, 1], np.float32), meter) for _ in range(n)],
+    "covariance": lambda n, meter: covariance(measured(n), sigmas(n), sigmas(n), meter),
+    "robust fit": lambda n, meter: robust_fit(*seen(n), sigmas(n), meter, scale=1.0, excess=1.0),
+    "robust fit of another focal length": lambda n, meter: robust_fit(
+        *seen(n), sigmas(n), meter, scale=1.001, excess=1.0
+    ),
+    "matched": lambda n, meter: confirmation.matched(measured(n), measured(n)[::2], 1e-3, meter),
+    "false alarm": lambda n, meter: confirmation.false_alarm(1.0, n, n // 2, 1e-3, meter),
+    "scaled": lambda n, meter: geometry.scaled(measured(n), 1.01, meter),
+    "correction": lambda n, meter: confirmation.correction(
+        measured(n), measured(n), meter, with_scale=False
+    ),
+    "correction with scale": lambda n, meter: confirmation.correction(
+        measured(n), measured(n), meter, with_scale=True
+    ),
+    "from three": lambda n, meter: confirmation.from_three(
+        *(vectors[:3] for vectors in seen(n)), meter
+    ),
+    "undistort": lambda n, meter: geometry.undistort(points(n), CAMERA, meter),
+    "unit vectors": lambda n, meter: geometry.unit_vectors(points(n), CAMERA, meter),
+    "direction of": lambda _, meter: geometry.direction_of(1.0, 0.5, meter),
+    "angles of": lambda n, meter: geometry.angles_of(measured(n)[0], meter),
+    "field": lambda n, meter: FIELD.contains(measured(n), meter),
+    "field with blind cells": lambda n, meter: BLIND.contains(measured(n), meter),
+}
 
 
 @pytest.mark.parametrize("count", [4, 13])
