@@ -17,19 +17,14 @@ def write_bytes(link: Any, data: bytes) -> int:
 
 
 class HostSide:
-    """The node's UART and I2C address as its host sees them.
-
-    Attributes:
-        sent: bytes that the node gave to its UART since a test took them.
-        backlog: bytes that the UART still has to send.
-    """
+    """The node's UART and I2C address as its host sees them."""
 
     interface: Interface
     link: SatelliteLink
 
     def __init__(self) -> None:
-        self.sent = bytearray()
-        self.backlog = 0
+        self.sent = bytearray()  #: bytes that the node gave to its UART since a test took them
+        self.backlog = 0  #: bytes that the UART still has to send
 
     # --- what the program uses --------------------------------------------------------------------
 

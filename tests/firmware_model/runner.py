@@ -15,26 +15,20 @@ T = TypeVar("T")
 
 
 class Runner:
-    """Virtual time, and the requests that every program makes.
-
-    Attributes:
-        meter: what the program is charged.
-        now_ns: virtual time.
-        resets: causes of all resets.
-        log: (time in us, request) of every request but those that only take time.
-        on_request: called with every request before it is performed.
-        on_sleep: called when a routine that runs by itself waits to be woken, before time passes.
-    """
+    """Virtual time, and the requests that every program makes."""
 
     boot_us = 0
     hang_us = 1_000_000_000
 
     def __init__(self, table: CostTable) -> None:
-        self.meter = Meter(table)
-        self.now_ns = 0
-        self.resets: list[int] = []
+        self.meter = Meter(table)  #: what the program is charged
+        self.now_ns = 0  #: virtual time
+        self.resets: list[int] = []  #: causes of all resets
+        #: log: (time in us, request) of every request but those that only take time
         self.log: list[tuple[int, requests.Request]] = []
+        #: on_request: called with every request before it is performed
         self.on_request: Callable[[requests.Request], object] = lambda _request: None
+        #: on_sleep: called when a routine that runs by itself waits to be woken, before time passes
         self.on_sleep: Callable[[], object] = lambda: None
         self._woken = False
 

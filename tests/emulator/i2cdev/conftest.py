@@ -19,18 +19,14 @@ TIMEOUT = struct.pack("ll", 20, 0)  # 20 s, for a socket
 
 
 class Registers:
-    """256 registers behind a pointer that counts up; beyond 0xF0 a write is not acknowledged.
-
-    Attributes:
-        log: messages that came, as bytes written or number of bytes read.
-        busy_reads: how often the next byte is not ready yet.
-    """
+    """256 registers behind a pointer that counts up; beyond 0xF0 a write is not acknowledged."""
 
     def __init__(self) -> None:
         self.memory = bytearray(range(256))
         self.pointer = 0
+        #: messages that came, as bytes written or number of bytes read
         self.log: list[list[int] | int] = []
-        self.busy_reads = 0
+        self.busy_reads = 0  #: how often the next byte is not ready yet
         self._first = True
 
     def i2c_start(self, read: bool) -> None:

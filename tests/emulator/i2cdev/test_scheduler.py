@@ -24,24 +24,18 @@ from .conftest import Registers
 US = 1000
 BIT_NS = 2500
 READ_BITS = (1 + 9 + 9) + (1 + 9 + 9) + 1
-READ_NS = READ_BITS * BIT_NS
-"""A register's byte at 400 kHz."""
+READ_NS = READ_BITS * BIT_NS  #: A register's byte at 400 kHz
 
 POINTER = I2cMessage(0x1A, bytearray(1))
-WAY_NS = 15 * US
-"""From a program to the emulation, or back."""
+WAY_NS = 15 * US  #: From a program to the emulation, or back
 
 
 class World:
-    """Wall time, which passes a bit at each look at the clock, and what happens in it.
-
-    Attributes:
-        now_ns: wall time.
-        stalls: time that goes by, all at once, at the next look at the clock after a time.
-    """
+    """Wall time, which passes a bit at each look at the clock, and what happens in it."""
 
     def __init__(self) -> None:
-        self.now_ns = 12_345_678
+        self.now_ns = 12_345_678  #: wall time
+        #: stalls: time that goes by, all at once, at the next look at the clock after a time
         self.stalls: list[tuple[int, int]] = []
         self._arrivals: list[tuple[int, int, Callable[[], None]]] = []
         self._order = itertools.count()

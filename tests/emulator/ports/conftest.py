@@ -31,17 +31,12 @@ TIMEOUT_S = 20.0  # of a client that waits for what must come
 
 
 class Device:
-    """A UART at 1 Mbaud unless told otherwise: a byte takes 10 us.
-
-    Attributes:
-        answers: how often every byte is sent back.
-        received: all bytes that came.
-    """
+    """A UART at 1 Mbaud unless told otherwise: a byte takes 10 us."""
 
     def __init__(self, kernel: Kernel, baud: int = 1_000_000, answers: int = 0) -> None:
         self.kernel = kernel
-        self.received = bytearray()
-        self.answers = answers
+        self.received = bytearray()  #: all bytes that came
+        self.answers = answers  #: how often every byte is sent back
         self.uart = Uart(kernel, baud, self._on_byte, lambda: None, silence_bytes=1_000_000)
 
     def _on_byte(self, byte: int) -> None:

@@ -21,8 +21,7 @@ Command = tuple[int, str, int]
 class Outcome(NamedTuple):
     memories: dict[str, bytes]
     data: bytes
-    acks: list[int]
-    """Times in ps at which the acknowledge that was watched rose."""
+    acks: list[int]  #: Times in ps at which the acknowledge that was watched rose
 
 
 def run_engine(

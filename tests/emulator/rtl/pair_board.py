@@ -20,8 +20,7 @@ SIZES = (
 )
 
 STROBE_PERIOD = 100_000
-SETTLED = 50_000
-"""From an enable to the first data clock: the SRAM's access time, and more."""
+SETTLED = 50_000  #: From an enable to the first data clock: the SRAM's access time, and more
 
 
 def pair_camera(rng: np.random.Generator, size: ReadOut, frames: int = 3) -> ListCamera:

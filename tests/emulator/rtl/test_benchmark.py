@@ -10,8 +10,7 @@ from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import NoCompilerError
 from cubestack.emulator.rtl import benchmark
 
-WIRING: Any = None
-"""Nobody looks at it here."""
+WIRING: Any = None  #: Nobody looks at it here
 
 
 def test_the_first_build_alone_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,8 +22,7 @@ COLUMNS, ROWS = 8, 4
 PIXELS = COLUMNS * ROWS
 CYCLES = 8
 
-SECOND = np.arange(PIXELS, 2 * PIXELS, dtype=np.int32)
-"""Places in the second memory."""
+SECOND = np.arange(PIXELS, 2 * PIXELS, dtype=np.int32)  #: Places in the second memory
 
 
 def desk_with(*steps: object, tick_ns: int | None = None) -> Desk:

@@ -15,13 +15,7 @@ from ..runner import Runner
 
 
 class Harness(Runner, HostSide):
-    """Memories, the camera's register file, and its supply.
-
-    Attributes:
-        registers: of the camera; None while it does not answer.
-        captures: addresses of requested frames.
-        stopped: how often one was given up.
-    """
+    """Memories, the camera's register file, and its supply."""
 
     interface = INTERFACE
 
@@ -32,9 +26,10 @@ class Harness(Runner, HostSide):
         self.catalogue_flash: NDArray[np.uint8] = np.full(FLASH_BYTES, 0xFF, np.uint8)
         self.flash = FlashStore()
         self.reset_cause = 1
+        #: registers: of the camera; None while it does not answer
         self.registers: dict[int, int] | None = {r.address: r.reset for r in REGISTERS}
-        self.captures: list[NDArray[np.uint8]] = []
-        self.stopped = 0
+        self.captures: list[NDArray[np.uint8]] = []  #: addresses of requested frames
+        self.stopped = 0  #: how often one was given up
         self.camera_on = True
 
     def start_capture(self, target: NDArray[np.uint8]) -> None:

@@ -17,8 +17,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 
 Array = NDArray[np.float64]
 
-FALSE_STAR = 0
-"""Stands for the Hipparcos number of a star that does not exist."""
+FALSE_STAR = 0  #: Stands for the Hipparcos number of a star that does not exist
 
 FIELD = CameraField()
 

@@ -12,16 +12,12 @@ from .harness import Harness
 
 
 class Served(Harness):
-    """A link with canned telemetry.
-
-    Attributes:
-        told: urgent telecommands, by their names.
-    """
+    """A link with canned telemetry."""
 
     def __init__(self) -> None:
         super().__init__()
         self.state = State(self.flash)
-        self.told: list[str] = []
+        self.told: list[str] = []  #: urgent telecommands, by their names
         self._link = AramisLink(self, self.meter, self.state, Message.reset_values, self.tell)
 
     @property

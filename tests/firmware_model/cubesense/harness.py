@@ -42,21 +42,15 @@ LINES = ("SHIFT", "EDGE", "RNW")
 
 
 class SccbCamera:
-    """A camera's registers behind its two lines.
-
-    Attributes:
-        writes: (address, value) of every register written.
-        registers: values by name, as far as written since power-up.
-        answers: whether it acknowledges.
-    """
+    """A camera's registers behind its two lines."""
 
     def __init__(self) -> None:
-        self.writes: list[tuple[int, int]] = []
-        self.answers = True
+        self.writes: list[tuple[int, int]] = []  #: (address, value) of every register written
+        self.answers = True  #: whether it acknowledges
         self.power_up()
 
     def power_up(self) -> None:
-        self.registers: dict[str, int] = {}
+        self.registers: dict[str, int] = {}  #: values by name, as far as written since power-up
         self._slave = SccbSlave(REGISTERS.i2c_address, self._write)
 
     def set(self, line: str, level: int, now_ns: int) -> None:
@@ -76,18 +70,7 @@ class SccbCamera:
 
 
 class Harness(Runner, HostSide):
-    """A program on fake hardware.
-
-    Attributes:
-        switches: of the program; the FPGAs are not those as flown.
-        scenes: what each camera sends, (480, 640); None: it is dead.
-        memories: what each memory holds.
-        wait_us: from the store command to a picture's first row.
-        latched: memories that draw ``LATCH_UP_MA`` until their supply is off.
-        cameras: control bus of each camera.
-        pins: output pins.
-        bench_sent, bench_backlog: as ``sent`` and ``backlog``, of the bench protocol's port.
-    """
+    """A program on fake hardware."""
 
     interface = INTERFACE
     boot_us = 5_000
@@ -98,24 +81,29 @@ class Harness(Runner, HostSide):
     ) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, PIC18F45K20)
+        #: switches: of the program; the FPGAs are not those as flown
         self.switches = replace(switches, gateware="corrected")
         self.mcu_addressing = mcu_addressing
         self.serial_number = "CS0042"
         dark = np.full((ROWS, COLUMNS), 34, np.uint8)
+        #: scenes: what each camera sends, (480, 640); None: it is dead
         self.scenes: dict[Camera, NDArray[np.uint8] | None] = dict.fromkeys(Camera, dark)
-        self.wait_us = 17_500
+        self.wait_us = 17_500  #: from the store command to a picture's first row
         self.supply_ma = {pins.Monitor.SUPPLY_3V3: 31.4, pins.Monitor.SUPPLY_5V: 12.0}
         self.memory_ma = 5.0
         self.power_on()
 
     def power_on(self) -> None:
+        #: what each memory holds
         self.memories = {sram: np.full((ROWS, COLUMNS), LOST, np.uint8) for sram in Sram}
+        #: memories that draw ``LATCH_UP_MA`` until their supply is off
         self.latched: set[Sram] = set()
-        self.cameras = {camera: SccbCamera() for camera in Camera}
+        self.cameras = {camera: SccbCamera() for camera in Camera}  #: control bus of each camera
         self.sent.clear()
+        #: bench_sent, bench_backlog: as ``sent`` and ``backlog``, of the bench protocol's port
         self.bench_sent = bytearray()
         self.now_ns = self.backlog = self.bench_backlog = 0
-        self.pins: dict[str, int] = {}
+        self.pins: dict[str, int] = {}  #: output pins
         self._boot()
         self.run()
 

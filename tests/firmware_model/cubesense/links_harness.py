@@ -26,30 +26,24 @@ BENCH_BYTE_US = 87
 
 
 class Links(Runner, HostSide):
-    """Everything between the pins of the buses and the main loop.
-
-    Attributes:
-        pictures: what each memory holds, (2, 307200).
-        off: memories without supply.
-        done: what the program did beside reading: measurements, restarts, cleared flags.
-        opened: memories whose pictures were begun, in order.
-        read, skipped: bytes read and passed over.
-        outcome: capture result of the next measurements.
-        bench_sent: bytes that the bench protocol's port got.
-    """
+    """Everything between the pins of the buses and the main loop."""
 
     interface = INTERFACE
 
     def __init__(self, *, mcu_addressing: bool = False) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, PIC18F45K20)
+        #: what each memory holds, (2, 307200)
         self.pictures: NDArray[np.uint8] = np.zeros((2, codes.IMAGE_BYTES), np.uint8)
-        self.off: set[codes.Sram] = set()
+        self.off: set[codes.Sram] = set()  #: memories without supply
+        #: done: what the program did beside reading: measurements, restarts, cleared flags
         self.done: list[tuple[object, ...]] = []
-        self.opened: list[codes.Sram] = []
+        self.opened: list[codes.Sram] = []  #: memories whose pictures were begun, in order
+        #: read, skipped: bytes read and passed over
         self.read = self.skipped = 0
+        #: capture result of the next measurements
         self.outcome = codes.CaptureResult.STORED_OWN_SRAM
-        self.bench_sent = bytearray()
+        self.bench_sent = bytearray()  #: bytes that the bench protocol's port got
         self._free_us = 0
         self.woken = 0
         self.amps = {monitor: 1.5 + index for index, monitor in enumerate(pins.Monitor)}

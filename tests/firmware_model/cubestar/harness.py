@@ -38,19 +38,7 @@ SHORTEST_DELAY_US = 10_000
 
 
 class Harness(Runner, HostSide):
-    """A program on fake hardware.
-
-    Attributes:
-        picture: what the FPGA delivers.
-        algorithms: switches of the program.
-        camera_refuses: whether the camera leaves a message with these bytes unanswered.
-        frame_us: from the FPGA's ENABLE to ACK; None: the frame never comes.
-        pins: output pins.
-        camera: the camera's registers by address, as far as they were written.
-        camera_writes: data of every message on the camera bus.
-        currents: what the channels draw when they are on, in mA.
-        switches: state of the load switches.
-    """
+    """A program on fake hardware."""
 
     interface = INTERFACE
     boot_us = 3_000
@@ -61,22 +49,27 @@ class Harness(Runner, HostSide):
     ) -> None:
         HostSide.__init__(self)
         Runner.__init__(self, CORTEX_M3)
+        #: algorithms: switches of the program
         self.catalogue, self.algorithms = catalogue, switches
         self.flash = FlashStore()
-        self.picture: NDArray[np.uint8] = np.zeros((512, 1024), np.uint8)
+        self.picture: NDArray[np.uint8] = np.zeros((512, 1024), np.uint8)  #: what the FPGA delivers
+        #: camera_refuses: whether the camera leaves a message with these bytes unanswered
         self.camera_refuses: Callable[[bytes], bool] = lambda _data: False
+        #: from the FPGA's ENABLE to ACK; None: the frame never comes
         self.frame_us: int | None = FRAME_US
+        #: what the channels draw when they are on, in mA
         self.currents = {"memory": 2.0, "imager": 52.8}
-        self.camera_writes: list[bytes] = []
+        self.camera_writes: list[bytes] = []  #: data of every message on the camera bus
         self.power_on()
 
     def power_on(self) -> None:
         """Power up, or off and on again: only flash stays."""
         self.external_ram = np.full(EXTERNAL_RAM_BYTES, 0xA5, np.uint8)
         self.retention = bytearray(RETENTION_BYTES)
-        self.pins = {"ENABLE": 0, "RNW": 0, "BANK": 0}
+        self.pins = {"ENABLE": 0, "RNW": 0, "BANK": 0}  #: output pins
+        #: camera: the camera's registers by address, as far as they were written
         self.camera: dict[int, int] = {}
-        self.switches = {"memory": True, "imager": True}
+        self.switches = {"memory": True, "imager": True}  #: state of the load switches
         self.now_ns = self.backlog = 0
         self.sent.clear()
         self.reset_causes: set[int] = {ResetCause.POWER_ON}

@@ -15,8 +15,7 @@ from .sky import Sky
 
 EFFECTS: dict[str, object] = {}
 
-#: Decorator: the test shows what the named telecommands do.
-telecommand = registered_in(EFFECTS)
+telecommand = registered_in(EFFECTS)  #: Decorator: the test shows what the named telecommands do
 
 
 def test_every_telecommand_has_an_effect_and_no_other_does(unit: Harness) -> None:

@@ -52,8 +52,7 @@ ELSEWHERE = {
 }  # fmt: skip
 
 
-#: Decorator: the test is of the named telemetry.
-telemetry = registered_in(CHECKS)
+telemetry = registered_in(CHECKS)  #: Decorator: the test is of the named telemetry
 
 
 def test_every_frame_is_tested_once() -> None:

@@ -12,8 +12,7 @@ from tests.hdl.harness.store_states import left_in, read_state, steps
 #: The design that is simulated, or None for one that is no top of ours.
 TOP = CUBESTAR.get(os.environ.get("DESIGN", ""))
 
-#: Periods without an edge after which a clock has stopped; stalls are shorter.
-STOPPED = 25
+STOPPED = 25  #: Periods without an edge after which a clock has stopped; stalls are shorter
 
 
 def sample(

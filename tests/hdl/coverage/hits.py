@@ -11,8 +11,7 @@ from pathlib import Path
 
 from tests.hdl.coverage.points import GROUPS, Point
 
-#: Points that this process noted.
-_noted: set[tuple[str, Point]] = set()
+_noted: set[tuple[str, Point]] = set()  #: Points that this process noted
 
 _POINTS = {name: frozenset(group.points()) for name, group in GROUPS.items()}
 

@@ -37,8 +37,7 @@ READ_FROM_STATES = ("no clock", "addressed byte", "next bytes")
 #: Pixel clocks in MHz: the range, the sensors' own, and between.
 PIXEL_MHZ = (1.0, 2.0, 5.0, 10.0, 13.5, 20.0)
 
-#: Steps of the pixel clock's phase against the processor's.
-PHASES = 8
+PHASES = 8  #: Steps of the pixel clock's phase against the processor's
 
 #: The testbenches that ``harness.any_top`` and ``harness.rates`` run on.
 TESTBENCHES = [f"{name}Testbench" for name in ("Published", "Shared", "Double", "Boards", "Pair")]

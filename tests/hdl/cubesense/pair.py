@@ -22,8 +22,7 @@ from tests.hdl.harness.testbench import Testbench
 from tests.hdl.harness.timing import ANY, Timing
 from tests.hdl.harness.watching import Levels, levels, never_high, watch
 
-#: Camera and memory.
-Place = tuple[str, str]
+Place = tuple[str, str]  #: Camera and memory
 
 PREFIXES = {"sun": "SUN", "nadir": "NAD"}
 OTHER = {"sun": "nadir", "nadir": "sun"}

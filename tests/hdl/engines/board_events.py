@@ -23,17 +23,14 @@ from cubestack.hdl.cubestar.top import CubeStarTop
 from cubestack.hdl.cubestar.two_boards import CubeStarTwoBoards
 from tests.hdl.regression import SMALLEST
 
-#: Between two events at least; a bench in Verilog needs some of it to settle.
-SPACING_PS = 10
+SPACING_PS = 10  #: Between two events at least; a bench in Verilog needs some of it to settle
 
 #: Of CubeStar's tops: so wide that the bus' address latch has bits; no power of two.
 COLUMNS, ROWS = 18, 5
 
-#: One more than the memories on the bus have.
-ADDRESS_BITS = 10
+ADDRESS_BITS = 10  #: One more than the memories on the bus have
 
-#: Wait in ps, then the pin to drive and its level.
-Step = tuple[int, str, int]
+Step = tuple[int, str, int]  #: Wait in ps, then the pin to drive and its level
 Rng = np.random.Generator
 Script = Callable[[Rng], Iterator[Step]]
 

@@ -14,8 +14,7 @@ from tests.hdl.harness.reference import Pulse
 
 UNKNOWN = LogicArray("X" * 8)
 
-#: An SRAM's pins that the FPGA drives.
-OUTPUTS = ("A", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")
+OUTPUTS = ("A", "D_O", "D_OE", "CE_N", "OE_N", "WE_N")  #: An SRAM's pins that the FPGA drives
 
 #: Longest time in ps from an address to its byte. The real part is quicker than this.
 SLOWEST_ACCESS = 12_000

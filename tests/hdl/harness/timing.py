@@ -32,8 +32,7 @@ class Timing:
     pauses: tuple[int, int] = (1_000, 20_000)  # between two changes of the external bus's pins
 
 
-#: Rates at random, unless a test says more.
-ANY = Timing()
+ANY = Timing()  #: Rates at random, unless a test says more
 
 #: Idle times and back-pressure by name.
 PRESSURES = {

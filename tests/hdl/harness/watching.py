@@ -10,8 +10,7 @@ from cocotb.triggers import ReadOnly
 from tests.hdl.harness.geometry import GEOMETRY
 from tests.hdl.harness.instants import ODD, now, wait
 
-#: (time in ps, level) whenever a pin has changed.
-Levels = list[tuple[int, int]]
+Levels = list[tuple[int, int]]  #: (time in ps, level) whenever a pin has changed
 
 
 async def watch(signal: Any, seen: Levels) -> None:

@@ -57,11 +57,9 @@ opt -full
 
 _START = "-set-at 1 standby 1 -set-at 1 retained 1"
 
-#: Registers wider than this are not guessed about.
-_NARROW_BITS = 4
+_NARROW_BITS = 4  #: Registers wider than this are not guessed about
 
-#: Counterexamples looked for at once.
-_GROUPS = 12
+_GROUPS = 12  #: Counterexamples looked for at once
 
 #: Steps of a counterexample, at most and before more is guessed; a clock takes two.
 STEPS, SOON = 40, 16

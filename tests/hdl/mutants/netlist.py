@@ -46,8 +46,7 @@ write_verilog -noattr -norename mutants.v
 _CONTROL = "chosen_mutant"
 _CONTROL_BITS = 16
 
-#: More than any design here has.
-_ALL = 10**6
+_ALL = 10**6  #: More than any design here has
 
 _SOURCE = re.compile(r'^(\s*attribute \\src ")([^"]*)"$', re.MULTILINE)
 _OPTION = re.compile(r" -(\S+) (\S+)")

@@ -21,8 +21,7 @@ from tests.hdl.regression import Outcome, build, simulate
 #: A simulation hangs after this multiple of its duration without a mutant, and at least 120 s.
 PATIENCE, SHORTEST = 20, 120
 
-#: Mutants in one compiled file.
-CHUNK = 250
+CHUNK = 250  #: Mutants in one compiled file
 
 
 @dataclass(frozen=True)

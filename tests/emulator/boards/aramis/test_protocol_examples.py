@@ -6,8 +6,7 @@ from pathlib import Path
 from .desk import Desk
 
 PAGE = Path(__file__).parents[4] / "docs" / "protocols-aramis.md"
-NEXT_S = 1.5
-"""From one request to the next: a measurement is over by then."""
+NEXT_S = 1.5  #: From one request to the next: a measurement is over by then
 
 
 def exchanges() -> list[tuple[str, str]]:

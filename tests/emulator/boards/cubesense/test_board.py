@@ -20,8 +20,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera, Sram
 from cubestack.firmware_model.interface.cubesense.pins import MA_PER_COUNT, Monitor
 
 FRAME_MS = 34
-DETECT = bytes.fromhex("1f7f1401011fff")
-"""Capture and detect: nadir, SRAM2."""
+DETECT = bytes.fromhex("1f7f1401011fff")  #: Capture and detect: nadir, SRAM2
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 

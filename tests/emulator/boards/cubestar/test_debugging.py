@@ -32,8 +32,7 @@ GDB = shutil.which("gdb-multiarch")
 needs_gdb = pytest.mark.skipif(GDB is None, reason="needs gdb-multiarch")
 
 SKY = SkyScene(np.array([0.0, 0.0, 0.0, 1.0]), mag_limit=3.0)
-LIMIT_S = 60
-"""Wall time of a session with GDB."""
+LIMIT_S = 60  #: Wall time of a session with GDB
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,7 @@ pytestmark = [
     pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler"),
 ]
 
-RESULTS = 0x1_0000
-"""Where the programs leave their results, in RAM."""
+RESULTS = 0x1_0000  #: Where the programs leave their results, in RAM
 
 SKY = SkyScene(np.array([0.0, 0.0, 0.0, 1.0]), mag_limit=3.8)
 

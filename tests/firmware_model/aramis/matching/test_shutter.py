@@ -15,8 +15,7 @@ from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 
 from ..sky import FIELD, database, errors_deg, meter, picture
 
-ROLL = (0.0, 0.0, 0.0058)
-"""10 deg/s about the boresight over 33 ms, rad."""
+ROLL = (0.0, 0.0, 0.0058)  #: 10 deg/s about the boresight over 33 ms, rad
 ACROSS = (0.0005, 0.0009, 0.0)
 
 

@@ -25,6 +25,14 @@ def tracking(catalogue: StarCatalogue) -> Harness:
     return unit
 
 
+@pytest.fixture
+def unsure(tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch) -> Harness:
+    """After a fix; no fix counts as sure any more."""
+    monkeypatch.setattr(transitions, "SURE", 0.0)
+    seen(tracking, pose)
+    return tracking
+
+
 def seen(unit: Harness, pose: Rotation | None, wait_s: float = 0.0) -> tuple[MatchMode, Reason]:
     """Search that a picture taken after ``wait_s`` was identified by, and what came of it."""
     unit.run(until_us=unit.now_us + round(1e6 * wait_s))
@@ -111,15 +119,11 @@ def test_contradicting_fix_needs_confirmation(
     assert seen(tracking, elsewhere) == (TRACKING, Reason.SOLVED)
 
 
-def test_another_contradiction_replaces_the_candidate(
-    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(transitions, "SURE", 0.0)
-    seen(tracking, pose)
+def test_another_contradiction_replaces_the_candidate(unsure: Harness, pose: Rotation) -> None:
     for pose_after in (turned(pose, 60), turned(pose, -70)):
-        assert seen(tracking, pose_after, wait_s=5.0) == (LOST, Reason.CONTRADICTION)
-    assert seen(tracking, turned(pose, 2)) == (LOST, Reason.SOLVED)  # the base was right
-    assert tracking.program.state.candidate is None
+        assert seen(unsure, pose_after, wait_s=5.0) == (LOST, Reason.CONTRADICTION)
+    assert seen(unsure, turned(pose, 2)) == (LOST, Reason.SOLVED)  # the base was right
+    assert unsure.program.state.candidate is None
 
 
 def test_a_sure_fix_needs_no_second_one(tracking: Harness, pose: Rotation) -> None:
@@ -128,13 +132,9 @@ def test_a_sure_fix_needs_no_second_one(tracking: Harness, pose: Rotation) -> No
     assert tracking.telemetry("Quality")["LogFalseAlarm"] < np.log10(transitions.SURE)
 
 
-def test_a_base_contradicts_nothing_after_half_a_turn(
-    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(transitions, "SURE", 0.0)
-    seen(tracking, pose)
-    assert seen(tracking, turned(pose, 170), wait_s=181.0) == (LOST, Reason.SOLVED)
-    assert "IDModeError" in tracking.flags()
+def test_a_base_contradicts_nothing_after_half_a_turn(unsure: Harness, pose: Rotation) -> None:
+    assert seen(unsure, turned(pose, 170), wait_s=181.0) == (LOST, Reason.SOLVED)
+    assert "IDModeError" in unsure.flags()
 
 
 def test_base_keeps_its_age_across_a_reset_on_day_50(tracking: Harness, pose: Rotation) -> None:
@@ -145,38 +145,28 @@ def test_base_keeps_its_age_across_a_reset_on_day_50(tracking: Harness, pose: Ro
     assert seen(tracking, turned(pose, 0.2)) == (TRACKING, Reason.SOLVED)
 
 
-def test_commanded_lost_in_space_judges_each_picture_alone(
-    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(transitions, "SURE", 0.0)
-    seen(tracking, pose)
-    tracking.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
+def test_commanded_lost_in_space_judges_each_picture_alone(unsure: Harness, pose: Rotation) -> None:
+    unsure.command("setIDMode", IdMode=IdMode.LOST_IN_SPACE)
     for degrees in (60, -50, 10):
-        assert seen(tracking, turned(pose, degrees)) == (LOST, Reason.SOLVED)
-    tracking.command("setIDMode", IdMode=IdMode.TRACKING)
-    assert seen(tracking, turned(pose, 10.2)) == (TRACKING, Reason.SOLVED)
+        assert seen(unsure, turned(pose, degrees)) == (LOST, Reason.SOLVED)
+    unsure.command("setIDMode", IdMode=IdMode.TRACKING)
+    assert seen(unsure, turned(pose, 10.2)) == (TRACKING, Reason.SOLVED)
 
 
-def test_power_cycle_forgets_the_tracking_history(
-    tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(transitions, "SURE", 0.0)
-    seen(tracking, pose)
-    tracking.power_on()  # the attitude is in flash
-    tracking.command("setIDMode", IdMode=IdMode.TRACKING)
-    assert seen(tracking, turned(pose, 60)) == (LOST, Reason.SOLVED)
+def test_power_cycle_forgets_the_tracking_history(unsure: Harness, pose: Rotation) -> None:
+    unsure.power_on()  # the attitude is in flash
+    unsure.command("setIDMode", IdMode=IdMode.TRACKING)
+    assert seen(unsure, turned(pose, 60)) == (LOST, Reason.SOLVED)
 
 
 def test_a_candidate_and_the_quality_survive_the_loop_s_reset(
-    tracking: Harness, pose: Rotation, sky: Sky, monkeypatch: pytest.MonkeyPatch
+    unsure: Harness, pose: Rotation, sky: Sky
 ) -> None:
-    monkeypatch.setattr(transitions, "SURE", 0.0)
-    seen(tracking, pose)
-    seen(tracking, turned(pose, 60), wait_s=5.0)
-    quality, candidate = tracking.telemetry("Quality"), tracking.program.state.candidate
-    tracking.command("MCUReset")
-    after = tracking.program.state.candidate
+    seen(unsure, turned(pose, 60), wait_s=5.0)
+    quality, candidate = unsure.telemetry("Quality"), unsure.program.state.candidate
+    unsure.command("MCUReset")
+    after = unsure.program.state.candidate
     assert candidate is not None
     assert after is not None
     assert after.pack() == candidate.pack()
-    assert tracking.telemetry("Quality") == quality
+    assert unsure.telemetry("Quality") == quality
