@@ -100,9 +100,9 @@ def _act(emulation: Emulation, device: str, words: list[Any], text: str) -> Json
     return emulation.state()
 
 
-def _then_state(act: Callable[[Emulation], None]) -> Callable[[Emulation], JsonObject]:
-    def call(emulation: Emulation) -> JsonObject:
-        act(emulation)
+def _then_state(act: Callable[..., None]) -> Callable[..., JsonObject]:
+    def call(emulation: Emulation, **arguments: Any) -> JsonObject:
+        act(emulation, **arguments)
         return emulation.state()
 
     return call
@@ -126,25 +126,21 @@ CALLS = (
     ),
     Call(
         *("POST", "/run", "run to a virtual time as fast as possible, then hold"),
-        lambda emulation, to_s: emulation.run_to(to_s),
+        Emulation.run_to,
         {"to_s": (NUMBER, REQUIRED)},
     ),
     Call(
         *("POST", "/snapshot", "save the current time under a name"),
-        lambda emulation, name: _then_state(lambda one: one.snapshot(name))(emulation),
+        _then_state(Emulation.snapshot),
         {"name": (str, REQUIRED)},
     ),
     Call(
         *("POST", "/back", "go back to a time or a snapshot, then hold"),
-        lambda emulation, to: emulation.back(to),
+        Emulation.back,
         {"to": (TIME_OR_NAME, REQUIRED)},
     ),
     Call(
-        *(
-            "POST",
-            "/pace",
-            "real: speed virtual seconds per second; fast: ahead while devices work",
-        ),
+        *("POST", "/pace", "pace: real, with a speed, or fast"),
         _pace,
         {"pace": (str, "real"), "speed": (NUMBER, 1.0)},
     ),
@@ -159,14 +155,14 @@ CALLS = (
     Call("GET", "/devices/{device}/recording", "recording of its ports", Emulation.recording),
     Call(
         *("GET", "/devices/{device}/trace", "VCD file of a past time span"),
-        lambda emulation, device, from_s, to_s: emulation.trace(device, from_s, to_s),
+        Emulation.trace,
         {"from_s": (NUMBER, REQUIRED), "to_s": (NUMBER, REQUIRED)},
     ),
     Call("GET", "/devices/{device}/scene", "current scene, as a table", Emulation.scene),
     Call("GET", "/devices/{device}/scene/keys", "keys of scene files", Emulation.scene_keys),
     Call(
         *("POST", "/devices/{device}/scene/look", "position of another scene on the sky"),
-        lambda emulation, device, table: emulation.look(device, table),
+        Emulation.look,
         {"table": (dict, REQUIRED)},
     ),
     Call(

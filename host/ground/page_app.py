@@ -81,8 +81,8 @@ def page_app(sessions: "Sequence[Future[TargetSession]]") -> Starlette:
             Route("/targets", targets),
             get("pictures/{name}", relays.picture),
             get("recording", _recording),
-            get("transcript/{kind}", _transcript),
-            get("results/{kind}", _results),
+            get("transcript/{kind}", _table(transcript_table)),
+            get("results/{kind}", _table(results_table)),
             get("trace", relays.trace),
             get("detections/{name}", _detections),
             get("sensor-registers/{name}", _sensor_register),
@@ -177,20 +177,14 @@ async def _recording(session: TargetSession, _body: JsonObject, _path: JsonObjec
     return Response(content, media_type="text/plain", headers=_file(session, "rec"))
 
 
-async def _transcript(session: TargetSession, _body: JsonObject, path: JsonObject) -> Response:
-    return await _table(session, transcript_table, path["kind"])
+def _table(make: Callable[[TargetSession, str], bytes]) -> Any:
+    async def handle(session: TargetSession, _body: JsonObject, path: JsonObject) -> Response:
+        kind = path["kind"]
+        content = await asyncio.to_thread(make, session, kind)
+        media = "text/csv" if kind == "csv" else "application/vnd.apache.parquet"
+        return Response(content, media_type=media, headers=_file(session, kind))
 
-
-async def _results(session: TargetSession, _body: JsonObject, path: JsonObject) -> Response:
-    return await _table(session, results_table, path["kind"])
-
-
-async def _table(
-    session: TargetSession, make: Callable[[TargetSession, str], bytes], kind: str
-) -> Response:
-    content = await asyncio.to_thread(make, session, kind)
-    media = "text/csv" if kind == "csv" else "application/vnd.apache.parquet"
-    return Response(content, media_type=media, headers=_file(session, kind))
+    return handle
 
 
 async def _download(session: TargetSession, body: JsonObject, _path: JsonObject) -> JsonObject:

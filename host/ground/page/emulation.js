@@ -60,10 +60,9 @@ export class Emulation {
         button(`${channel} ${to}`, `${channel}-${to}`, () => execute(`power ${channel} ${to}`)),
       ),
     );
-    const chosen = Object.entries(about.chosen).map(([name, value]) => `${name} ${value}`);
     place.append(
       make("p", {}, "virtual time ", this.time),
-      note(chosen.join(", "), { id: "chosen" }),
+      note(listed(about.chosen), { id: "chosen" }),
       this.state,
       time,
       history,
@@ -92,16 +91,16 @@ export class Emulation {
     this.time.textContent = `${emulation.time_s.toFixed(6)} s`;
     const pace = emulation.pace === "fast" ? "fast" : String(emulation.speed);
     if (document.activeElement !== this.speed) this.speed.value = pace;
-    const currents = Object.entries(emulation.currents_ma)
-      .map(([name, current]) => `${name} ${current.toFixed(1)} mA`)
-      .join(", ");
-    const probes = Object.entries(emulation.probes)
-      .map(([name, value]) => `${name} ${value}`)
-      .join(", ");
+    const currents = listed(emulation.currents_ma, (current) => `${current.toFixed(1)} mA`);
+    const probes = listed(emulation.probes);
     const busy = emulation.held ? "paused" : emulation.busy ? "busy" : "waiting for the host";
     this.state.className = "quiet";
     this.state.textContent = `${emulation.goes_back ? "going back" : busy}; ${probes}; ${currents}`;
   }
+}
+
+function listed(values, text = String) {
+  return Object.entries(values).map(([name, value]) => `${name} ${text(value)}`).join(", ");
 }
 
 function disable(place, why) {

@@ -24,13 +24,41 @@ import { Waveform } from "./waveform.js";
 
 const MOST_LINES = 500;
 
+const TITLES = {
+  playback: "Playback",
+  picture: "Image",
+  transfer: "Image transfer",
+  attitude: "Attitude",
+  commands: "Commands",
+  settings: "Settings and registers",
+  log: "Log",
+  transcript: "Recording",
+  results: "Results",
+  timeline: "Timeline",
+  health: "Health",
+  emulation: "Emulation",
+  start: "Profile and firmware",
+  scene: "Scene",
+  waveform: "Waveform",
+  telemetry: "Telemetry",
+};
+
 const opened = Date.now();
-const lines = document.getElementById("lines");
+const lines = make("ol", { id: "lines", "aria-live": "polite" });
 const link = document.getElementById("link");
 let live = null;
 let targets = [];
 let selected = 0;
 let reloading = false;
+
+function addSections() {
+  for (const [id, textContent] of Object.entries(TITLES)) {
+    const title = make("h2", { id: `${id}-title`, textContent });
+    const attributes = { id, "aria-labelledby": title.id, hidden: id === "playback" };
+    document.querySelector("main").append(make("section", attributes, title));
+  }
+  document.getElementById("log").append(lines);
+}
 
 function report(text, kind = "") {
   const time = new Date().toLocaleTimeString();
@@ -150,6 +178,7 @@ async function reload() {
 }
 
 async function start() {
+  addSections();
   link.textContent = "waiting for the devices to start";
   targets = await ask("/targets");
   const buttons = targets.map((about, number) =>

@@ -37,7 +37,7 @@ export class Pictures {
     const key = (kind, text) => make("li", { className: kind, textContent: text });
     this.legend = make(
       "ul",
-      { id: "detections-legend", hidden: true },
+      { id: "detections-legend", className: "legend", hidden: true },
       key("identified", "identified"),
       key("unidentified", "not identified"),
       key("fitted", "fitted curve or window"),

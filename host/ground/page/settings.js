@@ -18,12 +18,12 @@ export class Settings {
     const { registers, sensor_registers } = about.missing;
     this.table(place, "registers", "register", registers, about.registers, {
       name: (one) => one.name,
-      where: (one) => `${address(one)}, ${one.access}`,
+      where: registerPlace,
       read: (rows) => this.readRegisters(rows),
     });
     this.table(place, "sensor", "image sensor register", sensor_registers, about.sensor_registers, {
       name: (one) => one.name,
-      where: (one) => `${address(one)}, ${one.access}`,
+      where: registerPlace,
       read: (rows) => this.readSensor(rows),
     });
   }
@@ -107,6 +107,10 @@ function same({ type, default: reset }, found) {
   if (found === null) return false;
   if (type === "f32") return found.toPrecision(DIGITS) === reset.toPrecision(DIGITS);
   return typeof found === "string" ? found === reset : Number(found) === Number(reset);
+}
+
+function registerPlace(one) {
+  return `${address(one)}, ${one.access}`;
 }
 
 function address(one) {

@@ -55,14 +55,8 @@ export class Telemetry {
         disabled: !number,
       });
       const name = make("th", { scope: "row", title: field.details, textContent: field.name });
-      return make(
-        "tr",
-        {},
-        name,
-        value,
-        make("td", { className: "quiet", textContent: field.unit }),
-        make("td", {}, beside("plot", plot)),
-      );
+      const unit = make("td", { className: "quiet", textContent: field.unit });
+      return make("tr", {}, name, value, unit, make("td", {}, beside("plot", plot)));
     });
     this.table.replaceChildren(...rows);
     this.subscribe(this.names());

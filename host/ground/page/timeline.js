@@ -39,7 +39,7 @@ export class Timeline {
     this.status = note("", { id: "timeline-status" });
     this.canvas = make("canvas", { id: "bands-canvas", width: 300, height: 1, role: "img" });
     this.canvas.setAttribute("aria-label", "named values over time");
-    this.legend = make("ul", { id: "timeline-legend" });
+    this.legend = make("ul", { id: "timeline-legend", className: "legend" });
     place.append(
       row(labelled("field", this.field), add, labelled("time span", this.span)),
       this.buttons,

@@ -85,11 +85,11 @@ def test_live_texts_are_escaped(chromium: Any, address: str) -> None:
 
 def test_live_errors_are_escaped(chromium: Any, address: str) -> None:
     def change(told: dict[str, Any]) -> dict[str, Any]:
-        carried = {"what": HOSTILE, "done": 1, "total": 2, "held": False, "ended": HOSTILE}
+        transfer = {"what": HOSTILE, "done": 1, "total": 2, "paused": False, "ended": HOSTILE}
         return {
             "link": told["link"] | {"failed": 1, "broken": True, "error": HOSTILE},
-            "carried": carried | {"saved": False},
-            "played": None,
+            "transfer": transfer | {"saved": False},
+            "playback": None,
             "values": {frame: {"error": HOSTILE} for frame in told.get("values", {})},
             "results": {"error": HOSTILE},
             "emulation": {"error": HOSTILE},
