@@ -15,7 +15,7 @@ from tests.hdl.engines.icarus_board import IcarusBoard
 from .cameras import ListCamera
 
 Command = tuple[int, str, int]
-"""At a time in ps: a pin takes a level, "power MEMORY" is 1 or 0, or "strobe" reads bytes."""
+"""At a time in ps: a pin takes a level, or "strobe" reads bytes."""
 
 
 class Outcome(NamedTuple):
@@ -50,8 +50,6 @@ def run_engine(
             made = engine.strobe_read(out, Fraction(strobe_ps), time_ps + value * strobe_ps)
             assert made == value
             data += out.tobytes()
-        elif name.startswith("power"):
-            engine.power_memory(name.split()[1], bool(value))
         else:
             engine.set_pin(name, value)
     return Outcome({name: m.tobytes() for name, m in engine.memories.items()}, data, acks)

@@ -1,20 +1,21 @@
-"""Compiled engine against Icarus Verilog, whose Verilog of the design comes the other way."""
+"""Whole frames on the compiled engine and on Icarus Verilog.
+
+Random commands are compared in tests/hdl/engines and in test_equivalence.
+"""
 
 import shutil
 from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar.wiring import cubestar_wiring
 from cubestack.emulator.rtl.factory import make_engine
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.hdl.cubestar.top import CubeStarTop
-from tests.tiers import quick
 
-from .cameras import ListCamera, plain_camera, random_camera
+from .cameras import ListCamera, plain_camera
 from .commanded import Command, CommandedIcarus, Outcome, run_engine
 
 pytestmark = pytest.mark.skipif(
@@ -22,7 +23,6 @@ pytestmark = pytest.mark.skipif(
 )
 
 STROBE_PERIOD = 1_000_000
-COMMANDS = ("ENABLE", "RNW", "BANK", "strobe")
 
 
 class Star(NamedTuple):
@@ -41,35 +41,6 @@ class Star(NamedTuple):
 def star(folder: Path, top: CubeStarTop, camera: ListCamera) -> Star:
     wiring = cubestar_wiring(top)
     return Star(wiring, CommandedIcarus(folder, wiring, STROBE_PERIOD), camera)
-
-
-def random_commands(rng: np.random.Generator, camera, count: int) -> list[Command]:
-    """Toggles at any moment, and bursts of reading in every mode that leaves the clock alone."""
-    commands: list[Command] = []
-    time_ps, levels = 0, {"ENABLE": 0, "RNW": 0, "BANK": 0}
-    for _ in range(count):
-        time_ps += int(rng.exponential(camera.end_ps / count))
-        name = str(rng.choice(COMMANDS, p=[0.5, 0.2, 0.1, 0.2]))
-        if name == "strobe":
-            value = int(rng.integers(1, 50))
-            # While storing, no frame may be completed inside the burst: its time would be lost.
-            if levels["ENABLE"] and not levels["RNW"]:
-                continue
-        else:
-            value = int(rng.random() < (0.75 if name == "ENABLE" else 0.3))
-            levels[name] = value
-        commands.append((time_ps, name, value))
-        time_ps += value * STROBE_PERIOD if name == "strobe" else 0
-    return [*commands, (max(time_ps, camera.end_ps) + STROBE_PERIOD, "ENABLE", levels["ENABLE"])]
-
-
-@pytest.mark.parametrize("seed", quick(range(12), 6))
-def test_random_commands(seed, tmp_path):
-    rng = np.random.default_rng(seed)
-    top = CubeStarTop(*((8, 4), (5, 3))[seed % 2])
-    camera = random_camera(rng, top.columns, top.rows)
-    commands = random_commands(rng, camera, 25)
-    star(tmp_path, top, camera).outcome(commands)
 
 
 @pytest.mark.parametrize("bank", [0, 1])
