@@ -161,12 +161,6 @@ def test_every_float_operation_of_the_other_star_tracker_is_there() -> None:
     assert floats <= set(BLACKFIN_BF533.operations)
 
 
-def test_reading_the_flash_once_takes_the_bus_time() -> None:
-    meter = Meter(BLACKFIN_BF533)
-    meter.charge(flash_read=1_000_000)
-    assert BLACKFIN_BF533.seconds(meter.total) == pytest.approx(11 / 120)
-
-
 # --- PIC18 ----------------------------------------------------------------------------------------
 
 

@@ -43,6 +43,7 @@ BITS = {
 def test_every_register_is_where_it_is_published() -> None:
     assert {register.name: register.address for register in ov7620.REGISTERS} == PUBLISHED
     assert {register.width for register in ov7620.REGISTERS} == {1}
+    assert ov7620.REGISTERS["GAIN"].bits == 0x3F  # of eight
     assert (ov7620.REGISTERS.i2c_address << 1, ov7620.REGISTERS.address_bytes) == (0x42, 1)
 
 
@@ -51,23 +52,16 @@ def test_bits_are_where_they_are_published(register: str, field: str) -> None:
     assert ov7620.REGISTERS[register].field(field).mask == BITS[register, field]
 
 
-def test_gain_has_six_bits() -> None:
-    assert ov7620.REGISTERS["GAIN"].bits == 0x3F
-
-
 def test_the_window_after_a_reset_is_the_whole_picture() -> None:
     edges = [ov7620.REGISTERS[name].reset for name in ("HSTART", "HSTOP", "VSTART", "VSTOP")]
     assert edges == [0x2F, 0xCF, 0x05, 0xF5]
     assert (ov7620.window_column(323), ov7620.window_row(101)) == (0x2F + 80, 0x05 + 50)
 
 
-def test_timing_is_that_of_ccir_601() -> None:
+def test_timing_after_reset_is_that_of_ccir_601() -> None:
     line_s = ov7620.CLOCKS_PER_LINE / ov7620.PIXEL_CLOCK_HZ
     assert ov7620.LINES_PER_FRAME * line_s == pytest.approx(33.37e-3, rel=1e-3)
     assert ov7620.EXPOSURE_LINES * line_s == pytest.approx(127e-6, rel=1e-3)
-
-
-def test_after_a_reset_nothing_slows_the_frames_down() -> None:
-    """The timing above is that of registers as they are then: clock undivided, rate unadjusted."""
+    # That holds for the reset values: clock undivided, rate unadjusted.
     names = ("CLOCK_DIVIDER", "FRAME_RATE_HIGH", "FRAME_RATE_LOW")
     assert [ov7620.REGISTERS[name].reset for name in names] == [0, 0, 0]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.firmware_model.interface.codec.field import Value
-from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize, TaskStatus
+from cubestack.firmware_model.interface.cubestar import INTERFACE, ImageBlockSize
 
 PRINTED = Path(__file__).with_name("printed_layouts.txt").read_text(encoding="ascii")
 
@@ -176,16 +176,8 @@ def test_poles_and_both_conventions_of_right_ascension_are_allowed() -> None:
             assert not message.violations(message.unpack(data))
 
 
-def test_stepping_telemetry() -> None:
+def test_stepping_and_unsupported_messages() -> None:
     assert {message.name for message in INTERFACE.messages if message.steps} == STEPPING
-
-
-def test_only_the_later_sensors_set_up_is_unsupported() -> None:
     unsupported = [message.id for message in INTERFACE.messages if not message.supported]
     assert unsupported == [138]
     assert INTERFACE.find(138) is None
-
-
-def test_named_numbers() -> None:
-    assert TaskStatus(29) is TaskStatus.CALCULATED
-    assert [size.length for size in ImageBlockSize] == [32, 64, 128, 256]
