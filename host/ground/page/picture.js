@@ -136,7 +136,7 @@ export class Pictures {
     const hidden = this.zoomFrame.drawOver((pen, place, size) =>
       drawDetections(pen, this.detected, place, size, this.magnitudes.checked),
     );
-    this.hidden.textContent = hidden ? `${hidden} names do not fit; zoom in to read them` : "";
+    this.hidden.textContent = hidden ? `names hidden: ${hidden}; zoom in to read them` : "";
   }
 
   point(event) {
