@@ -92,7 +92,7 @@ def test_flip_flop_with_enable_and_clear_is_one_tile():
     assert (*count, count.total) == (0, 1, 1)
 
 
-def test_unknown_cell_is_refused():
+def test_rejects_unknown_cell():
     with pytest.raises(area.UnknownCellError, match=r"not of \$mul"):
         count_tiles(Function(4, lambda a, b: a * b, 8))
 

@@ -107,7 +107,7 @@ def test_a_master_reads_and_writes_its_camera() -> None:
     assert bus.read(1) == [bus.camera.registers.peek(1) >> 8]
 
 
-def test_a_write_takes_effect_at_its_end_and_once() -> None:
+def test_write_takes_effect_once_at_its_end() -> None:
     bus = Bus()
     bus.write(0x09, 0x55, 0xAA, stop=False)
     assert bus.camera.registers.peek(9) == 0x0419
@@ -211,7 +211,7 @@ def test_nearby_rate_snaps_to_host_or_board_rate(processor: Any, baud: float, ta
     assert line.uart.form.baud == pytest.approx(taken, abs=1)
 
 
-def test_what_is_sent_at_other_pins_is_not_the_line_s(processor: Any) -> None:
+def test_bytes_at_other_pins_are_not_on_the_line(processor: Any) -> None:
     line = Line(processor)
     line.send(0x41, 10, 9600, pin=TX + 1)
     assert line.uart.backlog == 0
@@ -219,7 +219,7 @@ def test_what_is_sent_at_other_pins_is_not_the_line_s(processor: Any) -> None:
     assert line.uart.backlog == 1
 
 
-def test_what_arrives_is_received_at_the_line_s_rate(processor: Any) -> None:
+def test_bytes_are_received_at_the_line_s_rate(processor: Any) -> None:
     line = Line(processor)
     line.uart.host_writes(b"\xa5")
     line.kernel.advance_to(PS_PER_S)

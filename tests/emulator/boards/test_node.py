@@ -66,7 +66,7 @@ def test_pins_of_the_processor_lead_to_the_board() -> None:
         node.telemetry("Level")
 
 
-def test_the_check_of_a_program_changes_nothing_on_the_board() -> None:
+def test_checking_a_program_leaves_the_board_unchanged() -> None:
     checked, unchecked = DoublerBoard(1, seed=5), DoublerBoard(1, seed=5)
     unchecked.rng.random()
     assert checked.processor.meter.total == 0

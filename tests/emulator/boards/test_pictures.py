@@ -23,7 +23,7 @@ def take(name: str, emulated: AnyEmulated) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_picture_is_the_one_that_the_device_sends(name: str) -> None:
+def test_image_equals_the_one_sent_by_the_device(name: str) -> None:
     with open_device(name) as emulated:
         take(name, emulated)
         sent = emulated.client.picture()
@@ -32,7 +32,7 @@ def test_a_picture_is_the_one_that_the_device_sends(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_memories_have_what_was_taken(name: str) -> None:
+def test_memories_contain_the_captured_image(name: str) -> None:
     with open_device(name) as emulated:
         before = {at: picture.copy() for at, picture in emulated.board.pictures().items()}
         take(name, emulated)

@@ -123,7 +123,7 @@ def test_cancelled_waiter_does_not_block_the_bus(granted):
     [(0x1A, "0x1a is already in use")]
     + [(address, r"is not in 0x08\.\.0x77") for address in (-1, 0x00, 0x07, 0x78, 0x3FF)],
 )
-def test_reserved_and_taken_addresses_are_refused(address, text):
+def test_rejects_reserved_and_used_addresses(address, text):
     _, bus = make(x1A=Memory())
     with pytest.raises(ValueError, match=text):
         bus.attach(address, Memory())

@@ -60,7 +60,7 @@ def test_reports_every_pause_once(desk):
     assert desk.silences == [(20 * i + 1 + SILENCE) * BYTE for i in range(3)]
 
 
-def test_pause_that_is_too_short_is_no_silence(desk):
+def test_short_pause_is_not_a_silence(desk):
     for _ in range(10):
         desk.uart.host_writes(b"a")
         desk.kernel.advance_to(desk.kernel.now + (1 + SILENCE) * BYTE - 1)

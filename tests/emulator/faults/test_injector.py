@@ -50,7 +50,7 @@ def desk() -> Desk:
     return Desk()
 
 
-def test_a_fault_acts_at_once_until_it_is_cleared(desk: Desk) -> None:
+def test_fault_is_active_until_cleared(desk: Desk) -> None:
     injection = desk.faults.inject("uart-drop")
     assert (injection.number, injection.target, injection.start_ps) == (0, "uart", 0)
     assert (injection.end_ps, injection.seed) == (None, 3)
@@ -63,7 +63,7 @@ def test_a_fault_acts_at_once_until_it_is_cleared(desk: Desk) -> None:
     assert injection.end_ps == PS_PER_S
 
 
-def test_a_fault_acts_for_its_time(desk: Desk) -> None:
+def test_fault_is_active_for_its_duration(desk: Desk) -> None:
     first = desk.faults.inject(UartDrop(), at_s=1.0, for_s=0.5)
     second = desk.faults.inject(UartDrop(), at_s=2.0)
     assert [first.number, second.number] == [0, 1]
@@ -154,7 +154,7 @@ def plan(*kinds: str) -> Plan:
     return Plan(9, tuple(PlannedFault(fault) for fault in made), "p.toml")
 
 
-def test_a_plan_brings_its_seed(desk: Desk) -> None:
+def test_plan_sets_the_seed(desk: Desk) -> None:
     loaded = desk.faults.load(plan("uart-drop", "latch-up"))
     assert [one.seed for one in loaded] == [9, 9] == [desk.faults.seed] * 2
     assert [one.number for one in loaded] == [0, 1]
@@ -182,7 +182,7 @@ def test_log_is_limited_but_counts_everything(desk: Desk, monkeypatch: pytest.Mo
     assert str(told[0]).startswith("0.000000000 s uart-drop uart: ")
 
 
-def test_an_injection_s_numbers_are_its_own() -> None:
+def test_each_injection_has_its_own_random_numbers() -> None:
     def made(number: int = 0, seed: int = 5) -> Injection:
         return Injection(number, UartDrop(), "uart", 10, 20, seed)
 

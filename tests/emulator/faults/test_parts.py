@@ -31,7 +31,7 @@ class Part:
 
 
 @pytest.mark.parametrize("per_s", [100.0, 0.9 * MOST_UPSETS_PER_S, 10 * MOST_UPSETS_PER_S])
-def test_upsets_come_at_their_rate_all_over(per_s: float) -> None:
+def test_upsets_follow_the_rate_everywhere(per_s: float) -> None:
     part = Part(per_s / BITS)
     found = part.run(2.0)
     odd = BITS / 2 * -np.expm1(-2 * 2 * per_s / BITS)  # turned over once, or three times, ...
@@ -42,7 +42,7 @@ def test_upsets_come_at_their_rate_all_over(per_s: float) -> None:
     assert max(planes) - min(planes) < 10 * np.sqrt(found / 8)
 
 
-def test_even_the_highest_rate_takes_a_bounded_number_of_steps() -> None:
+def test_highest_rate_takes_a_bounded_number_of_steps() -> None:
     part = Part(1.0)
     assert part.run(0.1) == pytest.approx(BITS / 2 * -np.expm1(-0.2), rel=0.02)
     assert len(part.log) == round(0.1 / BATCH_S) - 1
@@ -50,7 +50,7 @@ def test_even_the_highest_rate_takes_a_bounded_number_of_steps() -> None:
 
 
 @pytest.mark.parametrize("per_s", [100.0, 10 * MOST_UPSETS_PER_S])
-def test_they_end_and_repeat_with_the_seed(per_s: float) -> None:
+def test_upsets_end_and_repeat_with_the_seed(per_s: float) -> None:
     parts = [Part(per_s / BITS, seed) for seed in (1, 1, 2)]
     counts = [part.run(0.5) for part in parts]
     assert parts[0].log == parts[1].log != parts[2].log

@@ -138,7 +138,7 @@ def test_byte_begun_under_a_fault_is_hit_despite_a_later_byte() -> None:
     assert line.heard == []
 
 
-def test_faults_that_ended_long_ago_are_forgotten() -> None:
+def test_expired_faults_are_dropped() -> None:
     line = Line()
     for number in range(100):
         line.inject(UartDrop(), 250 * number, 250 * number + 0.5)  # in ms

@@ -70,7 +70,7 @@ def watch(world: World, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Watch]
 
 
 @pytest.mark.parametrize("first", [False, True])
-def test_a_call_that_comes_is_seen_at_once(world, watch, first):
+def test_call_is_seen_immediately(world, watch, first):
     waiting = watch(first=first)
     world.due_ns = world.now_ns + 30_500
     assert len(waiting.wait(TIMEOUT_NS, awake=True)) == 1
@@ -78,7 +78,7 @@ def test_a_call_that_comes_is_seen_at_once(world, watch, first):
     assert world.yields == 31
 
 
-def test_a_wait_ends_in_time(world, watch):
+def test_wait_respects_its_time_limit(world, watch):
     waiting = watch(first=False)
     for awake in (True, False):
         began_ns = world.now_ns

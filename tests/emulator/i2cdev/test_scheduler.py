@@ -190,7 +190,7 @@ def test_transfers_one_after_the_other_take_the_time_of_the_wire(make):
 
 @settings(deadline=None, max_examples=20)
 @given(st.lists(st.integers(0, 1000), min_size=1, max_size=5))
-def test_no_answer_is_early(think_us):
+def test_answers_are_never_early(think_us):
     """Whatever the programs do, the wire does one thing at a time."""
     with pytest.MonkeyPatch.context() as patch:
         bench = ScheduledWorld(patch)
@@ -275,7 +275,7 @@ def test_programs_take_turns_on_the_wire(make):
     assert spans == pytest.approx([3 * READ_NS] * 3, rel=0.05)
 
 
-def test_as_fast_as_possible_virtual_time_is_that_of_the_wire(make):
+def test_at_full_speed_virtual_time_is_the_wire_s(make):
     bench = make(fast=True)
     program = bench.program(think_ns=0, calls=101)
     bench.scheduler.run()
@@ -283,7 +283,7 @@ def test_as_fast_as_possible_virtual_time_is_that_of_the_wire(make):
     assert bench.kernel.now >= 101 * READ_NS * US
 
 
-def test_as_fast_as_possible_a_device_at_work_goes_ahead(make):
+def test_at_full_speed_a_busy_device_runs_ahead(make):
     """Programs need not ask again and again until it has done its work."""
     bench = make(fast=True, busy=lambda: bool(program.ends) and bench.kernel.now < 10**11)
     bench.kernel.process(bench.kernel.timeout(10**9) for _ in range(100))

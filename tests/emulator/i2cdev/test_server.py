@@ -139,7 +139,7 @@ def test_a_flood_waits_in_the_operating_system(served, registers):
         served.serve()
 
 
-def test_half_a_call_behind_a_whole_one_is_waited_for_at_rest(served):
+def test_partial_call_does_not_spin_the_server(served):
     client, call = served.connect(), packed(linux.Call.IOCTL, SLAVE)
     client.socket.sendall(call + call[:5])
     for _ in range(3):

@@ -71,7 +71,7 @@ def test_block_of_nothing_is_a_probe(perform: Perform, registers):
     assert registers.log == [[0x41], 0, -1]
 
 
-def test_data_of_a_write_stay_as_they_were(perform: Perform):
+def test_write_leaves_its_data_unchanged(perform: Perform):
     assert perform(WRITE, 0x41, SmbusSize.WORD_DATA, BLOCK) == BLOCK
 
 

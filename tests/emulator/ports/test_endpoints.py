@@ -52,7 +52,7 @@ def test_client_receives_no_data_of_its_predecessor(port, device, connect, unrea
     assert_fresh(port, device, connect())
 
 
-def test_output_without_a_client_is_dropped(port, device, connect):
+def test_drops_output_without_a_client(port, device, connect):
     device.sends(port, b"stale")
     assert_fresh(port, device, connect())
 

@@ -164,7 +164,7 @@ def open_url(port, **settings) -> serial.SerialBase:
     return serial.serial_for_url(port.name, DEVICE_BAUD, timeout=TIMEOUT_S, **settings)
 
 
-def test_wrong_rate_gives_the_same_garbage_each_time(port, device):
+def test_wrong_rate_garbles_reproducibly(port, device):
     heard = []
     device.uart.on_byte = lambda _byte: device.uart.send(b"UUUUUUUU")
     with served(device, port, "fast"):

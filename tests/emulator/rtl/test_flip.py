@@ -75,7 +75,7 @@ def test_registers_in_reset_have_their_reset_value_at_once(engine: CompiledEngin
                 assert {pin: engine.get_pin(pin) for pin in before} == before, register
 
 
-def test_what_is_no_register_bit_is_refused_with_those_there_are(engine: CompiledEngine) -> None:
+def test_rejects_unknown_register_bits_listing_known_ones(engine: CompiledEngine) -> None:
     for register, bit in (("writer.ack", 1), ("writer.ack", -1), ("writer.nack", 0)):
         with pytest.raises(ValueError, match=r"no register bit writer.*reader\.data \(8\)"):
             engine.flip(register, bit)

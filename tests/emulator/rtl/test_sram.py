@@ -100,7 +100,7 @@ def test_read_access(before, limit, late):
     assert found(sram) == [("read-access", START + limit - 1, 7)] * late
 
 
-def test_nothing_is_expected_of_a_memory_that_does_not_drive():
+def test_undriven_memory_has_no_access_limit():
     sram = make((START, idle(7, 0x33)))
     assert sram.sample(START) == 0x33
     sram.drive(START + 1, idle(8))

@@ -108,7 +108,7 @@ def test_bytes_are_read_alike(seed: int) -> None:
 
 
 @pytest.mark.parametrize("timing", SLOW_PARTS)
-def test_a_memory_that_is_too_slow_breaks_its_rules_alike(timing: SramTiming) -> None:
+def test_slow_memory_violates_the_same_rules(timing: SramTiming) -> None:
     rng = np.random.default_rng(1)
     source = camera(rng, 12)
     with both(cubestar_wiring(), timing) as engines:

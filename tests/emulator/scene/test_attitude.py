@@ -47,7 +47,7 @@ def test_pointing_comes_back() -> None:
         np.testing.assert_allclose(same, a, atol=1e-14)
 
 
-def test_stars_move_against_the_camera() -> None:
+def test_stars_move_opposite_to_the_camera() -> None:
     # Turning about +x lifts the view (z towards -y, up), so a star sinks: its y grows.
     q = attitude.propagate([0, 0, 0, 1], [1.0, 0, 0], 2.0)
     star = attitude.matrix_from_quaternion(q) @ [0, 0, 1]

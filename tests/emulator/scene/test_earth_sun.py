@@ -42,7 +42,7 @@ def test_alpha_is_to_the_right_and_beta_down() -> None:
     assert vector[0] / vector[1] == pytest.approx(30 / -40)
 
 
-def test_facing_is_what_the_truth_says_whatever_the_mounting() -> None:
+def test_facing_matches_the_truth_for_any_mounting() -> None:
     mounting = Mounting([1, 2, 3], [0, 1, 0])
     scene = EarthSunScene.facing((20, -10), (-5, 60), sun_camera=mounting, altitude_km=400)
     assert angles(scene, SUN) == pytest.approx((20, -10))

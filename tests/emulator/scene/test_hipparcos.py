@@ -116,7 +116,7 @@ def test_patches_and_absent_stars_are_needed() -> None:
         assert star(hip)[2] == v
 
 
-def test_another_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rejects_a_different_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = tmp_path / "hip2.dat"
     other.write_bytes(b"not the catalogue")
     digest = hashlib.sha256(b"not the catalogue").hexdigest()

@@ -48,7 +48,7 @@ def run_on(debugger: Debugger) -> tuple[int, int, bool]:
     return debugger.register("pc"), debugger.register("r1"), debugger.halted is not None
 
 
-def test_each_breakpoint_of_the_program_stops_it_once(debugger: Debugger) -> None:
+def test_program_breakpoint_stops_once(debugger: Debugger) -> None:
     debugger.set_register("r1", 0)
     debugger.set_register("pc", CODE)
     assert run_on(debugger) == (CODE, 0, True)

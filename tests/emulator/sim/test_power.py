@@ -155,7 +155,7 @@ def test_comparator_trips_again_after_the_current_fell(kernel, power, tripped):
     assert [channel for _, channel in tripped] == ["memory", "memory"]
 
 
-def test_channel_that_is_off_can_not_latch_up(kernel, power, tripped):
+def test_switched_off_channel_cannot_latch_up(kernel, power, tripped):
     power.switch("memory", False)
     power.latch_up("memory")
     power.switch("memory", True)
@@ -178,7 +178,7 @@ NO_CHANNEL = r"no supply channel 'radio', only \['imager', 'memory'\]"
         ("set_state", ("memory", "on"), NO_STATE),
     ],
 )
-def test_unknown_names_leave_the_start_as_it_is(power, call, arguments, text):
+def test_unknown_names_are_rejected_without_effect(power, call, arguments, text):
     with pytest.raises(ValueError, match=text):
         getattr(power, call)(*arguments)
     assert power.current_ma() == pytest.approx(MODES[1][0], abs=0.005)

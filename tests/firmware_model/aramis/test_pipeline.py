@@ -127,7 +127,7 @@ def test_random_stars_give_no_attitude(seed: int) -> None:
     assert solve(image.astype(np.uint8)).outcome is MeasurementOutcome.NONE
 
 
-def test_a_picture_of_another_size_is_refused() -> None:
+def test_rejects_image_of_another_size() -> None:
     words = r"a picture must have 1024 rows of 1280 pixels, not \(10, 10\)"
     with pytest.raises(ValueError, match=words):
         solve(np.zeros((10, 10), np.uint8))

@@ -92,7 +92,7 @@ def test_clearing_does_not_touch_a_memory_that_works(unit: Harness) -> None:
 
 
 @pytest.mark.parametrize(("ma", "cut"), [(OVER_CURRENT_MA - 1, False), (OVER_CURRENT_MA + 1, True)])
-def test_the_limit(unit: Harness, ma: float, cut: bool) -> None:
+def test_over_current_limit(unit: Harness, ma: float, cut: bool) -> None:
     unit.memory_ma = ma
     unit.run(until_us=unit.now_us + 10_000)
     assert unit.cut() == (set(codes.Sram) if cut else set())

@@ -147,7 +147,7 @@ def test_reduced_charges_one_pass_over_each_list_and_the_copies() -> None:
         ({"unit_vectors": np.ones((10, 3))}, "unit_vectors must have length 1"),
     ],
 )
-def test_impossible_catalogues_are_refused(change: dict[str, object], message: str) -> None:
+def test_rejects_impossible_catalogues(change: dict[str, object], message: str) -> None:
     hip, vectors, v_mag = random_sky(10, 9)
     sky = {"hip": hip, "unit_vectors": vectors, "v_mag": v_mag}
     limits = {"mag_limit": 4.0, "pair_limit_deg": 42.1}

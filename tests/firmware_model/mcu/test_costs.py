@@ -60,7 +60,7 @@ def test_unknown_operation_is_named_and_nothing_of_it_is_counted() -> None:
         Meter(SIMPLE).charge(f64_add=1)
 
 
-def test_negative_count_is_refused() -> None:
+def test_rejects_negative_counts() -> None:
     with pytest.raises(CostError, match="'add' cannot happen -1 times"):
         Meter(SIMPLE).charge(add=-1)
 
@@ -116,7 +116,9 @@ def test_phase_ends_when_its_block_fails() -> None:
         (1, "measured", "", "needs a source"),
     ],
 )
-def test_doubtful_are_refused(cycles: int, provenance: str, source: str, message: str) -> None:
+def test_rejects_costs_without_provenance(
+    cycles: int, provenance: str, source: str, message: str
+) -> None:
     with pytest.raises(CostError, match=message):
         Cost(cycles, provenance, source)  # type: ignore[arg-type]
 

@@ -193,7 +193,7 @@ def test_telecommands_are_taken_from_both_buses(node: Node, message: Message) ->
     assert not unit.queue
 
 
-def test_an_unknown_telecommand(node: Node, unit: Any) -> None:
+def test_rejects_unknown_telecommand(node: Node, unit: Any) -> None:
     known = {message.id for message in node.interface.telecommands}
     for identifier in (identifier for identifier in range(128) if identifier not in known):
         unit.state.flags.clear()
@@ -217,7 +217,7 @@ def test_a_write_beyond_the_longest_telecommand_is_not_acknowledged(node: Node, 
     assert not unit.queue
 
 
-def test_a_bad_parameter(node: Node, unit: Any) -> None:
+def test_rejects_bad_parameter(node: Node, unit: Any) -> None:
     name, values = node.refused
     assert unit.send(name, **values) == AckError.BAD_PARAMETER
     assert unit.state.flags == flags(node, "parameter")
@@ -225,7 +225,7 @@ def test_a_bad_parameter(node: Node, unit: Any) -> None:
 
 
 @pytest.mark.parametrize("bus", ["uart", "i2c"])
-def test_a_full_buffer(node: Node, unit: Any, bus: str) -> None:
+def test_full_buffer_rejects_telecommands(node: Node, unit: Any, bus: str) -> None:
     data = good(node)
     for _ in range(QUEUE_DEPTH):
         assert unit.frames(data) == ack(AckError.OK)

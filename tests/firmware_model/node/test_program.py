@@ -107,13 +107,13 @@ def test_a_telecommand_without_an_action_is_a_setting(node: Node) -> None:
         (bytes([77]), AckError.INVALID_ID, "TcmdRefused"),
     ],
 )
-def test_a_refusal_raises_a_flag(node: Node, payload: bytes, error: AckError, flag: str) -> None:
+def test_rejection_raises_a_flag(node: Node, payload: bytes, error: AckError, flag: str) -> None:
     assert node.frames(payload) == [bytes([error])]
     assert [name for name, up in node.telemetry("ErrorFlags").items() if up] == [flag]
     assert node.telemetry("TcmdProcessed")["Error"] == error
 
 
-def test_a_full_queue_refuses(node: Node) -> None:
+def test_full_queue_rejects_telecommands(node: Node) -> None:
     for _ in range(QUEUE_DEPTH):
         assert node.send("SetLevel") == AckError.OK
     assert node.send("SetLevel") == AckError.BUFFER_FULL

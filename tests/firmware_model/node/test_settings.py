@@ -81,6 +81,6 @@ def test_one_telecommand_s_parameters_are_copied_in_and_out() -> None:
     assert all(settings.all(name) == fresh.all(name) for name in others)
 
 
-def test_stored_settings_of_another_length_are_refused(settings: Settings) -> None:
+def test_rejects_stored_settings_of_another_length(settings: Settings) -> None:
     with pytest.raises(ValueError, match=f"have 3 bytes, not {settings.size()}"):
         settings.unpack(b"\0\0\0")

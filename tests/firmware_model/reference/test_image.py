@@ -23,7 +23,7 @@ def test_the_image_is_as_recorded() -> None:
     assert IMAGE.stat().st_size < LARGEST
 
 
-def test_another_image_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rejects_another_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = tmp_path / IMAGE.name
     other.write_bytes(IMAGE.read_bytes()[:-1])
     shutil.copy(IMAGE.with_suffix(".json"), other.with_suffix(".json"))

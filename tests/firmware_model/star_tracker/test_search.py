@@ -57,7 +57,7 @@ def test_false_stars_are_not_identified(tracker: Tracker, count: int) -> None:
         assert (tracker.identify(tracker.false_rays(rng, count)).stars == -1).all()
 
 
-def test_the_mirror_image_of_the_sky_is_refused(tracker: Tracker) -> None:
+def test_rejects_mirrored_sky(tracker: Tracker) -> None:
     rng = np.random.default_rng(70)
     outcomes = []
     for _ in range(20):
@@ -68,7 +68,7 @@ def test_the_mirror_image_of_the_sky_is_refused(tracker: Tracker) -> None:
     assert outcomes.count(expected) >= 19
 
 
-def test_fewer_stars_than_an_attitude_needs_are_refused(tracker: Tracker) -> None:
+def test_rejects_too_few_stars(tracker: Tracker) -> None:
     for count in range(tracker.fewest):
         found = tracker.identify(np.tile(np.array([[0, 0, 1]], np.float32), (count, 1)))
         assert found.outcome == "TOO_FEW_CENTROIDS"

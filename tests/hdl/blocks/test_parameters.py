@@ -31,7 +31,7 @@ def test_address_width(columns: int, rows: int, bits: int) -> None:
         (lambda: GrayCounter(3), "positions must be at least 4, not 3"),
     ],
 )
-def test_impossible_designs_are_refused(make: Callable[[], Component], error: str) -> None:
+def test_rejects_impossible_designs(make: Callable[[], Component], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         make()
     gc.collect()  # what was refused is never elaborated; have Amaranth say so here

@@ -39,7 +39,7 @@ def test_covered_points_are_not_missed(folder: Path) -> None:
     assert lines[-1] == f"not reached: {len(everything) - 5} more"
 
 
-def test_undeclared_points_are_errors(folder: Path) -> None:
+def test_rejects_undeclared_points(folder: Path) -> None:
     with pytest.raises(ValueError, match=f"{BOARD} / idle is no declared point of 'pressure'"):
         hits.hit("pressure", testbench=BOARD, pressure="idle")
     with pytest.raises(ValueError, match="has testbench, pressure, not testbench"):

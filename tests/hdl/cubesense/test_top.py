@@ -27,7 +27,7 @@ def test_address_control_takes_no_further_pin() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::amaranth.hdl.UnusedElaboratable")
-def test_impossible_side_is_refused() -> None:
+def test_rejects_impossible_side() -> None:
     with pytest.raises(ValueError, match='must be "sun" or "nadir", not \'moon\''):
         CubeSenseFpga("moon")  # type: ignore[arg-type]
     gc.collect()  # what was refused is never elaborated; have Amaranth say so here

@@ -60,7 +60,7 @@ def test_all_mutants_are_in_one_text(counter: Netlist, every: list[Mutant]) -> N
     assert all(f"chosen_mutant == 16'h{n:04x}" in text for n in range(1, len(every) + 1))
 
 
-def test_too_many_mutants_are_refused(counter: Netlist, every: list[Mutant]) -> None:
+def test_rejects_too_many_mutants(counter: Netlist, every: list[Mutant]) -> None:
     with pytest.raises(ValueError, match="at most 65535 mutants, not 65536"):
         selectable(counter, every[:1] * 65536)
 
@@ -100,7 +100,7 @@ def test_block_is_scored(tmp_path: Path) -> None:
     assert kept.read_text(encoding="utf-8") == before, "what is known is not tried again"
 
 
-def test_unknown_name_is_refused() -> None:
+def test_rejects_unknown_name() -> None:
     done = score("cubestars")
     assert done.returncode == 2
     assert "'cubestars' has no mutants; there are cubestar," in done.stderr

@@ -31,7 +31,7 @@ def published() -> Database:
     return build_database(CatalogueParameters(epoch=2000))
 
 
-def test_counts_are_close_to_the_published_ones(published: Database) -> None:
+def test_star_counts_match_published_ones(published: Database) -> None:
     """Within 1 %: another catalogue has other magnitudes (see the module)."""
     counts = {"stars": len(published.numbers), "triangles": len(published)}
     assert counts == {"stars": 1324, "triangles": 267_128}

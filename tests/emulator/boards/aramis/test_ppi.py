@@ -82,7 +82,7 @@ def test_stores_only_the_requested_lines() -> None:
     assert (target == 1).all()
 
 
-def test_a_short_frame_and_wrong_lines_are_reported() -> None:
+def test_reports_short_frames_and_wrong_lines() -> None:
     bench = Bench()
     bench.lines.rows = ROWS - 2
     bench.ppi.start(bench.target)
@@ -123,7 +123,7 @@ def test_restart_discards_the_frame_in_progress() -> None:
     assert (other == 2).all()
 
 
-def test_a_change_that_leaves_the_frame_alone_does_not_disturb_it() -> None:
+def test_unrelated_change_does_not_disturb_the_frame() -> None:
     bench = Bench()
     bench.ppi.start(bench.target)
     for _ in range(9):

@@ -16,7 +16,7 @@ from cubestack.host.errors import CommandRefusedError
 from .desk import Desk, scene
 
 
-def test_a_dead_camera_is_reported(active: Desk) -> None:
+def test_reports_dead_camera(active: Desk) -> None:
     active.board.camera.power(False, active.board.kernel.now)
     found = active.aramis.measure()
     assert (found.valid, found.reason) == (False, Reason.CAMERA_TIMEOUT)
@@ -145,7 +145,7 @@ def test_the_times_of_the_steps_add_up(active: Desk) -> None:
     assert times["spikes"] > times["centroids"] > 0
 
 
-def test_settings_survive_a_reset_when_they_are_saved(active: Desk) -> None:
+def test_saved_settings_survive_a_reset(active: Desk) -> None:
     for save in (False, True):
         active.client.command("SetExposure", Rows=1234)
         if save:
@@ -179,7 +179,7 @@ def test_power_follows_what_runs(desk: Desk) -> None:
     assert desk.board.power.charge_mas() / desk.now_s > resting_ma + 200 / ARAMIS_POWER.volts
 
 
-def test_truth_is_that_of_the_requested_frame() -> None:
+def test_truth_describes_the_requested_frame() -> None:
     desk = Desk(scene(rate_deg_s=(0.0, 0.5, 0.0)))
     assert desk.board.truth() is None
     desk.aramis.activate()

@@ -83,7 +83,7 @@ def test_a_picture_takes_current(board: CubeSenseBoard, camera: Camera, sram: Sr
     assert board.power.current_ma() == pytest.approx(idle_ma)
 
 
-def test_a_memory_loses_its_content_with_its_supply(board: CubeSenseBoard) -> None:
+def test_memory_loses_content_without_supply(board: CubeSenseBoard) -> None:
     before = {half: memory.copy() for half, memory in board.engine.memories.items()}
     board.power.switch("SRAM1", False)
     assert np.mean(board.engine.memories["sun"] != before["sun"]) > 0.9
@@ -100,7 +100,7 @@ def test_memories_hold_seeded_noise_after_power_up() -> None:
     assert np.mean(contents[0] != contents[2]) > 0.9
 
 
-def test_a_dead_camera_has_no_clock_and_answers_nothing(board: CubeSenseBoard) -> None:
+def test_dead_camera_has_no_clock_and_no_answers(board: CubeSenseBoard) -> None:
     board.faults.inject("camera-dead", target="sun")
     camera = board.cameras[Camera.SUN]
     assert camera.segment_at(board.kernel.now) is None
@@ -121,7 +121,7 @@ def test_frames_begin_when_the_camera_starts(board: CubeSenseBoard, camera: Came
     assert (first.readout_ps - board.kernel.now) / PS_PER_MS == pytest.approx(blank_ms)
 
 
-def test_a_failed_memory_draws_too_much_each_time_it_is_switched_on(board: CubeSenseBoard) -> None:
+def test_failed_memory_draws_over_current_at_each_power_up(board: CubeSenseBoard) -> None:
     board.faults.inject("latch-up", target="SRAM1", lasting=True)
     assert board.power.current_ma("SRAM1") > 100
     let_pass(board, 100)
@@ -130,7 +130,7 @@ def test_a_failed_memory_draws_too_much_each_time_it_is_switched_on(board: CubeS
     assert board.power.current_ma("SRAM1") > 100
 
 
-def test_truth_is_of_the_frame_that_was_stored(board: CubeSenseBoard) -> None:
+def test_truth_describes_the_stored_frame(board: CubeSenseBoard) -> None:
     assert board.truth(Camera.NADIR) is None
     board.scene = EarthSunScene(rate_deg_s=(0, 10.0, 0))
     start_ms = board.kernel.now / PS_PER_MS
@@ -160,7 +160,7 @@ def test_both_protocols_have_an_address_of_their_own(board: CubeSenseBoard) -> N
     assert (list(identification)[1], list(threshold)) == (2, [225])  # interface version first
 
 
-def test_busy_while_it_works_and_not_while_it_waits(board: CubeSenseBoard) -> None:
+def test_busy_only_while_working(board: CubeSenseBoard) -> None:
     assert not board.busy()
     board.serial().write(DETECT)
     for ms, busy in ((0, True), (50, True), (500, False)):

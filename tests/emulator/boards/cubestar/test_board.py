@@ -44,7 +44,7 @@ def truth_of_capture(
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="full frames take minutes in the simulator")
-def test_truth_is_that_of_the_stored_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_truth_describes_the_stored_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many frames the sensor sends before the program looks at ACK."""
     scene = SkyScene([0, 0, 0, 1], rate_deg_s=(0, 1, 0), mag_limit=-2)
     first, late, next_one = (

@@ -22,7 +22,7 @@ def test_published_numbers_and_distances_of_stars(one: int, other: int, apart: f
     assert np.arccos(first @ second) == pytest.approx(apart, abs=1e-6)
 
 
-def test_every_pair_that_a_picture_can_show_is_listed() -> None:
+def test_lists_every_pair_within_a_field() -> None:
     x, y = LENS.columns - 0.5, LENS.rows - 0.5
     corners = LENS.unproject(np.array([[-0.5, -0.5], [x, -0.5], [-0.5, y], [x, y]]))
     diagonal = np.degrees(np.arccos(np.clip(corners @ corners.T, -1, 1))).max()

@@ -76,7 +76,7 @@ def test_picture_goes_through_the_fpga_into_the_external_memory(images: dict[str
     board.close()
 
 
-def test_other_layouts_are_refused_in_one_line(images: dict[str, Image]) -> None:
+def test_rejects_other_layouts_in_one_line(images: dict[str, Image]) -> None:
     with pytest.raises(ValueError, match=r"own firmware runs on memory layout 1, not two-boards"):
         powered(images["toggle"], layout=Layout.TWO_BOARDS)
 

@@ -12,7 +12,7 @@ def test_eight_degrees_double_it(temperature_c: float, factor: float) -> None:
     assert dark_at(3.0, temperature_c, 20.0) == pytest.approx(3.0 * factor)
 
 
-def test_hot_pixels_are_as_many_as_asked_each_in_its_place() -> None:
+def test_hot_pixels_have_the_requested_count_and_fixed_places() -> None:
     places, strengths = hot_pixels(5, 4000, 5000, 2.5)
     assert len(set(places.tolist())) == len(places) == len(strengths) == 4000
     assert places.min() >= 0

@@ -48,7 +48,7 @@ def test_interpolation_is_as_good_as_each_pixel(name: str, optics: Optics) -> No
         assert np.percentile(off, 98) < 0.05  # the rest is blurred, or at the limb
 
 
-def test_nearer_things_hide_farther_ones() -> None:
+def test_near_objects_hide_far_ones() -> None:
     now = camera_state_for(ORION.quaternion, LENS)
     behind = Moon(direction=tuple(now.boresight.tolist()))
     earth = replace(placed("earth-limb", LENS, 0), nadir=behind.direction, airglow=0.0)
@@ -65,7 +65,7 @@ def test_nearer_things_hide_farther_ones() -> None:
     assert all_three[0] >= both[0]
 
 
-def test_even_glow_gives_what_the_sky_gives_on_the_axis() -> None:
+def test_even_glow_equals_the_sky_on_axis() -> None:
     glare = SunGlare(direction=tuple(camera_state_for(ORION.quaternion, LENS).boresight.tolist()))
     even = replace(glare, slope_deg=1e6, transmittance=1e-12, decade_deg=180.0)
     scene = SkyScene(ORION.quaternion, mag_limit=-2, hazards=(even,))

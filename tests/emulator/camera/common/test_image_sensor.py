@@ -36,7 +36,7 @@ class Sensor(ImageSensor[Any, Any]):
         return int(self._cached(frame, make)[0])
 
 
-def test_pictures_are_made_once_and_two_are_kept() -> None:
+def test_images_are_rendered_once_and_two_are_cached() -> None:
     sensor = Sensor("sky")
     assert sensor.rendered is None
     assert [sensor.look(frame) for frame in (1, 1, 2, 1)] == [1, 1, 2, 1]
@@ -48,7 +48,7 @@ def test_pictures_are_made_once_and_two_are_kept() -> None:
     assert sensor.made == [1, 2, 3, 2]
 
 
-def test_another_scene_or_condition_makes_another_picture() -> None:
+def test_changed_scene_or_condition_re_renders_the_image() -> None:
     sensor = Sensor("sky")
     assert sensor.look(1) == 1
     sensor.scene = "ground"

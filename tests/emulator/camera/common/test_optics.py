@@ -97,7 +97,7 @@ def test_directions_outside_the_lens_are_nan() -> None:
     assert LENS.project(np.empty((0, 3))).shape == (0, 2)
 
 
-def test_one_direction_out_of_reach_does_not_hide_the_others() -> None:
+def test_direction_outside_the_field_does_not_hide_others() -> None:
     lens = replace(LENS, k1=-0.62, k2=0, p1=0, p2=0)  # folds right outside of the sensor
     plane = np.linspace(0, 0.55, 200)
     vectors = np.stack([plane, 0 * plane, np.ones(200)], axis=1)

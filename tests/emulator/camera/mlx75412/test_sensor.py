@@ -72,7 +72,7 @@ def test_registers_are_read_back_with_auto_increment(camera: Mlx75412) -> None:
 
 
 @pytest.mark.parametrize("how", ["power", "reset"])
-def test_without_power_or_in_reset_there_is_nothing(camera: Mlx75412, how: str) -> None:
+def test_no_output_without_power_or_in_reset(camera: Mlx75412, how: str) -> None:
     switch = camera.power if how == "power" else camera.set_reset_pin
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
@@ -182,7 +182,7 @@ def test_disabling_cuts_the_output_at_once(camera: Mlx75412) -> None:
     assert blanking.rows == 0
 
 
-def test_writing_the_same_mode_changes_nothing(camera: Mlx75412) -> None:
+def test_rewriting_the_mode_has_no_effect(camera: Mlx75412) -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     enable(camera, 0)
@@ -285,7 +285,7 @@ def test_features_reach_the_pixels() -> None:
     assert mean(dark, 2000 * MS) < 1
 
 
-def test_published_set_up_only_logs_what_is_not_modelled(caplog: pytest.LogCaptureFixture) -> None:
+def test_published_setup_logs_only_unmodelled_registers(caplog: pytest.LogCaptureFixture) -> None:
     camera = Mlx75412(SkyScene.pointing(80.0, 0.0))
     with caplog.at_level(logging.INFO):
         configure(camera)

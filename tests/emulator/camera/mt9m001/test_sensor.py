@@ -106,7 +106,7 @@ def test_a_long_exposure_makes_the_frame_longer(camera: Mt9m001, shutter: int, r
         (66.2, 0, 0.0662),  # that frame ended at 65.85 ms, the next is due at 66.68
     ],
 )
-def test_after_a_change_of_exposure_no_frame_is_of_mixed_exposure(
+def test_no_frame_mixes_two_exposures(
     camera: Mt9m001, change_ms: float, read_out: int, counts_from_s: float
 ) -> None:
     change = round(change_ms * PS_PER_MS)
@@ -171,7 +171,7 @@ def test_consecutive_registers_half_words_and_strangers(camera: Mt9m001) -> None
     assert camera.i2c_read(0x2C, 2, 0) is None
 
 
-def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs(camera: Mt9m001) -> None:
+def test_no_answer_and_no_clock_without_power_or_in_reset(camera: Mt9m001) -> None:
     put(camera, "SHUTTER_WIDTH", 77)
     for switch in (camera.power, camera.set_reset_pin):
         switch(False, 10)
@@ -181,7 +181,7 @@ def test_without_power_or_in_reset_nothing_answers_and_no_clock_runs(camera: Mt9
         assert get(camera, "SHUTTER_WIDTH") == 0x0419
 
 
-def test_stopping_ends_the_frame_and_starting_begins_a_new_exposure(camera: Mt9m001) -> None:
+def test_stop_ends_the_frame_and_start_begins_an_exposure(camera: Mt9m001) -> None:
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)
     stop, start = 40 * PS_PER_MS, 90 * PS_PER_MS

@@ -109,7 +109,7 @@ def test_sun_shrinks_as_published_towards_the_rim_and_is_cut_there() -> None:
     assert picture.shape == (480, 640)
 
 
-def test_sun_camera_sees_no_earth_and_no_hidden_sun() -> None:
+def test_sun_camera_images_neither_earth_nor_hidden_sun() -> None:
     picture = levels(EarthSunScene.facing((94, 0), (0, 0), sun_camera=DOWN), SUN)
     assert picture[radius(SUN) < 160].max() < 34.1
     behind = EarthSunScene.facing((30, 0), sun_camera=DOWN)
@@ -163,7 +163,7 @@ def test_the_earth_hides_what_is_behind_it_and_not_what_is_in_the_lens() -> None
     assert (levels(patch, NADIR) - plain).max() > 100
 
 
-def test_a_hazard_without_a_sun_has_that_of_the_scene() -> None:
+def test_hazard_uses_the_scene_s_sun_by_default() -> None:
     scene = EarthSunScene.facing(nadir_deg=(70, 0), sun_deg=None, sun=(-0.5, 0.0, 1.0))
     ghosts = levels(replace(scene, hazards=(Ghosts(seed=2),)), NADIR)
     told = levels(replace(scene, hazards=(Ghosts(seed=2, sun=(-0.5, 0.0, 1.0)),)), NADIR)

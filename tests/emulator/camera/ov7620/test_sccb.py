@@ -40,7 +40,7 @@ def test_value_counts_with_the_ninth_clock_of_the_third_byte(device: Device) -> 
 
 
 @pytest.mark.parametrize("address", [0x40, 0x43, 0x00, 0xFF])
-def test_other_addresses_and_reading_are_not_answered(device: Device, address: int) -> None:
+def test_ignores_other_addresses_and_reads(device: Device, address: int) -> None:
     assert device.send(bytes([address, 0x10, 0x5A])) == [1, 1, 1]
     assert device.registers == []
     device.send(bytes([0x42, 0x10, 0x5A]))
@@ -59,7 +59,7 @@ def test_extra_bytes_are_logged_only(device: Device, caplog: pytest.LogCaptureFi
     assert caplog.messages == ["SCCB: ignored byte 0x77 after a register's value"]
 
 
-def test_a_start_in_the_middle_begins_anew(device: Device) -> None:
+def test_start_within_a_message_restarts_it(device: Device) -> None:
     pin = device.slave.on_pin
     for byte in (0x42, 0x10):
         for n in range(8):

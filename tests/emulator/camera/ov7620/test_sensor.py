@@ -225,7 +225,7 @@ def test_logs_unimplemented_addresses(camera: Ov7620, caplog: pytest.LogCaptureF
     ]
 
 
-def test_without_power_there_is_nothing(scene: EarthSunScene) -> None:
+def test_no_output_without_power(scene: EarthSunScene) -> None:
     camera = make(scene)
     changes: list[int] = []
     camera.on_change = lambda: changes.append(1)

@@ -53,7 +53,7 @@ def test_without_fixed_levels_every_register_stays(rtlil):
     assert registers(variant_text(rtlil, ())) == registers(cxxrtl_text(WIRING.component))
 
 
-def test_wrong_input_is_named(rtlil):
+def test_names_the_wrong_input(rtlil):
     with pytest.raises(ValueError, match="no one-bit input SUNENN"):
         variant_text(rtlil, [("SUNENN", 0)])
     with pytest.raises(ValueError, match="no one-bit input SUN_Y"):

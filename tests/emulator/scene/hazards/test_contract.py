@@ -10,7 +10,6 @@ from cubestack.emulator.scene.file import SceneError
 from cubestack.emulator.scene.hazards.contract import (
     EARTH_RADIANCE,
     CameraState,
-    Depth,
     SkyHazard,
     angles_rad,
     check_hazards,
@@ -118,9 +117,3 @@ def test_plain_hazard_has_no_effect() -> None:
 def test_the_earth_s_radiance_is_that_of_its_albedo() -> None:
     """0.3 of the Sun's light on a Lambert surface, by pi; the Sun is V -26.74."""
     assert np.pi * EARTH_RADIANCE / 10 ** (0.4 * 26.74) == pytest.approx(0.3)
-
-
-def test_every_depth_is_distinct() -> None:
-    """The sky behind the planets, they behind the Moon, and all behind the lens's own light."""
-    assert [*map(int, Depth)] == [0, 1, 2, 3, 4, 5]
-    assert (min(Depth), max(Depth)) == (Depth.SKY, Depth.LENS)

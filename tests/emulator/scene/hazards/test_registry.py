@@ -63,7 +63,7 @@ def test_is_drawn_from_the_generator_alone(kind: type[SkyHazard]) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_file_can_say_what_was_placed(kind: type[SkyHazard]) -> None:
+def test_sampled_hazard_round_trips_through_a_file(kind: type[SkyHazard]) -> None:
     hazard = kind.sample(kind.strength.usual, NOW, np.random.default_rng(4))
     assert set(kind.declared()) == {entry.name for entry in fields(kind)}
     values = {entry.name: getattr(hazard, entry.name) for entry in fields(kind)}
@@ -89,6 +89,6 @@ def test_lights_move_at_the_declared_rate(kind: type[SkyHazard]) -> None:
     assert hazard.speed_deg_s == pytest.approx(fastest_deg_s, abs=1e-3)
 
 
-def test_a_scene_takes_hazards_only() -> None:
+def test_rejects_scene_hazard_of_wrong_type() -> None:
     with pytest.raises(SceneError, match="hazards must be hazards of light, not 'moon'"):
         SkyScene([0, 0, 0, 1], hazards=("moon",))  # type: ignore[arg-type]

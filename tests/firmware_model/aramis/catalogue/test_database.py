@@ -50,13 +50,13 @@ def test_the_published_database_takes_6_megabytes() -> None:
 
 
 @pytest.mark.parametrize("length", [0, 3, HEADER.size, 200])
-def test_a_short_image_is_refused(image: bytes, length: int) -> None:
+def test_rejects_short_image(image: bytes, length: int) -> None:
     with pytest.raises(DatabaseError, match="bytes"):
         Database.unpack(image[:length])
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_any_flipped_bit_is_noticed(image: bytes, seed: int) -> None:
+def test_detects_any_flipped_bit(image: bytes, seed: int) -> None:
     rng = np.random.default_rng(seed)
     damaged = bytearray(image)
     damaged[rng.integers(len(image))] ^= 1 << rng.integers(8)
@@ -74,20 +74,20 @@ def test_any_flipped_bit_is_noticed(image: bytes, seed: int) -> None:
         ("vectors", struct.pack("<f", float("nan")), "vectors of the image are not all finite"),
     ],
 )
-def test_misleading_contents_are_refused(image: bytes, name: str, value: bytes, words: str) -> None:
+def test_rejects_misleading_contents(image: bytes, name: str, value: bytes, words: str) -> None:
     start = place(image, name)
     with pytest.raises(DatabaseError, match=words):
         Database.unpack(sealed(image[:start] + value + image[start + len(value) :]))
 
 
 @pytest.mark.parametrize(("offset", "value"), [(0, b"XRAM"), (4, b"\x09\x00")])
-def test_another_kind_of_image_is_refused(image: bytes, offset: int, value: bytes) -> None:
+def test_rejects_other_kinds_of_image(image: bytes, offset: int, value: bytes) -> None:
     other = image[:offset] + value + image[offset + len(value) :]
     with pytest.raises(DatabaseError, match="an image starts with"):
         Database.unpack(sealed(other))
 
 
-def test_counts_that_do_not_fit_are_refused(image: bytes) -> None:
+def test_rejects_inconsistent_counts(image: bytes) -> None:
     for offset in (8, 12, 16, 20, 24):
         other = image[:offset] + b"\x01\x00" + image[offset + 2 :]
         with pytest.raises(DatabaseError):

@@ -95,14 +95,14 @@ def test_an_erased_flash_holds_no_catalogue(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"x", b"ARAM" + bytes(100)])
-def test_contents_that_are_no_catalogue_are_refused(content: bytes) -> None:
+def test_rejects_contents_that_are_no_catalogue(content: bytes) -> None:
     desk = Desk(content)
     assert not desk.load()
     assert desk.store.state in (CatalogueState.DAMAGED, CatalogueState.MISSING)
     assert (desk.store.loads, desk.store.failures) == (1, 1)
 
 
-def test_a_catalogue_longer_than_the_flash_is_refused() -> None:
+def test_rejects_catalogue_larger_than_flash() -> None:
     with pytest.raises(ValueError, match="fewer stars per field"):
         flash_image(bytes(MOST_CATALOGUE_BYTES + 1))
 

@@ -22,7 +22,7 @@ def test_each_split_makes_four_of_one(splits: int, faces: int) -> None:
 
 
 @pytest.mark.parametrize("splits", [-1, 5])
-def test_splits_out_of_range_are_refused(splits: int) -> None:
+def test_rejects_splits_out_of_range(splits: int) -> None:
     with pytest.raises(ValueError, match=f"splits must be 0 to 4, not {splits}"):
         geodesic_sphere(splits)
 

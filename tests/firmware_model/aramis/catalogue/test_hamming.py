@@ -71,6 +71,6 @@ def test_the_cost_is_that_of_the_words_read() -> None:
     assert counter.counts["flash_read"] == 100 * hamming.CODED_BYTES // 2
 
 
-def test_parts_of_words_are_refused() -> None:
+def test_rejects_partial_words() -> None:
     with pytest.raises(ValueError, match="words of 9 bytes, not 10"):
         decode(np.zeros(10, np.uint8), meter())

@@ -64,7 +64,7 @@ def test_the_whole_picture_is_one_region() -> None:
     np.testing.assert_allclose(found.centroids, [[639.5, 511.5]], atol=1e-3)
 
 
-def test_too_many_runs_are_given_up() -> None:
+def test_gives_up_on_too_many_runs() -> None:
     chequered = (np.indices((256, 256)).sum(axis=0) % 2).astype(bool)
     assert chequered.sum() > MOST_RUNS
     assert find_regions(chequered) is None

@@ -61,7 +61,7 @@ def test_a_window_of_thirteen_stays_and_one_of_twelve_goes() -> None:
     assert run(mask, SpikeRemoval.WINDOW).sum() == 0
 
 
-def test_off_changes_nothing() -> None:
+def test_filter_off_leaves_the_image_unchanged() -> None:
     mask = np.random.default_rng(2).random((9, 9)) < 0.5
     assert run(mask, SpikeRemoval.OFF) is mask
 

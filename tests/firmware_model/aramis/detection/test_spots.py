@@ -122,6 +122,6 @@ def test_a_picture_of_more_stripes_than_can_be_listed_has_no_regions() -> None:
     assert (len(stars), stars.light.rejected, stars.light.widest) == (0, 0, 0)
 
 
-def test_a_full_picture_has_no_stars() -> None:
+def test_full_image_has_no_stars() -> None:
     for level in (0, 255):
         assert len(found(np.full(Y.shape, level, np.uint8))) == 0

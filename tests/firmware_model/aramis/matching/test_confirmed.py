@@ -61,7 +61,7 @@ def test_it_is_given_up_when_time_is_over() -> None:
     assert 0.02 <= spent.table.seconds(spent.total) < 0.03
 
 
-def test_a_turn_that_is_in_doubt_is_refused() -> None:
+def test_rejects_uncertain_rotation() -> None:
     made = pictures(1, 14)[0]
     strict = replace(PROFILE, largest_sigma_rad=1e-6)
     solution = identify(made.stars, FIELD, strict, database(), meter())

@@ -152,7 +152,7 @@ def test_opposite_direction_gives_no_solution(profile: Profile) -> None:
         assert solution.outcome is not MeasurementOutcome.CONCLUSIVE
 
 
-def test_an_attitude_far_from_the_direction_is_refused() -> None:
+def test_rejects_attitude_far_from_the_hint() -> None:
     """The faces around a direction reach farther than its tolerance."""
     rng = np.random.default_rng(8)
     strict = replace(VERIFIED.profile, hint_tolerance_deg=1.0)

@@ -67,7 +67,7 @@ def test_letters_are_answered_in_their_order(node: Links) -> None:
     assert answer == b"Y" + nadir + b"Y" + sun
 
 
-def test_letters_beyond_the_queue_are_lost(node: Links) -> None:
+def test_excess_letters_are_dropped(node: Links) -> None:
     assert node.letters(b"a" * (LETTERS + 3)) == b"Y" * LETTERS
     assert node.letters(b"a") == b"Y"
 

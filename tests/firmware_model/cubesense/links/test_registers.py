@@ -105,7 +105,7 @@ def test_over_current_flags_can_be_cleared(node: Links, selection: codes.SramSel
     assert node.done == [("clear", *cleared)]
 
 
-def test_a_value_that_is_not_allowed_is_ignored(node: Links) -> None:
+def test_ignores_values_out_of_range(node: Links) -> None:
     state = {camera: asdict(settings) for camera, settings in node.state.cameras.items()}
     for register in REGISTERS:
         for number in range(256):
@@ -125,7 +125,7 @@ def test_a_search_that_the_fpgas_are_not_built_for_is_ignored() -> None:
     assert value(node, "NADIR_SEARCH") == codes.NadirSearch.LINES
 
 
-def test_an_action_that_meets_a_full_queue_is_lost(node: Links) -> None:
+def test_action_is_dropped_when_the_queue_is_full(node: Links) -> None:
     for _ in range(5):
         write(node, "MEASURE", codes.Measurement.SUN_SRAM1)
     write(node, "MEASURE", codes.Measurement.NADIR_SRAM2)
@@ -164,7 +164,7 @@ def test_a_second_data_byte_is_not_acknowledged(node: Links) -> None:
     assert value(node, "SUN_GAIN") == 7
 
 
-def test_a_read_before_any_pointer_gives_nothing(node: Links) -> None:
+def test_read_without_pointer_returns_fill_bytes(node: Links) -> None:
     assert node.read_register(3) == bytes([FILL] * 3)
 
 
@@ -238,7 +238,7 @@ def test_a_measurement_in_between_does_not_show(node: Links) -> None:
     assert len(node.opened) == 2
 
 
-def test_a_memory_without_supply_gives_nothing(node: Links) -> None:
+def test_memory_without_supply_returns_fill_bytes(node: Links) -> None:
     node.off = {codes.Sram.SRAM1}
     assert node.read_register(200, IMAGE) == bytes([FILL] * 200)
     node.off = set()

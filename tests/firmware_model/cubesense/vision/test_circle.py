@@ -48,11 +48,11 @@ def test_removing_a_point_equals_never_adding_it(meter: Meter) -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_too_few_points(meter: Meter, count: int) -> None:
+def test_rejects_too_few_points(meter: Meter, count: int) -> None:
     assert LeastSquaresCircle(np.ones((count, 2), np.float32), meter).solve() is None
 
 
-def test_points_on_a_line(meter: Meter) -> None:
+def test_rejects_collinear_points(meter: Meter) -> None:
     points = np.array([[x, 2 * x + 3] for x in range(-100, 100, 13)], np.float32)
     assert LeastSquaresCircle(points, meter).solve() is None
     assert LeastSquaresCircle(np.full((9, 2), 50, np.float32), meter).solve() is None

@@ -70,7 +70,7 @@ def test_what_is_accepted_gives_tables_and_lenses_like_ours_are() -> None:
         ((-32768, -32768, -32768, -32768, -32768), False),
     ],
 )
-def test_some_lenses(factors: Sequence[float], expected: bool) -> None:
+def test_known_lenses(factors: Sequence[float], expected: bool) -> None:
     assert invertible(factors, Meter(PIC18F45K20)) is expected
     assert tables_exist(factors) or not expected
 

@@ -218,7 +218,7 @@ def test_no_angle_is_beyond_the_field_wherever_the_light_is(ours: SunConfig, met
             assert np.hypot(result.alpha, result.beta) < 9700
 
 
-def test_another_number_of_bytes_is_refused(ours: SunConfig, meter: Meter) -> None:
+def test_rejects_other_lengths(ours: SunConfig, meter: Meter) -> None:
     assert window_bytes() == 229
     with pytest.raises(ValueError, match="229 bytes, not"):
         find_sun(np.zeros(228, np.uint8), ours, meter)

@@ -223,7 +223,7 @@ def test_rejects_contradictory_settings(settings: dict[str, int], message: str) 
         replace(DetectionConfig(), **settings)
 
 
-def test_a_region_beyond_the_picture_is_refused() -> None:
+def test_rejects_region_beyond_the_image() -> None:
     with pytest.raises(DetectionConfigError, match="y_end must be 0 to 256 px, not 512"):
         detect_stars(np.zeros((256, 1024), dtype=np.uint8), DetectionConfig(), meter())
 

@@ -53,7 +53,7 @@ def test_unknown_names_are_named_with_the_known_ones() -> None:
         GAIN.field("ON")
 
 
-def test_overlapping_declarations_are_refused() -> None:
+def test_rejects_overlapping_declarations() -> None:
     with pytest.raises(ValueError, match="GAIN and OTHER both have address 0x0011"):
         registers(GAIN, dataclasses.replace(CONTROL, name="OTHER", address=0x11))
     with pytest.raises(ValueError, match="declares register GAIN twice"):

@@ -145,7 +145,7 @@ def test_limit_may_depend_on_another_field() -> None:
         ({"scale": 0}, "scale must be positive"),
     ],
 )
-def test_wrong_declarations_are_refused(wrong: dict[str, Any], message: str) -> None:
+def test_rejects_wrong_declarations(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InterfaceError, match=message):
         Field(**{"type": "u8", "name": "x", "meaning": ""} | wrong)
 

@@ -11,7 +11,7 @@ def test_lookup_by_byte() -> None:
     assert (bench.find(ord("a")), bench.find(0), TAKE.request) == (TAKE, None, b"a")
 
 
-def test_wrong_declarations_are_refused() -> None:
+def test_rejects_wrong_declarations() -> None:
     for letter in ("", "ab", "é"):
         with pytest.raises(ValueError, match="is not one ASCII character"):
             Letter(letter, "X", "", 1)

@@ -104,7 +104,7 @@ def test_errors_name_the_offender_in_one_line(call: Callable[[], object], messag
         ((1, u8("a", "", high_by=("z", {}))), "no field 'z'"),
     ],
 )
-def test_wrong_declarations_are_refused(arguments: tuple[Any, ...], message: str) -> None:
+def test_rejects_wrong_declarations(arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(InterfaceError, match=message):
         Message(arguments[0], "M", "").of(*arguments[1:])
 
@@ -147,7 +147,7 @@ def test_an_unsupported_message_is_unknown_to_the_node_only() -> None:
         ((WINDOW, Message(21, "window", "")), (), "two telecommands of one name"),
     ],
 )
-def test_wrong_interfaces_are_refused(
+def test_rejects_wrong_interfaces(
     telecommands: tuple[Message, ...], telemetries: tuple[Message, ...], message: str
 ) -> None:
     with pytest.raises(InterfaceError, match=message):

@@ -60,7 +60,7 @@ def test_address_is_row_and_column_highest_byte_first(pixel: tuple[int, int], se
 
 
 @pytest.mark.parametrize("pixel", [(640, 0), (0, 480), (-1, 0), (0, -1)])
-def test_address_of_a_pixel_outside_is_refused(pixel: tuple[int, int]) -> None:
+def test_rejects_address_outside_the_image(pixel: tuple[int, int]) -> None:
     with pytest.raises(ValueError, match="not inside of 640 x 480 pixels"):
         fpga.address_bytes(*pixel)
 
@@ -129,7 +129,7 @@ def test_window_is_inside_of_the_picture(sun: tuple[int, int], origin: tuple[int
         ({"rows": 16, "window": 17}, "does not fit into 640 x 16"),
     ],
 )
-def test_impossible_read_outs_are_refused(change: dict[str, int], error: str) -> None:
+def test_rejects_impossible_readouts(change: dict[str, int], error: str) -> None:
     with pytest.raises(ValueError, match=error):
         fpga.ReadOut(**change)
 

@@ -64,7 +64,7 @@ def recorded_compiler() -> None:
 
 @needs_compiler
 @pytest.mark.usefixtures("recorded_compiler")
-def test_operations_cost_what_was_recorded(fast: Calls) -> None:
+def test_operation_costs_match_the_record(fast: Calls) -> None:
     _, recorded = load_measurements()
     (of_this_build,) = (
         one for one in recorded if (one.build, one.timing) == (str(Build("O2")), str(Timing()))

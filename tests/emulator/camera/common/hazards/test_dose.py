@@ -23,7 +23,7 @@ def test_mean_dark_current_is_that_of_the_universal_damage_factor() -> None:
     assert expected * 1.3 / 1.9 < mean < expected * 2.5 / 1.9
 
 
-def test_number_grows_with_dose_and_strength_with_temperature_only() -> None:
+def test_dose_sets_the_count_and_temperature_the_strength() -> None:
     small, large = charge(Dose(krad=0.1)), charge(Dose(krad=1.0))
     assert np.sum(large > 0) == pytest.approx(10 * np.sum(small > 0), rel=0.1)
     assert large[large > 0].mean() == pytest.approx(small[small > 0].mean(), rel=0.1)
@@ -37,6 +37,6 @@ def test_places_are_the_sensor_s_in_every_frame() -> None:
     assert np.any(first != charge(Dose(krad=1.0, seed=5), seed=1))
 
 
-def test_no_dose_is_no_damage() -> None:
+def test_zero_dose_causes_no_damage() -> None:
     assert not charge(Dose(krad=0.0)).any()
     assert Dose(krad=0.0).dark_rise() == 1

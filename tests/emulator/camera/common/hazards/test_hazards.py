@@ -103,7 +103,7 @@ def test_rejects_more_hot_pixels_than_pixels() -> None:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_other_frames_have_other_protons_but_the_same_damage(camera: str) -> None:
+def test_protons_differ_per_frame_and_damage_stays(camera: str) -> None:
     def bright(name: str, readout_ps: int) -> set[int]:
         hazard = HAZARDS[name].sample(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
         frame = picture(camera, hazard, scene=DARK, readout_ps=readout_ps, hot_pixels=0)
@@ -128,7 +128,7 @@ def test_a_photograph_has_what_happens_in_the_sensor(striped: PictureScene) -> N
 
 
 @pytest.mark.parametrize("name", ["protons", "hot-pixels"])
-def test_a_frame_with_it_takes_little_longer(name: str) -> None:
+def test_hazard_adds_little_render_time(name: str) -> None:
     hazard = HAZARDS[name].sample(HAZARDS[name].strength.usual, None, np.random.default_rng(1))
 
     def seconds(*hazards: SensorHazard) -> float:

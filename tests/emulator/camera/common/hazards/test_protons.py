@@ -105,7 +105,7 @@ def test_a_track_has_its_charge_evenly_about_its_middle() -> None:
     np.testing.assert_allclose(middle, [510, 245], atol=0.006)
 
 
-def test_the_same_frame_has_the_same_tracks_and_another_has_others() -> None:
+def test_tracks_repeat_per_frame_and_differ_between_frames() -> None:
     first = charge(Protons(hits=100), 1)
     np.testing.assert_array_equal(first, charge(Protons(hits=100), 1))
     other = charge(Protons(hits=100), 2)
