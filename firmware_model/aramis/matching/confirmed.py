@@ -21,7 +21,7 @@ from cubestack.firmware_model.attitude.quest import AttitudeError
 from cubestack.firmware_model.attitude.robust_fit import robust_fit
 from cubestack.firmware_model.interface.aramis import MeasurementOutcome, Reason
 from cubestack.firmware_model.mcu.costs import Meter
-from cubestack.firmware_model.star_tracker.observation import Candidate, Observation
+from cubestack.firmware_model.star_tracker.observation import OTHER_SCALE, Candidate, Observation
 from cubestack.firmware_model.star_tracker.quality import Rating
 from cubestack.firmware_model.star_tracker.search import AttitudeSearch, MatchOutcome
 
@@ -145,7 +145,8 @@ def _at_middle_row(
     still = measured.smear_px <= profile.smear_px or measured.skew_px <= 0
     if still or len(named) < FEWEST:
         return vectors, sigmas
-    vectors = scaled(vectors, found.factor, meter)
+    factor = found.factor if abs(found.factor - 1) > OTHER_SCALE else 1.0
+    vectors = scaled(vectors, factor, meter)
     heights = measured.centroids[named, 1] / np.float32(field.rows) - np.float32(0.5)
     predicted = turned(picture.stars.vectors[found.stars], found.rotation)
     meter.charge(f32_mul=9 * len(named), f32_add=6 * len(named), loop=len(named))
@@ -158,7 +159,7 @@ def _at_middle_row(
     meter.charge(f32_mul=5 * len(named), f32_add=6 * len(named), f32_div=len(named))
     meter.charge(f32_sqrt=2 * len(named) + 1)
     sigmas = (np.hypot(sigmas, moved) / np.sqrt(weights)).astype(np.float32)
-    return scaled(straight, 1 / found.factor, meter), sigmas
+    return scaled(straight, 1 / factor, meter), sigmas
 
 
 class DatabaseStars:
