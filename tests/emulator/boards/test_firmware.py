@@ -165,9 +165,7 @@ class Line:
         (0x3305, 8, "O", 2),
     ],
 )
-def test_usart_frame_format(
-    processor: Any, frame: int, data: int, parity: Any, stops: float
-) -> None:
+def test_usart_frames(processor: Any, frame: int, data: int, parity: Any, stops: float) -> None:
     """EFM32GG Reference Manual, USART_FRAME: DATABITS, PARITY, STOPBITS."""
     line = Line(processor)
     line.memory[FRAMES[0][0]] = frame

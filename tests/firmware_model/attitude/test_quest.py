@@ -94,9 +94,7 @@ def test_two_stars_determine_the_attitude() -> None:
         ([[0, 0, 1], [0.6, 0, 0.8]], [0, 0], "add up to 0"),
     ],
 )
-def test_rejects_degenerate_vectors(
-    body: list[list[float]], weights: list[float], message: str
-) -> None:
+def test_rejects_bad_vectors(body: list[list[float]], weights: list[float], message: str) -> None:
     with pytest.raises(AttitudeError, match=message):
         solve(np.array(body), np.array(body), np.array(weights, dtype=float))
 

@@ -116,9 +116,7 @@ def test_phase_ends_when_its_block_fails() -> None:
         (1, "measured", "", "needs a source"),
     ],
 )
-def test_rejects_costs_without_provenance(
-    cycles: int, provenance: str, source: str, message: str
-) -> None:
+def test_rejects_doubtful_costs(cycles: int, provenance: str, source: str, message: str) -> None:
     with pytest.raises(CostError, match=message):
         Cost(cycles, provenance, source)  # type: ignore[arg-type]
 

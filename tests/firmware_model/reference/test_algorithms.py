@@ -167,7 +167,7 @@ def test_random_blobs_meet_every_limit_alike(program: Algorithms, seed: int) -> 
     assert_same_detection(program.detect(picture, config), expected)
 
 
-def test_random_centroids_are_identified_alike(
+def test_random_centroids_have_the_same_identities(
     program: Algorithms, listed: StarCatalogue, camera: CameraParameters
 ) -> None:
     rng = np.random.default_rng(7)

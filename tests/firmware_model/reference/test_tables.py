@@ -19,9 +19,7 @@ from cubestack.firmware_model.reference import tables
         ({1, 3}, [(1, 1), (3, 3)]),
     ],
 )
-def test_consecutive_values_are_one_range(
-    allowed: set[int], expected: list[tuple[int, int]]
-) -> None:
+def test_consecutive_values_form_range(allowed: set[int], expected: list[tuple[int, int]]) -> None:
     assert tables._ranges(9, lambda raw: raw in allowed) == expected
 
 

@@ -30,7 +30,7 @@ def near(boresight: NDArray[np.float64], deg: float, rng: np.random.Generator) -
     ("hint_deg", "false_stars", "least"),
     [(None, 0, 0.98), (None, 5, 0.98), (None, 20, 0.95), (5.0, 0, 0.98), (5.0, 20, 0.95)],
 )
-def test_a_sky_is_solved_and_never_wrong(
+def test_solves_and_is_never_wrong(
     tracker: Tracker, hint_deg: float | None, false_stars: int, least: float
 ) -> None:
     rng = np.random.default_rng((10 if hint_deg is None else 30) + false_stars)

@@ -102,9 +102,7 @@ def test_a_shorter_side_leaves_fewer_triangles(small: Database) -> None:
     assert len(fewer.numbers) == len(small.numbers)
 
 
-def test_cache_keeps_database(
-    tmp_path: Path, small: Database, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_caches_database(tmp_path: Path, small: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     first = cached(tmp_path / "new")
     (file,) = (tmp_path / "new").iterdir()
     assert first == small.pack() == file.read_bytes()

@@ -154,9 +154,7 @@ def test_typical_debugging_session(board: CubeStarFirmwareBoard, endpoint: GdbEn
 
 
 @needs_gdb
-def test_time_passes_in_a_stepped_sleep(
-    board: CubeStarFirmwareBoard, endpoint: GdbEndpoint
-) -> None:
+def test_time_passes_in_stepped_sleep(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint) -> None:
     said = session(
         board,
         endpoint,

@@ -307,7 +307,7 @@ def test_an_answer_that_comes_later(program: Program) -> None:
     ("name", "arguments", "close_on_exec"),
     [("dup", (), False), ("fcntl", (0, 5), False), ("fcntl", (1030, 5), True)],
 )
-def test_a_copy_is_the_same_file(
+def test_descriptor_copy_is_the_same_file(
     program: Program, name: str, arguments: tuple[int, ...], close_on_exec: bool
 ) -> None:
     fd = program.opened()

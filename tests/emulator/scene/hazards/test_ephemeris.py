@@ -129,9 +129,7 @@ def test_two_centuries_of_places(planet: str, within_arcsec: float) -> None:
     ("planet", "perihelion_deg", "node_deg"),
     [("jupiter", 14.3313, 100.4644), ("saturn", 93.0568, 113.6655)],
 )
-def test_giants_are_near_their_mean_elements(
-    planet: str, perihelion_deg: float, node_deg: float
-) -> None:
+def test_giants_are_near_mean_elements(planet: str, perihelion_deg: float, node_deg: float) -> None:
     """Meeus, Astronomical Algorithms, table 31.A: J2000; these are fitted to two centuries."""
     *_, perihelion, node = ephemeris.ELEMENTS[planet][0]
     assert perihelion == pytest.approx(perihelion_deg, abs=0.5)

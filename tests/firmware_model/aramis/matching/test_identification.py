@@ -70,7 +70,7 @@ def test_a_rough_direction_rules_out_what_is_far_away() -> None:
         (Light(false_stars=5), None, 0.95, CameraField(fov_deg=18)),
     ],
 )
-def test_verification_is_right(
+def test_verification_accepts_right_solutions(
     light: Light, hint_error_deg: float | None, right: float, field: CameraField
 ) -> None:
     found = rates(50, VERIFIED.profile, light, hint_error_deg, field, seed=1)

@@ -183,9 +183,7 @@ def test_costs_equal_the_listing_s_operations(meter: Meter, printed: nadir.Nadir
 
 @pytest.mark.parametrize("first", [(100, 1, 200, 0), (139, 0, 247, 0)], ids=["stuck", "outside"])
 @pytest.mark.parametrize(("printed", "detect"), [(False, "SUN_NOT_FOUND"), (True, "SUCCESS")])
-def test_accepts_any_sun_pixel(
-    meter: Meter, printed: bool, detect: str, first: tuple[int, ...]
-) -> None:
+def test_any_sun_pixel(meter: Meter, printed: bool, detect: str, first: tuple[int, ...]) -> None:
     config = sun_centroid.SunConfig(byte_table(meter), printed=printed)
     data = np.zeros(sun_centroid.window_bytes(), np.uint8)
     data[:4], data[100] = first, 230

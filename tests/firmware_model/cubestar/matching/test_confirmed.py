@@ -69,7 +69,7 @@ def test_stars_that_were_tried_in_vain_have_votes(name: Name, tracker: PairTrack
 
 
 @pytest.mark.parametrize("per_cent", [-3.0, -0.85, -0.35, 0.35, 0.85, 3.0])
-def test_five_stars_suffice_at_3_per_cent_lens_error(
+def test_five_stars_suffice_at_3_per_cent(
     tracker: PairTracker, shoot: Shoot, per_cent: float
 ) -> None:
     """So few are only found where one of the focal lengths that are tried is nearly right."""
@@ -99,9 +99,7 @@ def test_what_the_result_says(name: Name, shoot: Shoot) -> None:
     assert found.scale == pytest.approx(1, abs=0.001)
 
 
-def test_triangles_are_those_that_trying_all_finds(
-    catalogue: StarCatalogue, tracker: PairTracker
-) -> None:
+def test_triangles_equal_exhaustive_search(catalogue: StarCatalogue, tracker: PairTracker) -> None:
     rng = np.random.default_rng(97)
     tolerance, count = 0.001, 10
     vectors = catalogue.vectors.astype(float)
@@ -129,9 +127,7 @@ def test_triangles_are_those_that_trying_all_finds(
     assert 0.4 < seen / chance < 1.2  # these stars do not cluster
 
 
-def test_few_random_pictures_are_believed_and_no_more_than_said(
-    name: Name, tracker: PairTracker
-) -> None:
+def test_false_solutions_stay_below_the_declared_rate(name: Name, tracker: PairTracker) -> None:
     rng = np.random.default_rng(98)
     believed = 0
     for _ in range(150):

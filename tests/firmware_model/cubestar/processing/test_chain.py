@@ -65,7 +65,7 @@ def test_the_attitude_belongs_to_the_picture_of_the_stars(lit: Harness) -> None:
     assert values["ImageTime"] < at_ms
 
 
-def test_stars_weigh_as_much_as_they_were_confirmed(
+def test_weights_follow_confirmation(
     unit: Harness, monkeypatch: pytest.MonkeyPatch, pose: Rotation
 ) -> None:
     given: list[np.ndarray] = []
@@ -191,7 +191,7 @@ def test_a_hint_is_used_up_by_the_first_fix(tracking: Harness, sky: Sky, pose: R
 
 @pytest.mark.parametrize("profile", ["extended"])
 @pytest.mark.parametrize(("degrees", "kept"), [(0.1333, True), (0.29, True), (0.35, False)])
-def test_tracking_follows_up_to_its_rate(
+def test_tracking_follows_up_to_its_rate_limit(
     tracking: Harness, sky: Sky, pose: Rotation, degrees: float, kept: bool
 ) -> None:
     process(tracking, sky.picture)

@@ -99,7 +99,7 @@ def test_a_hint_is_used_once(tracking: Harness, pose: Rotation) -> None:
     assert seen(tracking, elsewhere) == (LOST, Reason.SOLVED)
 
 
-def test_contradicting_fix_needs_confirmation(
+def test_contradiction_needs_second_fix(
     tracking: Harness, pose: Rotation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transitions, "SURE", 0.0)  # nothing is
@@ -159,9 +159,7 @@ def test_power_cycle_forgets_the_tracking_history(unsure: Harness, pose: Rotatio
     assert seen(unsure, turned(pose, 60)) == (LOST, Reason.SOLVED)
 
 
-def test_a_candidate_and_the_quality_survive_the_loop_s_reset(
-    unsure: Harness, pose: Rotation, sky: Sky
-) -> None:
+def test_candidate_and_quality_survive_a_reset(unsure: Harness, pose: Rotation, sky: Sky) -> None:
     seen(unsure, turned(pose, 60), wait_s=5.0)
     quality, candidate = unsure.telemetry("Quality"), unsure.program.state.candidate
     unsure.command("MCUReset")
