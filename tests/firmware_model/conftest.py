@@ -13,7 +13,7 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 
 @dataclass
 class Shot:
-    """What a perfect pinhole of CubeStar's field sees, with the truth beside it."""
+    """The image of a perfect pinhole with CubeStar's field, and the truth."""
 
     directions: NDArray[np.float32]
     stars: NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""What a host does with a node: frames and messages, on both buses, without a line between."""
+"""A node's host: frames and messages on both buses, without a line between."""
 
 from typing import Any
 

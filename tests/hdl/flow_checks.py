@@ -1,4 +1,4 @@
-"""What the flow has to make of every top, whichever sensor it is of."""
+"""Properties that the flow's output must have for every top."""
 
 import json
 import re

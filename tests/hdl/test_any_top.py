@@ -1,4 +1,4 @@
-"""What every top has to do, at every rate and from every state, on Icarus Verilog."""
+"""Requirements of every top, at every rate and from every state, on Icarus Verilog."""
 
 from typing import Any
 

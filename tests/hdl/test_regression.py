@@ -83,7 +83,7 @@ def test_hanging_simulation_is_terminated(verilog: Path, tmp_path: Path) -> None
 
 @pytest.fixture
 def failing(icarus: Any, tmp_path: Path) -> Any:
-    """Keeps its waveforms apart from those that somebody looks at."""
+    """Keeps its waveforms apart from those of other runs."""
     return type(icarus)(tmp_path, tmp_path / "waves")
 
 

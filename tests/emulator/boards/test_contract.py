@@ -1,4 +1,4 @@
-"""What all boards have in common: one kernel and one bus for several of them."""
+"""Behaviour common to all boards: several share one kernel and one bus."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack

@@ -1,4 +1,4 @@
-"""What an engine asks of a camera."""
+"""Segments, as an engine requests them of a camera."""
 
 from typing import Any
 

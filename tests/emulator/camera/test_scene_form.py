@@ -1,4 +1,4 @@
-"""A scene that is written down is the same when it is read again, and stands where it says."""
+"""A scene is the same after saving and loading, and its bodies are where it says."""
 
 import re
 from dataclasses import fields, is_dataclass

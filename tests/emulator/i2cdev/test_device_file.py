@@ -72,7 +72,7 @@ def test_other_requests(ask: Ask, number, argument, answer):
 
 
 def test_the_timeout_is_in_units_of_ten_milliseconds(ask: Ask, adapter: I2cAdapter):
-    """linux/i2c-dev.h; retries are as many as are said."""
+    """linux/i2c-dev.h; retries are a plain number."""
     ioctl(ask, linux.Ioctl.TIMEOUT, 3)
     ioctl(ask, linux.Ioctl.RETRIES, 4)
     assert (adapter.timeout_ps, adapter.retries) == (30 * 10**9, 4)

@@ -42,7 +42,7 @@ def test_a_file_under_its_key(served):
 
 
 def test_a_key_that_is_used_again(served):
-    """The kernel gives an inode's number anew before we hear of the end of the old one."""
+    """The kernel reuses an inode number before the server sees the old client's end."""
     old, new, caller = served.connect(), served.connect(), served.connect()
     served.ask(old, linux.Call.OPEN, key=77)
     served.ask(new, linux.Call.OPEN, key=77)

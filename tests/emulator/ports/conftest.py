@@ -31,7 +31,7 @@ TIMEOUT_S = 20.0  # of a client that waits for what must come
 
 
 class Device:
-    """A UART at 1 Mbaud unless told otherwise: a byte takes 10 us."""
+    """A UART, by default at 1 Mbaud: a byte takes 10 us."""
 
     def __init__(self, kernel: Kernel, baud: int = 1_000_000, answers: int = 0) -> None:
         self.kernel = kernel

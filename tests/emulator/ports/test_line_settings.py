@@ -45,7 +45,7 @@ class Desk:
         return opened
 
     def serve(self, byte_times: int = 3000) -> bytes:
-        """What the device has heard since, once it and the client got what they wrote."""
+        """Bytes that the device received, once both sides have everything that was written."""
         self.device.received.clear()
         for _ in range(50):
             self.port.exchange(self.device.advance(byte_times // 50))

@@ -42,7 +42,7 @@ class Wall:
 
 
 class FakePort(Endpoint):
-    """Takes note of its calls and stops the scheduler in the end."""
+    """Records its calls and stops the scheduler at the end."""
 
     congested = False
 

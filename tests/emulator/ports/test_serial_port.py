@@ -1,4 +1,4 @@
-"""What a serial port releases, on one whose client is a byte string."""
+"""Bytes that a serial port releases, with a byte string as its client."""
 
 import select
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What counts as the time of a first build."""
+"""The time of a first build."""
 
 from pathlib import Path
 from types import SimpleNamespace

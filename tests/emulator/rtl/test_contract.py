@@ -47,7 +47,7 @@ def reading(engine):
 
 @pytest.fixture
 def storing(engine, camera):
-    """The engine, told to store from the camera's first clock on."""
+    """The engine stores from the camera's first clock on."""
     engine.attach(camera)
     engine.set_pin("ENABLE", 1)
     return engine

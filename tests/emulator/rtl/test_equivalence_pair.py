@@ -141,7 +141,7 @@ def test_at_one_instant_the_first_camera_comes_first(kind):
 
 @pytest.mark.parametrize("kind", ["compiled", "python"])
 def test_two_drivers_on_one_wire_are_recorded_each_time(kind):
-    """The designs never do that, so another output stands in for CONTENTION."""
+    """The designs never do that, so another output replaces CONTENTION."""
     wiring = replace(cubestar_wiring(CubeStarTop(3, 2)), contention="SRAM_CE_N")
     engine = make_engine(wiring, kind)
     for time_ps in (1_000, 2_000):

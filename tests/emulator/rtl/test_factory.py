@@ -11,7 +11,7 @@ from cubestack.emulator.rtl.sram import SramTiming
 
 @pytest.fixture
 def engines(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """What stands for both; "fails" is what the compiler says."""
+    """Replaces both; "fails" is the compiler's message."""
     made: dict[str, Any] = {"fails": None}
 
     def compiled(*arguments: object, **options: object) -> tuple[object, ...]:

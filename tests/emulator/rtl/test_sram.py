@@ -50,7 +50,7 @@ def test_write_takes_effect_at_the_end_of_the_pulse():
 
 
 def test_hold_times_are_zero():
-    """What changes together with the pulse's end came too late to be written."""
+    """Changes at the end of the pulse come too late to be written."""
     sram = make((START, writing(5, 0xA5)), (START + T.write_pulse_ps, idle(6, 0x11)))
     assert sram.memory[5] == 0xA5
     assert sram.memory[6] == 6

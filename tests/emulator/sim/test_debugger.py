@@ -1,4 +1,4 @@
-"""A debugged machine: it stands while time is held, and at its program's own breakpoints."""
+"""A debugged machine stops while time is held, and at its program's own breakpoints."""
 
 import pytest
 

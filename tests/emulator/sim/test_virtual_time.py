@@ -78,7 +78,7 @@ def test_advance_leaves_nothing_behind():
 
 
 def test_horizon_is_no_later_than_where_time_is_advanced_to():
-    """What looks ahead stops there, as somebody outside may act then."""
+    """Look-ahead stops there, because an outside event may follow."""
     kernel = Kernel()
     seen = []
     kernel.timeout(10).callbacks.append(lambda _event: seen.append(kernel.horizon()))

@@ -1,4 +1,4 @@
-"""What the settings make of the processing; measurements themselves are tested on the board."""
+"""Effects of the settings on the processing; measurements are tested on the board."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What AraMiS' routines are charged, and what they find, on pictures and lists of stars."""
+"""Charges and results of AraMiS' routines on images and lists of stars."""
 
 from dataclasses import replace
 from typing import Any
@@ -47,7 +47,7 @@ PROFILES = {
 
 
 def numbers(found: Solution) -> list[float]:
-    """What became of it; ends and counts only, as an attitude's last digits are the processor's."""
+    """Outcome and counts only, because an attitude's last digits depend on the processor."""
     ends = [found.outcome.value, found.reason.value]
     counts = [found.candidates, found.pivots, found.triples, found.expected, len(found.measured)]
     return [*ends, *counts, *found.stars[:30].tolist()]

@@ -1,4 +1,4 @@
-"""What spoilt a picture is named by its traces."""
+"""The cause of a bad image is identified by its traces."""
 
 import numpy as np
 import pytest

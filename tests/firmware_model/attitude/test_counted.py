@@ -1,4 +1,4 @@
-"""What each further star is charged, beside what its numbers see: arrays that count."""
+"""The charge of each further star equals the operations that counting arrays record."""
 
 from collections import Counter
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What the attitude's routines are charged: of a few stars, and of many."""
+"""Charges of the attitude's routines, for few stars and for many."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What every telecommand of the table does, seen from the pins and the buses."""
+"""The effect of every telecommand, observed at the pins and the buses."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,7 @@ EFFECTS: dict[str, Effect] = {}
 SUN_BORESIGHT = (369.0, 250.0)
 
 OF_RESULTS = {"DetectionThreshold", "Boresight", "Mask", "Distortion"}
-"""Their effects show in the figures and codes of a result, as the verified vision gives them."""
+"""Their effects show in a result's values and codes, as the verified vision returns them."""
 
 
 #: Decorator: the function shows what the named telecommands do.
@@ -248,7 +248,7 @@ def set_nadir_search(_: Harness) -> None:
 
 @telecommand("SetProfile", "SetSwitch")
 def set_switches(_: Harness) -> None:
-    """After a measurement as before the first one; a table of other coefficients is made anew."""
+    """Before and after the first measurement; other coefficients need a new table."""
     seen = []
     for coefficients in (False, True):
         for early in (False, True):

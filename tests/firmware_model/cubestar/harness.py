@@ -117,7 +117,7 @@ class Harness(Runner, HostSide):
         assert found == pytest.approx(values, rel=1e-6), f"{frame} shows {found}"
 
     def start_loop(self, seconds: float) -> int:
-        """Trigger the 1 Hz loop and run it so long; the time at which it began."""
+        """Trigger the 1 Hz loop and run it for this time; returns its start time."""
         start_us = self.now_us + SHORTEST_DELAY_US
         assert self.send("Trigger") == 0
         self.run(until_us=start_us + round(seconds * 1e6))

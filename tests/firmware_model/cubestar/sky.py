@@ -64,7 +64,7 @@ def distort(wanted: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def take(catalogue: StarCatalogue, attitude: Rotation, most: int | None = None) -> Sky:
-    """What a camera with this attitude (inertial to camera) sees; at most the ``most`` first."""
+    """The view of a camera with this attitude (inertial to camera); at most ``most`` stars."""
     return draw(catalogue.vectors, attitude, most)
 
 

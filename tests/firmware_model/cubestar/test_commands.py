@@ -1,4 +1,4 @@
-"""What all telecommands have in common."""
+"""Behaviour common to all telecommands."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What each telecommand of the table does."""
+"""The effect of each telecommand."""
 
 import numpy as np
 import pytest

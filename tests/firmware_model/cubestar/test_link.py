@@ -1,4 +1,4 @@
-"""What is CubeStar's own of its link, with the whole program behind it."""
+"""The parts of the link that only CubeStar has, with the whole program."""
 
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE

@@ -1,4 +1,4 @@
-"""What CubeStar's routines are charged, and what they find, on pictures and lists of stars."""
+"""Charges and results of CubeStar's routines on images and lists of stars."""
 
 from collections.abc import Callable
 from typing import Any

@@ -18,7 +18,7 @@ FLAGS = [field.name for field in INTERFACE.telemetry("ErrorFlags").fields]
 
 
 class Memories:
-    """What of the hardware the state uses."""
+    """The part of the hardware that the state uses."""
 
     def __init__(self) -> None:
         self.retention = bytearray(RETENTION_BYTES)

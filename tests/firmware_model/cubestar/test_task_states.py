@@ -29,7 +29,7 @@ def sending(*names: str, before: tuple[str, ...] = (), **values: object) -> Act:
 
 
 def failing(*names: str, dead: bool = False, cut: bool = False, **values: object) -> Act:
-    """The same with a camera that does not answer, or a memory whose supply is cut meanwhile."""
+    """The same with a camera that does not answer, or a memory that loses its supply during it."""
 
     def act(unit: Harness, _sky: Sky) -> None:
         unit.camera_refuses = lambda _data: dead

@@ -1,4 +1,4 @@
-"""What holds for the tables of every device."""
+"""Properties that the tables of every device have."""
 
 import pytest
 

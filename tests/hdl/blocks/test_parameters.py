@@ -1,4 +1,4 @@
-"""What the blocks refuse, and how wide addresses are."""
+"""Parameters that the blocks reject, and widths of addresses."""
 
 import gc
 from collections.abc import Callable

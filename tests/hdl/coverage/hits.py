@@ -17,7 +17,7 @@ _POINTS = {name: frozenset(group.points()) for name, group in GROUPS.items()}
 
 
 def hit(group: str, **parts: object) -> None:
-    """A point was reached. ValueError when it is not declared: nobody would miss it."""
+    """Record a reached point; raises ValueError when it is not declared."""
     names = tuple(GROUPS[group].axes)
     if set(parts) != set(names):
         raise ValueError(f"a point of {group!r} has {', '.join(names)}, not {', '.join(parts)}")

@@ -65,7 +65,7 @@ def vsync(href: Sequence[int]) -> list[int]:
 
 
 def action_of(side: str, controls: Controls) -> Action:
-    """What an FPGA does that sees its own enable, and the other one only over the link."""
+    """Actions of an FPGA that sees its own enable, and the other one only over the link."""
     _, shift, edge, rnw, sunen, naden = controls
     if not fpga.link_shows_enables(shift, edge):
         sunen, naden = (sunen, 0) if side == "sun" else (0, naden)

@@ -1,4 +1,4 @@
-"""What the simulation that imports this runs on, from its environment."""
+"""Settings of the simulation that imports this, from its environment."""
 
 import json
 import os

@@ -24,7 +24,7 @@ def test_pair(simulate: Any, read_out: ReadOut, name: str, seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_needs_no_initial_values(simulate: Any, seed: int) -> None:
-    """Standby alone makes the state: the parts' flip-flops come up as they like."""
+    """Standby alone sets the state: the parts' flip-flops power up at any level."""
     names = NAMES.copy()
     random.Random(seed).shuffle(names)
     simulate(CubeSensePair, SMALLEST, *names, seed=seed, initialised=False)

@@ -20,7 +20,7 @@ from tests.hdl.harness.watching import Levels, levels, watch
 
 
 class Mcu(Processor[Controls]):
-    """Drives ENABLE, RNW and BANK, or what stands for them on ``dut``."""
+    """Drives ENABLE, RNW and BANK, or their equivalents on ``dut``."""
 
     CLOCK = "DCLK"
 

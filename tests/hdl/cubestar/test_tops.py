@@ -28,7 +28,7 @@ def test_published(icarus: Any, name: str, columns: int, rows: int, seed: int) -
 
 @pytest.mark.parametrize("seed", quick([1, 2, 3], 1))
 def test_published_needs_no_initial_values(icarus: Any, seed: int) -> None:
-    """Standby alone makes the state: the part's flip-flops come up as they like."""
+    """Standby alone sets the state: the part's flip-flops power up at any level."""
     shuffled = [*modules(STAR, "store", "read", "modes")]
     random.Random(seed).shuffle(shuffled)
     icarus.run(CubeStarTop, 5, 3, *shuffled, seed=seed, initialised=False)

@@ -84,7 +84,7 @@ def read_state(count: int) -> str:
 
 
 def left_in(clocks: Sequence[Clock], stepped: Sequence[Step], end: int) -> str:
-    """What a writer was at at a time in ps, from the clocks since it was started."""
+    """The state of a writer at a time in ps, from the clocks since it was started."""
     before = [index for index, clock in enumerate(clocks) if clock.rise < end]
     if len(before) < 2:
         return "reset"

@@ -1,4 +1,4 @@
-"""What the testbench of every top has in common."""
+"""The common part of every top's testbench."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable

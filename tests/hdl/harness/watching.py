@@ -1,4 +1,4 @@
-"""What is looked at in the background of a test, whenever a point in time has settled."""
+"""Checks that run in the background of a test, whenever a point in time has settled."""
 
 import random
 from collections.abc import Callable, Iterable, Sequence

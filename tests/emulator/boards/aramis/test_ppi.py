@@ -49,7 +49,7 @@ class Lines:
 
 
 class Bench:
-    """Where a frame has just ended, unless told otherwise."""
+    """A camera whose frame has just ended, by default."""
 
     def __init__(self, phase: int = ROWS * LINE) -> None:
         self.kernel = Kernel()
@@ -152,7 +152,7 @@ def test_the_sensor_s_frame_ends_when_its_last_pixel_comes(start_ms: int) -> Non
 
 @pytest.mark.parametrize("wrong", range(ROWS))
 def test_wrong_line_spoils_only_its_own_frame(wrong: int) -> None:
-    """A frame of pieces, one of which has lines of another length; then the frame begins anew."""
+    """One piece of a frame has lines of another length; the frame then starts again."""
     bench = Bench()
     lines = Pieces(wrong)
     bench.ppi = Ppi(bench.kernel, lines)

@@ -69,7 +69,7 @@ def variable(board: CubeStarFirmwareBoard, name: str) -> int:
 
 
 def session(board: CubeStarFirmwareBoard, endpoint: GdbEndpoint, script: str) -> str:
-    """What GDB says to the commands in ``script``, while virtual time goes on as it lets it."""
+    """GDB's output for the commands in ``script``; virtual time runs while GDB lets it."""
     assert GDB is not None
     assert board.image.path is not None
     commands = [

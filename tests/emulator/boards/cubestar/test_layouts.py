@@ -1,4 +1,4 @@
-"""What the layouts draw, by what the parts of the published board draw."""
+"""Currents of the layouts, derived from the parts of the published board."""
 
 from itertools import product
 

@@ -1,4 +1,4 @@
-"""What all sensors do with scenes, supply and pictures, at one that renders a number."""
+"""Scenes, supply and images of all sensors, on a sensor that renders a number."""
 
 from typing import Any
 

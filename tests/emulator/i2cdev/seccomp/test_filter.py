@@ -14,7 +14,7 @@ ALLOW, NOTIFY = 0x7FFF0000, 0x7FC00000
 
 
 def decide(abi: Abi, call: int, *arguments: int, arch: int | None = None) -> int:
-    """What the filter returns; the processor of classic BPF, as far as it is used."""
+    """The filter's return value, by the classic BPF instructions that it uses."""
     data = struct.pack("<iIQ", call, abi.audit_arch if arch is None else arch, 0)
     data += struct.pack("<6Q", *(n & (1 << 64) - 1 for n in (*arguments, *[0] * 6)[:6]))
     program = list(struct.iter_unpack("=HBBI", make_filter(abi, NUMBERS)))

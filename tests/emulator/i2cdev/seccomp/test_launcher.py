@@ -15,7 +15,7 @@ CALL = 317
 
 
 class Libc:
-    """Takes note of calls; ``fails`` names those that do, ``flags`` those that it knows."""
+    """Records calls; ``fails`` names those that fail, ``flags`` are the supported flags."""
 
     def __init__(self, fails: str = "", flags: tuple[int, ...] = (8 | 32, 8)) -> None:
         self.calls: list[tuple[Any, ...]] = []

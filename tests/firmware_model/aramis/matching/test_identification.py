@@ -106,7 +106,7 @@ def test_solution_fields() -> None:
 
 @pytest.mark.slow
 def test_the_order_of_brightness_is_not_needed() -> None:
-    """Verification tells stars apart by their sides when their brightness misleads."""
+    """Verification distinguishes stars by their sides when their brightness misleads."""
     rng = np.random.default_rng(5)
     right = 0
     for made in pictures(30, 5):
@@ -188,7 +188,7 @@ def test_rejects_skewed_star_streaks(smear_px: float, skew_px: float, refused: b
 
 
 def test_stars_drawn_out_while_all_rows_were_exposed_at_once_are_not_set_straight() -> None:
-    """None moved from row to row: a list that says nothing of it gives the same attitude."""
+    """No star moved between rows, so a list without exposure rows gives the same attitude."""
     (made,) = pictures(1)
     smeared = StarList(made.stars.centroids, made.stars.brightness, smear_px=9.0)
     still, drawn_out = (named(one, VERIFIED.profile) for one in (made.stars, smeared))

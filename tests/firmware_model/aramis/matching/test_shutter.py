@@ -61,7 +61,7 @@ def test_a_wrong_star_counts_less(rng: np.random.Generator) -> None:
 
 
 def test_few_stars_leave_more_doubt(rng: np.random.Generator) -> None:
-    """The doubt told is about the real error, whatever the stars."""
+    """The reported uncertainty is about the real error for any stars."""
     doubts = {}
     for count in (FEWEST, 30):
         errors, told = [], []

@@ -1,4 +1,4 @@
-"""What the vision is charged, picture by picture, in each of its variants."""
+"""Charges of the vision, image by image, in each of its variants."""
 
 from typing import Any
 

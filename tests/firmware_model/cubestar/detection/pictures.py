@@ -26,7 +26,7 @@ def spots(places: Places, light: NDArray[np.float64], sigma: float = 0.9) -> NDA
 
 
 def taken(image: NDArray[np.float64]) -> Picture:
-    """What a camera of 8 bits makes of it."""
+    """The image of an 8-bit camera."""
     picture: Picture = np.clip(np.floor(image), 0, 255).astype(np.uint8)
     return picture
 

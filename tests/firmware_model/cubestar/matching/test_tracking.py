@@ -38,7 +38,7 @@ def full_shot(shoot: Shoot, seed: int) -> Any:
 
 
 def solved(results: list[tuple[bool, int]], least: float) -> bool:
-    """Whether so large a part is solved, and at most one identity wrong in all."""
+    """Whether at least this share is solved, with at most one wrong identity in total."""
     rate = np.mean([identified for identified, _ in results])
     return bool(rate >= least) and sum(wrong for _, wrong in results) <= 1
 

@@ -27,7 +27,7 @@ WINDOW = Message(20, "Window", "").of(
 
 
 def test_a_node_of_any_kind_is_identified_by_the_same_numbers() -> None:
-    """As CubeStar's: frames of an unknown node can be asked who it is."""
+    """As CubeStar's: a host can identify an unknown node."""
     assert [message.id for message in node_telemetry(9, {})] == [128, 130, 131]
     assert CUBESTAR.telemetry("Identification").id == 128
 

@@ -22,7 +22,7 @@ async def fills(bench: DoubleTestbench, memory: int) -> None:
 
 @checked_test(DoubleTestbench)
 async def one_memory_serves_both_in_turn(bench: DoubleTestbench) -> None:
-    """The other one has failed: it is not stored in, not asked, and never selected."""
+    """The other one has failed: it is never written, read or selected."""
     good = random.getrandbits(1)
     failed = getattr(bench.dut, f"SRAM{2 - good}_CE_N")
     for _ in range(3):
