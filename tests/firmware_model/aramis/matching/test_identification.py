@@ -188,7 +188,7 @@ def test_rejects_skewed_star_streaks(smear_px: float, skew_px: float, refused: b
 
 
 def test_stars_drawn_out_while_all_rows_were_exposed_at_once_are_not_set_straight() -> None:
-    """No star moved between rows, so a list without exposure rows gives the same attitude."""
+    """No star moved between rows, so the attitude is that of a list without streaks."""
     (made,) = pictures(1)
     smeared = StarList(made.stars.centroids, made.stars.brightness, smear_px=9.0)
     still, drawn_out = (named(one, VERIFIED.profile) for one in (made.stars, smeared))
