@@ -1,5 +1,3 @@
-"""The part's memory map in the debugger."""
-
 import itertools
 from types import SimpleNamespace
 from typing import Any

@@ -1,5 +1,3 @@
-"""Wires between a machine's peripherals and a board's, at a machine of the test's own."""
-
 from typing import Any
 
 import pytest

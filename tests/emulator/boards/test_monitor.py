@@ -1,5 +1,3 @@
-"""Commands of a debugger about pins, at a board of the test's own."""
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Words of a part by the names of its tables, of a memory of the test's own."""
-
 from typing import Any
 
 import pytest

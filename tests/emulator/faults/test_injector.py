@@ -1,5 +1,3 @@
-"""When faults begin and end, and what is refused, on a desk with a line and a supply."""
-
 from typing import Any, cast
 
 import pytest

@@ -1,5 +1,3 @@
-"""Faults in a serial line and on a bus, each byte with its time."""
-
 from collections.abc import Callable
 from typing import Any
 

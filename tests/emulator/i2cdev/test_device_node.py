@@ -1,5 +1,3 @@
-"""The name of the device file, and what it looks like."""
-
 import ctypes
 import os
 import stat

@@ -1,5 +1,3 @@
-"""Waiting awake, in a made-up wall time."""
-
 import os
 from collections.abc import Callable
 

@@ -1,5 +1,3 @@
-"""A program on an emulated bus, from its start to its end."""
-
 from contextlib import closing
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""How virtual time follows a clock of the test's own."""
-
 import pytest
 
 from cubestack.emulator.ports.pace import Pace

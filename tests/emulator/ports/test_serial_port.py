@@ -1,5 +1,3 @@
-"""Bytes that a serial port releases, with a byte string as its client."""
-
 import select
 from dataclasses import dataclass, field
 

@@ -1,5 +1,3 @@
-"""The time of a first build."""
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any

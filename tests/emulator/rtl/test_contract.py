@@ -1,5 +1,3 @@
-"""The contract of both engines, on small frames."""
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Registers that are turned over from outside."""
-
 from collections.abc import Iterator
 from fractions import Fraction
 

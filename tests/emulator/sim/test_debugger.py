@@ -1,5 +1,3 @@
-"""A debugged machine stops while time is held, and at its program's own breakpoints."""
-
 import pytest
 
 from cubestack.emulator.iss.outcome import Stop, StopReason

@@ -1,5 +1,3 @@
-"""A machine's pins and external bus at an FPGA that is reached by callbacks."""
-
 from typing import Any
 
 from cubestack.emulator.sim.firmware_fpga import FpgaCoupling

@@ -1,5 +1,3 @@
-"""The camera's part of the program on a harness whose frames end when a test says so."""
-
 import numpy as np
 import pytest
 

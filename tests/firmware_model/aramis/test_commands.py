@@ -1,5 +1,3 @@
-"""Telecommands by themselves, on a harness."""
-
 import pytest
 
 from cubestack.firmware_model.aramis.program import AramisProgram

@@ -1,5 +1,3 @@
-"""Pixels to directions and back, and what is in the field."""
-
 import numpy as np
 import pytest
 from scipy import integrate

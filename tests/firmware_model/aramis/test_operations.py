@@ -1,5 +1,3 @@
-"""Charges and results of AraMiS' routines on images and lists of stars."""
-
 from dataclasses import replace
 from typing import Any
 

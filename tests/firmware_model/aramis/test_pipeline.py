@@ -1,5 +1,3 @@
-"""Pictures of the sky, from grey levels to the attitude."""
-
 from dataclasses import replace
 from typing import Any
 

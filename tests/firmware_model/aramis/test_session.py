@@ -1,5 +1,3 @@
-"""Telecommands on a sky, one after the other, with the whole program on fake hardware."""
-
 import zlib
 from functools import lru_cache
 

@@ -1,5 +1,3 @@
-"""The border of the picture, beside the lens itself."""
-
 import numpy as np
 import pytest
 

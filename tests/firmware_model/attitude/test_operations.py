@@ -1,5 +1,3 @@
-"""Charges of the attitude's routines, for few stars and for many."""
-
 from collections.abc import Callable
 
 import numpy as np

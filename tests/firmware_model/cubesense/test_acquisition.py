@@ -1,5 +1,3 @@
-"""Commands to the FPGAs, the wait for ACK, and bytes in sequence or by address."""
-
 from collections.abc import Iterator
 from itertools import product
 

@@ -1,5 +1,3 @@
-"""The effect of every telecommand, observed at the pins and the buses."""
-
 from collections.abc import Callable
 
 import numpy as np

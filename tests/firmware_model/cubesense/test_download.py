@@ -1,5 +1,3 @@
-"""Frames of a download, and how often the picture is read for them."""
-
 import numpy as np
 import pytest
 

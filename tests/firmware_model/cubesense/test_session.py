@@ -1,5 +1,3 @@
-"""Telecommands on an Earth and a Sun, one after the other."""
-
 import pytest
 
 from cubestack.firmware_model.interface.cubesense.switches import CubeSenseSwitches

@@ -1,5 +1,3 @@
-"""Where every field of every telemetry frame comes from."""
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Telemetry of the attitude and of the latest picture's outcome."""
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,5 +1,3 @@
-"""Behaviour common to all telecommands."""
-
 import pytest
 
 from cubestack.firmware_model.cubestar.commands import STREAM_BACKLOG_BYTES

@@ -1,5 +1,3 @@
-"""The effect of each telecommand."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The camera's registers, as the firmware writes and reads them."""
-
 import pytest
 
 from cubestack.firmware_model.interface.cameras.mlx75412 import REGISTERS

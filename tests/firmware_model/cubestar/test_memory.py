@@ -1,5 +1,3 @@
-"""The program's buffers fit the part."""
-
 import struct
 
 import numpy as np

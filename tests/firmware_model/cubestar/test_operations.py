@@ -1,5 +1,3 @@
-"""Charges and results of CubeStar's routines on images and lists of stars."""
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Telecommands on a picture of stars, one after the other."""
-
 import pytest
 
 from ..sessions import Step, as_recorded

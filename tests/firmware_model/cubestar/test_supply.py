@@ -1,5 +1,3 @@
-"""Over-current, under-current, the load switches and what the host sees of them."""
-
 import pytest
 
 from cubestack.firmware_model.cubestar.supply import CHANNELS, OFF_TIME_US, UNDER_CURRENT_MA

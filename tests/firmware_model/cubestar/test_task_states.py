@@ -1,5 +1,3 @@
-"""Every state of telemetry TaskStatus, reached by its cause."""
-
 from collections.abc import Callable
 
 import pytest

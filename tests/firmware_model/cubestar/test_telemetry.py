@@ -1,5 +1,3 @@
-"""Every telemetry frame shows the state that it declares to show."""
-
 import math
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Properties that the tables of every device have."""
-
 import pytest
 
 from cubestack.firmware_model.interface.aramis import INTERFACE as ARAMIS

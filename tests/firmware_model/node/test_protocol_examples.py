@@ -1,5 +1,3 @@
-"""The byte examples of the protocol pages come out of the firmware."""
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Settings of a node, with those of the two nodes that store them."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""The files that the reference firmware's Makefile generates."""
-
 import runpy
 import sys
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The prebuilt image is the one that the sources make."""
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The tables of the reference program, as C."""
-
 import math
 import re
 from itertools import pairwise

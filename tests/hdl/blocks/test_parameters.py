@@ -1,5 +1,3 @@
-"""Parameters that the blocks reject, and widths of addresses."""
-
 import gc
 from collections.abc import Callable
 

@@ -1,5 +1,3 @@
-"""The interface on a camera of eight lines, and on the real one's timing."""
-
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction

@@ -1,5 +1,3 @@
-"""The byte examples of docs/protocols-aramis.md come out of the board."""
-
 import re
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Camera, loop, buses and clocks of the whole star tracker."""
-
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The star tracker's use cases, over the wire."""
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

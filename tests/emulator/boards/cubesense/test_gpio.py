@@ -1,5 +1,3 @@
-"""Lines that a processor lets go of when it is reset."""
-
 from types import SimpleNamespace
 from typing import Any
 

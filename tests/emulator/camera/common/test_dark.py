@@ -1,5 +1,3 @@
-"""Dark current by temperature, and hot pixels by statistics."""
-
 import pytest
 
 from cubestack.emulator.camera.common.dark import dark_at, hot_pixels

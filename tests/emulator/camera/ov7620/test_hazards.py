@@ -1,5 +1,3 @@
-"""Hazards of sensor and lens in the pictures of a sun and nadir camera."""
-
 from dataclasses import replace
 
 import numpy as np

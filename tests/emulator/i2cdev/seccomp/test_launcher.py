@@ -1,5 +1,3 @@
-"""How the filter is installed, on a C library of the test's own."""
-
 import ctypes
 import errno
 import os

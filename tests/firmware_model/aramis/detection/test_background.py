@@ -1,5 +1,3 @@
-"""The threshold of the last five pictures."""
-
 import numpy as np
 import pytest
 

@@ -1,5 +1,3 @@
-"""Stars told from other lights by their shape."""
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

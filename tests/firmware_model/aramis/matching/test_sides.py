@@ -1,5 +1,3 @@
-"""Sides and sense of rotation of two triangles."""
-
 import numpy as np
 
 from cubestack.firmware_model.aramis.matching.identification import sides_agree

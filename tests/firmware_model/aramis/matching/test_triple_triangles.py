@@ -1,5 +1,3 @@
-"""Triples in a promising order, and the attitudes that they suggest."""
-
 from collections.abc import Iterator
 from itertools import combinations, islice
 

@@ -1,5 +1,3 @@
-"""The register protocol on the backup UART, byte by byte."""
-
 import re
 from pathlib import Path
 

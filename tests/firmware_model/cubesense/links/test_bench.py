@@ -1,5 +1,3 @@
-"""The one-letter bench protocol."""
-
 import pytest
 
 from cubestack.firmware_model.cubesense.hardware import Port

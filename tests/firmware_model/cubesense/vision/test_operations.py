@@ -1,5 +1,3 @@
-"""Charges of the vision, image by image, in each of its variants."""
-
 from typing import Any
 
 import numpy as np

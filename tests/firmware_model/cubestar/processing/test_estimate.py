@@ -1,5 +1,3 @@
-"""Attitudes rated by what their stars' errors will be."""
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,5 +1,3 @@
-"""Every way between lost in space, assisted and tracking, in virtual time."""
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,5 +1,3 @@
-"""Telemetry Quality's covariance in both directions, and what none can be."""
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,5 +1,3 @@
-"""Messages made of switches, of which one is the board's."""
-
 from dataclasses import dataclass
 
 import pytest

@@ -1,5 +1,3 @@
-"""All hazards of sensor and lens, in pictures of both star cameras."""
-
 import inspect
 import time
 from dataclasses import replace
