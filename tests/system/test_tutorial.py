@@ -60,7 +60,7 @@ def done(line: str, folder: Path) -> str:
 
 def test_all_commands_are_tested() -> None:
     assert commands() == [
-        *("python3 -m venv .venv", ". .venv/bin/activate", "pip install cubestack pytest", ""),
+        *("python3 -m venv .venv", ". .venv/bin/activate", "pip install ../cubestack pytest", ""),
         *("cubestack measure cubesense --frames 3 --profile extended", ""),
         *("cubestack emulate cubesense --profile extended --pty ./ttyCUBESENSE", ""),
         *("python sunsensor.py ./ttyCUBESENSE", "", "pytest test_sunsensor.py", ""),
