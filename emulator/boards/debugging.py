@@ -46,7 +46,7 @@ SERVE_S = 0.02
 
 @dataclass(frozen=True)
 class CameraWindow:
-    """Read-only registers of a camera."""
+    """Registers of a camera, as memory that the debugger can only read."""
 
     registers: RegisterFile
 

@@ -93,7 +93,7 @@ class SerialWire(UartTap):
 
 @dataclass(frozen=True)
 class Core:
-    """The core's registers, for upsets."""
+    """Registers of the processor's core, as a target of upsets."""
 
     processor: FirmwareProcessor
 

@@ -31,7 +31,7 @@ Report = Callable[[int, "Injection", str], None]
 
 @dataclass(eq=False)
 class Injection:
-    """A fault at its target."""
+    """A fault that acts on its target from ``start_ps`` until ``end_ps``."""
 
     number: int  # counted from 0
     fault: Fault

@@ -261,7 +261,7 @@ class SupplyFaults(Mechanism):
 
 @dataclass(eq=False)
 class ProcessorFaults(Mechanism):
-    """Resets with one cause."""
+    """Faults that reset the processor, all with the same cause."""
 
     reset: Callable[[], None]
 

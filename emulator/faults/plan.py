@@ -40,7 +40,7 @@ class PlannedFault:
 
 @dataclass(frozen=True)
 class Plan:
-    """Faults of one run."""
+    """The faults of one run, as a plan file declares them."""
 
     seed: int = 0  # seed of their random numbers
     faults: tuple[PlannedFault, ...] = ()  # in the order of injection

@@ -19,7 +19,7 @@ from cubestack.emulator.sim.virtual_time import Kernel
 
 @dataclass(frozen=True)
 class CameraSite:
-    """A camera."""
+    """A camera as a target of faults: its pixels and its supply."""
 
     source: PixelSource  # its output
     power: Callable[[bool, int], None]  # switches its supply, at a time in ps

@@ -27,7 +27,7 @@ FORWARDED = (signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(frozen=True)
 class HostBus:
-    """A bus for programs."""
+    """An I2C bus that programs reach through device files."""
 
     kernel: Kernel
     busy: Callable[[], bool]  # whether its devices have work without the host

@@ -25,7 +25,7 @@ States = dict[str, str]
 
 @dataclass(frozen=True)
 class LayoutBoard:
-    """One layout."""
+    """FPGA design, wiring and power of the boards with one memory layout."""
 
     top: str  # name of the design in each of its FPGAs
     wiring: Callable[[], Wiring]

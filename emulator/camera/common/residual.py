@@ -14,7 +14,7 @@ _INVERSION_PX = 1e-11
 
 @dataclass(frozen=True)
 class Residual:
-    """Polynomials across the sensor."""
+    """Displacement of the picture, a polynomial of the position on the sensor."""
 
     shape: tuple[int, int]  # rows and columns of the area with coordinates -1..1
     # coefficients in px: for each power of x, those of the powers of y

@@ -14,7 +14,7 @@ GAINS = ("GREEN_1_GAIN", "BLUE_GAIN", "RED_GAIN", "GREEN_2_GAIN")
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """Settings of a frame."""
+    """Settings of a frame, decoded from the registers."""
 
     enabled: bool  # whether frames are sent
     # first pixel of the window, counted from the first active one; may be negative

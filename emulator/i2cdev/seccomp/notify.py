@@ -35,7 +35,7 @@ CHUNK_BYTES = 256  # most paths are shorter
 
 
 class Notification(NamedTuple):
-    """A pending call."""
+    """A system call that waits for the supervisor's answer."""
 
     id: int  # identifies the call in the answer
     pid: int  # calling thread

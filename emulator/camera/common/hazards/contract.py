@@ -26,7 +26,6 @@ class Exposure:
 
     @property
     def area_cm2(self) -> float:
-        """Area of all pixels."""
         return self.shape[0] * self.shape[1] * (self.pitch_um * 1e-4) ** 2
 
 
