@@ -401,7 +401,6 @@ class DeclaredValues:
             setattr(cls, name, field() if one.default is REQUIRED else field(default=one.default))
 
     def __post_init__(self) -> None:
-        """Check every value."""
         for one in self._declared.values():
             self._check(one)
 

@@ -181,7 +181,6 @@ class CameraWire:
                 self._finish(one.time_ps)
 
     def _start(self, address_byte: int, now_ps: int) -> bool:
-        """Whether the camera acknowledges its address."""
         self._address, reads = address_byte >> 1, bool(address_byte & 1)
         if reads:
             self._read = b""

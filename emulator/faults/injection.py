@@ -79,7 +79,6 @@ class Mechanism:
     def begin(self, injection: Injection) -> None: ...
 
     def end(self, injection: Injection) -> None:
-        """Called when a fault ends."""
         if injection in self.injections:
             self.injections.remove(injection)
 

@@ -139,7 +139,6 @@ class Faults:
                 self._end(running, self._mechanism(running.fault.site, running.target))
 
     def report(self, time_ps: int, injection: Injection, text: str) -> None:
-        """Log an effect of a fault."""
         injection.hits += 1
         event = FaultEvent(time_ps, injection.fault.kind, injection.target, text)
         self.events += 1

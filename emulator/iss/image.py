@@ -60,7 +60,6 @@ class Image:
 
     @property
     def size(self) -> int:
-        """Number of bytes."""
         return sum(len(data) for _, data in self.segments)
 
 

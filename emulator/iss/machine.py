@@ -162,7 +162,6 @@ class Machine:
 
     @property
     def hz(self) -> int:
-        """Present clock of the core."""
         return int(self._library.iss_hz(self.handle))
 
     @property
@@ -289,7 +288,6 @@ class Machine:
         return frozenset(self._watches)
 
     def watch(self, watch: Watch, on: bool = True) -> None:
-        """Add or remove a watchpoint."""
         kind = {"r": 1, "w": 2, "a": 3}[watch.kind]
         if on != (watch in self._watches):
             self._library.iss_watchpoint(self.handle, watch.address, watch.length, kind, on)

@@ -82,7 +82,6 @@ def reported(report: Report) -> Iterator[None]:
 
 
 def hash_of(content: bytes) -> str:
-    """Short hash for file names."""
     return hashlib.sha256(content).hexdigest()[:24]
 
 

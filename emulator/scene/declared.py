@@ -37,7 +37,6 @@ class DeclaredScene(DeclaredValues):
 
     @classmethod
     def form(cls) -> SceneForm[Self]:
-        """What tools need of such scenes."""
         return SceneForm(
             {cls.kind: described(cls.declared())}, lambda board: board.scene, _table, cls.sky_map
         )

@@ -62,7 +62,6 @@ class SkyMap:
     turn: Matrix = field(default_factory=lambda: np.eye(3))
 
     def as_dict(self) -> dict[str, Any]:
-        """The JSON object of the map."""
         return {
             "title": self.title,
             "fields": [_field(one) for one in self.fields],

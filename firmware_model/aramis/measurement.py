@@ -85,7 +85,6 @@ class Measuring:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the pictures so far."""
         self._background = LevelHistory()
 
     def latest_boresight(self) -> Floats | None:

@@ -104,7 +104,6 @@ class Commands(CommandExecutor):
         self._reset_cause = codes.ResetCause.SYSTEM_REQUEST
 
     def _test_watchdog(self, _command: QueuedCommand) -> Routine[None]:
-        """Hang; interrupts are still served."""
         yield from pause(WATCHDOG_US)
         self._reset_cause = codes.ResetCause.WATCHDOG
 

@@ -20,7 +20,6 @@ class Settings:
         self.clear()
 
     def clear(self) -> None:
-        """Return to the reset values."""
         self._values = {name: dict(m.reset_values()) for name, m in self._messages.items()}
 
     def get(self, command: str, field: str) -> Any:

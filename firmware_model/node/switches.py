@@ -22,5 +22,4 @@ class RunningSwitches(Generic[switch_messages.SwitchesT]):
         self.now = switch_messages.apply_command(self.now, telecommand, values)
 
     def forget(self) -> None:
-        """Return to the switches of power-up."""
         self.now = self._at_power_up

@@ -162,7 +162,6 @@ class CubeStarFirmwareBoard(CubeStarStack):
         )
 
     def _memory_changed(self, name: str, first: int, count: int) -> None:
-        """Discard decoded instructions of changed code."""
         bases = {"ram": RAM_BASE, "flash": FLASH_BASE}
         if name in bases:
             self.machine.invalidate(bases[name] + first, count)

@@ -72,7 +72,6 @@ class ImageSensor(ABC, Generic[S, C]):
 
     @property
     def condition(self) -> C:
-        """State of lens and sensor."""
         return self._condition
 
     @condition.setter

@@ -67,7 +67,6 @@ class RegisterFile:
         return {register.name: self._value(register, self._written) for register in self._table}
 
     def sync(self) -> None:
-        """Make all written values active."""
         self._active = dict(self._written)
 
     def active(self, name: str) -> int:

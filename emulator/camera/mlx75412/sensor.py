@@ -103,7 +103,6 @@ class Mlx75412(StarSensor):
 
     @property
     def enabled(self) -> bool:
-        """Whether it sends frames."""
         return self.running and bool(_ENABLE.of(self._registers.active("MODE_SELECT")))
 
     def _on_restart(self, now_ps: int) -> None:

@@ -30,7 +30,6 @@ def unescape(data: bytes) -> bytes:
 
 
 def framed(data: bytes) -> bytes:
-    """Packet of already escaped data."""
     return b"$%b#%02x" % (data, sum(data) & 0xFF)
 
 

@@ -37,15 +37,13 @@ class DebugTarget(Protocol):
         """Names of its registers by the numbers of the description."""
 
     @property
-    def regions(self) -> tuple[MemoryRegion, ...]:
-        """The memory map."""
+    def regions(self) -> tuple[MemoryRegion, ...]: ...
 
     @property
     def halted(self) -> Stop | None:
         """Why it is halted; None while it runs."""
 
-    def attach(self) -> None:
-        """Halt for a new client."""
+    def attach(self) -> None: ...
 
     def detach(self) -> None:
         """Remove all breakpoints and watchpoints, and run: the client has gone."""
@@ -53,17 +51,14 @@ class DebugTarget(Protocol):
     def halt(self) -> None:
         """Halt before the next instruction."""
 
-    def resume(self) -> None:
-        """Run."""
+    def resume(self) -> None: ...
 
     def step(self, low: int, high: int) -> None:
         """Run one instruction, or more while the next one is in ``low``..``high`` - 1."""
 
-    def register(self, name: str) -> int:
-        """Read a register."""
+    def register(self, name: str) -> int: ...
 
-    def set_register(self, name: str, value: int) -> None:
-        """Write a register."""
+    def set_register(self, name: str, value: int) -> None: ...
 
     def read(self, address: int, count: int) -> bytes:
         """Read memory without side effects; fewer bytes at the end of a memory."""

@@ -33,7 +33,6 @@ def write_callgrind(observer: Observer, stream: IO[str]) -> None:
     places: dict[str, tuple[str, str]] = {}
 
     def place(function: Symbol | None, address: int) -> tuple[str, str]:
-        """File and name of a function."""
         name = function.name if function else NOWHERE
         if name not in places:
             line = symbols.line_at(function.address if function else address)

@@ -40,7 +40,6 @@ class Strength:
 
     @property
     def usual(self) -> float:
-        """The strength where none is given."""
         return self.values[-1] if self.default is None else self.default
 
 

@@ -74,7 +74,6 @@ class Database:
     sphere: GeodesicSphere  #: the faces
 
     def __len__(self) -> int:
-        """Number of triangles."""
         return len(self.areas)
 
     @property

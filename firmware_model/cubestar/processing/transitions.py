@@ -58,7 +58,6 @@ class Automatic:
         self._state = state
 
     def choose(self) -> MatchMode:
-        """The mode for the next picture."""
         state = self._state
         if state.mode is MatchMode.LOST_IN_SPACE:
             return MatchMode.LOST_IN_SPACE
@@ -76,7 +75,6 @@ class Automatic:
         return True
 
     def solved(self) -> None:
-        """A new attitude was stored."""
         self._state.mode = MatchMode.TRACKING
 
     def failed(self, mode: MatchMode) -> None:
@@ -84,12 +82,10 @@ class Automatic:
         self._state.mode = MatchMode.LOST_IN_SPACE
 
     def commanded(self, mode: IdMode) -> None:
-        """Telecommand setIDMode came."""
         if mode == IdMode.LOST_IN_SPACE:
             self._state.mode = MatchMode.LOST_IN_SPACE
 
     def hinted(self) -> None:
-        """Telecommand setTrackingMode came."""
         self._state.mode = MatchMode.ASSISTED
 
 

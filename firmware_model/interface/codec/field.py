@@ -54,7 +54,6 @@ def _nearest_f32(value: float) -> float:
 
 
 def _round_half_away(value: float) -> int:
-    """Nearest integer, halves away from zero."""
     magnitude = abs(value)
     whole = math.floor(magnitude)
     return int(math.copysign(whole + (magnitude - whole >= 0.5), value))

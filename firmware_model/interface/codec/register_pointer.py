@@ -50,7 +50,6 @@ class PointerRegister:
 
     @property
     def length(self) -> int:
-        """In bytes."""
         return self.field.bits // 8
 
     @property

@@ -171,7 +171,6 @@ class ImageSize(IntEnum):
 
     @property
     def side(self) -> int:
-        """Number of columns and of rows."""
         return 1024 // self.step
 
     @property

@@ -59,7 +59,6 @@ class Register:
 
     @property
     def writable(self) -> int:
-        """Bits that a write can change."""
         return sum(field.mask for field in self.fields if field.writable)
 
 

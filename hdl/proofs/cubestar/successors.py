@@ -20,7 +20,6 @@ _SHARED, _DOUBLE, _BOARDS = map(published.full, (CubeStarShared, CubeStarDouble,
 
 
 def _shared_address(m: Module, d: SimpleNamespace) -> None:
-    """The processor may address anything."""
     starts_in(m, ~d.ENABLE)
     m.d.comb += [
         Assert(inside(d.written, d.size)),

@@ -55,7 +55,6 @@ class SensorHazard(Hazard):
         return 0
 
     def dark_rise(self) -> float:
-        """Factor on the mean dark current."""
         return 1.0
 
     def response(self, shape: tuple[int, int]) -> Field | None:
