@@ -19,7 +19,7 @@ static constexpr uint32_t WAIT_STATES[] = {0, 1, 0, 1, 2, 2, 2, 2};
 static constexpr uint32_t NO_TAG = 0xFFFFFFFF;
 
 Msc::Msc(Part &part, const Instance &instance)
-    : Peripheral(part, instance), wear(part.memories.flash_size / Part::PAGE_SIZE) {
+    : Peripheral(part, instance), wear(part.memories.flash_size / Part::PAGE_BYTES) {
     std::fill(std::begin(missing), std::end(missing), NO_TAG);
     invalidate_cache();
 }
@@ -176,9 +176,9 @@ void Msc::command(uint32_t value) {
     if (value & (WRITECMD_ERASEPAGE | WRITECMD_ERASEMAIN0 | WRITECMD_ERASEMAIN1) && done.pending()) {
         part.log_once("MSC: an erasure while the flash is busy is lost");
     } else if (value & WRITECMD_ERASEPAGE) {
-        const uint32_t start = address & ~(Part::PAGE_SIZE - 1);
+        const uint32_t start = address & ~(Part::PAGE_BYTES - 1);
         if (page(start) && !page_locked(start) && start != Part::LOCK_PAGE)
-            erase(start, Part::PAGE_SIZE, ERASE_TIME);
+            erase(start, Part::PAGE_BYTES, ERASE_TIME);
     } else if (value & (WRITECMD_ERASEMAIN0 | WRITECMD_ERASEMAIN1) && !reg(MASSLOCK)) {
         const uint32_t half = part.memories.flash_size / 2;
         erase(value & WRITECMD_ERASEMAIN0 ? 0 : half, half, MASS_ERASE_TIME);
@@ -198,7 +198,7 @@ uint8_t *Msc::page(uint32_t at) {
 
 // Lock bits: one word for 32 pages, 0 locks; word 126 is for the user data page (7.3.5).
 bool Msc::page_locked(uint32_t at) const {
-    const uint32_t number = at / Part::PAGE_SIZE;
+    const uint32_t number = at / Part::PAGE_BYTES;
     uint32_t left, word;
     const uint32_t where = at >= Part::USER_PAGE ? 126 * 32 : number;
     std::memcpy(&word, part.memory_at(Part::LOCK_PAGE + 4 * (where / 32), left), 4);
@@ -208,7 +208,7 @@ bool Msc::page_locked(uint32_t at) const {
 void Msc::load_address() {
     address = reg(ADDRB) & ~3u;
     reg(STATUS) &= ~(STATUS_INVADDR | STATUS_LOCKED | STATUS_ERASEABORTED);
-    const uint32_t start = address & ~(Part::PAGE_SIZE - 1);
+    const uint32_t start = address & ~(Part::PAGE_BYTES - 1);
     if (!page(address))
         reg(STATUS) |= STATUS_INVADDR;
     else if (page_locked(start))
@@ -237,10 +237,10 @@ void Msc::erase(uint32_t at, uint32_t size, int64_t time) {
     std::memset(page(at), 0xFF, size);
     part.cpu.invalidate(at, size);
     for (uint32_t one = at; one < at + size && one < part.memories.flash_size;
-         one += Part::PAGE_SIZE)
-        wear[one / Part::PAGE_SIZE]++;
-    part.send(Kind::FLASH, 1, at, size == Part::PAGE_SIZE && at < part.memories.flash_size
-                                      ? wear[at / Part::PAGE_SIZE] : size, false);
+         one += Part::PAGE_BYTES)
+        wear[one / Part::PAGE_BYTES]++;
+    part.send(Kind::FLASH, 1, at, size == Part::PAGE_BYTES && at < part.memories.flash_size
+                                      ? wear[at / Part::PAGE_BYTES] : size, false);
     erasing = true;
     busy(time);
 }

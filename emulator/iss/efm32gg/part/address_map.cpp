@@ -44,9 +44,9 @@ uint8_t *Part::memory_at(uint32_t address, uint32_t &left) {
     } blocks[] = {{0, memories.flash_size, memories.flash},
                   {RAM, memories.ram_size, memories.ram},
                   {RAM_CODE, memories.ram_size, memories.ram},
-                  {USER_PAGE, PAGE_SIZE, information},
-                  {LOCK_PAGE, PAGE_SIZE, information + PAGE_SIZE},
-                  {INFORMATION, PAGE_SIZE, information + 2 * PAGE_SIZE}};
+                  {USER_PAGE, PAGE_BYTES, information},
+                  {LOCK_PAGE, PAGE_BYTES, information + PAGE_BYTES},
+                  {INFORMATION, PAGE_BYTES, information + 2 * PAGE_BYTES}};
     for (const auto &block : blocks)
         if (block.host && address - block.base < block.size) {
             left = block.size - (address - block.base);

@@ -20,11 +20,11 @@ armv7m::SystemParameters Part::system_parameters() {
 }
 
 Part::Part(armv7m::Cpu &cpu, const Memories &memories)
-    : cpu(cpu), memories(memories), own_information(memories.information ? 0 : 3 * PAGE_SIZE, 0xFF),
+    : cpu(cpu), memories(memories), own_information(memories.information ? 0 : 3 * PAGE_BYTES, 0xFF),
       information(memories.information ? memories.information : own_information.data()) {
     for (int n = 0; n < instance::DEVINFO.layout->count; n++) {
         const Register &word = instance::DEVINFO.layout->registers[n];
-        const uint32_t at = 2 * PAGE_SIZE + instance::DEVINFO.base - INFORMATION + word.offset;
+        const uint32_t at = 2 * PAGE_BYTES + instance::DEVINFO.base - INFORMATION + word.offset;
         std::memcpy(information + at, &word.reset, 4);
     }
     add_units();

@@ -46,7 +46,7 @@ struct Memories {
 
 class Part : public armv7m::Bus, public armv7m::SystemListener {
 public:
-    static constexpr uint32_t PAGE_SIZE = 4096;
+    static constexpr uint32_t PAGE_BYTES = 4096;  // PAGE_SIZE is a macro of musl
     static constexpr uint32_t RAM = 0x20000000, RAM_CODE = 0x10000000, PERIPHERALS = 0x40000000;
     static constexpr uint32_t USER_PAGE = 0x0FE00000, LOCK_PAGE = 0x0FE04000,
                               INFORMATION = 0x0FE08000;
