@@ -249,7 +249,7 @@ def test_loop_rate_and_age_of_each_layout(capsys: pytest.CaptureFixture[str]) ->
         assert all(EXPERIMENT.row(0, result))
     *told, last = EXPERIMENT.summarise(results, wall_s=1.0)
     assert [line.split(": ")[1] for line in told] == [result.published for result in results]
-    assert "layout 3 can not be built" in last
+    assert "layout 3 can't be built" in last
 
 
 @pytest.mark.parametrize("node", [Layout.TWO_MEMORIES], indirect=True)
