@@ -67,8 +67,8 @@ def compile_missing(wanted: Iterable[Recipe]) -> None:
     threads = min(len(missing), os.cpu_count() or 1)
     about_s = compiler.build_s(len(missing)) / threads
     say(
-        f"compiling {len(missing)} FPGA designs and simulators with {compiler.name}, once, into "
-        f"{cache_folder()}: about {about_s:.0f} s"
+        f"compiling FPGA designs and simulators with {compiler.name}, once, into {cache_folder()}: "
+        f"{len(missing)} in about {about_s:.0f} s"
     )
     with ThreadPoolExecutor(threads) as pool:
         jobs = [pool.submit(library_of, one) for one in missing]
