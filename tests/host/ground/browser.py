@@ -68,9 +68,11 @@ def line(page: Any, words: str) -> str:
     before = page.locator("#lines li").count()
     page.fill("#line", words)
     page.press("#line", "Enter")
-    page.wait_for_function(
-        "([words, before]) => { const told = document.querySelectorAll('#lines li');"
-        "return told.length > before && told[0].innerText.includes(words) }",
+    # A button's answer may come after it, and then stands before it.
+    told = page.wait_for_function(
+        "([words, before]) => { const told = [...document.querySelectorAll('#lines li')];"
+        "return told.slice(0, told.length - before).map((one) => one.innerText)"
+        ".find((text) => text.includes(words)) }",
         arg=[words, before],
     )
-    return str(page.locator("#lines li").first.inner_text())
+    return str(told.json_value())
