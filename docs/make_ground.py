@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/ground.md and docs/ground-page.md: `python -m docs.make_ground`.
+"""Draws the pictures of the pages about the ground page: `python -m docs.make_ground`.
 
 It starts the page for two emulated devices, has CubeStar capture an image, and takes screenshots
 in chromium. It needs the extra `ground`, playwright, and chromium on the PATH.

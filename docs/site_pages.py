@@ -26,18 +26,19 @@ REPOSITORY = metadata("cubestack")["Project-URL"].rpartition(" ")[2] + "/blob/ma
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages."""
     pages = {
-        "reference-commands.md": commands(),
-        "reference-python.md": python(),
-        "reference-sensor.md": sensor(),
+        "reference/commands.md": commands(),
+        "reference/python.md": python(),
+        "reference/sensor.md": sensor(),
     }
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
     return files
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Links that lead out of the documents."""
-    return re.sub(r"\]\(\.\./([^)]+)\)", rf"]({REPOSITORY}\1)", markdown)
+    up = re.escape("../" * (page.file.src_uri.count("/") + 1))
+    return re.sub(rf"\]\({up}([^)]+)\)", rf"]({REPOSITORY}\1)", markdown)
 
 
 def commands() -> str:

@@ -41,8 +41,9 @@ def test_changelog_has_the_usual_headings() -> None:
 def workflows() -> Iterator[tuple[str, Any]]:
     for path in sorted((ROOT / ".github" / "workflows").glob("*.yml")):
         yield path.name, yaml.safe_load(path.read_text())
-    blocks = re.findall(r"```yaml\n(.*?)```", text_of("docs/ci.md"), re.DOTALL)
-    yield from ((f"docs/ci.md, {number}", yaml.safe_load(one)) for number, one in enumerate(blocks))
+    page = "docs/how-to/ci.md"
+    blocks = re.findall(r"```yaml\n(.*?)```", text_of(page), re.DOTALL)
+    yield from ((f"{page}, {number}", yaml.safe_load(one)) for number, one in enumerate(blocks))
 
 
 def commands(workflow: Any) -> Iterator[str]:
@@ -73,7 +74,7 @@ def test_workflows_use_existing_targets(name: str, workflow: Any) -> None:
 def test_pytest_options_of_the_workflows_exist() -> None:
     call = [sys.executable, "-m", "pytest", "--help"]
     known = subprocess.run(call, capture_output=True, text=True, check=True, cwd=ROOT).stdout
-    for option in set(re.findall(r"--cubestack-[\w-]+", text_of("docs/ci.md"))):
+    for option in set(re.findall(r"--cubestack-[\w-]+", text_of("docs/how-to/ci.md"))):
         assert option in known
 
 

@@ -15,7 +15,7 @@ from cubestack.host.cli.reports import reports
 
 ROOT = Path(__file__).parent.parent
 
-DIAGRAMS = ("architecture.html", "sensor-cubesense.html")
+DIAGRAMS = ("architecture.html", "sensors/sensor-cubesense.html")
 
 LOADED = re.compile(
     r"<(?:script|img|iframe|source|video)[^>]*\ssrc=\"(https?:)?//"
@@ -45,19 +45,19 @@ def test_pages_load_nothing_from_other_hosts(site: Path) -> None:
 
 def test_every_document_is_in_the_navigation() -> None:
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    named = set(re.findall(r": ([\w-]+\.md)$", text, re.MULTILINE))
-    generated = {"reference-commands.md", "reference-python.md", "reference-sensor.md"}
-    assert named - generated == {path.name for path in (ROOT / "docs").glob("*.md")}
+    named = set(re.findall(r": ([\w/-]+\.md)$", text, re.MULTILINE))
+    pages = {str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")}
+    assert named == pages | {f"reference/{name}.md" for name in ("commands", "python", "sensor")}
     assert yaml.safe_load(text)["theme"]["font"] is False
 
 
 def test_commands_and_public_names_are_documented(site: Path) -> None:
-    page = (site / "reference-commands.html").read_text(encoding="utf-8")
+    page = (site / "reference/commands.html").read_text(encoding="utf-8")
     subcommands = ("hdl-area", "hdl-wave", "measure-aramis", "calibrate-cubestar")
     for name in (*commands(), *reports(), *subcommands):
         assert f'id="cubestack-{name}"' in page
     for file, module in (("python", cubestack), ("sensor", cubestack.sensor)):
-        names = (site / f"reference-{file}.html").read_text(encoding="utf-8")
+        names = (site / f"reference/{file}.html").read_text(encoding="utf-8")
         for name in (name for name in module.__all__ if not name.startswith("_")):
             assert f'id="{name.lower()}"' in names
         assert "\nNone\n</code>" not in names  # a docstring that is missing

@@ -245,7 +245,7 @@ def make_fault(kind: str, /, **parameters: object) -> Fault:
 
 
 def markdown_table() -> str:
-    """All faults with their parameters, as the Markdown table of docs/fault-kinds.md."""
+    """All faults with their parameters, as the Markdown table of docs/reference/fault-kinds.md."""
     head = ("kind", "target", "effect", "parameters, with range and default")
     rows = [head, ("---",) * len(head)]
     for kind, fault in FAULTS.items():

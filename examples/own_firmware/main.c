@@ -1,6 +1,6 @@
 // Captures an image through the FPGA whenever 'p' arrives on the satellite's UART, and answers with
 // the sum of its pixels and the position of the brightest one. Complete from reset on;
-// docs/own-firmware.md explains it.
+// docs/how-to/own-firmware.md explains it.
 #include "processor.h"  // from `cubestack export cubestar --format processor-c`
 
 #define COLUMNS 1024u

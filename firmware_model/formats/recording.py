@@ -1,4 +1,4 @@
-"""Recordings of a device's ports, as lines of JSON; docs/recording.md has the format for users.
+"""Recordings of a device's ports, as lines of JSON; docs/reference/recording-format.md for users.
 
 The first line is the header: ``{"recording": 1, "device": ..., "lines": {port: baud}, "setup"}``;
 the optional last member is that of ``Setup.to_json``. Each further line is one event, in any order;

@@ -22,7 +22,7 @@ from cubestack.host.terminal import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
+    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/how-to/recording.md")
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="or FILE.parquet")
     parser.add_argument("--json", action="store_true", help="print one JSON object per message")
 

@@ -31,7 +31,7 @@ def add_start_arguments(
     """Declare the options for the seed, whose default is ``seed``, for faults and the engine."""
     add_value(parser, "seed", whole(seed, seed_help, 0))
     parser.add_argument(
-        "--faults", type=Path, metavar="FILE", help="TOML fault plan (docs/faults.md)"
+        "--faults", type=Path, metavar="FILE", help="TOML fault plan (docs/how-to/faults.md)"
     )
     add_engine_arguments(parser)
 
@@ -104,7 +104,7 @@ def add_record_arguments(parser: argparse.ArgumentParser) -> None:
         "--record",
         type=Path,
         metavar="FILE",
-        help="record every byte of all ports to FILE (docs/recording.md)",
+        help="record every byte of all ports to FILE (docs/how-to/recording.md)",
     )
     parser.add_argument(
         "--trace",
@@ -120,7 +120,7 @@ def add_insight_arguments(parser: argparse.ArgumentParser) -> None:
         "gdb",
         whole(
             None,
-            "serve gdb on this port of this machine, for --firmware (docs/own-firmware.md)",
+            "serve gdb on this port of this machine, for --firmware (docs/how-to/own-firmware.md)",
             0,
             0xFFFF,
             metavar="PORT",

@@ -77,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--orbit",
         type=Path,
         metavar="FILE",
-        help="TOML orbit of the satellite that all devices are on (docs/orbit.md)",
+        help="TOML orbit of the satellite that all devices are on (docs/how-to/orbit.md)",
     )
     add_port_arguments(parser)
     add_value(
@@ -97,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "control",
         whole(
             None,
-            f"HTTP port for control (docs/control.md); token in ${TOKEN}, or a new one",
+            f"HTTP port for control (docs/how-to/control.md); token in ${TOKEN}, or a new one",
             0,
             LAST_PORT,
             metavar="PORT",

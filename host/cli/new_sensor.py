@@ -1,7 +1,7 @@
 """Write a sensor of your own as a folder that installs: a photodiode behind a converter.
 
 It measures, passes `cubestack conformance` and its own tests; change it step by step
-into your sensor, as docs/adding-a-sensor.md shows.
+into your sensor, as docs/how-to/adding-a-sensor.md shows.
 
 example:
   cubestack new-sensor glow

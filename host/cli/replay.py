@@ -34,7 +34,7 @@ LATEST_S = 1e8
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/recording.md")
+    parser.add_argument("recording", type=Path, metavar="FILE", help="see docs/how-to/recording.md")
     parser.add_argument("--scene", type=Path, metavar="SCENE", help="replaces the recorded one")
     add_start_arguments(parser, seed=None, seed_help="replaces the recorded one")
     add_record_arguments(parser)

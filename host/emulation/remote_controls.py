@@ -26,7 +26,7 @@ PATIENT = ("/run", "/back", "/trace")
 
 
 class ControlClient:
-    """Client of a control port (docs/control.md)."""
+    """Client of a control port (docs/how-to/control.md)."""
 
     def __init__(self, url: str, token: str) -> None:
         """Send nothing yet; raises TargetError for an invalid address."""

@@ -20,7 +20,7 @@ class MeasureOptions(Options):
     scene: Any = file_option(None, "TOML scene; default: a random one")
     frames: int = whole(1, "number of frames (default 1)", 1)
     seed: int = whole(0, "seed of everything random (default 0)", 0)
-    faults: Path | Plan | None = file_option(None, "TOML fault plan (docs/faults.md)")
+    faults: Path | Plan | None = file_option(None, "TOML fault plan (docs/how-to/faults.md)")
 
 
 def _silent(items: Iterable[Any], _total: int, _label: str) -> Iterator[Any]:

@@ -176,7 +176,8 @@ DEVICE: "Device[CubeStarStack, CubeStar]" = Device(
         BoardOption(
             "firmware",
             "program for the processor: an ELF, Intel HEX or binary file (FILE@0xADDRESS), "
-            f"or {REFERENCE}, the same in C, instead of this project's own (docs/own-firmware.md)",
+            f"or {REFERENCE}, the same in C, instead of this project's own "
+            "(docs/how-to/own-firmware.md)",
             default="",
             metavar=FILE,
             known=(REFERENCE,),

@@ -283,7 +283,7 @@ def test_mistake_in_the_firmware_is_one_line(mistake: str, run: Run, tmp_path: P
 def test_edits_of_the_document_work(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / "docs" / "adding-a-sensor.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "how-to" / "adding-a-sensor.md").read_text(encoding="utf-8")
     formula, message = re.findall(r"```python\n(.*)\n```", text)
     (line,) = re.findall(r"^cubestack measure: .*", text, re.MULTILINE)
     assert formula in dict(rendered("glow"))[SENSOR]

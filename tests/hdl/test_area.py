@@ -27,7 +27,7 @@ DESIGNS = {name: design for table, _ in SENSORS for name, design in table.items(
 ROWS = [(name, design, file) for table, file in SENSORS for name, design in table.items()]
 every_design = pytest.mark.parametrize(("name", "design", "file"), ROWS)
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[2] / "docs" / "sensors"
 
 
 class Function(Component):

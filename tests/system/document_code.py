@@ -38,7 +38,7 @@ class Code(NamedTuple):
 
 def blocks(*documents: Path) -> Iterator[Code]:
     """All blocks in order; by default of README.md, then of docs/."""
-    for path in documents or (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+    for path in documents or (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
         for indent, language, text in BLOCK.findall(path.read_text(encoding="utf-8")):
             yield Code(path.name, language, textwrap.dedent(text) if indent else text)
 

@@ -239,7 +239,7 @@ def main() -> int:
     bad = 0
     with tempfile.TemporaryDirectory(prefix="pasted-") as base:
         clone = fresh(Path(base) / "cubestack")
-        pages = (str(one.relative_to(clone)) for one in sorted((clone / "docs").glob("*.md")))
+        pages = (str(one.relative_to(clone)) for one in sorted((clone / "docs").rglob("*.md")))
         for name in args.documents or ("README.md", *pages):
             document, ready = clone / name, list[str]()
             folder = clone

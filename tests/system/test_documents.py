@@ -62,7 +62,7 @@ def section(text: str, heading: str) -> str:
     ],
 )
 def test_every_key_of_a_scene_is_documented(tmp_path: Path, heading: str, scene: str) -> None:
-    part = section(text_of("docs/scene-keys.md"), heading)
+    part = section(text_of("docs/reference/scene-keys.md"), heading)
     firsts = [row.split("|")[1] for row in part.splitlines() if row.startswith("| `")]
     with pytest.raises(SceneError, match="unknown key 'colour'; allowed are") as raised:
         load(tmp_path, f"{scene}\ncolour = 1")
@@ -80,7 +80,7 @@ def test_every_key_of_a_scene_is_documented(tmp_path: Path, heading: str, scene:
     ],
 )
 def test_documented_defaults_match_the_code(heading: str, defaults: tuple[object, ...]) -> None:
-    part = section(text_of("docs/scene-keys.md"), heading)
+    part = section(text_of("docs/reference/scene-keys.md"), heading)
     checked = 0
     for row in part.splitlines():
         cells = [cell.strip() for cell in row.split("|")]
@@ -111,7 +111,7 @@ def hazard_rows(hazard: type[Hazard]) -> list[str]:
 
 
 def test_every_key_of_every_hazard_is_documented() -> None:
-    part = section(text_of("docs/scene-keys.md"), "Keys of `hazards`")
+    part = section(text_of("docs/reference/scene-keys.md"), "Keys of `hazards`")
     light = [*SKY_HAZARDS.values(), *EARTH_HAZARDS.values()]
     hazards: list[type[Hazard]] = [*light, *SENSOR_HAZARDS.values()]
     expected = [row for hazard in hazards for row in hazard_rows(hazard)]
@@ -133,7 +133,7 @@ def test_hazard_curves_have_all_strengths() -> None:
 
 
 def test_examples_of_scenes_load(tmp_path: Path) -> None:
-    examples = re.findall(r"```toml\n(.*?)```", text_of("docs/scenes.md"), re.DOTALL)
+    examples = re.findall(r"```toml\n(.*?)```", text_of("docs/how-to/scenes.md"), re.DOTALL)
     sky, night, hard, picture, earth, ball, device = examples
     scene = load(tmp_path, device + sky).scene
     assert {*tomllib.loads(device)} == {*DEVICE_KEYS}
@@ -155,7 +155,7 @@ def test_examples_of_scenes_load(tmp_path: Path) -> None:
 #: Every document for people; of examples their own pages.
 DOCUMENTS = [
     *sorted(ROOT.glob("*.md")),
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
     *sorted((ROOT / "examples").glob("*/README.md")),
 ]
 
@@ -234,7 +234,7 @@ def test_commands_and_files_of_the_fidelity_pages_exist(
 
 
 def test_documented_reads_that_act_match_the_tables() -> None:
-    rows = section(text_of("docs/i2c-bus.md"), "Reads that act").splitlines()
+    rows = section(text_of("docs/reference/i2c-bus.md"), "Reads that act").splitlines()
     for device in devices():
         found = [
             ", ".join(f"{one.id} {one.name}" for one in messages if one.supported) or "none"
@@ -247,7 +247,8 @@ def test_documented_reads_that_act_match_the_tables() -> None:
 
 
 def test_refusal_of_a_second_client_is_documented() -> None:
-    assert REFUSAL.decode().strip() in section(text_of("docs/serial-ports.md"), "A second client")
+    page = text_of("docs/how-to/serial-ports.md")
+    assert REFUSAL.decode().strip() in section(page, "A second client")
 
 
 def test_reasons_on_the_aramis_page_exist() -> None:
@@ -258,6 +259,7 @@ def test_reasons_on_the_aramis_page_exist() -> None:
 def test_memory_of_cubesense_is_documented(run: Run) -> None:
     table = run("memory", "cubesense", "--profile", "published").out
     ram, flash = re.findall(r"\*\*all, of \d+\*\* \| \*\*(\d+)", table)
-    assert f"{ram} of 1536 bytes of RAM in use, and {flash} bytes" in text_of("docs/switches.md")
+    page = text_of("docs/reference/switches.md")
+    assert f"{ram} of 1536 bytes of RAM in use, and {flash} bytes" in page
     extended = used(budget(CubeSenseSwitches.of("extended")))[Memory.RAM]
     assert f"{extended} of 1536 bytes" in text_of("docs/fidelity-cubesense.md")

@@ -17,7 +17,7 @@ PAGES = {
 
 
 def text_of(page: str) -> str:
-    return (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    return (ROOT / "docs" / "sensors" / f"{page}.md").read_text(encoding="utf-8")
 
 
 def sections(text: str, mark: str) -> dict[str, str]:

@@ -162,7 +162,7 @@ RESETS: list[tuple[str, int, str, dict[str, Any]]] = [
 
 def table(name: str) -> dict[str, list[str]]:
     """Rows of the page's table: item, and its fate by column."""
-    page = (ROOT / "docs" / f"{PAGES[name]}.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "sensors" / f"{PAGES[name]}.md").read_text(encoding="utf-8")
     part = page.split("## What a reset keeps\n")[1].split("\n## ")[0]
     rows = [line.strip("|").split("|") for line in part.splitlines() if line.startswith("|")]
     return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows[2:]}

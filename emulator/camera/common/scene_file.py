@@ -10,7 +10,7 @@
     [atmosphere]                   # between camera and stars
     latitude_deg = -33.9
     sidereal_deg = 200.0           # right ascension of the zenith at time 0
-    [hazards.moon]                 # see docs/scene-keys.md
+    [hazards.moon]                 # see docs/reference/scene-keys.md
     direction = [90.0, -10.0]
 
     kind = "picture"

@@ -20,7 +20,7 @@
     at_deg = [20.0, -10.0]         # alpha and beta
     radius_px = 4.0
     level = 200.0                  # grey values above black
-    [hazards.clouds]               # see docs/scene-keys.md
+    [hazards.clouds]               # see docs/reference/scene-keys.md
     contrast = 0.8
 
 Directions are in scene axes, the satellite's body axes at time 0. Each key belongs to the scene or

@@ -1,6 +1,6 @@
 """Calibrate a device's camera from images of a real or an emulated unit.
 
-The result can be loaded into the device or `cubestack measure`; docs/calibration.md
+The result can be loaded into the device or `cubestack measure`; docs/how-to/calibration.md
 describes how to take the images.
 
 examples:

@@ -1,7 +1,7 @@
 """Measure thousands of skies: every combination of the values in a plan, on all cores
 or a cluster, with 95 % limits of the rates of right, refused and wrong results.
 
-A plan is a TOML file (docs/campaigns.md). Results are appended to FOLDER/rows.jsonl block
+A plan is a TOML file (docs/how-to/campaigns.md). Results are appended to FOLDER/rows.jsonl block
 by block, so an interruption loses little; --resume continues.
 
 examples:

@@ -3,7 +3,7 @@
 The file has ``device``, ``frames`` and ``seed``, and three tables of options of `cubestack measure
 DEVICE`, or of another ``command``: ``[options]`` for all frames, ``[grid]`` with lists of which
 every combination is a point, and ``[random]`` with what is drawn anew for each block
-(docs/campaigns.md has an example).
+(docs/how-to/campaigns.md has an example).
 
 All points use the same skies and the same drawn values, so that they differ only by their options.
 """

@@ -20,7 +20,7 @@ from cubestack.firmware_model.values import plain
 
 from .files import save
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "scenes.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "how-to" / "scenes.md"
 EXAMPLES = [
     one
     for one in re.findall(r"```toml\n(.*?)```", DOCUMENT.read_text("utf-8"), re.DOTALL)

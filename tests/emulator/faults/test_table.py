@@ -11,7 +11,7 @@ from cubestack.emulator.faults import table
 from cubestack.emulator.faults.declaration import FaultError
 from cubestack.emulator.faults.table import FAULTS, make_fault, markdown_table
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "fault-kinds.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "fault-kinds.md"
 
 
 @pytest.mark.parametrize("kind", FAULTS)

@@ -9,7 +9,7 @@ from cubestack.firmware_model.cubestar.catalogue import StarCatalogue
 from ..cubesense.harness import Harness as CubeSense
 from ..cubestar.harness import Harness as CubeStar
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = Path(__file__).parents[3] / "docs" / "sensors"
 NEXT_US = 5_000  # from one request to the next: settings are applied, measurements are not over
 
 

@@ -85,7 +85,7 @@ def test_header_has_every_pin_once() -> None:
 
 
 def test_document_has_the_same_pins() -> None:
-    text = (Path(__file__).parents[3] / "docs" / "gateware.md").read_text()
+    text = (Path(__file__).parents[3] / "docs" / "sensors" / "gateware.md").read_text()
     rows = re.findall(r"^\| ([\d-]+) \| `(\w+)` \| (in|out) \| (.+) \|$", text, re.M)
     assert rows == [
         (position, pin, pin.direction.removesuffix("put"), pin.meaning)

@@ -16,7 +16,7 @@ from cubestack.host.export.interface import FORMATS, render
 
 from ...conftest import Run
 
-DOCUMENTS = Path(__file__).parents[3] / "docs"
+DOCUMENTS = Path(__file__).parents[3] / "docs" / "sensors"
 DEVICES = pytest.mark.parametrize("interface", [INTERFACE, CUBESENSE, ARAMIS], ids=lambda i: i.name)
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 TIMEOUT_S = 120

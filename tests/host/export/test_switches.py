@@ -9,14 +9,14 @@ from cubestack.host.export.switches import render_switches
 
 from ...conftest import Run
 
-PAGE = Path(__file__).parents[3] / "docs" / "switches.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "switches.md"
 WITH_SWITCHES = [name for name in device_names() if device(name).switches.declared()]
 
 
 @pytest.mark.parametrize("name", WITH_SWITCHES)
 def test_page_table_is_up_to_date(name: str) -> None:
     table = render_switches(device(name).title, device(name).switches, "markdown")
-    hint = f"paste `cubestack registers {name} --switches --format markdown` into docs/switches.md"
+    hint = f"paste `cubestack registers {name} --switches --format markdown` into {PAGE}"
     assert table in PAGE.read_text(encoding="utf-8"), hint
 
 

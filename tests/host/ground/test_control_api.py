@@ -18,7 +18,7 @@ def test_root_lists_all_calls(controlled: Controlled) -> None:
 
 
 def test_document_describes_every_call() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "control-api.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "control-api.md").read_text("utf-8")
     for call in CALLS:
         assert f"`{call.method} {call.path.replace('{device}', 'NAME')}`" in page
         assert all(f"`{name}`" in page for name in call.takes)

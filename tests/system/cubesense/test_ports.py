@@ -37,7 +37,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def test_bench_client_of_the_document_downloads_the_nadir_picture(
     served: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / "docs" / "protocols-cubesense.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "sensors" / "protocols-cubesense.md").read_text(encoding="utf-8")
     client = text.split("```python\n")[1].split("```")[0]
     timeout_s = re.search(r"timeout=(\d+)", client)
     assert timeout_s is not None

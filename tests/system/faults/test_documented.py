@@ -9,7 +9,7 @@ from cubestack.emulator.faults.table import FAULTS
 from .bench import BENCHES, powered
 
 HERE = Path(__file__).parent
-DOCUMENT = HERE.parents[2] / "docs" / "fault-kinds.md"
+DOCUMENT = HERE.parents[2] / "docs" / "reference" / "fault-kinds.md"
 
 Pair = tuple[str, str]
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 from .desk import Desk
 
-PAGE = Path(__file__).parents[4] / "docs" / "protocols-aramis.md"
+PAGE = Path(__file__).parents[4] / "docs" / "sensors" / "protocols-aramis.md"
 NEXT_S = 1.5  #: From one request to the next: a measurement is over by then
 
 

@@ -9,7 +9,7 @@ from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 
 from ..harness import Harness
 
-PAGE = Path(__file__).parents[4] / "docs" / "protocols-cubesense.md"
+PAGE = Path(__file__).parents[4] / "docs" / "sensors" / "protocols-cubesense.md"
 WRITE, READ = REGISTERS.i2c_address << 1, REGISTERS.i2c_address << 1 | 1
 IMAGE = REGISTERS["IMAGE"].address
 THRESHOLD = REGISTERS["SUN_THRESHOLD"].address

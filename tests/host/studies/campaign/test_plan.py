@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
 
-PAGE = Path(__file__).parents[4] / "docs" / "campaigns.md"
+PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "campaigns.md"
 
 TEXT = """
 device = "cubestar"
