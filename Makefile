@@ -64,7 +64,7 @@ test-all: .venv/ready-dev
 	@$(PYTEST) $(TESTS) -m "slow or not slow"
 
 pasted:
-	@$(PYTHON) -m tests.system.pasted $(DOCUMENTS)
+	@$(PYTHON) -m tests.system.documents.pasted $(DOCUMENTS)
 
 firmware: .venv/ready-run
 	@command -v arm-none-eabi-gcc >/dev/null 2>&1 || { \

@@ -43,8 +43,8 @@ commands run, and few look at.
 """
 
 DOCUMENTS = (
-    "tests/system/test_documents.py",
-    "tests/system/test_protocol_pages.py",
+    "tests/system/documents/test_pages.py",
+    "tests/system/documents/test_protocol_pages.py",
     "tests/host/export/test_interface.py",
 )
 """They compare tables with the documents, and need not run a line for it."""

@@ -2,7 +2,7 @@
 
 ::
 
-    .venv/bin/python -m tests.system.reference_pictures --frames 200
+    .venv/bin/python -m tests.system.firmware.reference_pictures --frames 200
 
 Both boards have the same picture in memory: one that the firmware took of a random sky. Both
 process it by telecommand, and all that telemetry then says of stars and attitude is compared.

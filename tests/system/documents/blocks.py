@@ -8,7 +8,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 BLOCK = re.compile(r"^( *)```([^\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 ENVIRONMENT = re.compile(r"[A-Z_]+=\S*")
@@ -21,7 +21,7 @@ LEFT = {
     r"\bglow\b": "a device of the text: tests/examples/test_adding_a_sensor.py",
     r"/dev/ttyUSB0|\./tty": "a port that another program serves",
     r"^ground run\.rec": "a recording of such a port",
-    r"program\.elf|picture\.elf": "needs the firmware of tests/system/test_own_firmware.py",
+    r"program\.elf|picture\.elf": "firmware: tests/system/firmware/test_own_firmware.py",
     r"sky\.jpg|night/|bench/": "needs photographs",
     r"^run -- bash|my_script\.py|^hdl wave|^shell emulated:cubesense$": "the reader's turn",
 }

@@ -20,19 +20,9 @@ import cubestack
 from cubestack.host.cli.main import make_parser
 from cubestack.host.emulation.emulated import open_device
 from tests.conftest import Run
+from tests.system.conftest import ROOT, Served
 
-from .conftest import ROOT, Served
-from .document_code import (
-    BLOCKS,
-    LEFT,
-    LONG,
-    SERVES,
-    Code,
-    lines_of,
-    own_call,
-    reader_files,
-    words_of,
-)
+from .blocks import BLOCKS, LEFT, LONG, SERVES, Code, lines_of, own_call, reader_files, words_of
 
 LANGUAGES = {"sh", "python", "toml", "yaml", "text", "csv"}
 #: Dialogues and register accesses of the protocol pages, whose own tests run them.
@@ -71,8 +61,8 @@ OTHERS |= {"", "gdb-multiarch"}  # the first one is `.`
 NOT_HERE = LEFT | {
     SERVES: "serves until Ctrl-C",
     LONG: "minutes to hours",
-    "^run --attach": "the bus of the command above it: tests/system/pasted.py",
-    "--image out/": "a picture of make run: tests/system/pasted.py",
+    "^run --attach": "the bus of the command above it: tests/system/documents/pasted.py",
+    "--image out/": "a picture of make run: tests/system/documents/pasted.py",
 }
 
 #: Commands that take a moment; all others that are run are slow.

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from .document_code import LEFT
+from .blocks import LEFT
 from .pasted import Pasted, Shell, left_out, pasted
 
 DOCUMENT = """

@@ -1,6 +1,6 @@
 """CubeStar's program in C on its processor's simulator, over the wire.
 
-What its telemetry says of a picture is compared to the bit in test_reference_firmware.
+Telemetry of pictures is compared bit by bit with the model's.
 """
 
 import sys
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+import cubestack
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import INTERFACE
@@ -24,6 +25,8 @@ from cubestack.host.errors import CommandRefusedError
 from cubestack.host.experiments.attitude import errors
 from cubestack.host.targets import Target
 from tests.system.conftest import ROOT
+
+from .reference_pictures import compare
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -195,3 +198,24 @@ def test_conformance_of_telemetry_and_framing(star: AnyEmulated, node: NodeClien
 def test_programs_of_the_examples_run_on_it(star: AnyEmulated, program: str) -> None:
     done = star.run(sys.executable, ROOT / "examples" / program, "{port}")
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_telemetry_of_pictures_matches_in_every_mode() -> None:
+    found = list(compare(3, 16, "reference"))
+    assert [one.differences for one in found] == [[]] * 3
+    assert {one.mode for one in found} == {"lost", "assisted", "as it stands"}
+    assert any(one.solved for one in found)
+    assert all(one.stars > 3 for one in found)
+
+
+def test_measured_skies_give_the_same_quaternions() -> None:
+    options = {"frames": 3, "seed": 7, "no_noise": True, "threshold": 16}
+    both = [
+        [
+            (one.centroids, one.matched, one.quaternion)
+            for one in cubestack.measure("cubestar", **options, **board)
+        ]
+        for board in ({}, {"firmware": "reference"})
+    ]
+    assert both[0] == both[1]
+    assert any(quaternion is not None for _, _, quaternion in both[0])

@@ -1,11 +1,17 @@
+import re
+from pathlib import Path
+
 import pytest
+from PIL import Image
 
 from docs.diagrams.architecture import FLOORS, architecture
 from docs.make_diagrams import IMAGES, diagrams
-
-from .conftest import ROOT
+from docs.make_hero import PICTURE, caption_of, hero
+from tests.system.conftest import ROOT
 
 SENSORS = IMAGES / "sensors"
+README = (ROOT / "README.md").read_text("utf-8")
+NUMBER = r"\d+(?:\.\d+)?"
 STALE = "is stale: python -m docs.make_diagrams"
 
 
@@ -33,3 +39,18 @@ def test_architecture_diagram_is_up_to_date() -> None:
             assert place.is_dir() or place.with_suffix(".py").is_file(), f"{floor}/{box.folder}"
     stored = (IMAGES / "architecture.svg").read_text(encoding="utf-8")
     assert stored == architecture(), f"architecture.svg {STALE}"
+
+
+def test_caption_is_the_one_stored_in_the_picture() -> None:
+    with Image.open(PICTURE) as picture:
+        stored = picture.info["Description"]
+    assert caption_of(README) == stored, "python -m docs.make_hero"
+
+
+@pytest.mark.slow
+def test_new_run_gives_the_same_caption(tmp_path: Path) -> None:
+    _, caption = hero(tmp_path)
+    stored = caption_of(README)
+    assert re.sub(NUMBER, "N", caption) == re.sub(NUMBER, "N", stored)
+    measured = [[float(one) for one in re.findall(NUMBER, text)] for text in (caption, stored)]
+    assert measured[0][1:4] == pytest.approx(measured[1][1:4], abs=0.01)  # RA, Dec, roll

@@ -199,6 +199,10 @@ def test_architecture_page_names_every_folder(package: str) -> None:
     assert folders <= set(re.findall(r"`(\w+)/`", row))
 
 
+def test_readme_has_at_most_600_words() -> None:
+    assert len(text_of("README.md").split()) <= 600
+
+
 def test_makefile_has_the_documented_targets() -> None:
     targets = set(re.findall(r"^(\w+):", text_of("Makefile"), re.MULTILINE))
     assert {"venv", "run", "test", "lint", "bench", "clean"} <= targets

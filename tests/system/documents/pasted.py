@@ -1,8 +1,9 @@
 """Runs the commands of README.md and docs/ in their order, in a fresh clone.
 
-``python -m tests.system.pasted`` clones the project and runs every shell block of README.md and of
-each page, line by line in one shell per document. A server runs until its document ends or the next
-server starts; scripts of README.md run beside it. The tutorial runs in an empty folder.
+``python -m tests.system.documents.pasted`` clones the project and runs every shell block of
+README.md and of each page, line by line in one shell per document. A server runs until its document
+ends or the next server starts; scripts of README.md run beside it. The tutorial runs in an empty
+folder.
 
 Prints the result and duration of each command, or why it was skipped; exit status 1 if one failed.
 ``--long`` includes commands that take minutes to hours.
@@ -25,7 +26,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import NamedTuple
 
-from .document_code import (
+from .blocks import (
     LEFT,
     LONG,
     MAKES_PORT,

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import Served
+from tests.system.conftest import ROOT, Served
 
-TEXT = (Path(__file__).parents[2] / "docs" / "tutorial.md").read_text(encoding="utf-8")
+TEXT = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SERVES = "cubestack emulate "
 SOON_S = 120
