@@ -2,8 +2,7 @@
 
 from functools import cached_property
 
-from cubestack.emulator.iss.insight.history import History
-from cubestack.emulator.iss.insight.observer import Observer
+from cubestack.emulator.iss.insight.observer import History, Observer
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
 from cubestack.firmware_model.interface.efm32gg import LAYOUTS

@@ -1,10 +1,18 @@
-"""Declarations of the functions of api.cpp for ctypes."""
+"""The simulator's C++ library: its build, and declarations of api.cpp and insight for ctypes."""
 
 import ctypes
-from functools import cache
+from collections.abc import Iterable
+from functools import cache, lru_cache, partial
+from pathlib import Path
 from typing import Any
 
-from cubestack.emulator.iss.build import simulator_library
+from cubestack.emulator.native import cache as libraries
+from cubestack.emulator.native.compiler import Compiler, compile_library
+from cubestack.firmware_model.interface.efm32gg import LAYOUTS
+from cubestack.firmware_model.interface.efm32gg.cxx import cxx_header
+
+FOLDER = Path(__file__).parent
+LOOP = FOLDER / "armv7m" / "execute" / "loop.cpp"
 
 
 class OutgoingRecord(ctypes.Structure):
@@ -53,6 +61,41 @@ class FpgaWireRecord(ctypes.Structure):
     )
 
 
+class RangeRecord(ctypes.Structure):
+    """``CodeRange`` of insight.h."""
+
+    _fields_ = (
+        ("base", ctypes.c_uint32),
+        ("size", ctypes.c_uint32),
+        ("host", ctypes.c_void_p),
+        ("cycles", ctypes.c_void_p),
+        ("counts", ctypes.c_void_p),
+        ("functions", ctypes.c_void_p),
+    )
+
+
+class EdgeRecord(ctypes.Structure):
+    """``Edge`` of insight.h."""
+
+    _fields_ = (
+        ("site", ctypes.c_uint32),
+        ("callee", ctypes.c_uint32),
+        ("count", ctypes.c_uint64),
+        ("cycles", ctypes.c_uint64),
+    )
+
+
+class ChangeRecord(ctypes.Structure):
+    """``Change`` of insight.h."""
+
+    _fields_ = (
+        ("time", ctypes.c_int64),
+        ("function", ctypes.c_uint16),
+        ("exception", ctypes.c_uint16),
+        ("pc", ctypes.c_uint32),
+    )
+
+
 _P, _I, _U, _L = ctypes.c_void_p, ctypes.c_int32, ctypes.c_uint32, ctypes.c_int64
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_new": (_P, (_P, _L, _P, _L, _P, _L, _P, _P, _I, _L)),
@@ -89,25 +132,52 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "iss_stop": (None, (_P,)),
     "iss_fpga": (None, (_P, ctypes.POINTER(FpgaDriverRecord), ctypes.POINTER(FpgaWireRecord), _I)),
     "iss_fpga_running": (None, (_P, _U)),
+    "insight_new": (_P, (_P, ctypes.POINTER(RangeRecord), _I)),
+    "insight_trace": (None, (_P, _I)),
+    "insight_delete": (None, (_P, _P)),
+    "insight_finish": (None, (_P,)),
+    "insight_edges": (_I, (_P, ctypes.POINTER(EdgeRecord), _I)),
+    "insight_changes": (_I, (_P, ctypes.POINTER(ChangeRecord))),
+    "insight_figures": (None, (_P, ctypes.POINTER(_L))),
+    "insight_fault": (None, (_P, ctypes.POINTER(_L))),
 }
 
 Library = Any
-"""The loaded library with the functions of api.cpp."""
+"""The loaded library with these functions."""
 
 
-Functions = dict[str, tuple[Any, tuple[Any, ...]]]
-"""Result and argument types by name."""
+def sources() -> list[Path]:
+    return sorted([*FOLDER.rglob("*.cpp"), *FOLDER.rglob("*.h")])
 
 
-def declare(library: Library, functions: Functions) -> None:
-    for name, (result, arguments) in functions.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
+@lru_cache(maxsize=4)
+def simulator_library(folder: Path | None = None) -> Path:
+    """See :func:`cubestack.emulator.native.cache.library_of`."""
+    header = cxx_header(LAYOUTS)
+    build = partial(_compile, header, sources())
+    recipe = libraries.recipe("the Cortex-M3 simulator", header, sources(), build)
+    return libraries.library_of(recipe, folder)
+
+
+def _compile(
+    header: str, files: Iterable[Path], compiler: Compiler, scratch: Path, log: Path
+) -> Path:
+    (scratch / "registers.h").write_text(header)
+    units = [file for file in files if file.suffix == ".cpp"]
+    # Peripherals import the names of their registers, and the loop defines many macros.
+    apart = [file for file in units if FOLDER / "efm32gg" in file.parents or file == LOOP]
+    unity = scratch / "simulator.cpp"
+    unity.write_text("".join(f'#include "{file}"\n' for file in units if file not in apart))
+    return compile_library(
+        compiler, scratch / "library.so", log, [f"-I{FOLDER}", f"-I{scratch}", unity, *apart]
+    )
 
 
 @cache
 def simulator() -> Library:
     """The library of this process; CompilerError when it cannot be built."""
     library = ctypes.CDLL(str(simulator_library()))
-    declare(library, _FUNCTIONS)
+    for name, (result, arguments) in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
     return library

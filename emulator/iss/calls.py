@@ -6,12 +6,9 @@ Procedure Call Standard for the Arm Architecture (IHI 0042): integers and addres
 
 import struct
 from collections.abc import Callable, Mapping
-from io import BytesIO
-
-from elftools.elf.elffile import ELFFile
-from elftools.elf.sections import SymbolTableSection
 
 from cubestack.emulator.iss.image import Image
+from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
 from cubestack.emulator.iss.outcome import StopReason
 
@@ -23,20 +20,6 @@ THUMB_STATE = 1 << 24
 
 class CallError(RuntimeError):
     """A call did not return."""
-
-
-def symbols_of(image: Image) -> dict[str, int]:
-    """Addresses of functions and variables; ValueError if the image is not from an ELF file."""
-    if image.elf is None:
-        raise ValueError("only ELF files contain function names")
-    table = ELFFile(BytesIO(image.elf)).get_section_by_name(".symtab")
-    if not isinstance(table, SymbolTableSection):
-        return {}
-    return {
-        symbol.name: symbol["st_value"] & (~1 if symbol["st_info"]["type"] == "STT_FUNC" else ~0)
-        for symbol in table.iter_symbols()
-        if symbol.name
-    }
 
 
 class Calls:
@@ -51,9 +34,11 @@ class Calls:
     ) -> None:
         """Load the program and run its start-up code to function ``returned``, where calls end too.
 
-        Faults end in function ``failed``.
+        Faults end in function ``failed``. Raises ValueError if the image is not from an ELF file.
         """
-        self.machine, self.symbols = machine, symbols_of(image)
+        if image.elf is None:
+            raise ValueError("only ELF files contain function names")
+        self.machine, self.symbols = machine, Symbols.of(image).labels
         self._end = self.symbols[returned]
         machine.load(image)
         machine.reset()

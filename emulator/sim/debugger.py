@@ -16,8 +16,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.iss.gdb.description import REGISTERS
 from cubestack.emulator.iss.gdb.target import (
+    REGISTERS,
     SIGBUS,
     SIGILL,
     SIGINT,

@@ -28,8 +28,7 @@ class InsightFiles:
 
         Raises ValueError for a file that cannot be written.
         """
-        from cubestack.emulator.iss.insight.callgrind import write_callgrind
-        from cubestack.emulator.iss.insight.lcov import write_lcov
+        from cubestack.emulator.iss.insight.reports import write_callgrind, write_lcov
 
         observers: list[Observer] = []
         outputs: list[tuple[IO[str], Any]] = [

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 from cubestack.emulator.iss.gdb import packets
-from cubestack.emulator.iss.gdb.description import TARGET_XML, memory_map
-from cubestack.emulator.iss.gdb.target import DebugTarget, Stop, WatchKind
+from cubestack.emulator.iss.gdb.target import TARGET_XML, DebugTarget, Stop, WatchKind, memory_map
 
 OK, ERROR, UNKNOWN = b"OK", b"E01", b""
 THREAD = b"1"

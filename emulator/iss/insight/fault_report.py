@@ -6,11 +6,11 @@ stack frame).
 
 import ctypes
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
 from types import MappingProxyType
+from typing import NamedTuple
 
+from cubestack.emulator.iss.binding import simulator
 from cubestack.emulator.iss.insight.backtrace import PSP, backtrace
-from cubestack.emulator.iss.insight.library import insight_library
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import Machine
 
@@ -55,8 +55,7 @@ BRANCH_TO_SELF = b"\xfe\xe7"
 REPORTED_FRAMES = 12
 
 
-@dataclass(frozen=True)
-class FaultRecord:
+class FaultRecord(NamedTuple):
     """``FaultRecord`` of system.h."""
 
     exception: int
@@ -83,8 +82,8 @@ def exception_name(number: int, interrupts: Mapping[int, str] = MappingProxyType
 
 def last_fault(machine: Machine) -> FaultRecord:
     """The last fault; its ``count`` is 0 if there was none since power-on."""
-    values = (ctypes.c_int64 * len(fields(FaultRecord)))()
-    insight_library().insight_fault(machine.handle, values)
+    values = (ctypes.c_int64 * len(FaultRecord._fields))()
+    simulator().insight_fault(machine.handle, values)
     return FaultRecord(*values)
 
 

@@ -4,19 +4,15 @@ Observation slows the machine down but does not change its behaviour or timing.
 """
 
 import ctypes
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cubestack.emulator.iss.insight.library import (
-    ChangeRecord,
-    EdgeRecord,
-    RangeRecord,
-    insight_library,
-)
+from cubestack.emulator.iss.binding import ChangeRecord, EdgeRecord, RangeRecord, simulator
+from cubestack.emulator.iss.insight.fault_report import exception_name
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import FLASH_BASE, RAM_BASE, Machine
 
@@ -24,6 +20,9 @@ EXCEPTION_SITE = 0xFFFF_F000
 MOST_EDGES = 1 << 14
 MOST_CHANGES = 1 << 14
 """As in insight.h."""
+
+FUNCTION, EXCEPTION, HANDLER = "function", "exception", "handler"
+"""Variables of a history."""
 
 
 @dataclass(frozen=True, order=True)
@@ -79,7 +78,7 @@ class Observer:
     """
 
     def __init__(self, machine: Machine, symbols: Symbols) -> None:
-        self._library = insight_library()
+        self._library = simulator()
         self.machine, self.symbols = machine, symbols
         self.ram_at_start = machine.ram.copy()
         self.codes = []
@@ -176,3 +175,26 @@ class Observer:
                 numbers[first:last] = len(self._names)
                 self._names.append(function.name)
         return numbers
+
+
+class History:
+    """Functions and exceptions over time: an observer's changes as variables of a trace."""
+
+    #: bits of each variable by name; None for text
+    variables: Mapping[str, int | None] = {FUNCTION: None, EXCEPTION: 8, HANDLER: None}
+
+    def __init__(self, observer: Observer, interrupts: Mapping[int, str]) -> None:
+        """Start; ``interrupts``: names of the part's interrupts by number."""
+        self._observer = observer
+        self._interrupts = interrupts
+        self._exception = 0
+        observer.trace()
+
+    def take(self) -> Iterator[tuple[int, str, int | str]]:
+        """Changes since the last call by time: time in ps, variable, value."""
+        for change in self._observer.changes():
+            yield change.time_ps, FUNCTION, change.function
+            if change.exception != self._exception:
+                self._exception = change.exception
+                yield change.time_ps, EXCEPTION, change.exception
+                yield change.time_ps, HANDLER, exception_name(change.exception, self._interrupts)

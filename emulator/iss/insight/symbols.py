@@ -11,6 +11,10 @@ from functools import cached_property, lru_cache
 from io import BytesIO
 from typing import Any, TypeVar
 
+from elftools.dwarf.callframe import FDE
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
 from cubestack.emulator.iss.image import Image
 
 
@@ -47,7 +51,7 @@ class Symbols:
     Attributes:
         functions: sorted by address, without overlap.
         variables: by name.
-        labels: value of every symbol by name, including those of the linker script.
+        labels: address or value of every symbol by name, including those of the linker script.
     """
 
     def __init__(self, elf: bytes | None) -> None:
@@ -110,9 +114,6 @@ class Symbols:
     @cached_property
     def frames(self) -> "list[tuple[int, int, Any]]":
         """Start, end and record of the call frame information (DWARF 4, 6.4), by start."""
-        from elftools.dwarf.callframe import FDE
-        from elftools.elf.elffile import ELFFile
-
         if self._elf is None:
             return []
         dwarf = ELFFile(BytesIO(self._elf)).get_dwarf_info()
@@ -126,9 +127,6 @@ class Symbols:
         return sorted(found, key=lambda one: one[0])
 
     def _read_symbols(self) -> None:
-        from elftools.elf.elffile import ELFFile
-        from elftools.elf.sections import SymbolTableSection
-
         assert self._elf is not None
         file = ELFFile(BytesIO(self._elf))
         found: dict[int, Symbol] = {}
@@ -141,18 +139,16 @@ class Symbols:
                     continue
                 value, size = symbol["st_value"], symbol["st_size"]
                 if kind == "STT_FUNC":
-                    address = value & ~1
-                    known = found.get(address)
+                    value &= ~1
+                    known = found.get(value)
                     if known is None or known.size < size:
-                        found[address] = Symbol(name, address, size)
+                        found[value] = Symbol(name, value, size)
                 elif kind == "STT_OBJECT":
                     self.variables[name] = Symbol(name, value, size)
                 self.labels[name] = value
         self.functions = list(_apart(sorted(found.values(), key=lambda one: one.address)))
 
     def _read_lines(self) -> Iterator[Line]:
-        from elftools.elf.elffile import ELFFile
-
         if self._elf is None:
             return
         file = ELFFile(BytesIO(self._elf))

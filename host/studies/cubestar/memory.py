@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from cubestack.emulator.iss.insight.memory_report import MemoryUse, memory_use
+from cubestack.emulator.iss.insight.reports import MemoryUse, memory_use
 from cubestack.firmware_model.values import positive, whole
 from cubestack.host.emulation.insight import own_firmware
 from cubestack.host.experiments.facts import Facts, Telling

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cubestack.emulator.iss.insight.memory_report import MemoryUse
+from cubestack.emulator.iss.insight.reports import MemoryUse
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.experiment import Section
 from cubestack.host.experiments.aramis import measure as aramis

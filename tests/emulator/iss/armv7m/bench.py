@@ -5,7 +5,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
-from cubestack.emulator.iss.build import FOLDER, LOOP
+from cubestack.emulator.iss.binding import FOLDER, LOOP
 from cubestack.emulator.native import cache
 from cubestack.emulator.native.compiler import Compiler, compile_library
 

@@ -1,9 +1,8 @@
 """A debug target without a processor, and a session on it."""
 
-from cubestack.emulator.iss.gdb.description import REGISTERS
 from cubestack.emulator.iss.gdb.packets import framed
 from cubestack.emulator.iss.gdb.session import Session
-from cubestack.emulator.iss.gdb.target import SIGINT, MemoryRegion, Stop, WatchKind
+from cubestack.emulator.iss.gdb.target import REGISTERS, SIGINT, MemoryRegion, Stop, WatchKind
 
 RAM = 0x2000_0000
 

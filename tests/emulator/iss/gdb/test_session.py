@@ -4,9 +4,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cubestack.emulator.iss.gdb.description import REGISTERS
 from cubestack.emulator.iss.gdb.packets import escape, framed
-from cubestack.emulator.iss.gdb.target import SIGSEGV, Stop
+from cubestack.emulator.iss.gdb.target import REGISTERS, SIGSEGV, Stop
 
 from .fake_target import RAM, Talk
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from cubestack.emulator.iss.insight.memory_report import memory_use
 from cubestack.emulator.iss.insight.observer import Observer
+from cubestack.emulator.iss.insight.reports import memory_use
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import RAM_BASE, Machine
 

@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 
 from cubestack.emulator.iss.image import load_image
-from cubestack.emulator.iss.insight.callgrind import write_callgrind
-from cubestack.emulator.iss.insight.history import History
-from cubestack.emulator.iss.insight.lcov import write_lcov
-from cubestack.emulator.iss.insight.observer import Edge, Observer
+from cubestack.emulator.iss.insight.observer import Edge, History, Observer
+from cubestack.emulator.iss.insight.reports import write_callgrind, write_lcov
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import RAM_BASE, Machine
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
