@@ -16,8 +16,7 @@ from cubestack.emulator.camera.mlx75412.lens import LENS
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.emulator.sim.virtual_time import PS_PER_S
-from cubestack.host.experiments.rendered import picture_of
-from cubestack.host.experiments.star_truth import true_stars
+from cubestack.host.experiments.scene_truth import picture_of, true_stars
 from cubestack.host.pictures.images import IDENTIFIED, UNKNOWN, star_sheet
 from cubestack.host.pictures.sheet import GRID, PAPER, PLATE, TEXT, TRUTH
 from cubestack.host.studies.cubestar.demo import left_out_by

@@ -4,7 +4,10 @@ Values that a message cannot carry raise ``InterfaceError`` of the interface tab
 before anything is sent.
 """
 
+import re
+import shlex
 from enum import IntEnum
+from importlib.metadata import requires
 
 
 class TargetError(ValueError):
@@ -66,3 +69,12 @@ class CommandRefusedError(NodeError):
         name = code.name if isinstance(code, IntEnum) else "unknown code"
         super().__init__(f"telecommand {command} refused: {name} ({int(code)}){reason}")
         self.code = code
+
+
+def install_command(extra: str) -> str:
+    """The command that installs the packages of an extra, wherever cubestack was installed from."""
+    marker = re.compile(rf"\bextra == [\"']{extra}[\"']")
+    lines = [one.partition(";") for one in requires("cubestack") or ()]
+    return (
+        f"pip install {shlex.join(name.strip() for name, _, when in lines if marker.search(when))}"
+    )

@@ -10,8 +10,7 @@ import yaml
 
 import cubestack
 import cubestack.sensor
-from cubestack.host.cli.commands import commands
-from cubestack.host.cli.reports import reports
+from cubestack.host.cli.commands import commands, reports
 
 ROOT = Path(__file__).parent.parent
 

@@ -1,15 +1,19 @@
-"""The commands of ``cubestack``, by name: built-in ones and those of other packages.
+"""The commands of ``cubestack``, by name: built-in ones, those of other packages and devices.
 
 A package registers commands by an entry point in the group ``cubestack.commands`` that leads to a
 ``dict[str, Command]``.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from pkgutil import resolve_name
 from typing import Any, Protocol
+
+from cubestack.host.devices.device import AnyDevice, Report
+from cubestack.host.devices.registry import devices
 
 GROUP = "cubestack.commands"
 
@@ -77,3 +81,28 @@ def with_headings(known: Mapping[str, Listed]) -> Iterator[tuple[str, str, Liste
             if command.group == group:
                 yield heading, name, command
                 heading = ""
+
+
+@dataclass
+class Reports:
+    """One command: what the devices that have it say of themselves."""
+
+    summary: str  #: one phrase for the help
+    #: device and report of each device that has it
+    declared: list[tuple[AnyDevice, Report]] = field(default_factory=list)
+    group: str = STUDIES
+
+    def load(self) -> Any:
+        """The command; it loads the emulator."""
+        found = {one.name: (one, report.load()) for one, report in self.declared}
+        return resolve_name("cubestack.host.cli.measure:ReportCommand")(found)
+
+
+def reports() -> dict[str, Reports]:
+    """The commands that the registered devices declare, by name."""
+    found: dict[str, Reports] = {}
+    for device in devices():
+        for report in device.reports:
+            command = found.setdefault(report.name, Reports(report.summary))
+            command.declared.append((device, report))
+    return found

@@ -16,8 +16,7 @@ import json
 import sys
 from collections import Counter
 
-from cubestack.host.cli.device_options import given_options
-from cubestack.host.cli.targets import add_target_arguments, open_any_target
+from cubestack.host.cli.device_options import add_target_arguments, given_options, open_any_target
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.suite import compare, run_suite
 from cubestack.host.terminal import busy, tell

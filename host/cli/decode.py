@@ -16,8 +16,7 @@ from pathlib import Path
 
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.devices.registry import device
-from cubestack.host.recording.tables import TABLES
-from cubestack.host.recording.transcript import TranscriptEntry, transcript
+from cubestack.host.recording.transcript import TABLES, TranscriptEntry, transcript
 from cubestack.host.terminal import say
 
 

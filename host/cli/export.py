@@ -15,10 +15,30 @@ examples:
 """
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
+from cubestack.firmware_model.interface.codec.message import Interface
+from cubestack.firmware_model.interface.efm32gg.table import Processor
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.export.programs import OF_INTERFACE, OF_PROCESSOR
+from cubestack.host.export.c_header import c_header
+from cubestack.host.export.cosmos import cosmos
+from cubestack.host.export.processor import processor_header, svd
+from cubestack.host.export.python_module import python_module
+from cubestack.host.export.wireshark import wireshark
+from cubestack.host.export.xtce import xtce
+
+#: Exporter of an interface by format.
+OF_INTERFACE: dict[str, Callable[[Interface], str]] = {
+    "c": c_header,
+    "python": python_module,
+    "xtce": xtce,
+    "cosmos": cosmos,
+    "wireshark": wireshark,
+}
+
+#: Exporter of a processor's registers by format.
+OF_PROCESSOR: dict[str, Callable[[Processor], str]] = {"processor-c": processor_header, "svd": svd}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

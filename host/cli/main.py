@@ -14,8 +14,7 @@ from importlib.metadata import version
 from io import TextIOWrapper
 
 from cubestack.host.cli.arguments import Parser
-from cubestack.host.cli.commands import BUILT_IN, Listed, commands, with_headings
-from cubestack.host.cli.reports import reports
+from cubestack.host.cli.commands import BUILT_IN, Listed, commands, reports, with_headings
 from cubestack.host.devices.registry import device_names
 from cubestack.host.terminal import hush, say
 

@@ -36,6 +36,7 @@ from cubestack.host.devices.registry import device_names
 from cubestack.host.errors import TargetError
 from cubestack.host.experiments.measure import board_as_said, board_options, running
 from cubestack.host.experiments.opener import Opener
+from cubestack.host.options import option_string
 from cubestack.host.terminal import progress, say, show, tell
 
 SHOWN = 40
@@ -170,3 +171,36 @@ def _report(
             tell(f"... and {len(results) - SHOWN} more; --json lists them all")
     for line in experiment.summarise(results, wall_s):
         tell(line)
+
+
+class ReportCommand:
+    """The experiments of one command, by the name of their device."""
+
+    def __init__(self, found: dict[str, tuple[AnyDevice, AnyExperiment]]) -> None:
+        self.found = found
+        self.__doc__ = "\n".join(experiment.description for _, experiment in found.values())
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the device, and the options of all that can be it."""
+        first = next(iter(self.found))
+        parser.add_argument(
+            "device", nargs="?", choices=tuple(self.found), default=first, help=f"default {first}"
+        )
+        parser.add_argument("--json", action="store_true", help="print one JSON object per result")
+        add_options(parser, *(experiment.options for _, experiment in self.found.values()))
+        add_board(parser, *self.found.values())
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Run it for the device; ValueError for an option that is another's."""
+        device, experiment = self.found[args.device]
+        own = experiment.options.declared()
+        known = board_options(device, experiment)
+        for other, theirs in self.found.values():
+            for name, declared in board_options(other, theirs).items():
+                if name not in known and getattr(args, name) is not None:
+                    raise ValueError(f"{declared.flag} is an option of {other.name} alone")
+            for name, option in theirs.options.declared().items():
+                if name not in own and getattr(args, name) != option.default:
+                    whose = f"has no effect for {device.name}; it is {other.name}'s"
+                    raise ValueError(f"{option_string(name)} {whose}")
+        return run_experiment(args, device, experiment)

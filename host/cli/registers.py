@@ -11,9 +11,8 @@ examples:
 import argparse
 
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.export.interface import FORMATS, render
+from cubestack.host.export.interface import FORMATS, render, render_switches
 from cubestack.host.export.processor import render_processor
-from cubestack.host.export.switches import render_switches
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

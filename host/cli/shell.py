@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from cubestack.host.cli.targets import add_target_arguments, open_any_target
+from cubestack.host.cli.device_options import add_target_arguments, open_any_target
 from cubestack.host.errors import HostError
 from cubestack.host.shell.language import CommandResult, Shell
 from cubestack.host.terminal import say

@@ -3,6 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
@@ -17,7 +18,6 @@ from cubestack.firmware_model.interface.codec.switch_messages import (
     switch_parameters,
 )
 from cubestack.firmware_model.interface.codec.switches import Switches
-from cubestack.host.clients.exchanges import Exchanges
 from cubestack.host.errors import (
     BadAnswerError,
     CommandRefusedError,
@@ -25,6 +25,29 @@ from cubestack.host.errors import (
     NotSupportedError,
     TargetError,
 )
+
+
+@dataclass
+class Exchanges:
+    """Counts since a client was made."""
+
+    sent: int = 0  #: requests: frames on a serial line, transfers on I2C
+    answered: int = 0  #: requests with a whole answer or an acknowledge
+    late: int = 0  #: requests that timed out
+    repeated: int = 0  #: retries
+    refused: int = 0  #: telecommands answered with an error
+    streamed: int = 0  #: image frames, which come without requests
+
+    def ended(self, answered: bool) -> None:
+        """Count a request as answered or timed out."""
+        self.answered += answered
+        self.late += not answered
+
+    def __add__(self, other: Self) -> "Exchanges":
+        """Of two clients together."""
+        names = [one.name for one in fields(self)]
+        return Exchanges(*(getattr(self, name) + getattr(other, name) for name in names))
+
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,8 +13,7 @@ from smbus2 import i2c_msg
 
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.message import Interface
-from cubestack.host.clients.contract import Client
-from cubestack.host.clients.exchanges import Exchanges
+from cubestack.host.clients.contract import Client, Exchanges
 from cubestack.host.errors import CommandRefusedError, NoAnswerError, TransportError
 
 RETRY_PERIOD_S = 0.01

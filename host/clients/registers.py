@@ -14,8 +14,7 @@ from smbus2 import i2c_msg
 
 from cubestack.firmware_model.interface.codec.field import InterfaceError, Value
 from cubestack.firmware_model.interface.codec.register_pointer import PointerMap, PointerRegister
-from cubestack.host.clients.contract import Progress
-from cubestack.host.clients.exchanges import Exchanges
+from cubestack.host.clients.contract import Exchanges, Progress
 from cubestack.host.clients.i2c import I2cBus, T, acknowledged
 from cubestack.host.transport.streams import READ_BYTES, Transport
 

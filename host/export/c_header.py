@@ -5,8 +5,11 @@ fields at their offsets in a byte buffer. Names keep the printed spelling.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
@@ -129,3 +132,32 @@ def _field(name: str, field: Field) -> Iterator[str]:
         yield f"#define {name}_SIZE {field.bits // 8}"
     elif field.scale != 1:
         yield f"#define {name}_SCALE {field.scale:g}"
+
+
+TYPES = {"u2": "uint16_t", "i2": "int16_t", "u4": "uint32_t", "f4": "float"}
+"""C types by NumPy's names, without byte order."""
+
+PER_LINE = 8
+
+
+def c_arrays(prefix: str, arrays: Mapping[str, NDArray[np.generic]], about: str) -> str:
+    """Text of a C file with each array (n,) as constant ``prefix_name`` and ``PREFIX_NAME_COUNT``.
+
+    For flash memory: CubeStar thesis, appendix A and section 5.3.2.
+
+    Floats have enough digits to read back exactly. Raises ValueError for an array of another shape
+    or of a type not in ``TYPES``.
+    """
+    lines = [f"/* {about} */", "#include <stdint.h>"]
+    for name, array in arrays.items():
+        kind = array.dtype.str[1:]
+        if kind not in TYPES or array.ndim != 1:
+            raise ValueError(f"{name} must be one row of {', '.join(TYPES)}, not {array.dtype}")
+        count = f"{prefix}_{name}_count".upper()
+        lines += ["", f"#define {count} {len(array)}"]
+        lines.append(f"const {TYPES[kind]} {prefix}_{name}[{count}] = {{")
+        texts = [f"{value:.9e}f" if kind == "f4" else str(value) for value in array.tolist()]
+        rows = [texts[at : at + PER_LINE] for at in range(0, len(texts), PER_LINE)]
+        lines += [f"    {', '.join(row)}," for row in rows]
+        lines.append("};")
+    return "\n".join(lines) + "\n"

@@ -1,11 +1,14 @@
-"""Renders an interface as text, Markdown and JSON."""
+"""Renders an interface, or a sensor's switches, as text, Markdown and JSON."""
 
 import json
+import textwrap
 from collections.abc import Callable
 from inspect import cleandoc
 
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
+from cubestack.firmware_model.interface.codec.switches import Switches
 from cubestack.host.export import field_text
+from cubestack.host.export.field_text import picked
 from cubestack.host.export.side_protocols import side_json, side_markdown, side_table
 
 
@@ -117,3 +120,37 @@ def _meaning(message: Message) -> str:
         notes.append(message.confidence.value)
     notes += [f"{low} must not exceed {high}" for low, high in message.ordered]
     return "; ".join([message.meaning, *notes])
+
+
+FIELDS = ("meaning", "published", "extended", "source", "reason", "choices", "hardware")
+
+
+def render_switches(title: str, switches: type[Switches], format_name: str) -> str:
+    """The switches of the sensor called ``title``."""
+    declared = switches.declared()
+    if format_name == "json":
+        shown = {name: picked(one, *FIELDS) for name, one in declared.items()}
+        return json.dumps(shown, indent=2) + "\n"
+    if format_name == "table":
+        return (
+            "".join(
+                f"{name}: {one.meaning}\n"
+                f"  published  {one.published} ({one.source})\n"
+                f"  extended   {one.extended}\n"
+                + "".join(f"  or         {other}\n" for other in one.choices[2:])
+                + textwrap.fill(one.reason, 96, initial_indent="  ", subsequent_indent="  ")
+                + "\n"
+                for name, one in declared.items()
+            )
+            or f"{title} has no switches\n"
+        )
+    rows = [
+        f"| `{name}` | {one.meaning} | `{one.published}` | "
+        f"{', '.join(f'`{value}`' for value in one.choices[1:])} | {one.source} | {one.reason} |"
+        for name, one in declared.items()
+    ]
+    head = [
+        "| switch | what it decides | published | extended (others) | source | reason |",
+        "|---|---|---|---|---|---|",
+    ]
+    return "\n".join([*head, *rows]) + "\n"

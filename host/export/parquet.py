@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from io import BytesIO
 from typing import Any
 
-from cubestack.host.extras import install_command
+from cubestack.host.errors import install_command
 
 Cell = bool | int | float | str | None
 

@@ -4,12 +4,39 @@ An answer of the node protocol does not say which telemetry it is, so each frame
 its own, to be chosen by the request. A telecommand begins with its ID byte.
 """
 
+from collections.abc import Iterator
 from xml.etree import ElementTree as Xml
 
 from cubestack.firmware_model.interface.codec.field import Field
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
 from cubestack.host.export.field_text import field_details
-from cubestack.host.export.stream import slots
+
+
+def slots(message: Message) -> Iterator[tuple[Field | None, int]]:
+    """Fields and their bits, in the stream's order; None for unused bits.
+
+    Flags, which are numbered from a byte's lowest bit, come highest first.
+    """
+    whole = {one.bit_offset // 8: one for one in message.fields if one.type != "bool1"}
+    flags = {one.bit_offset: one for one in message.fields if one.type == "bool1"}
+    at, unused = 0, 0
+    while at < message.length:
+        if at in whole:
+            found: list[Field | None] = [whole[at]]
+        else:
+            found = [flags.get(8 * at + bit) for bit in range(7, -1, -1)]
+        for one in found:
+            if one is None:
+                unused += 1
+                continue
+            if unused:
+                yield None, unused
+            unused = 0
+            yield one, one.bits
+        at += whole[at].bits // 8 if at in whole else 1
+    if unused:
+        yield None, unused
+
 
 NAMESPACE = "http://www.omg.org/spec/XTCE/20180204"
 

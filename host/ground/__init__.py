@@ -2,7 +2,7 @@
 
 from importlib.util import find_spec
 
-from cubestack.host.extras import install_command
+from cubestack.host.errors import install_command
 
 for _name in ("starlette", "uvicorn", "websockets"):
     if find_spec(_name) is None:

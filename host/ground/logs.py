@@ -7,8 +7,7 @@ from tempfile import TemporaryDirectory
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.host.ground.results import FORMS
 from cubestack.host.ground.session import TargetSession
-from cubestack.host.recording.tables import TABLES
-from cubestack.host.recording.transcript import transcript
+from cubestack.host.recording.transcript import TABLES, transcript
 
 
 def recording(session: TargetSession) -> bytes:

@@ -89,3 +89,12 @@ def _form(device: AnyDevice) -> SceneForm[Any]:
     if device.scene_form is None:
         raise TargetError(f"{device.title} declares no scene keys")
     return device.scene_form()
+
+
+@lru_cache(maxsize=4096)
+def magnitude(hipparcos: int) -> float | None:
+    """V of a star by its Hipparcos number; None if the catalogue does not have it."""
+    sky = load_sky()
+    at = int(sky.hip.searchsorted(hipparcos))
+    known = at < len(sky) and sky.hip[at] == hipparcos
+    return round(float(sky.v_mag[at]), 2) if known else None

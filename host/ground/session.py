@@ -14,9 +14,9 @@ from cubestack.host.export.field_text import field_details, field_json, picked
 from cubestack.host.export.parquet import missing as parquet_missing
 from cubestack.host.ground.emulation import JsonObject
 from cubestack.host.ground.emulators import Emulator, UploadedFile
-from cubestack.host.ground.magnitudes import magnitude
 from cubestack.host.ground.playback import PlaybackClient
 from cubestack.host.ground.results import ResultLog
+from cubestack.host.ground.scenes import magnitude
 from cubestack.host.ground.tables import (
     pointer_row,
     read_sensor_register,
@@ -26,8 +26,7 @@ from cubestack.host.ground.tables import (
 from cubestack.host.ground.transfer import Transfer, grey_values
 from cubestack.host.pictures.overlay import Overlay, star_overlay
 from cubestack.host.shell.language import Shell
-from cubestack.host.shell.names import Names
-from cubestack.host.shell.result import ShellError
+from cubestack.host.shell.names import Names, ShellError
 from cubestack.host.targets import Target
 
 T = TypeVar("T")

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from cubestack.host.extras import install_command
-from cubestack.host.pictures.stretch import stretched
+from cubestack.host.errors import install_command
+from cubestack.host.pictures.images import stretched
 
 WIDTH_PX = 480
 RIGHT, REFUSED, WRONG = "#1a7f37", "#9a9a9a", "#c62828"

@@ -1,4 +1,4 @@
-"""Pictures for people: grey values as PNG, and a picture with its stars marked."""
+"""Pictures for people: grey values stretched and as PNG, marked stars, arrows of residuals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,12 +7,39 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from cubestack.host.clients.contract import FoundStar
 from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Lens, Sheet
 from cubestack.host.pictures.star_names import star_name
-from cubestack.host.pictures.stretch import SKY, stretched
+
+FEWEST_COUNTS = 24
+"""Range of grey values that is stretched to the whole, at least: noise is not made a picture."""
+
+DARKEST, BRIGHTEST = 1.0, 99.98
+"""Percentiles that become black and white: hot or dead pixels alone do not set the scale."""
+
+SKY = 50.0
+"""The same of black where at least half of a picture is dark sky."""
+
+GAMMA = 0.6
+
+
+def stretched(
+    picture: NDArray[np.uint8], darkest: float = DARKEST, gamma: float = GAMMA
+) -> NDArray[np.uint8]:
+    """``picture`` between two of its percentiles, with a gamma.
+
+    Args:
+        picture: grey values (rows, columns).
+        darkest: percentile, 0 to 100, at and below which it becomes black.
+        gamma: exponent; below 1 it lifts what is faint.
+    """
+    low, high = np.percentile(picture, (darkest, BRIGHTEST))
+    spread = max(float(high - low), FEWEST_COUNTS)
+    grey = 255 * np.clip((picture - low) / spread, 0, 1) ** gamma
+    return np.asarray(grey, np.uint8)
+
 
 CIRCLE, TICKS = 0.6, 1.05
 """Sizes of marks, in heights of the text."""
@@ -120,3 +147,32 @@ def widest_deg(lens: Lens, shape: tuple[int, ...]) -> float:
         if not np.any(np.all((places >= 0) & (places < shape[::-1]), axis=1)):
             return float(angle)
     return float(angles[-1])
+
+
+BACKGROUND, FRAME, ARROW, PLACE = (255, 255, 255), (190, 190, 190), (200, 40, 40), (60, 60, 60)
+LONGEST_PX = 40.0
+MARGIN_PX = 40
+ROUND = (1, 2, 5)
+
+
+def save_residuals(places: NDArray[np.float64], residuals: NDArray[np.float64], path: Path) -> None:
+    """Write a PNG with ``residuals`` (n, 2) at ``places`` (n, 2), both px, magnified alike.
+
+    The magnification is a round one, which the picture says; most arrows are at most 40 px long.
+    """
+    width, height = (int(side) + 2 * MARGIN_PX for side in np.ceil(places.max(axis=0)))
+    image = Image.new("RGB", (width, height), BACKGROUND)
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((MARGIN_PX, MARGIN_PX, width - MARGIN_PX, height - MARGIN_PX), outline=FRAME)
+    scale = _round(LONGEST_PX / max(float(np.percentile(np.hypot(*residuals.T), 95)), 1e-9))
+    for (x, y), (dx, dy) in zip(places + MARGIN_PX, residuals * scale, strict=True):
+        draw.ellipse((x - 2, y - 2, x + 2, y + 2), fill=PLACE)
+        draw.line((x, y, x + dx, y + dy), fill=ARROW)
+    draw.text((MARGIN_PX, 12), f"measured less fitted, magnified {scale:g} times", fill=PLACE)
+    image.save(path)
+
+
+def _round(value: float) -> float:
+    """The largest 1, 2 or 5 times a power of ten that is not above ``value``."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in ROUND if step * power <= value * (1 + 1e-9)))

@@ -1,16 +1,19 @@
 """Messages between host and device in a recording, decoded by the tables.
 
 It decodes the node protocol on the serial line and on I2C. A device answers one request at a time,
-so an answer belongs to the last request before it.
+so an answer belongs to the last request before it. A table has a row per field of each message.
 """
 
+import csv
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from io import StringIO
 
 from cubestack.firmware_model.formats.recording import BusTransfer, LineBytes, Recording
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.firmware_model.interface.codec.frames import FrameDecoder, FrameEvent
 from cubestack.firmware_model.interface.codec.message import Interface, Message, MessageKind
+from cubestack.host.export.parquet import parquet_file
 
 PS_PER_S = 10**12
 
@@ -135,3 +138,26 @@ def _told(time_s: float, port: str, message: Message, data: bytes, error: str) -
 def _unknown(time_s: float, port: str, identifier: bytes) -> TranscriptEntry:
     name = str(identifier[0]) if identifier else "nothing"
     return TranscriptEntry(time_s, port, "unknown", name, error="not in the tables")
+
+
+NUMBERS = ("time_s", "value")
+"""Numeric columns."""
+
+
+def csv_table(messages: Iterable[TranscriptEntry]) -> bytes:
+    """The table as a CSV file."""
+    text = StringIO(newline="")
+    writer = csv.DictWriter(text, COLUMNS)
+    writer.writeheader()
+    writer.writerows(row for one in messages for row in one.rows())
+    return text.getvalue().encode()
+
+
+def parquet_table(messages: Iterable[TranscriptEntry]) -> bytes:
+    """The table as a Parquet file; raises ValueError without pyarrow."""
+    rows = [row for one in messages for row in one.rows()]
+    return parquet_file({name: [row[name] for row in rows] for name in COLUMNS}, NUMBERS)
+
+
+TABLES = {"csv": csv_table, "parquet": parquet_table}
+"""By the file's suffix."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cubestack.host.emulation.controls import Controls
-from cubestack.host.shell.result import (
+from cubestack.host.shell.names import (
     CommandResult,
     ShellCommand,
     ShellError,

@@ -14,10 +14,9 @@ from cubestack.firmware_model.interface.codec.message import MessageKind
 from cubestack.host.clients.diagnosis import why_silent
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 from cubestack.host.shell.controls import LOG, ON_OFF, ControlCommands
-from cubestack.host.shell.names import Names
+from cubestack.host.shell.names import CommandResult, Names, ShellCommand, ShellError
 from cubestack.host.shell.ports import PortCommands
 from cubestack.host.shell.registers import RegisterCommands
-from cubestack.host.shell.result import CommandResult, ShellCommand, ShellError
 from cubestack.host.targets import Target
 
 __all__ = ["CommandResult", "Shell", "ShellError"]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cubestack.host.errors import TargetError
 from cubestack.host.pictures.images import save_picture
-from cubestack.host.shell.result import CommandResult, ShellCommand, ShellError, check_count
+from cubestack.host.shell.names import CommandResult, ShellCommand, ShellError, check_count
 from cubestack.host.targets import Target
 from cubestack.host.transport.streams import READ_BYTES, read_answer
 

@@ -9,12 +9,13 @@ from cubestack.firmware_model.interface.codec.message import Message, MessageKin
 from cubestack.firmware_model.interface.codec.register_pointer import PointerRegister
 from cubestack.host.errors import NodeError
 from cubestack.host.export.field_text import field_details, field_type
-from cubestack.host.shell.names import Names, number_of
-from cubestack.host.shell.result import (
+from cubestack.host.shell.names import (
     CommandResult,
+    Names,
     ShellCommand,
     ShellError,
     check_count,
+    number_of,
     to_number,
 )
 from cubestack.host.targets import Target

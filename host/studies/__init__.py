@@ -10,14 +10,14 @@ _HERE = "cubestack.host.studies"
 COMMANDS = {
     name: Command(STUDIES, summary, f"{_HERE}.{module}")
     for name, module, summary in (
-        ("demo", "demo.command", "run the devices end to end, with pictures (`make run`)"),
+        ("demo", "demo", "run the devices end to end, with pictures (`make run`)"),
         ("fidelity", "fidelity.command", "measure every published figure, in both profiles"),
         ("hazards", "hazards.command", "count right, refused and wrong results in hard skies"),
         ("campaign", "campaign.command", "measure thousands of skies, resumable, on all cores"),
-        ("calibrate", "calibrate.command", "fit a camera's lens to pictures of stars or lights"),
-        ("costs", "costs.command", "count the cycles of a device's program as compiled code"),
+        ("calibrate", "calibrate", "fit a camera's lens to pictures of stars or lights"),
+        ("costs", "costs", "count the cycles of a device's program as compiled code"),
         ("picture", "picture", "render what a star tracker sees at a known attitude"),
         ("log", "log", "log a device's results to a CSV file"),
-        ("bench", "bench.command", "measure the cost of the hot paths on this machine"),
+        ("bench", "bench", "measure the cost of the hot paths on this machine"),
     )
 }

@@ -21,8 +21,8 @@ from pathlib import Path
 
 from cubestack.firmware_model.values import number, whole
 from cubestack.host.cli.arguments import add_value
+from cubestack.host.cli.device_options import add_target_arguments, open_any_target
 from cubestack.host.cli.shell import split_commands
-from cubestack.host.cli.targets import add_target_arguments, open_any_target
 from cubestack.host.clients.contract import Columns
 from cubestack.host.devices.result_table import log_lines, scatter
 from cubestack.host.emulation.records import create_file

@@ -24,8 +24,7 @@ from cubestack.host.cli.arguments import add_value
 from cubestack.host.clients.quaternions import pointing_deg
 from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
-from cubestack.host.pictures.images import save_picture
-from cubestack.host.pictures.stretch import SKY, stretched
+from cubestack.host.pictures.images import SKY, save_picture, stretched
 from cubestack.host.terminal import say
 
 ANGLES = {

@@ -20,7 +20,7 @@ from multiprocessing import connection, get_context, parent_process
 from threading import Thread
 from typing import Any, TypeVar
 
-from cubestack.host.extras import install_command
+from cubestack.host.errors import install_command
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")

@@ -1,6 +1,6 @@
 import pytest
 
-from cubestack.host.extras import install_command
+from cubestack.host.errors import install_command
 
 
 def test_install_command_names_the_packages_of_an_extra() -> None:
@@ -14,5 +14,5 @@ def test_install_command_names_the_packages_of_an_extra() -> None:
 @pytest.mark.parametrize("quote", "'\"")
 def test_quotes_of_the_metadata_do_not_matter(monkeypatch: pytest.MonkeyPatch, quote: str) -> None:
     lines = [f"a>=1; extra == {quote}x{quote}", f"b; extra == {quote}xy{quote}", "c"]
-    monkeypatch.setattr("cubestack.host.extras.requires", lambda _: lines)
+    monkeypatch.setattr("cubestack.host.errors.requires", lambda _: lines)
     assert install_command("x") == "pip install 'a>=1'"

@@ -23,7 +23,7 @@ from cubestack.host.pictures.campaigns import figure
 from cubestack.host.pictures.hazards import save_curves
 from cubestack.host.recording.setups import read_document
 from cubestack.host.shell.language import Shell
-from cubestack.host.shell.result import ShellError
+from cubestack.host.shell.names import ShellError
 from cubestack.host.studies import workers
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.fidelity import table as fidelity

@@ -1,7 +1,8 @@
 """Image download from a CubeSense in frames of 128 bytes.
 
 CubeSpace family with two cameras, interface generation 2: a telecommand prepares a frame; telemetry
-ImageFrameInfo is polled until it is ready; then the frame is read and its checksum compared.
+ImageFrameInfo is polled until it is ready; then the frame is read and its checksum compared. The
+service port sends a whole image: one-letter protocol, CubeSense thesis, appendix E.
 """
 
 import math
@@ -10,10 +11,19 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from cubestack.firmware_model.interface.codec.letters import Letter
 from cubestack.firmware_model.interface.cubesense import codes
-from cubestack.firmware_model.interface.cubesense.codes import ImageSize, Sram
+from cubestack.firmware_model.interface.cubesense.codes import (
+    COLUMNS,
+    ROWS,
+    Camera,
+    ImageSize,
+    Sram,
+)
+from cubestack.firmware_model.interface.cubesense.service_port import CAPTURES, DOWNLOADS
 from cubestack.host.clients.contract import Client, Progress
 from cubestack.host.errors import BadAnswerError, HostError, NoAnswerError
+from cubestack.host.transport.streams import Transport
 
 POLL_PERIOD_S = 0.04
 FRAME_TIMEOUT_S = 2.0
@@ -91,3 +101,51 @@ def _wait_ready(client: Client, number: int, sram: Sram) -> int:
         if client.telemetry("Power")[f"OverCurrent{sram + 1}"]:
             late += f": {sram.name} drew too much current and may be off (see telemetry Power)"
     raise NoAnswerError(late)
+
+
+READ_BYTES = 4096
+
+
+class ServicePortClient:
+    """A bench computer on the serial line; the caller opens and closes that."""
+
+    def __init__(self, transport: Transport, *, timeout_s: float = 2.0) -> None:
+        """Use ``transport``; ``timeout_s`` is the longest silence before or within an answer."""
+        self._transport = transport
+        self._timeout_s = timeout_s
+
+    def take(self, camera: Camera) -> None:
+        """Capture an image; returns when it is stored. Raises NoAnswerError, BadAnswerError."""
+        letter = CAPTURES[camera]
+        answer = self._ask(letter)
+        if answer != letter.answer:
+            raise BadAnswerError(
+                f"bench letter {letter.letter!r} answered with {answer!r}, not {letter.answer!r}"
+            )
+
+    def download(self, camera: Camera, progress: Progress | None = None) -> NDArray[np.uint8]:
+        """The image (480, 640) in the camera's own memory, first row on top.
+
+        ``progress`` is called with (bytes done, total). Raises NoAnswerError if the line falls
+        silent before the end.
+        """
+        data = self._ask(DOWNLOADS[camera], progress)
+        return np.frombuffer(data, np.uint8).reshape(ROWS, COLUMNS)
+
+    def _ask(self, letter: Letter, progress: Progress | None = None) -> bytes:
+        while self._transport.read(READ_BYTES, 0.0):
+            pass  # drop the rest of an earlier answer
+        self._transport.write(letter.request)
+        answer = bytearray()
+        while len(answer) < letter.length:
+            wanted = min(READ_BYTES, letter.length - len(answer))
+            data = self._transport.read(wanted, self._timeout_s)
+            if not data:
+                raise NoAnswerError(
+                    f"bench letter {letter.letter!r}: {len(answer)} bytes of {letter.length} came, "
+                    f"then nothing for {self._timeout_s:g} s"
+                )
+            answer += data
+            if progress is not None:
+                progress(len(answer), letter.length)
+        return bytes(answer)

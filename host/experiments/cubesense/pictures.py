@@ -16,10 +16,10 @@ from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
 from cubestack.firmware_model.interface.cubesense.fpga import FULL_SIZE
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
 from cubestack.host.clients.cubesense.client import CubeSense, direction
+from cubestack.host.pictures.images import stretched
 from cubestack.host.pictures.labels import Box
 from cubestack.host.pictures.overlay import Mark, Overlay
 from cubestack.host.pictures.sheet import GRID, TRUTH, Entry, Sheet
-from cubestack.host.pictures.stretch import stretched
 
 SCALE = 2
 INSET_SCALE = 16

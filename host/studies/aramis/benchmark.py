@@ -17,8 +17,7 @@ from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.devices.device import Device
 from cubestack.host.emulation.emulated import power_up
-from cubestack.host.studies.bench.contract import Benchmark
-from cubestack.host.studies.bench.timing import LOOP_S, best_ms, simulated_ratio
+from cubestack.host.studies.bench import LOOP_S, Benchmark, best_ms, simulated_ratio
 
 HIGHEST_GAIN = 15.0
 

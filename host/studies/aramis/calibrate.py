@@ -25,7 +25,7 @@ from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.clients.aramis.client import Aramis
 from cubestack.host.clients.contract import FoundStar
-from cubestack.host.studies.calibrate.experiment import CalibrateOptions, StarCalibration
+from cubestack.host.studies.calibrate import CalibrateOptions, StarCalibration
 
 
 class _Experiment(StarCalibration[Aramis]):

@@ -14,9 +14,9 @@ from cubestack.firmware_model.interface.aramis.switches import AramisSwitches
 from cubestack.host.clients.aramis.client import Aramis, Attitude
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
-from cubestack.host.experiments.star_truth import true_stars
+from cubestack.host.experiments.scene_truth import true_stars
 from cubestack.host.pictures.images import annotate, save_picture
-from cubestack.host.studies.demo.subject import Demo, download, tell_times
+from cubestack.host.studies.demo import Demo, download, tell_times
 from cubestack.host.terminal import tell
 
 POINTING_DEG = (84.0, -1.0, 20.0)  # Orion

@@ -25,11 +25,10 @@ from rich.table import Table
 from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_value
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.studies.campaign import parquet, report, statistics
+from cubestack.host.studies.campaign import report, statistics
 from cubestack.host.studies.campaign import run as campaigns
-from cubestack.host.studies.campaign.folder import Folder
-from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
+from cubestack.host.studies.campaign.folder import Folder, write_parquet
+from cubestack.host.studies.campaign.plan import CampaignPlan, known_plans, plan_file, summary
 from cubestack.host.studies.campaign.statistics import Change, compared
 from cubestack.host.studies.campaign.worst import worst
 from cubestack.host.studies.workers import cores
@@ -131,7 +130,7 @@ def _replay(words: list[str]) -> int:
 def _parquet(words: list[str]) -> int:
     if len(words) != 1:
         raise ValueError("parquet wants a campaign's folder")
-    say(f"wrote {parquet.write(Folder(Path(words[0])))}")
+    say(f"wrote {write_parquet(Folder(Path(words[0])))}")
     return 0
 
 

@@ -1,7 +1,8 @@
 """A campaign's folder: its plan and a row per result, which survive any interruption.
 
 The rows of a finished block are appended together. Resuming removes incomplete blocks. A complete
-campaign is sorted, so that its file does not depend on the number of workers.
+campaign is sorted, so that its file does not depend on the number of workers. A Parquet file of its
+rows is for pandas, polars, DuckDB and their like.
 """
 
 import fcntl
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
+from cubestack.host.export.parquet import arrow as pyarrow
 from cubestack.host.studies.campaign.block import Row
 from cubestack.host.studies.campaign.plan import CampaignPlan
 
@@ -128,3 +130,29 @@ def _replace(path: Path, lines: Iterable[str]) -> None:
         file.flush()
         os.fsync(file.fileno())
     new.replace(path)
+
+
+PARQUET_FILE = "rows.parquet"
+
+
+def write_parquet(folder: Folder) -> Path:
+    """Write the rows so far, a column per value; returns the file.
+
+    Columns are the attributes of ``Row``; a swept option is ``swept.NAME``, a value of the result
+    ``result.NAME``.
+
+    Raises ValueError without rows, and without pyarrow.
+    """
+    arrow = pyarrow()
+    table = arrow.Table.from_pylist([vars(row) for row in folder.rows()])
+    if not table.num_rows:
+        raise ValueError(f"{folder.path} has no rows yet")
+    for nested in ("swept", "result"):
+        at = table.schema.get_field_index(nested)
+        fields = table.column(at).combine_chunks()
+        table = table.remove_column(at)
+        for name, column in zip((one.name for one in fields.type), fields.flatten(), strict=True):
+            table = table.append_column(f"{nested}.{name}", column)
+    new = folder.path / f"{PARQUET_FILE}.new"
+    arrow.parquet.write_table(table, new)
+    return new.replace(folder.path / PARQUET_FILE)

@@ -11,6 +11,7 @@ All points use the same skies and the same drawn values, so that they differ onl
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib import resources
 from itertools import product
 from pathlib import Path
 from typing import Any, Self
@@ -19,6 +20,7 @@ import numpy as np
 
 from cubestack.firmware_model.values import REQUIRED, whole
 from cubestack.host.devices.registry import device as registered
+from cubestack.host.devices.registry import devices
 from cubestack.host.experiments.measure import MEASURE, board_options, experiment_of, measure
 from cubestack.host.options import Options
 
@@ -182,3 +184,37 @@ def _with_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
             for name, values in table["grid"].items()
         }
     return changed
+
+
+FOLDER = "campaigns"
+SUFFIX = ".toml"
+
+
+def known_plans() -> dict[str, Path]:
+    folders = (
+        resources.files(package).joinpath(FOLDER)
+        for device in devices()
+        if (package := device.study("campaign"))
+    )
+    files = (Path(str(file)) for folder in folders for file in folder.iterdir())
+    return {file.stem: file for file in sorted(files) if file.suffix == SUFFIX}
+
+
+def summary(path: Path) -> str:
+    """A plan's purpose: the comment on its first line."""
+    first, _, _ = path.read_text("utf-8").partition("\n")
+    return first.removeprefix("#").strip() if first.startswith("#") else ""
+
+
+def plan_file(given: str) -> Path:
+    """The file of a path, or of the name of a shipped plan.
+
+    Raises ValueError if it is neither.
+    """
+    path, known = Path(given), known_plans()
+    if given in known and not path.exists():
+        return known[given]
+    if path.suffix != SUFFIX and not path.exists():
+        names = ", ".join(known)
+        raise ValueError(f"no plan is called {given!r}: give a {SUFFIX} file, or one of {names}")
+    return path

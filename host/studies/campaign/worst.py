@@ -6,7 +6,7 @@ from io import BytesIO
 
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.experiments.measure import MEASURE
-from cubestack.host.experiments.rendered import picture_of
+from cubestack.host.experiments.scene_truth import picture_of
 from cubestack.host.pictures.hazards import save_sample
 from cubestack.host.studies.campaign.block import Row
 from cubestack.host.studies.campaign.folder import Folder

@@ -9,8 +9,7 @@ from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import CubeSense
 from cubestack.host.devices.device import Device
 from cubestack.host.emulation.emulated import power_up
-from cubestack.host.studies.bench.contract import Benchmark
-from cubestack.host.studies.bench.timing import LOOP_S, simulated_ratio
+from cubestack.host.studies.bench import LOOP_S, Benchmark, simulated_ratio
 
 
 def _figures(device: Device[CubeSenseBoard, CubeSense]) -> dict[str, float]:

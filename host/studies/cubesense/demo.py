@@ -10,11 +10,11 @@ from cubestack.emulator.boards.cubesense.board import CubeSenseBoard
 from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE, Camera
 from cubestack.firmware_model.interface.cubesense.service_port import SERVICE_PORT
 from cubestack.host.clients.cubesense.client import CubeSense, Measurement, direction
-from cubestack.host.clients.cubesense.service_port import ServicePortClient
+from cubestack.host.clients.cubesense.download import ServicePortClient
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.cubesense.pictures import annotate_nadir, annotate_sun
 from cubestack.host.pictures.images import save_picture
-from cubestack.host.studies.demo.subject import ANSWER_TIMEOUT_S, Demo, download, tell_times
+from cubestack.host.studies.demo import ANSWER_TIMEOUT_S, Demo, download, tell_times
 from cubestack.host.terminal import tell
 from cubestack.host.transport.streams import open_transport
 

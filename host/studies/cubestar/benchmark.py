@@ -18,8 +18,7 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.devices.device import Device
 from cubestack.host.emulation.emulated import EmulatedDevice, power_up
-from cubestack.host.studies.bench.contract import Benchmark
-from cubestack.host.studies.bench.timing import LOOP_S, ROUNDS, simulated_ratio
+from cubestack.host.studies.bench import LOOP_S, ROUNDS, Benchmark, simulated_ratio
 
 I2C_HZ = 400_000
 I2C_CLIENT = """

@@ -25,7 +25,7 @@ from cubestack.host.clients.contract import FoundStar
 from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
 from cubestack.host.clients.cubestar.operator import find_threshold
-from cubestack.host.studies.calibrate.experiment import CalibrateOptions, StarCalibration
+from cubestack.host.studies.calibrate import CalibrateOptions, StarCalibration
 
 
 class _Experiment(StarCalibration[CubeStar]):

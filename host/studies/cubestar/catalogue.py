@@ -17,7 +17,7 @@ from cubestack.firmware_model.values import number
 from cubestack.host.devices.device import Shown
 from cubestack.host.emulation.records import create_file
 from cubestack.host.experiments.facts import Lookup
-from cubestack.host.export.c_arrays import c_arrays
+from cubestack.host.export.c_header import c_arrays
 from cubestack.host.options import Options, path_option
 
 

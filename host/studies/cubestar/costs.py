@@ -25,7 +25,7 @@ from cubestack.firmware_model.mcu.cortex_m3 import CORTEX_M3
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.emulated import power_up
-from cubestack.host.studies.costs.contract import CostMeasurement, CostReport
+from cubestack.host.studies.costs import CostMeasurement, CostReport
 from cubestack.host.studies.cubestar.reference_catalogue import catalogue_tables
 
 PUBLISHED_MS = 320.0

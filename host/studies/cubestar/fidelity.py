@@ -17,7 +17,7 @@ from cubestack.emulator.sim.virtual_time import Kernel
 from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, PIXEL_PITCH_MM, ROWS
 from cubestack.host.experiments.attitude import AttitudeResult
 from cubestack.host.experiments.cubestar.measure import CubeStarOpener
-from cubestack.host.studies.calibrate.experiment import CalibrateOptions
+from cubestack.host.studies.calibrate import CalibrateOptions
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.layouts import attitudes_of_loop
 from cubestack.host.studies.cubestar.night import night

@@ -17,7 +17,7 @@ from cubestack.emulator.boards.cubestar.catalogue import MAG_LIMIT, onboard_cata
 from cubestack.emulator.scene.hipparcos import DEFAULT_EPOCH
 from cubestack.firmware_model.cubestar.matching import tracking, voting
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
-from cubestack.host.export.c_arrays import c_arrays
+from cubestack.host.export.c_header import c_arrays
 
 #: Number of directions, about 2.9 deg apart, for counting the reduced pair list; and the margin for
 #: directions between them.

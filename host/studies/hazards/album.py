@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.emulation.emulated import AnyEmulated
+from cubestack.host.errors import install_command
 from cubestack.host.experiments.hazard_options import Asked, known
 from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.experiments.rendered import cameras_of
-from cubestack.host.extras import install_command
+from cubestack.host.experiments.scene_truth import cameras_of
 from cubestack.host.pictures.hazards import save_curves, save_sample
 from cubestack.host.studies.hazards.curves import Point
 

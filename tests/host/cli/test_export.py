@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
+from cubestack.host.cli.export import OF_INTERFACE, OF_PROCESSOR
 from cubestack.host.devices.registry import devices
-from cubestack.host.export.programs import OF_INTERFACE, OF_PROCESSOR
 from tests.conftest import Run
 
 

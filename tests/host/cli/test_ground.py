@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from cubestack.host.cli.main import main
-from cubestack.host.extras import install_command
+from cubestack.host.errors import install_command
 from tests.tiers import quick
 
 CONTROLLED = ["emulate", "cubestar", "--tcp", "0", "--control", "0"]

@@ -10,7 +10,7 @@ import pytest
 
 from cubestack.host.cli import shell
 from cubestack.host.errors import NoAnswerError
-from cubestack.host.shell.result import CommandResult, ShellError
+from cubestack.host.shell.names import CommandResult, ShellError
 from tests.conftest import Run
 
 

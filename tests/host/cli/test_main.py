@@ -12,9 +12,8 @@ from PIL import Image
 
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli import commands as registry
-from cubestack.host.cli.commands import commands
+from cubestack.host.cli.commands import commands, reports
 from cubestack.host.cli.measure import _are_right
-from cubestack.host.cli.reports import reports
 from cubestack.host.devices.experiment import Result
 from cubestack.host.studies.cubestar.demo import RENDERED
 

@@ -98,7 +98,7 @@ def test_ascii_locale_replaces_other_characters() -> None:
     text = (
         "import sys\n"
         "from cubestack.host.cli import main\n"
-        "from cubestack.host.studies.demo import command as demo\n"
+        "from cubestack.host.studies import demo\n"
         "from cubestack.host.terminal import head, say, tell\n"
         "def run(_args):\n"
         "    print(sys.stdout.encoding)\n"

@@ -38,7 +38,7 @@ def ending(monkeypatch: pytest.MonkeyPatch) -> list[BaseException | int | None]:
             raise end
         return end
 
-    monkeypatch.setattr("cubestack.host.studies.bench.command.run", run)
+    monkeypatch.setattr("cubestack.host.studies.bench.run", run)
     return ends
 
 
@@ -85,7 +85,7 @@ def test_log_level_is_set_during_the_command_and_restored_after(
         return own.level, len(own.handlers), terminal._errors.quiet
 
     own, during = logging.getLogger("cubestack"), list[tuple[int, int, bool]]()
-    command = "cubestack.host.studies.bench.command.run"
+    command = "cubestack.host.studies.bench.run"
     monkeypatch.setattr(command, lambda _: during.append(state()))
     before = state()
     assert run(*words, "bench").code == 0

@@ -6,7 +6,7 @@ from cubestack.firmware_model.interface.codec.field import InterfaceError, u8
 from cubestack.firmware_model.interface.codec.message import Message
 from cubestack.firmware_model.interface.codec.node_messages import node_interface
 from cubestack.host.clients.contract import Client
-from cubestack.host.clients.derived import client_type
+from cubestack.host.devices.node_device import client_type
 
 PAIR = u8("First", "one"), u8("Second", "another")
 INTERFACE = node_interface(

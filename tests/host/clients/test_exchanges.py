@@ -6,7 +6,7 @@ import pytest
 from cubestack.firmware_model.formats.recording import load_recording
 from cubestack.firmware_model.interface.codec.frames import encode_frame
 from cubestack.firmware_model.interface.cubestar import AckError
-from cubestack.host.clients.exchanges import Exchanges
+from cubestack.host.clients.contract import Exchanges
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient

@@ -14,8 +14,7 @@ from cubestack.host.clients.registers import RegisterClient, RegisterLine
 from cubestack.host.conformance import contract
 from cubestack.host.conformance.contract import CheckResult, CheckRun, FailedError, Verdict
 from cubestack.host.conformance.effects import check_watchdog
-from cubestack.host.conformance.reads import check_reads
-from cubestack.host.conformance.suite import run_suite
+from cubestack.host.conformance.suite import check_reads, run_suite
 from cubestack.host.devices.device import ConformanceNotes
 from cubestack.host.devices.registry import device
 from cubestack.host.devices.shown_settings import read_back

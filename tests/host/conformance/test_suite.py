@@ -17,8 +17,7 @@ from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitche
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.conformance.contract import CheckResult, CheckRun, Verdict
 from cubestack.host.conformance.effects import check_stream
-from cubestack.host.conformance.reads import check_reads
-from cubestack.host.conformance.suite import compare
+from cubestack.host.conformance.suite import check_reads, compare
 from cubestack.host.conformance.values import values_to_try
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.registry import device

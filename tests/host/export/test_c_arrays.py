@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cubestack.emulator.boards.cubestar.catalogue import onboard_catalogue
-from cubestack.host.export.c_arrays import c_arrays
+from cubestack.host.export.c_header import c_arrays
 from tests.conftest import Run
 
 DUMP = """

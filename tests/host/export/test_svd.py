@@ -8,7 +8,7 @@ from cmsis_svd.parser import SVDParser
 from lxml import etree
 
 from cubestack.host.devices.registry import devices
-from cubestack.host.export.svd import svd
+from cubestack.host.export.processor import svd
 
 TABLES = [device.processor() for device in devices() if device.processor is not None]
 EACH = pytest.mark.parametrize("tables", TABLES, ids=lambda tables: tables.name)

@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.firmware_model.interface.codec.switches import PROFILES, Switches
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.export.switches import render_switches
+from cubestack.host.export.interface import render_switches
 
 from ...conftest import Run
 

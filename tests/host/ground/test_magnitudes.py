@@ -1,6 +1,6 @@
 import pytest
 
-from cubestack.host.ground.magnitudes import magnitude
+from cubestack.host.ground.scenes import magnitude
 
 
 def test_magnitudes_match_the_catalogue() -> None:

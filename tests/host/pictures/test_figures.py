@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.host.pictures.campaigns import error_curves, png, rate_curves, sky_map
+from cubestack.host.pictures.campaigns import effects, error_curves, png, rate_curves, sky_map
 from cubestack.host.pictures.hazards import save_curves, save_sample
-from cubestack.host.pictures.upsets import effects
 
 figure_module = pytest.importorskip("matplotlib.figure")
 

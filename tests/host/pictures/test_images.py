@@ -6,10 +6,9 @@ from numpy.typing import NDArray
 
 from cubestack.emulator.scene.attitude import quaternion_from_pointing
 from cubestack.host.calibration.camera import Camera
-from cubestack.host.experiments.star_truth import true_stars
-from cubestack.host.pictures.images import IDENTIFIED, UNKNOWN, TrueStar, star_sheet
+from cubestack.host.experiments.scene_truth import true_stars
+from cubestack.host.pictures.images import IDENTIFIED, SKY, UNKNOWN, TrueStar, star_sheet, stretched
 from cubestack.host.pictures.sheet import GRID, TRUTH, Sheet
-from cubestack.host.pictures.stretch import SKY, stretched
 
 SHAPE = (256, 512)
 CAMERA = Camera(f_px=600, cx_px=255.5, cy_px=127.5)

@@ -19,19 +19,20 @@ from cubestack.host.experiments.cubesense.pictures import (
     pixel,
 )
 from cubestack.host.pictures.images import (
+    ARROW,
     IDENTIFIED,
     UNKNOWN,
     TrueStar,
     annotate,
     png,
     save_picture,
+    save_residuals,
     star_sheet,
+    stretched,
     widest_deg,
 )
-from cubestack.host.pictures.residuals import ARROW, save_residuals
 from cubestack.host.pictures.sheet import GRID, TRUTH, Colour
 from cubestack.host.pictures.star_names import _NAMES, star_name
-from cubestack.host.pictures.stretch import stretched
 from tests.host.pictures.test_images import CAMERA, SHAPE, Found
 
 SENSE = np.full((480, 640), 34, np.uint8)

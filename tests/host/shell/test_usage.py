@@ -8,7 +8,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.emulation.controls import EmulatedControls
 from cubestack.host.shell.language import Shell, ShellError
-from cubestack.host.shell.result import check_count, to_number
+from cubestack.host.shell.names import check_count, to_number
 from cubestack.host.targets import Target
 
 from ..conftest import LetterLine, UartLink

@@ -12,7 +12,7 @@ from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera, DetectResult
 from cubestack.firmware_model.interface.cubesense.registers import REGISTERS
 from cubestack.host.clients.cubesense.client import CubeSense
-from cubestack.host.clients.cubesense.service_port import ServicePortClient
+from cubestack.host.clients.cubesense.download import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.registers import RegisterClient
 from cubestack.host.targets import open_target

@@ -10,7 +10,7 @@ from cubestack.firmware_model.formats.recording import Recording, load_recording
 from cubestack.firmware_model.interface.cubesense import INTERFACE
 from cubestack.firmware_model.interface.cubesense.codes import Camera
 from cubestack.host.clients.cubesense.client import CubeSense
-from cubestack.host.clients.cubesense.service_port import ServicePortClient
+from cubestack.host.clients.cubesense.download import ServicePortClient
 from cubestack.host.clients.i2c import I2cClient
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.clients.registers import RegisterClient

@@ -5,7 +5,7 @@ import pytest
 
 from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.codes import Camera, CaptureResult, DetectResult
-from cubestack.host.clients.cubesense.service_port import ServicePortClient
+from cubestack.host.clients.cubesense.download import ServicePortClient
 from cubestack.host.errors import NoAnswerError
 from tests.system.cubesense.conftest import check_right
 

@@ -16,7 +16,7 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.firmware_model.interface.cubestar.codes import MemoryTest, ResetCause
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.conformance.contract import CheckRun, Verdict
-from cubestack.host.conformance.reads import check_reads
+from cubestack.host.conformance.suite import check_reads
 from cubestack.host.conformance.writes import check_writes
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.controls import EmulatedControls

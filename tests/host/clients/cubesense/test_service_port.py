@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cubestack.firmware_model.interface.cubesense.codes import Camera
-from cubestack.host.clients.cubesense.service_port import ServicePortClient
+from cubestack.host.clients.cubesense.download import ServicePortClient
 from cubestack.host.errors import BadAnswerError, NoAnswerError
 
 from ...conftest import LetterLine

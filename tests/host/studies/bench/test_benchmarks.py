@@ -13,10 +13,9 @@ from amaranth.hdl import Fragment
 
 from cubestack.emulator.rtl.wiring import Wiring
 from cubestack.host.devices.registry import BUILT_IN, device
+from cubestack.host.studies import bench
 from cubestack.host.studies.aramis import benchmark as aramis
-from cubestack.host.studies.bench import command as bench
-from cubestack.host.studies.bench import timing as benchmark
-from cubestack.host.studies.bench.contract import Benchmark
+from cubestack.host.studies.bench import Benchmark
 from cubestack.host.studies.cubesense import benchmark as cubesense
 from cubestack.host.studies.cubestar import benchmark as cubestar
 from tests.conftest import Run
@@ -35,7 +34,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    for module in (benchmark, cubestar):
+    for module in (bench, cubestar):
         monkeypatch.setattr(module, "time", made)
     return made
 
@@ -84,13 +83,13 @@ def built(wiring: Wiring, seconds: float) -> float:
 
 def test_ratio_is_virtual_time_per_wall_time(clock: Clock) -> None:
     one: Any = Device(clock)
-    assert benchmark.simulated_ratio(one, lambda: one.pause(3.0)) == 4.0
+    assert bench.simulated_ratio(one, lambda: one.pause(3.0)) == 4.0
 
     def slower() -> None:
         one.pause(3.0)
         clock.now_s += 1.0
 
-    assert benchmark.simulated_ratio(one, slower) == 1.71
+    assert bench.simulated_ratio(one, slower) == 1.71
 
 
 def test_best_ms_is_the_shortest_of_5_runs(clock: Clock) -> None:
@@ -99,7 +98,7 @@ def test_best_ms_is_the_shortest_of_5_runs(clock: Clock) -> None:
     def run() -> None:
         clock.now_s += next(times)
 
-    assert benchmark.best_ms(run) == 31.2
+    assert bench.best_ms(run) == 31.2
     assert next(times) == 0.0  # five were measured
 
 
@@ -110,7 +109,7 @@ def test_both_sensors_are_read_once_per_second(
     monkeypatch.setattr(cubesense, "power_up", powered(one, asked))
     assert cubesense._loop_ratio(device("cubesense")) == 4.0
     times = [time_s for _, time_s in one.said]
-    assert len(times) == 2 * (benchmark.LOOP_S + 1)
+    assert len(times) == 2 * (bench.LOOP_S + 1)
     for first, second in zip(times[::2], times[2::2], strict=False):
         assert second - first == pytest.approx(1.0)
     assert len({camera for camera, _ in one.said}) == 2
@@ -196,7 +195,7 @@ def test_cubestar_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None
     }
     assert [what for what, _ in one.said] == ["Trigger", "StopLoop", "Trigger"]
     begun_s, ended_s, again_s = (time_s for _, time_s in one.said)
-    assert min(ended_s - begun_s, one.time_s - again_s) >= benchmark.LOOP_S + 0.9
+    assert min(ended_s - begun_s, one.time_s - again_s) >= bench.LOOP_S + 0.9
     assert asked == [{"engine": "compiled"}, {"engine": "compiled", "firmware": "reference"}]
 
 
@@ -216,7 +215,7 @@ def test_cubesense_figures(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_aramis_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes pictures in its loop, which needs activation."""
-    monkeypatch.setattr(benchmark, "ROUNDS", 1)
+    monkeypatch.setattr(bench, "ROUNDS", 1)
     monkeypatch.setattr(aramis, "LOOP_S", 1)
     found = aramis.BENCHMARK.run(device("aramis"))
     assert set(found) == set(aramis.BENCHMARK.figures)

@@ -18,8 +18,8 @@ from cubestack.host.calibration.camera import Camera
 from cubestack.host.calibration.fisheye import Fisheye
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.opener import Opener
-from cubestack.host.studies.calibrate import experiment as calibrate
-from cubestack.host.studies.calibrate.experiment import CalibrateOptions, CalibrateResult
+from cubestack.host.studies import calibrate
+from cubestack.host.studies.calibrate import CalibrateOptions, CalibrateResult
 from cubestack.host.studies.cubesense import calibrate as cubesense
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT as CUBESTAR
 

@@ -3,8 +3,7 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 
-from cubestack.host.studies.campaign import parquet
-from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.folder import PARQUET_FILE, Folder, write_parquet
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.run import run
 
@@ -14,7 +13,7 @@ def test_each_value_has_a_column(failing: set[float], plan: CampaignPlan, tmp_pa
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     rows = list(run(folder, 1))
     assert {row.outcome for row in rows} > {"failed", "right"}
-    found = pyarrow.parquet.read_table(parquet.write(folder)).to_pylist()
+    found = pyarrow.parquet.read_table(write_parquet(folder)).to_pylist()
     assert [(one["block"], one["row"], one["outcome"], one["reason"]) for one in found] == [
         (row.block, row.row, row.outcome, row.reason) for row in folder.rows()
     ]
@@ -27,5 +26,5 @@ def test_each_value_has_a_column(failing: set[float], plan: CampaignPlan, tmp_pa
 def test_rejects_a_campaign_without_rows(plan: CampaignPlan, tmp_path: Path) -> None:
     folder = Folder.begun(tmp_path / "c", plan, resume=False)
     with pytest.raises(ValueError, match="has no rows yet"):
-        parquet.write(folder)
-    assert not (folder.path / parquet.FILE).exists()
+        write_parquet(folder)
+    assert not (folder.path / PARQUET_FILE).exists()

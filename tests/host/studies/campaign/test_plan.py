@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.plans import known_plans, plan_file, summary
+from cubestack.host.studies.campaign.plan import CampaignPlan, known_plans, plan_file, summary
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "campaigns.md"
 

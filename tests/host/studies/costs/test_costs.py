@@ -10,8 +10,8 @@ import pytest
 from cubestack.emulator.boards.cubestar.compiled.build import COMPILER, compiler_version
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.devices.registry import device
-from cubestack.host.studies.costs import command as command
-from cubestack.host.studies.costs.contract import CostMeasurement, CostReport
+from cubestack.host.studies import costs as command
+from cubestack.host.studies.costs import CostMeasurement, CostReport
 from cubestack.host.studies.cubestar.costs import COLUMNS, _cases, costs, measure
 from tests.conftest import Run
 

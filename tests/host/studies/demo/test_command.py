@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from cubestack.host.devices.registry import device, device_names
-from cubestack.host.studies.demo import command as demo
+from cubestack.host.studies import demo
 
 from ....conftest import Run
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cubestack.host.errors import PortClosedError, PortOpenError
-from cubestack.host.studies.demo import subject as demo
+from cubestack.host.studies import demo
 
 LONG = "cubestack emulate: sky.toml: " + "a message that takes several lines of a terminal, " * 5
 SERVES = "CubeStar serves on out/ttyCUBESTAR at 57600 baud; Ctrl-C ends it"

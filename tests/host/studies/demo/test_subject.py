@@ -15,10 +15,10 @@ from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.clients.cubestar.client import Attitude
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import device
-from cubestack.host.experiments.rendered import cameras_of
+from cubestack.host.experiments.scene_truth import cameras_of
 from cubestack.host.studies.cubesense import demo as cubesense
 from cubestack.host.studies.cubestar import demo as cubestar
-from cubestack.host.studies.demo.subject import Demo, download
+from cubestack.host.studies.demo import Demo, download
 from cubestack.host.targets import Target, open_target
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")

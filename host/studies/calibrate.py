@@ -1,9 +1,14 @@
-"""Shared calibration of star trackers: images in, stars identified by the device, a fit.
+"""Calibrate a device's camera from images of a real or an emulated unit.
 
-The device detects and identifies with its own firmware; the fit uses only what comes back over its
-serial line, with directions from the catalogue.
+The result can be loaded into the device or `cubestack measure`; docs/how-to/calibration.md
+describes how to take the images.
+
+examples:
+  cubestack calibrate {first} --emulated 20 --out camera.json
+  cubestack calibrate DEVICE --help
 """
 
+import argparse
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -23,11 +28,12 @@ from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import whole
 from cubestack.host.calibration.camera import Camera, load_camera, save_camera
 from cubestack.host.calibration.stars import PARAMETERS, Fit, Sight, fit_camera
+from cubestack.host.cli.measure import add_devices, run_experiment
 from cubestack.host.clients.contract import DeviceClient, FoundStar
 from cubestack.host.devices.experiment import Experiment, Result
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options, path_option
-from cubestack.host.pictures.residuals import save_residuals
+from cubestack.host.pictures.images import save_residuals
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 DEFAULT_PICTURES = 20
@@ -116,10 +122,11 @@ _Opener: TypeAlias = "Opener[Board, ClientT]"
 class StarCalibration(
     Experiment["_Opener[ClientT]", CalibrateOptions, CalibrateResult], Generic[ClientT]
 ):
-    """Calibrates a star tracker's camera.
+    """Calibrates a star tracker's camera: images in, stars identified by the device, a fit.
 
-    It uses profile ``extended``: the published one identifies few stars with a lens that is a pixel
-    off.
+    The device detects and identifies with its own firmware; the fit uses only what comes back over
+    its serial line, with directions from the catalogue. It uses profile ``extended``: the
+    published one identifies few stars with a lens that is a pixel off.
     """
 
     options = CalibrateOptions
@@ -240,3 +247,13 @@ class StarCalibration(
             if result.lens_px is not None:
                 yield f"from the emulated unit's own lens: {result.lens_px:.3f} px"
         yield f"{wall_s:.1f} s wall time"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the devices that can be calibrated, each with options of its own."""
+    add_devices(parser, lambda device: device.study("calibrate"))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate; returns 0 when there is a result."""
+    return run_experiment(args, *args.chosen)

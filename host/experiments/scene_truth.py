@@ -1,4 +1,7 @@
-"""True positions of stars in an image, for marks on pictures; no device sees them."""
+"""Rendered images and true positions of stars in them, for pictures; no device sees them."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,3 +35,15 @@ def true_stars(
         TrueStar(int(number), float(x), float(y))
         for number, (x, y) in zip(sky.hip[ahead][inside], places[inside], strict=True)
     ]
+
+
+def cameras_of(board: Any) -> Sequence[Any]:
+    """All image sensors of a board, in its order."""
+    return list(board.cameras.values()) if hasattr(board, "cameras") else [board.camera]
+
+
+def picture_of(board: Any) -> NDArray[np.uint8] | None:
+    """The last rendered images of all cameras side by side, or None."""
+    rendered = [camera.rendered for camera in cameras_of(board)]
+    shown = [picture for picture in rendered if picture is not None]
+    return np.hstack(shown) if shown else None

@@ -11,14 +11,44 @@ examples:
 
 import argparse
 import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
 from cubestack.host.devices.device import AnyDevice
 from cubestack.host.devices.registry import devices
-from cubestack.host.studies.costs.contract import CostMeasurement, CostReport
 from cubestack.host.terminal import busy, show, tell
+
+
+@dataclass(frozen=True)
+class CostMeasurement:
+    """Of one build."""
+
+    #: build, timing: compiler options and precision, and waits of the memories, in words
+    build: str
+    timing: str
+    operations: Mapping[str, float]  #: cycles of each operation by name
+    phases: Mapping[str, int]  #: cycles of each phase of the processing
+
+
+@dataclass(frozen=True)
+class CostReport:
+    """The cost measurement of a device's program."""
+
+    #: levels, precisions: available builds
+    levels: tuple[str, ...]
+    precisions: tuple[str, ...]
+    #: measures builds of the given levels and precisions
+    measure: Callable[[Sequence[str], Sequence[str]], Iterator[CostMeasurement]]
+    as_data: Callable[[Sequence[CostMeasurement]], dict[str, Any]]  #: content of ``file``
+    file: Path
+    page: Callable[[Sequence[CostMeasurement]], str]  #: a table for ``document``, a page of docs
+    document: str
+    table: Mapping[str, float]  #: cycles that the device's model charges, by name
+
 
 _BEGIN, _END = "<!-- costs -->\n", "<!-- end of costs -->\n"
 

@@ -1,1 +1,0 @@
-"""`cubestack bench`: cost of the hot paths."""

@@ -1,1 +1,0 @@
-"""`cubestack calibrate`: lens parameters from pictures."""

@@ -1,1 +1,0 @@
-"""`cubestack costs`: cycles of a device's program as compiled code."""

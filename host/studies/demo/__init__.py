@@ -1,1 +1,0 @@
-"""`cubestack demo`: the devices end to end, with pictures."""
