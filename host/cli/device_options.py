@@ -11,8 +11,13 @@ from cubestack.host.cli.arguments import add_value
 from cubestack.host.devices.device import PROFILE_OPTIONS, AnyDevice, BoardOption, Engine
 from cubestack.host.devices.registry import device_names, devices
 from cubestack.host.emulation.emulated import AnyEmulated, check_options
-from cubestack.host.emulation.insight import InsightFiles, open_gdb
-from cubestack.host.emulation.records import create_file, start_recorder, start_trace
+from cubestack.host.emulation.records import (
+    InsightFiles,
+    create_file,
+    open_gdb,
+    start_recorder,
+    start_trace,
+)
 from cubestack.host.emulation.remote_controls import TOKEN
 from cubestack.host.options import option_string
 from cubestack.host.targets import FORMS, Target, open_target

@@ -23,14 +23,13 @@ from cubestack.emulator.scene.attitude import (
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.values import number, whole
-from cubestack.host.clients.quality import AttitudeQuality
-from cubestack.host.clients.quaternions import pointing_deg
+from cubestack.host.clients.quaternions import AttitudeQuality, pointing_deg
 from cubestack.host.devices.experiment import Experiment, OpenerT, Result, Section
 from cubestack.host.experiments import hazard_options as hazards
 from cubestack.host.experiments.opener import MeasureOptions
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.options import corner, file_option, path_option, switch
-from cubestack.host.pictures.campaigns import sky_map
+from cubestack.host.pictures.figures import sky_map
 
 RIGHT_CROSS_DEG = 0.1
 RIGHT_ROLL_DEG = 0.3

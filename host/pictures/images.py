@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ SKY = 50.0
 """The same of black where at least half of a picture is dark sky."""
 
 GAMMA = 0.6
+
+SAMPLE_PX = 480
+"""Width of a small picture."""
 
 
 def stretched(
@@ -63,6 +67,18 @@ class TrueStar:
 def save_picture(picture: NDArray[np.uint8], path: Path) -> None:
     """Write grey values (rows, columns) unchanged as PNG."""
     Image.fromarray(picture).save(path)
+
+
+def save_sample(picture: NDArray[np.uint8], path: Path | BinaryIO) -> None:
+    """Write grey values (rows, columns) as a small JPEG that is stretched for the eye.
+
+    As ``stretched`` does it.
+    """
+    image = Image.fromarray(stretched(picture))
+    height = round(SAMPLE_PX * picture.shape[0] / picture.shape[1])
+    image.resize((SAMPLE_PX, height), Image.Resampling.LANCZOS).save(
+        path, "JPEG", quality=70, optimize=True
+    )
 
 
 def png(picture: NDArray[np.uint8]) -> bytes:

@@ -19,8 +19,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.emulation.orbit import _seen
 from cubestack.host.errors import BadAnswerError, PortOpenError, TargetError
 from cubestack.host.experiments.measure import experiment_of, measure
-from cubestack.host.pictures.campaigns import figure
-from cubestack.host.pictures.hazards import save_curves
+from cubestack.host.pictures.figures import figure, save_curves
 from cubestack.host.recording.setups import read_document
 from cubestack.host.shell.language import Shell
 from cubestack.host.shell.names import ShellError

@@ -17,8 +17,12 @@ from cubestack.firmware_model.interface.aramis import BLOCK_BYTES, MS_PER_DAY, C
 from cubestack.firmware_model.interface.cameras.mt9m001 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.codec.field import Value
 from cubestack.host.clients.contract import Columns, DeviceClient, Progress
-from cubestack.host.clients.quality import AttitudeQuality, common
-from cubestack.host.clients.quaternions import attitude_columns, unit_quaternion
+from cubestack.host.clients.quaternions import (
+    AttitudeQuality,
+    attitude_columns,
+    common,
+    unit_quaternion,
+)
 from cubestack.host.errors import StepFailedError, TargetError
 
 PROGRAM_TIMEOUT_S = 300.0

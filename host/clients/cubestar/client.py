@@ -20,8 +20,13 @@ from cubestack.firmware_model.interface.cubestar import (
     TaskStatus,
 )
 from cubestack.host.clients.contract import Columns, DeviceClient, Progress
-from cubestack.host.clients.quality import AttitudeQuality, common
-from cubestack.host.clients.quaternions import attitude_columns, pointing_deg, unit_quaternion
+from cubestack.host.clients.quaternions import (
+    AttitudeQuality,
+    attitude_columns,
+    common,
+    pointing_deg,
+    unit_quaternion,
+)
 from cubestack.host.errors import BadAnswerError, StepFailedError
 
 

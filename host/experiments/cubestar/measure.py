@@ -38,9 +38,8 @@ from cubestack.firmware_model.interface.cubestar import INTERFACE, IdMode, Match
 from cubestack.firmware_model.interface.cubestar.codes import Reason
 from cubestack.firmware_model.values import REQUIRED, ValueKind, choice, declare, number, whole
 from cubestack.host.calibration.camera import load_camera
-from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
-from cubestack.host.clients.cubestar.operator import find_threshold
+from cubestack.host.clients.cubestar.operator import calibrate, find_threshold
 from cubestack.host.devices.experiment import Mark
 from cubestack.host.emulation.emulated import EmulatedDevice
 from cubestack.host.errors import CameraFileError

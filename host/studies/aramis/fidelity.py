@@ -21,8 +21,14 @@ from cubestack.firmware_model.interface.aramis import IMAGE_BYTES
 from cubestack.firmware_model.mcu.blackfin import BLACKFIN_BF533
 from cubestack.firmware_model.mcu.costs import Meter
 from cubestack.host.experiments.aramis.measure import AramisOpener, AramisResult
-from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
-from cubestack.host.studies.fidelity.table import mean, measured
+from cubestack.host.studies.fidelity.table import (
+    Fidelity,
+    Figures,
+    Trial,
+    mean,
+    measured,
+    read_tables,
+)
 
 EPOCH = 2000.0  # of the thesis' catalogue
 LOOKUP_SEED = 1

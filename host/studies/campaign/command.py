@@ -26,8 +26,14 @@ from cubestack.firmware_model.values import whole
 from cubestack.host.cli.arguments import add_value
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.studies.campaign import report, statistics
-from cubestack.host.studies.campaign import run as campaigns
-from cubestack.host.studies.campaign.folder import Folder, write_parquet
+from cubestack.host.studies.campaign.folder import (
+    Folder,
+    count,
+    default_folder,
+    replayed,
+    write_parquet,
+)
+from cubestack.host.studies.campaign.folder import run as run_into
 from cubestack.host.studies.campaign.plan import CampaignPlan, known_plans, plan_file, summary
 from cubestack.host.studies.campaign.statistics import Change, compared
 from cubestack.host.studies.campaign.worst import worst
@@ -99,10 +105,10 @@ def run(args: argparse.Namespace) -> int:
         raise ValueError(f"one plan at a time, not {' '.join(args.words)}")
     path = plan_file(args.words[0])
     plan = CampaignPlan.read(path)
-    folder = Folder.begun(args.out or campaigns.default_folder(path), plan, resume=args.resume)
-    total, done = campaigns.count(plan), 0
+    folder = Folder.begun(args.out or default_folder(path), plan, resume=args.resume)
+    total, done = count(plan), 0
     before = sum(1 for _ in folder.rows())
-    rows = campaigns.run(folder, args.workers or cores(), args.scheduler)
+    rows = run_into(folder, args.workers or cores(), args.scheduler)
     try:
         for _ in progress(rows, total, "measuring", quiet=args.json, before=before):
             done += 1
@@ -123,7 +129,7 @@ def _list(*, as_json: bool) -> int:
 def _replay(words: list[str]) -> int:
     if len(words) != 2 or not words[1].isdecimal():
         raise ValueError("replay wants a campaign's folder and the number of a row")
-    print(json.dumps(campaigns.replayed(Folder(Path(words[0])), int(words[1]))))
+    print(json.dumps(replayed(Folder(Path(words[0])), int(words[1]))))
     return 0
 
 

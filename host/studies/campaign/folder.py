@@ -1,4 +1,4 @@
-"""A campaign's folder: its plan and a row per result, which survive any interruption.
+"""A campaign's folder, and runs into it: a plan and a row per result survive any interruption.
 
 The rows of a finished block are appended together. Resuming removes incomplete blocks. A complete
 campaign is sorted, so that its file does not depend on the number of workers. A Parquet file of its
@@ -8,14 +8,18 @@ rows is for pandas, polars, DuckDB and their like.
 import fcntl
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
+from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.export.parquet import arrow as pyarrow
-from cubestack.host.studies.campaign.block import Row
-from cubestack.host.studies.campaign.plan import CampaignPlan
+from cubestack.host.studies.campaign.block import Row, frames_of, measured, perform, rows_of
+from cubestack.host.studies.campaign.plan import CampaignPlan, FrameBlock
+from cubestack.host.studies.workers import performed
 
 PLAN, ROWS = "campaign.json", "rows.jsonl"
 
@@ -156,3 +160,54 @@ def write_parquet(folder: Folder) -> Path:
     new = folder.path / f"{PARQUET_FILE}.new"
     arrow.parquet.write_table(table, new)
     return new.replace(folder.path / PARQUET_FILE)
+
+
+def run(folder: Folder, workers: int, scheduler: str | None = None) -> Iterator[Row]:
+    """Measure the missing rows; yields each row of the folder, earlier ones first.
+
+    Raises:
+        FolderError: another process works on it.
+        WorkersError: workers are unavailable or lost; finished blocks are kept.
+        RuntimeError: all frames of the first finished block failed.
+    """
+    blocks = {block.number: block for block in folder.plan.blocks()}
+    with folder.alone():
+        whole = folder.repair({number: rows_of(block) for number, block in blocks.items()})
+        yield from folder.rows()
+        missing = [block for number, block in blocks.items() if number not in whole]
+        for _, rows in performed(perform, missing, workers, scheduler):
+            if not whole and all(row.outcome == "failed" for row in rows):
+                raise RuntimeError(f"nothing can be measured: {rows[0].reason}")
+            folder.add(rows)
+            whole.add(rows[0].block)
+            yield from rows
+        folder.sort()
+
+
+def count(plan: CampaignPlan) -> int:
+    return sum(map(rows_of, plan.blocks()))
+
+
+def replayed(folder: Folder, number: int) -> dict[str, Any]:
+    """Measure again the frame of a row, counted from 0.
+
+    Raises FolderError for an unknown row, and the frame's own errors.
+    """
+    rows = list(folder.rows())
+    if not 0 <= number < len(rows):
+        raise FolderError(f"{folder.path} has rows 0 to {len(rows) - 1}, not {number}")
+    return again(folder, rows[number])
+
+
+def again(
+    folder: Folder, row: Row, opened: Callable[[AnyEmulated], object] = lambda _emulated: None
+) -> dict[str, Any]:
+    """The result of a row's frame, measured again; ``opened`` is called with the device."""
+    block: FrameBlock = next(each for each in folder.plan.blocks() if each.number == row.block)
+    results = measured(block, frames_of(block, row.seed), row.seed, opened=opened)
+    found: dict[str, Any] = next(islice(results, row.after, None)).as_dict()
+    return found
+
+
+def default_folder(path: Path) -> Path:
+    return Path(f"{path.stem}.campaign")

@@ -10,7 +10,7 @@ from cubestack.host.devices.experiment import Section
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.rates import wilson
-from cubestack.host.pictures.campaigns import error_curves, rate_curves
+from cubestack.host.pictures.figures import error_curves, rate_curves
 from cubestack.host.studies.campaign.folder import Folder
 from cubestack.host.studies.campaign.statistics import ENDINGS, Change, Point, errors, rates, told
 from cubestack.host.studies.campaign.worst import Case

@@ -7,10 +7,9 @@ from io import BytesIO
 from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.experiments.measure import MEASURE
 from cubestack.host.experiments.scene_truth import picture_of
-from cubestack.host.pictures.hazards import save_sample
+from cubestack.host.pictures.images import save_sample
 from cubestack.host.studies.campaign.block import Row
-from cubestack.host.studies.campaign.folder import Folder
-from cubestack.host.studies.campaign.run import again
+from cubestack.host.studies.campaign.folder import Folder, again
 from cubestack.host.studies.campaign.statistics import ERROR
 
 ORDER = ("failed", "wrong", "refused", "right")

@@ -19,8 +19,7 @@ from cubestack.hdl.flow.area_report import recorded_areas
 from cubestack.host.experiments.cubesense.measure import CubeSenseOpener, SensorResult, view_of
 from cubestack.host.experiments.measure import measure
 from cubestack.host.studies.cubesense.ball import EXPERIMENT, BallOptions
-from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
-from cubestack.host.studies.fidelity.table import measured
+from cubestack.host.studies.fidelity.table import Fidelity, Figures, Trial, measured, read_tables
 
 ALTITUDE_KM = 750.0  # of the text
 SUN_BANDS = {

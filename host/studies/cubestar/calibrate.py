@@ -22,9 +22,8 @@ from cubestack.firmware_model.interface.cameras.mlx75412 import COLUMNS, ROWS
 from cubestack.firmware_model.interface.cubestar import IdMode
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.clients.contract import FoundStar
-from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import CubeStar
-from cubestack.host.clients.cubestar.operator import find_threshold
+from cubestack.host.clients.cubestar.operator import calibrate, find_threshold
 from cubestack.host.studies.calibrate import CalibrateOptions, StarCalibration
 
 

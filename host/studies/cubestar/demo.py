@@ -18,9 +18,8 @@ from cubestack.emulator.scene.attitude import (
 from cubestack.firmware_model.cubestar.detection.background_search import MOST_STARS_FACTOR
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.calibration.camera import load_camera
-from cubestack.host.clients.cubestar.calibration import calibrate
 from cubestack.host.clients.cubestar.client import Attitude, CubeStar
-from cubestack.host.clients.cubestar.operator import find_threshold
+from cubestack.host.clients.cubestar.operator import calibrate, find_threshold
 from cubestack.host.devices.device import Device
 from cubestack.host.experiments.attitude import errors
 from cubestack.host.experiments.scene_truth import true_stars

@@ -22,8 +22,14 @@ from cubestack.host.studies.cubestar.calibrate import EXPERIMENT
 from cubestack.host.studies.cubestar.layouts import attitudes_of_loop
 from cubestack.host.studies.cubestar.night import night
 from cubestack.host.studies.cubestar.shots import PICTURES, field_shots, slewing_shots
-from cubestack.host.studies.fidelity.contract import Fidelity, Figures, Trial, read_tables
-from cubestack.host.studies.fidelity.table import mean, measured
+from cubestack.host.studies.fidelity.table import (
+    Fidelity,
+    Figures,
+    Trial,
+    mean,
+    measured,
+    read_tables,
+)
 
 RATES = (0.0635, 0.1333, 0.3, 2.0, 8.0)
 """Of section 6.2, in deg/s."""

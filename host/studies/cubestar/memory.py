@@ -12,7 +12,7 @@ from typing import Any
 
 from cubestack.emulator.iss.insight.reports import MemoryUse, memory_use
 from cubestack.firmware_model.values import positive, whole
-from cubestack.host.emulation.insight import own_firmware
+from cubestack.host.emulation.records import own_firmware
 from cubestack.host.experiments.facts import Facts, Telling
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.options import Options, switch

@@ -14,7 +14,7 @@ from cubestack.emulator.scene.attitude import random_quaternion
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.cubestar import IdMode, MatchMode, TaskStatus
 from cubestack.host.calibration.camera import Camera
-from cubestack.host.clients.cubestar.calibration import calibrate
+from cubestack.host.clients.cubestar.operator import calibrate
 from cubestack.host.experiments import attitude as attitudes
 from cubestack.host.experiments.cubestar import measure
 

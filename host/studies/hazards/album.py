@@ -16,7 +16,8 @@ from cubestack.host.experiments.measure import experiment_of
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.experiments.scene_truth import cameras_of
-from cubestack.host.pictures.hazards import save_curves, save_sample
+from cubestack.host.pictures.figures import save_curves
+from cubestack.host.pictures.images import save_sample
 from cubestack.host.studies.hazards.curves import Point
 
 PROFILE = "extended"

@@ -18,7 +18,7 @@ from cubestack.host.emulation.emulated import AnyEmulated
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.experiments.rates import wilson
 from cubestack.host.options import Options
-from cubestack.host.pictures.campaigns import effects
+from cubestack.host.pictures.figures import effects
 from cubestack.host.studies.upsets.atlas import HEAD, atlas, lines, rows
 from cubestack.host.studies.upsets.clean import PS_PER_S, CleanLoop, Interval, clean_loop, render
 from cubestack.host.studies.upsets.fork import in_copy

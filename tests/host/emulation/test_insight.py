@@ -11,7 +11,7 @@ from cubestack.emulator.iss.insight.observer import Observer
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.ports.gdb import GdbEndpoint
-from cubestack.host.emulation.insight import InsightFiles, open_gdb
+from cubestack.host.emulation.records import InsightFiles, open_gdb
 from tests.emulator.iss.efm32gg.bench import MS, Bench
 
 

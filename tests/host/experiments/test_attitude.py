@@ -9,7 +9,7 @@ from cubestack.emulator.scene.attitude import (
 )
 from cubestack.emulator.scene.hipparcos import load_sky
 from cubestack.firmware_model.interface.cubestar.codes import Reason
-from cubestack.host.clients.quality import AttitudeQuality, common
+from cubestack.host.clients.quaternions import AttitudeQuality, common
 from cubestack.host.experiments.attitude import (
     axis_errors_deg,
     claims,

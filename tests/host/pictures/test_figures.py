@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cubestack.host.pictures.campaigns import effects, error_curves, png, rate_curves, sky_map
-from cubestack.host.pictures.hazards import save_curves, save_sample
+from cubestack.host.pictures.figures import (
+    effects,
+    error_curves,
+    png,
+    rate_curves,
+    save_curves,
+    save_sample,
+    sky_map,
+)
 
 figure_module = pytest.importorskip("matplotlib.figure")
 

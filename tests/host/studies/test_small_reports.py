@@ -15,9 +15,8 @@ from cubestack.host.devices.experiment import Section
 from cubestack.host.experiments.aramis import measure as aramis
 from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign import worst as module
-from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.folder import Folder, run
 from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.run import run
 from cubestack.host.studies.campaign.worst import worst
 from cubestack.host.studies.cubestar import memory
 from cubestack.host.studies.fidelity.table import Job, perform

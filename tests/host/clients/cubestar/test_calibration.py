@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
 from cubestack.host.calibration.camera import Camera, load_camera
-from cubestack.host.clients.cubestar.calibration import Calibration, calibrate
+from cubestack.host.clients.cubestar.operator import Calibration, calibrate
 from cubestack.host.errors import CameraFileError
 
 # The camera of the photographs that the project is tried on, cropped to its middle rows.

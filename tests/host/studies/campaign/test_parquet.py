@@ -3,9 +3,8 @@ from pathlib import Path
 import pyarrow.parquet
 import pytest
 
-from cubestack.host.studies.campaign.folder import PARQUET_FILE, Folder, write_parquet
+from cubestack.host.studies.campaign.folder import PARQUET_FILE, Folder, run, write_parquet
 from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.run import run
 
 
 def test_each_value_has_a_column(failing: set[float], plan: CampaignPlan, tmp_path: Path) -> None:

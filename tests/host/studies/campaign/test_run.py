@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from cubestack.host.studies.campaign import block as blocks
-from cubestack.host.studies.campaign import run as running
-from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder
+from cubestack.host.studies.campaign import folder as running
+from cubestack.host.studies.campaign.folder import PLAN, ROWS, Folder, count, replayed, run
 from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.run import count, replayed, run
 from cubestack.host.studies.campaign.statistics import rates
 
 from ..cluster import dask_cluster

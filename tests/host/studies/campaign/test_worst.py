@@ -1,8 +1,7 @@
 from pathlib import Path
 
-from cubestack.host.studies.campaign.folder import Folder
+from cubestack.host.studies.campaign.folder import Folder, run
 from cubestack.host.studies.campaign.plan import CampaignPlan
-from cubestack.host.studies.campaign.run import run
 from cubestack.host.studies.campaign.worst import worst
 
 

@@ -15,8 +15,7 @@ from cubestack.host.studies.cubesense import fidelity as cubesense
 from cubestack.host.studies.cubestar import fidelity as cubestar
 from cubestack.host.studies.cubestar.shots import Shot
 from cubestack.host.studies.fidelity import table as fidelity
-from cubestack.host.studies.fidelity.contract import Row
-from cubestack.host.studies.fidelity.table import Job, fidelity_of, perform
+from cubestack.host.studies.fidelity.table import Job, Row, fidelity_of, perform
 
 DOCS = Path(__file__).parents[4] / "docs"
 LONG = {"calibration"}

@@ -9,10 +9,15 @@ import pytest
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.cli.main import make_parser
 from cubestack.host.devices.registry import BUILT_IN, device
-from cubestack.host.studies.fidelity import contract as declared
 from cubestack.host.studies.fidelity import table as fidelity
-from cubestack.host.studies.fidelity.contract import Fidelity, Row, Trial, read_tables
-from cubestack.host.studies.fidelity.table import Job, fidelity_of
+from cubestack.host.studies.fidelity.table import (
+    Fidelity,
+    Job,
+    Row,
+    Trial,
+    fidelity_of,
+    read_tables,
+)
 from tests.conftest import Run
 
 ROOT = Path(__file__).parents[4]
@@ -120,7 +125,7 @@ def test_rejects_a_table_with_an_unknown_word(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     (tmp_path / "published.md").write_text("## t\n| a | b | c | d | guessed | e | f |\n")
-    monkeypatch.setattr(declared.resources, "files", lambda _package: tmp_path)
+    monkeypatch.setattr(fidelity.resources, "files", lambda _package: tmp_path)
     with pytest.raises(ValueError, match="not the cells of key, figure"):
         read_tables("anything")
 

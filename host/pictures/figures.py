@@ -1,9 +1,12 @@
-"""Figures of campaigns: rates over what was swept, distributions of errors, effects of upsets."""
+"""Figures of rates over what was swept, of distributions of errors and of effects of upsets."""
 
 from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from math import log, radians, sin, sqrt
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from cubestack.host.errors import install_command
 
@@ -196,3 +199,43 @@ def effects(
     panel.set(xlabel=f"% of {what}", xlim=(0, 100))
     panel.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return png(drawn)
+
+
+def save_curves(
+    rows: Mapping[str, Sequence[Any]],
+    axis: str,
+    title: str,
+    limits: Callable[[int, int], tuple[float, float]],
+    path: Path,
+) -> None:
+    """Write shares of right, refused and wrong frames against strength, a panel for each device.
+
+    Args:
+        rows: points by the device's name; each with strength, pictures, right, refused, wrong.
+        axis: what strength is, with its unit.
+        title: of the whole.
+        limits: of a rate; the bands of right and wrong.
+        path: of the PNG.
+
+    Raises:
+        ValueError: matplotlib is not installed.
+    """
+    drawn = figure(3.2 * max(len(rows), 1.6), 2.9)
+    panels = drawn.subplots(1, len(rows), sharey=True, squeeze=False)[0]
+    for panel, (name, points) in zip(panels, rows.items(), strict=True):
+        places = range(len(points))
+        for kind in ("right", "refused", "wrong"):
+            colour = COLOURS[kind]
+            shares = [100 * getattr(point, kind) / point.pictures for point in points]
+            panel.plot(places, shares, marker=MARKS[kind], color=colour, label=kind, linewidth=1.5)
+            if kind != "refused":
+                bands = [limits(getattr(point, kind), point.pictures) for point in points]
+                low, high = np.array(bands).T * 100
+                panel.fill_between(places, low, high, color=colour, alpha=0.15, linewidth=0)
+        panel.set_xticks(places, [f"{point.strength:g}" for point in points])
+        panel.set(title=name, xlabel=axis, ylim=(-4, 104))
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("% of pictures")
+    panels[0].legend(loc="center left", fontsize="small")
+    drawn.suptitle(title, fontsize="medium")
+    drawn.savefig(path, dpi=110)
