@@ -1,8 +1,9 @@
-// Forms for telecommands, generated from the device's tables, and the shell.
+// Forms for telecommands, generated from the device's tables, and the shell with saved commands.
 
-import { choose, disabledIf, labelled, make, note, row } from "./dom.js";
+import { button, choose, disabledIf, labelled, make, note, row } from "./dom.js";
 
 const HISTORY = 30;
+const MOST = 40; // saved commands
 
 export class Commands {
   // `execute(line)` executes a line of the shell.
@@ -89,4 +90,49 @@ function input(field) {
   if (field.minimum !== null) limits.min = field.minimum;
   if (field.maximum !== null && field.also === null) limits.max = field.maximum;
   return make("input", { ...common, ...limits, type: "number" });
+}
+
+// Shell commands that this browser saves, per kind of device.
+export class Favourites {
+  constructor(place, about, commands) {
+    this.key = `cubestack lines ${about.device}`;
+    this.commands = commands;
+    this.list = make("ul", { className: "saved-lines", id: "saved-lines" });
+    const add = () => this.add(commands.line.value.trim());
+    place.append(row(button("Save this command", "save-line", add)), this.list);
+    this.show();
+  }
+
+  // Empty if the browser stores nothing or something else.
+  lines() {
+    try {
+      const lines = JSON.parse(localStorage.getItem(this.key));
+      return Array.isArray(lines) ? lines.filter((line) => typeof line === "string") : [];
+    } catch {
+      return [];
+    }
+  }
+
+  add(line) {
+    if (line) this.store([line, ...this.lines().filter((one) => one !== line)].slice(0, MOST));
+  }
+
+  store(lines) {
+    try {
+      localStorage.setItem(this.key, JSON.stringify(lines));
+    } catch {
+      // The browser stores nothing.
+    }
+    this.show();
+  }
+
+  show() {
+    const lines = this.lines();
+    const items = lines.map((line) => {
+      const remove = button("×", "", () => this.store(lines.filter((one) => one !== line)));
+      remove.setAttribute("aria-label", `remove: ${line}`);
+      return make("li", {}, button(line, "", () => this.commands.run(line)), remove);
+    });
+    this.list.replaceChildren(...items);
+  }
 }

@@ -4,21 +4,19 @@
 // requests, and `report(text, kind)`, which writes a line into the log.
 
 import { Attitude } from "./attitude.js";
-import { Commands } from "./commands.js";
+import { Commands, Favourites } from "./commands.js";
 import { make } from "./dom.js";
 import { Emulation } from "./emulation.js";
-import { Favourites } from "./favourites.js";
 import { Lamps } from "./lamps.js";
 import { Pictures } from "./picture.js";
-import { Playback } from "./playback.js";
+import { Playback, Transcript } from "./recording.js";
 import { Results } from "./results.js";
-import { Scene } from "./scene.js";
+import { Scene } from "./scene/scene.js";
 import { ask, listen } from "./server.js";
 import { Settings } from "./settings.js";
 import { Start } from "./start.js";
 import { Telemetry } from "./telemetry.js";
 import { Timeline } from "./timeline.js";
-import { Transcript } from "./transcript.js";
 import { Transfer } from "./transfer.js";
 import { Waveform } from "./waveform.js";
 

@@ -1,7 +1,7 @@
 // The images in an emulation's memories: the newest or a selected one, with detections drawn over it.
 
 import { beside, choose, disabledIf, labelled, make, note, row } from "./dom.js";
-import { drawDetections } from "./overlay.js";
+import { drawDetections } from "./draw.js";
 import { ask, fetched } from "./server.js";
 import { ZoomFrame } from "./zoom.js";
 

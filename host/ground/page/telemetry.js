@@ -1,7 +1,6 @@
 // A telemetry frame, and plots of any of its numbers over time.
 
 import { atNextFrame, beside, choose, labelled, make, note, row } from "./dom.js";
-import { valueName } from "./fields.js";
 
 const MOST_POINTS = 3600; // of a plot: one hour at one point per second
 
@@ -134,4 +133,16 @@ function text(field, values) {
   if (name) return `${name} (${value})`;
   if (typeof value === "number" && !Number.isInteger(value)) return value.toPrecision(7);
   return String(value);
+}
+
+// The name of the field's value in a frame; undefined if it has none.
+export function valueName(field, values) {
+  const value = Number(values[field.name]);
+  const [other, sets] = field.choices_by ?? [];
+  const choices = field.choices ?? sets?.[Number(values[other])] ?? {};
+  return Object.keys(choices).find((name) => choices[name] === value);
+}
+
+export function hasNames(field) {
+  return Boolean(field.choices ?? field.choices_by);
 }

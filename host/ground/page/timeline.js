@@ -2,7 +2,7 @@
 // whose values have names.
 
 import { atNextFrame, button, choose, labelled, make, note, row } from "./dom.js";
-import { hasNames, valueName } from "./fields.js";
+import { hasNames, valueName } from "./telemetry.js";
 
 const SPANS_S = [60, 300, 1800];
 const MOST_CHANGES = 20_000; // per band

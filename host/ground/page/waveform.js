@@ -2,13 +2,13 @@
 
 import { button, disabledIf, labelled, make, note, row, save } from "./dom.js";
 import { fetched } from "./server.js";
-import { readVcd } from "./vcd.js";
 
 const SPAN_S = 2; // default span, up to the current time
 const SHOWN = 40; // last changes that are shown at first
 const ROW = 24;
 const NAMES = 190; // pixels
 const WIDTH = 1000;
+const UNITS = { s: 1, ms: 1e-3, us: 1e-6, ns: 1e-9, ps: 1e-12 }; // of VCD files
 
 export class Waveform {
   constructor(place, about, path, report) {
@@ -150,4 +150,29 @@ function drawPin(pen, { bits, changes }, top, x, colour) {
     pen.lineTo(end, level);
   });
   pen.stroke();
+}
+
+// Variables of the scope `within` in a VCD file: name, bits, and changes [time in s, value].
+function readVcd(text, within) {
+  const variables = new Map();
+  const scopes = [];
+  let unit = 1e-9;
+  let time = 0;
+  for (const line of text.split("\n")) {
+    const words = line.trim().split(/\s+/);
+    if (words[0] === "$timescale") unit = Number(words[1]) * UNITS[words[2]];
+    else if (words[0] === "$scope") scopes.push(words[2]);
+    else if (words[0] === "$upscope") scopes.pop();
+    else if (words[0] === "$var" && scopes.at(-1) === within)
+      variables.set(words[3], { name: words[4], bits: Number(words[2]), changes: [] });
+    else if (line[0] === "#") time = Number(line.slice(1)) * unit;
+    else {
+      const long = words.length === 2 && /^[bBsSrR]/.test(line);
+      const code = long ? words[1] : words[0].slice(1);
+      const value = long ? words[0].slice(1) : words[0][0];
+      const changes = variables.get(code)?.changes;
+      if (changes && changes.at(-1)?.[1] !== value) changes.push([time, value]);
+    }
+  }
+  return [...variables.values()];
 }

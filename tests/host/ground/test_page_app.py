@@ -37,7 +37,7 @@ def test_page_and_its_files_are_served(served: Serving) -> None:
     assert status == 200
     assert b"/page/main.js" in page
     vendored = ("vendor/uPlot.iife.min.js", "vendor/uPlot.LICENSE")
-    for part in ("main.js", "style.css", "scene.css", *vendored):
+    for part in ("main.js", "style.css", "scene/scene.css", *vendored):
         assert ask(served, "GET", f"/page/{part}")[0] == 200
 
 

@@ -1,7 +1,7 @@
 // A form for the table of a scene file, generated from the declaration of its keys. An empty field is
 // not in the table; it shows the default.
 
-import { button, choose, labelled, make, note, row } from "./dom.js";
+import { button, choose, labelled, make, note, row } from "../dom.js";
 
 // A field for each of `keys`; calls `changed` after each change.
 export class SceneForm {

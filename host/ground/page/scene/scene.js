@@ -1,10 +1,10 @@
 // The scene of an emulation: on a map of the sky, in a form with all keys, or as the text of a file.
 
-import { button, choose, disabledIf, labelled, make, note, row } from "./dom.js";
-import { SceneForm } from "./sceneform.js";
+import { button, choose, disabledIf, labelled, make, note, row } from "../dom.js";
+import { SceneForm } from "./form.js";
 import { SkyMap } from "./skymap.js";
-import { ask } from "./server.js";
-import { angles, vector } from "./sphere.js";
+import { ask } from "../server.js";
+import { angles, vector } from "../sphere.js";
 
 const POINTING = "pointing";
 

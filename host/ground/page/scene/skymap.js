@@ -1,9 +1,9 @@
 // A map of the whole sky with stars, bodies and cameras' fields of view; a click, a drag or arrow keys
 // move the selected object.
 
-import { make } from "./dom.js";
-import { disc, overlap, ring, sharpPen } from "./draw.js";
-import { angles, circle, direction, dot, flat, RAD, turned, turnedBack, vector } from "./sphere.js";
+import { make } from "../dom.js";
+import { disc, overlap, ring, sharpPen } from "../draw.js";
+import { angles, circle, direction, dot, flat, RAD, turned, turnedBack, vector } from "../sphere.js";
 
 const GRID_DEG = 30;
 const LABELS_DEG = 60;

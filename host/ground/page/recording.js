@@ -1,7 +1,7 @@
-// Playback of a recording: position, pause and jumps.
+// A recording: playback with position, pause and jumps; saves it and the table of its messages.
 
-import { button, labelled, make, row } from "./dom.js";
-import { ask } from "./server.js";
+import { button, labelled, make, note, row } from "./dom.js";
+import { ask, saveFile } from "./server.js";
 
 export class Playback {
   constructor(place, about, path, report) {
@@ -28,5 +28,23 @@ export class Playback {
     this.toggle.textContent = playback.runs ? "Pause" : "Play";
     this.time.textContent = `${playback.time_s.toFixed(3)} of ${playback.end_s.toFixed(3)} s`;
     if (!this.bar.matches(":active")) this.bar.value = playback.time_s;
+  }
+}
+
+export class Transcript {
+  constructor(place, about, path, report) {
+    const { recording, parquet } = about.missing;
+    const name = about.device.toLowerCase();
+    const saves = (text, id, call, end, why) =>
+      button(text, id, () => saveFile(`${path}/${call}`, `${name}.${end}`, report), why);
+    place.append(
+      row(
+        saves("Save recording", "recording", "recording", "rec", recording),
+        saves("Save as CSV", "transcript-csv", "transcript/csv", "csv", recording),
+        saves("Save as Parquet", "transcript-parquet", "transcript/parquet", "parquet", recording ?? parquet),
+      ),
+    );
+    const why = [recording, parquet].filter(Boolean).join("; ");
+    if (why) place.append(note(why));
   }
 }
