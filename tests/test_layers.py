@@ -48,7 +48,7 @@ ORDER = {
         "reference",
     ),
     "host": (
-        "errors extras options terminal",
+        "errors options terminal",
         "transport export calibration",
         "clients",
         "recording pictures",
