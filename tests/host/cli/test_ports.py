@@ -1,4 +1,6 @@
 import argparse
+import errno
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from types import SimpleNamespace
@@ -6,10 +8,13 @@ from types import SimpleNamespace
 import pytest
 
 from cubestack.emulator.boards.contract import SerialLine
+from cubestack.emulator.bus.i2c import I2cMessage
 from cubestack.emulator.bus.uart import Uart
 from cubestack.emulator.ports.endpoint import PortError
 from cubestack.emulator.sim.virtual_time import Kernel
+from cubestack.host.cli import run
 from cubestack.host.cli.ports import add_port_arguments, open_ports
+from cubestack.host.devices.registry import device
 
 
 @pytest.fixture
@@ -83,3 +88,25 @@ def test_strict_line_rejects_tcp(ports):
     with pytest.raises(ValueError, match="a TCP client sets no baud rate; use --pty or --rfc2217"):
         ports("--tcp", "0", "--strict-line")
     assert ports("--strict-line") == ports()
+
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="/dev/i2c-N is of Linux")
+
+
+@pytest.mark.parametrize("names", [("aramis",), ("cubestar", "aramis")])
+def test_all_requested_devices_share_one_bus(names: tuple[str, ...]) -> None:
+    parser = argparse.ArgumentParser()
+    run.add_arguments(parser)
+    asked = [word for name in names for word in ("--device", name)]
+    results = {}
+    with ExitStack() as stack:
+        bus = run._emulated(parser.parse_args(["--quiet", *asked, "--", "true"]), stack)
+        assert bus.adapter is not None
+        for name in ("cubestar", "aramis"):
+            told: list[int] = []
+            address = device(name).interface.i2c_address
+            bus.adapter.submit([I2cMessage(address, read=1)], told.append)
+            while not told:
+                bus.kernel.step()
+            results[name] = told[0]
+    assert results == {name: 0 if name in names else -errno.ENXIO for name in results}

@@ -4,8 +4,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 
+import numpy as np
 import pytest
 
+from cubestack.emulator.scene.attitude import matrix_from_quaternion
+from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.devices import registry
 from cubestack.host.devices.lazily import get
 from cubestack.host.devices.registry import device, device_names, devices, merged_tables
@@ -108,3 +111,26 @@ def test_devices_beside_each_other_share_time_and_bus() -> None:
             open_device("aramis", beside=first)  # both would be at the same I2C address
         alone.wait(0.5)
         assert first.time_s == 0.0
+
+
+ALNILAM_DEG = 84.05, -1.20
+"""Right ascension and declination of the belt's middle star."""
+
+
+@pytest.mark.parametrize("name", ["cubestar", "aramis"])
+def test_star_trackers_point_at_orions_belt_with_north_up(name: str) -> None:
+    axes = matrix_from_quaternion(device(name).default_scene().quaternion)
+    ra, dec = np.radians(ALNILAM_DEG)
+    star = np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
+    assert np.degrees(np.arccos(axes[2] @ star)) < 0.25
+    assert axes @ (0, 0, 1) == pytest.approx((0, -1, 0), abs=0.02)
+
+
+def test_cubesense_default_scene_matches_the_tutorial() -> None:
+    scene = device("cubesense").default_scene()
+    for target, angles_deg in (
+        (CameraTarget.SUN, (20.0, 10.0)),
+        (CameraTarget.NADIR, (-8.0, 12.0)),
+    ):
+        truth = scene.truth(target, 0)
+        assert (truth.alpha_deg, truth.beta_deg) == pytest.approx(angles_deg)

@@ -1,5 +1,6 @@
 import csv
 import io
+from collections import Counter
 from itertools import islice
 from types import SimpleNamespace as Namespace
 
@@ -8,7 +9,9 @@ import pytest
 
 from cubestack.firmware_model.interface.cubesense import INTERFACE as CUBESENSE
 from cubestack.host.clients.contract import Client, Columns, DeviceClient
+from cubestack.host.devices.registry import device
 from cubestack.host.devices.result_table import log_lines, scatter
+from cubestack.host.devices.shown_settings import settings
 from cubestack.host.errors import NoAnswerError, TargetError
 from tests.conftest import Run
 
@@ -119,3 +122,29 @@ def test_rejects_invalid_arguments(run: Run, arguments: list[str], error: str) -
     code, out, err = run("log", *arguments)
     assert (code, out) == (2, "")
     assert error in err
+
+
+CORNERS = ("XMin", "XMax", "YMin", "YMax")
+
+
+@pytest.mark.parametrize(
+    ("name", "telecommand", "places"),
+    [
+        ("cubestar", "setIDMargin", ["IDMargin.Margin"]),
+        ("cubestar", "setPrincipalPoint", ["PrincipalPoint.Cx", "PrincipalPoint.Cy"]),
+        ("cubestar", "setTrackingMode", []),  # telemetry has the measured direction
+        ("cubesense", "DetectionThreshold2", ["Configuration.Threshold2"]),
+        ("cubesense", "Mask2", [f"Masks2.{one}{area}" for area in range(1, 6) for one in CORNERS]),
+        ("aramis", "SetGain", ["Gain.Gain"]),
+    ],
+)
+def test_each_setting_is_shown_once_per_area(
+    name: str, telecommand: str, places: list[str]
+) -> None:
+    sensor = device(name)
+    shown = Counter(
+        f"{one.frame.name}.{one.shown.name}"
+        for one in settings(sensor.interface, sensor.conformance)
+        if one.telecommand.name == telecommand
+    )
+    assert shown == Counter(places)

@@ -1,19 +1,28 @@
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from cubestack.emulator.boards import debugging
+from cubestack.emulator.iss.insight.observer import Observer
+from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.native.compiler import find_compiler
+from cubestack.emulator.ports.gdb import GdbEndpoint
 from cubestack.emulator.scene.sky import SkyScene
 from cubestack.firmware_model.interface.codec.switches import Switches
 from cubestack.firmware_model.interface.cubestar.switches import CubeStarSwitches
 from cubestack.host.devices.registry import device as registered
 from cubestack.host.emulation.emulated import open_device, power_up
+from cubestack.host.emulation.records import InsightFiles, open_gdb
 from cubestack.host.experiments.measure import measure
+from tests.emulator.iss.efm32gg.bench import MS, Bench
 
 ASK = bytes([0x1F, 0x7F, 128, 0x1F, 0xFF])
 
@@ -130,3 +139,37 @@ def test_device_without_switches_rejects_a_profile(tmp_path: Path) -> None:
     (tmp_path / "sky.toml").write_text(SKY + 'profile = "extended"')
     with pytest.raises(ValueError, match=r"sky\.toml: profile is .* of .*aramis, not of cubestar"):
         power_up(plain, tmp_path / "sky.toml")
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_profile_sums_the_cycles_of_all_devices(tmp_path: Path, count: int) -> None:
+    path, cycles = tmp_path / "profile", 0
+    with ExitStack() as stack:
+        watch = InsightFiles(profile=path).open(stack)
+        for number in range(1, count + 1):
+            bench = Bench()
+            observer = Observer(bench.machine, Symbols(None))
+            before = bench.machine.cycles
+            emulated: Any = SimpleNamespace(
+                board=SimpleNamespace(insight=SimpleNamespace(observer=observer))
+            )
+            watch(emulated)
+            bench.run_for(number * MS)
+            cycles += bench.machine.cycles - before
+            observer.close()
+    assert int(path.read_text().split("totals: ")[1]) == pytest.approx(cycles, abs=100)
+
+
+def test_closing_a_device_closes_its_debugger(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        debugging, "open_debugger", lambda _board, port, **_: GdbEndpoint(port, target)
+    )
+    target: Any = SimpleNamespace()
+    emulated: Any = SimpleNamespace(board=SimpleNamespace(insight=object(), on_close=[]))
+    endpoint = open_gdb(emulated, 0, wait=False)
+    socket.create_connection(endpoint.address).close()
+    for act in emulated.board.on_close:
+        act()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(endpoint.address)

@@ -1,4 +1,6 @@
+import hashlib
 import json
+import tomllib
 from collections.abc import Iterator
 from typing import Any
 
@@ -7,6 +9,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.ground.page_app import PAGE
 from cubestack.host.ground.serving import Serving
 from cubestack.host.ground.session import LONGEST_LINE, PAGE_COMMANDS, TargetSession
 from cubestack.host.targets import open_target
@@ -160,3 +163,18 @@ def test_invalid_message_closes_the_websocket(served: Serving, nonsense: str) ->
         with pytest.raises(ConnectionClosedError, match="1003"):
             [*iter(lambda: socket.recv(SOON_S), None)]
     assert do(served, "read Identification")[0] == 200
+
+
+VENDOR = PAGE / "vendor"
+
+
+def test_vendored_files_match_their_listed_sources() -> None:
+    sources = tomllib.loads((VENDOR / "sources.toml").read_text(encoding="utf-8"))
+    sums = {name: one for source in sources.values() for name, one in source["sha256"].items()}
+    found = {path.name: path.read_bytes() for path in VENDOR.iterdir()}
+    del found["sources.toml"]
+    assert {name: hashlib.sha256(text).hexdigest() for name, text in found.items()} == sums
+    version = sources["uplot"]["version"]
+    assert f"(v{version})".encode() in found["uPlot.iife.min.js"]
+    assert f"-{version}.tgz" in sources["uplot"]["package"]
+    assert b"The MIT License" in found["uPlot.LICENSE"]

@@ -10,6 +10,7 @@ from cubestack.host.devices.registry import device, device_names
 from cubestack.host.emulation.emulated import open_device
 from cubestack.host.errors import TargetError
 from cubestack.host.ground import scenes
+from cubestack.host.ground.scenes import magnitude
 
 from .conftest import Controlled
 
@@ -112,3 +113,9 @@ def test_rejects_a_device_without_scene_form() -> None:
     none = replace(device("cubestar"), scene_form=None)
     with pytest.raises(TargetError, match="CubeStar declares no scene keys"):
         scenes.keys(none)
+
+
+def test_magnitudes_match_the_catalogue() -> None:
+    for hipparcos, v_mag in ((32349, -1.44), (11767, 1.97), (78727, 4.16)):
+        assert magnitude(hipparcos) == pytest.approx(v_mag, abs=0.05)
+    assert magnitude(0) is magnitude(999_999) is None

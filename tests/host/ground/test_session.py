@@ -1,15 +1,26 @@
+import json
+import shutil
 from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
 
 import pytest
+from websockets.sync.client import connect
 
 from cubestack.firmware_model.interface.cubestar import INTERFACE, AckError
 from cubestack.host.clients.node import NodeClient
 from cubestack.host.devices.registry import device
+from cubestack.host.emulation.remote_controls import RemoteControls
 from cubestack.host.errors import CommandRefusedError, NoAnswerError
 from cubestack.host.ground.session import LinkState, TargetSession
-from cubestack.host.targets import Target
+from cubestack.host.targets import Target, open_target
+from cubestack.host.transport.streams import SerialTransport
 
 from ..conftest import FakeCubeStar, UartLink
+from .cable import cable
+from .conftest import BEARER, SOON_S, serving_pages
+from .fast_server import Changing, Hurried
 
 
 class Behind:
@@ -55,4 +66,53 @@ def test_missing_features_depend_on_the_device(client: str | None) -> None:
     )
     without = {"detections", "results", "download", "upload", "scene_form", "sensor_registers"}
     assert without & session.about["missing"].keys() == (set() if client else without)
+    session.close()
+
+
+class Held(Hurried):
+    held = True
+
+    def ask(self, method: str, path: str, body: object = None) -> dict[str, Any]:
+        told = super().ask(method, path, body)
+        return told | {"held": self.held} if path == "/state" else told
+
+
+def test_device_is_not_read_while_time_is_held() -> None:
+    port, uart = Held(), UartLink(Changing())
+    target = Target("held", INTERFACE, NodeClient(uart, INTERFACE), device=device("cubestar"))
+    target.controls = RemoteControls(port, "cubestar")  # type: ignore[arg-type]
+    wanted = {"show": ["Identification"], "results": True, "every_s": 0.2}
+    with closing(TargetSession(target)) as session, serving_pages(session) as serving:
+        address = serving.url.replace("http:", "ws:") + "/targets/0/live"
+        with connect(address, additional_headers=BEARER, open_timeout=SOON_S) as socket:
+            socket.send(json.dumps(wanted))
+            held = [json.loads(socket.recv(SOON_S)) for _ in range(3)]
+            assert all(one["emulation"]["held"] and one["link"]["sent"] == 0 for one in held)
+            assert not any("values" in one or "results" in one for one in held)
+            port.held = False
+            while "values" not in (told := json.loads(socket.recv(SOON_S))):
+                pass
+            assert told["values"]["Identification"]["NodeType"] is not None
+            assert told["results_logged"] == 1
+            assert told["emulation"]["truth"]["ra_deg"] > 0
+
+
+@pytest.mark.skipif(shutil.which("socat") is None, reason="no socat")
+@pytest.mark.parametrize("reopens", [True, False])
+def test_serial_line_recovers_from_an_unplugged_cable(
+    tmp_path: Path, uart: Any, reopens: bool
+) -> None:
+    ours, theirs = tmp_path / "ours", tmp_path / "theirs"
+    with cable(ours, theirs, uart):
+        target = open_target(str(ours), "cubestar")
+        assert isinstance(target.line, SerialTransport)
+        target.line.reopens = reopens
+        session = TargetSession(target)
+        assert "error" not in session.read(["Identification"]).result(SOON_S)["Identification"]
+    assert "error" in session.read(["Identification"]).result(SOON_S)["Identification"]
+    assert "error" in session.read(["Identification"]).result(SOON_S)["Identification"]
+    with cable(ours, theirs, uart):
+        found = session.read(["Identification"]).result(SOON_S)["Identification"]
+        assert ("error" in found) is not reopens
+    assert session.link.failed >= 2
     session.close()

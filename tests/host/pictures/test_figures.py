@@ -14,9 +14,9 @@ from cubestack.host.pictures.figures import (
     png,
     rate_curves,
     save_curves,
-    save_sample,
     sky_map,
 )
+from cubestack.host.pictures.images import save_sample
 
 figure_module = pytest.importorskip("matplotlib.figure")
 

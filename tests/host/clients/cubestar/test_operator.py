@@ -1,11 +1,19 @@
+import json
+import re
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from cubestack.host.clients.cubestar.operator import LADDER, find_threshold
+from cubestack.firmware_model.interface.cubestar import INTERFACE
+from cubestack.host.calibration.camera import Camera, load_camera
+from cubestack.host.clients.cubestar.operator import LADDER, Calibration, calibrate, find_threshold
+from cubestack.host.errors import CameraFileError
 from cubestack.host.studies.cubestar.night import choose_threshold
 
 
@@ -119,3 +127,117 @@ def test_night_threshold_without_matches_is_the_highest() -> None:
     sky: Any = Sky({}, full=4)
     assert choose_threshold(sky) == LADDER[-1]
     assert sky.thresholds == (LADDER[-1],) * 2
+
+
+# The camera of the photographs that the project is tried on, cropped to its middle rows.
+DISTORTION = {"k1": 0.17323, "k2": -0.310181, "p1": -0.000718546, "p2": -0.000419435}
+PHOTOGRAPHS = Camera(f_px=1070.949, cx_px=505.354, cy_px=230.801, **DISTORTION)
+
+
+def firmware_points(settings: dict[str, dict[str, float]], pixels: Any) -> NDArray[np.float64]:
+    """X/Z and Y/Z of pixels as the firmware computes them, from what the telecommands carry."""
+    carried: dict[str, Any] = {}
+    for name, parameters in settings.items():
+        message = INTERFACE.telecommand(name)
+        values = message.unpack(message.pack(**parameters))
+        assert not message.violations(values)
+        carried |= values
+    x = (pixels[:, 0] - carried["Cx"]) / carried["Fx"]
+    y = (pixels[:, 1] - carried["Cy"]) / carried["Fy"]
+    r2 = x**2 + y**2
+    radial = 1 + carried["K1"] * r2 + carried["K2"] * r2**2
+    x_u = x * radial + carried["P2"] * (r2 + 2 * x**2) + 2 * carried["P1"] * x * y
+    y_u = y * radial + carried["P1"] * (r2 + 2 * y**2) + 2 * carried["P2"] * x * y
+    scale = 0.0056 / carried["FocalLength"]
+    return np.stack([x_u * carried["Fx"] * scale, y_u * carried["Fy"] * scale], axis=-1)
+
+
+def frame_points(rng: np.random.Generator, camera: Camera) -> NDArray[np.float64]:
+    points = rng.uniform(-0.6, 0.6, (4000, 2))
+    pixels = camera.project(points)
+    inside = ((pixels > 0) & (pixels < [1023, 511])).all(axis=1)
+    assert inside.sum() > 500
+    return points[inside]
+
+
+def test_firmware_corrects_the_distortion_within_the_residual() -> None:
+    calibration = calibrate(PHOTOGRAPHS)
+    points = frame_points(np.random.default_rng(1), PHOTOGRAPHS)
+    found = firmware_points(calibration.settings, PHOTOGRAPHS.project(points))
+    error_px = PHOTOGRAPHS.f_px * np.hypot(*(found - points).T)
+    assert error_px.max() <= calibration.max_px * 1.05
+    assert np.sqrt(np.mean(error_px**2)) == pytest.approx(calibration.rms_px, rel=0.2)
+    assert calibration.rms_px < 0.03
+
+
+def test_without_distortion_the_fit_is_exact() -> None:
+    calibration = calibrate(Camera(1100.0, 500.0, 250.0))
+    assert calibration.max_px < 1e-9
+    assert calibration.settings["setFocalLength"]["FocalLength"] == pytest.approx(1100 * 0.0056)
+    for name in ("setRadialDistortionGains", "setTangentalDistortionGains"):
+        assert all(abs(value) < 1e-9 for value in calibration.settings[name].values())
+
+
+def test_no_other_coefficients_are_better() -> None:
+    best = calibrate(PHOTOGRAPHS)
+    pixels = np.stack(np.meshgrid(np.linspace(0, 1023, 128), np.linspace(0, 511, 64)), -1)
+    pixels = pixels.reshape(-1, 2)
+    true = PHOTOGRAPHS.unproject(pixels)
+
+    def cost(calibration: Calibration) -> float:
+        return float(np.sum((firmware_points(calibration.settings, pixels) - true) ** 2))
+
+    for name, parameters in best.settings.items():
+        if name in ("setPrincipalPoint", "setFocalLengthComponents"):
+            continue
+        for parameter in parameters:
+            for factor in (0.99, 1.01):
+                other = {key: dict(value) for key, value in best.settings.items()}
+                other[name][parameter] *= factor
+                assert cost(Calibration(other, 0.0, 0.0)) > cost(best)
+
+
+def test_projection_of_a_point_worked_by_hand() -> None:
+    # x = 0.2, y = 0, so r2 = 0.04.
+    camera = Camera(1000.0, 500.0, 250.0, k1=0.5, k2=0.25, p1=0.01, p2=0.02)
+    column = 500 + 1000 * (0.2 * (1 + 0.5 * 0.04 + 0.25 * 0.0016) + 0.02 * (0.04 + 0.08))
+    row = 250 + 1000 * 0.01 * 0.04
+    np.testing.assert_allclose(camera.project(np.array([0.2, 0.0])), [column, row])
+
+
+GOOD: dict[str, Any] = {"f_px": 1000, "cx_px": 512.5, "cy_px": 256.0, "k1": 0.1, "model": "any"}
+
+
+@pytest.mark.parametrize("content", [GOOD, {"camera": GOOD, "images": {}}])
+def test_camera_file_may_have_a_camera_object(content: Any, tmp_path: Path) -> None:
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(content))
+    assert load_camera(path) == Camera(1000.0, 512.5, 256.0, k1=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "not JSON"),
+        ("[1]", "must hold an object with f_px, cx_px, cy_px"),
+        ('{"camera": 1}', "must hold an object"),
+        ('{"cx_px": 1, "cy_px": 1}', "camera has no f_px; needed: f_px, cx_px, cy_px"),
+        ('{"f_px": "1", "cx_px": 1, "cy_px": 1}', "f_px must be a number, not '1'"),
+        ('{"f_px": true, "cx_px": 1, "cy_px": 1}', "f_px must be a number, not True"),
+        ('{"f_px": NaN, "cx_px": 1, "cy_px": 1}', "f_px must be a number, not nan"),
+        ('{"f_px": 0, "cx_px": 1, "cy_px": 1}', "f_px must be above 0, not 0"),
+        ('{"f_px": 9, "cx_px": 1, "cy_px": 1, "k1": null}', "k1 must be a number, not None"),
+    ],
+)
+def test_rejects_invalid_camera_files(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "camera.json"
+    path.write_text(text)
+    with pytest.raises(
+        CameraFileError, match=rf"^{re.escape(str(path))}: .*{re.escape(message)}.*\Z"
+    ):
+        load_camera(path)
+
+
+def test_rejects_a_missing_camera_file(tmp_path: Path) -> None:
+    with pytest.raises(CameraFileError, match=r"none\.json: No such file or directory"):
+        load_camera(tmp_path / "none.json")

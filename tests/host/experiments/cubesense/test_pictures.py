@@ -16,6 +16,7 @@ from cubestack.host.experiments.cubesense.pictures import (
     annotate_sun,
     pixel,
 )
+from cubestack.host.experiments.measure import measure
 from cubestack.host.pictures.sheet import TRUTH
 
 BACKGROUND = 34
@@ -85,3 +86,13 @@ def test_brightness_is_drawn_linearly(tmp_path: Path, camera: Camera) -> None:
     drawn = np.asarray(Image.open(tmp_path / "drawn.png"))[600:680]
     levels = [np.median(drawn[:, 2 * left : 2 * left + 80]) for left in (100, 200, 300)]
     assert levels == pytest.approx([0, 127.5, 255], abs=1)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "told", "other"), [("sun", "sun_pixels", "edges"), ("nadir", "edges", "sun_pixels")]
+)
+def test_each_sensor_has_its_own_column(sensor: str, told: str, other: str) -> None:
+    (result,) = measure("cubesense", frames=1, sensor=sensor)
+    assert result.sensor == sensor
+    assert getattr(result, told) > 0
+    assert getattr(result, other) is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
@@ -12,18 +13,22 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from cubestack.emulator.scene.hipparcos import load_sky
-from cubestack.firmware_model.interface.cubesense.codes import PIXELS_PER_DEGREE
+from cubestack.firmware_model.interface.aramis import OnOff
+from cubestack.firmware_model.interface.cameras.mt9m001 import ROWS
+from cubestack.firmware_model.interface.cubesense import codes
 from cubestack.firmware_model.interface.cubesense.telecommands import DISTORTION
+from cubestack.firmware_model.interface.cubestar import IdMode
 from cubestack.host.calibration.camera import Camera
 from cubestack.host.calibration.fisheye import Fisheye
 from cubestack.host.devices.registry import device
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.studies import calibrate
+from cubestack.host.studies.aramis.calibrate import EXPERIMENT as ARAMIS
 from cubestack.host.studies.calibrate import CalibrateOptions, CalibrateResult
 from cubestack.host.studies.cubesense import calibrate as cubesense
 from cubestack.host.studies.cubestar.calibrate import EXPERIMENT as CUBESTAR
 
-TRUE = Fisheye(322.5, 239.0, DISTORTION, PIXELS_PER_DEGREE, 95.0)
+TRUE = Fisheye(322.5, 239.0, DISTORTION, codes.PIXELS_PER_DEGREE, 95.0)
 ANGLES = np.array([(a, b) for a in range(-60, 61, 24) for b in range(-50, 51, 20)], float)
 
 
@@ -53,7 +58,7 @@ def test_fits_a_lens_to_pictures_of_lights(lights: Path) -> None:
     assert found.boresight_px == pytest.approx((322.5, 239.0), abs=0.1)
     assert found.after_px < 0.1 < found.before_px
     assert (found.error_before_deg, found.error_after_deg) == (None, None)
-    fitted = Fisheye(*found.boresight_px, found.factors, PIXELS_PER_DEGREE, 95.0)
+    fitted = Fisheye(*found.boresight_px, found.factors, codes.PIXELS_PER_DEGREE, 95.0)
     np.testing.assert_allclose(fitted.project(ANGLES), TRUE.project(ANGLES), atol=0.2)
     told = json.loads((lights / "out.json").read_text("utf-8"))
     assert set(told) == {"sun"}
@@ -214,3 +219,68 @@ def test_pictures_of_a_folder_are_sorted_by_name(tmp_path: Path) -> None:
     assert [one.name for one in CalibrateOptions(images=tmp_path).pictures] == ["a.JPG", "b.png"]
     assert CalibrateOptions(images=tmp_path / "c.txt").pictures == [tmp_path / "c.txt"]
     assert CalibrateOptions(out=tmp_path / "x.json").out == tmp_path / "x.json"
+
+
+def test_load_sets_the_field_before_it_activates_the_catalogue() -> None:
+    """A focal length of half the picture's height has it 90 degrees high."""
+    aramis = Mock()
+    ARAMIS.load(aramis, Camera(ROWS / 2, 640.0, 512.0), None)
+    field = call.client.command("SetField", FieldOfView=pytest.approx(90.0), Round=OnOff.ON)
+    assert aramis.mock_calls == [field, call.client.wait_processed(1.0), call.activate()]
+
+
+class Unit:
+    """A CubeStar in tracking mode; ``modes`` are the identification modes of its pictures."""
+
+    def __init__(self, valid: bool) -> None:
+        self.valid = valid
+        self.modes = list[IdMode]()
+        self._mode = IdMode.TRACKING
+        self.client = self
+
+    def command(self, _name: str, *, IdMode: IdMode) -> None:
+        self._mode = IdMode
+
+    def capture_and_process(self) -> None:
+        self.modes.append(self._mode)
+
+    def attitude(self) -> "Unit":
+        return self
+
+    def stars(self) -> list[str]:
+        return ["a star"]
+
+
+@pytest.mark.parametrize("valid", [True, False])
+def test_pictures_are_matched_lost_in_space_and_need_an_attitude(valid: bool) -> None:
+    unit: Any = Unit(valid)
+    assert CUBESTAR.identify(unit) == (["a star"] if valid else [])
+    assert unit.modes == [IdMode.LOST_IN_SPACE]
+
+
+LENS = Fisheye(300.0, 250.0, (0.5, 1.0, 0.0, 0.0, 0.0), 1.45, 95.0)
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.client = Mock()
+
+    def __call__(self, _scene: object, *, seed: int) -> Any:
+        return nullcontext(SimpleNamespace(client=self.client))
+
+    def shown(self, views: Any, _count: int, _label: str) -> Any:
+        return iter(views)
+
+
+def test_fitted_lens_is_loaded_before_the_second_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, options = Bench(), cubesense.CalibrateOptions(check_poses=3)
+
+    def measured(*_: object) -> SimpleNamespace:
+        told = bench.client.set_boresight.called and bench.client.set_distortion.called
+        return SimpleNamespace(error_deg=0.25 if told else 1.5)
+
+    monkeypatch.setattr(cubesense, "measure_once", measured)
+    opened: Any = bench
+    assert cubesense._checked(opened, options, codes.Camera.SUN, LENS) == (1.5, 0.25)
+    bench.client.set_boresight.assert_called_once_with(codes.Camera.SUN, 300.0, 250.0)
+    bench.client.set_distortion.assert_called_once_with(codes.Camera.SUN, LENS.factors)

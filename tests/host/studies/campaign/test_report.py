@@ -12,9 +12,10 @@ from scipy.stats import binomtest
 
 from cubestack.host.studies.campaign import report
 from cubestack.host.studies.campaign.block import Row
-from cubestack.host.studies.campaign.folder import Folder, FolderError
+from cubestack.host.studies.campaign.folder import Folder, FolderError, run
 from cubestack.host.studies.campaign.plan import CampaignPlan
 from cubestack.host.studies.campaign.statistics import by_chance, compared, errors, rates
+from cubestack.host.studies.campaign.worst import worst
 
 Make = Callable[..., Folder]
 FRAMES = 120
@@ -171,3 +172,27 @@ def test_report_page_shows_the_comparison(make: Make) -> None:
 def test_report_rejects_a_campaign_without_rows(plan: CampaignPlan, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="has no rows yet"):
         report.write(Folder.begun(tmp_path / "c", plan, resume=False))
+
+
+def test_worst_cases_are_sorted_by_outcome(
+    tmp_path: Path, plan: CampaignPlan, failing: set[float]
+) -> None:
+    failing.add(0.9)
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    rows = list(run(folder, 1))
+    cases = list(worst(folder, len(rows)))
+    outcomes = [list(folder.rows())[case.number].outcome for case in cases]
+    order = ["failed", "wrong", "refused", "right"]
+    assert outcomes == sorted(outcomes, key=order.index)
+    assert {"failed", "right"} <= set(outcomes)
+    assert all(case.text.startswith(outcome) for case, outcome in zip(cases, outcomes, strict=True))
+    assert not any(case.jpeg for case in cases)  # nothing was powered up
+
+
+def test_worst_case_of_a_real_device_has_its_picture(tmp_path: Path) -> None:
+    plan = CampaignPlan(device="cubestar", frames=2, options={"mag_limit": 3.8})
+    folder = Folder.begun(tmp_path / "c", plan, resume=False)
+    first, second = (row.result["error_cross_deg"] for row in run(folder, 1))
+    (case,) = worst(folder, 1)
+    assert case.number == int(second > first)
+    assert case.jpeg.startswith(b"\xff\xd8")

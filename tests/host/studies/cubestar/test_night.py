@@ -1,13 +1,19 @@
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from cubestack.firmware_model.interface.cubestar import MatchMode, TaskStatus
+from cubestack.firmware_model.interface.cubestar.layouts import Layout
+from cubestack.host.experiments.cubestar import measure
+from cubestack.host.studies.cubestar import layouts
 from cubestack.host.studies.cubestar import night as module
+from cubestack.host.studies.cubestar.layouts import Found, LayoutOptions, LayoutResult
 from cubestack.host.studies.cubestar.night import INTERVAL_S, SETTLING, night
+from cubestack.host.studies.cubestar.shots import _shot
 
 #: Of each field: sigma of right ascension, declination and roll, deg; part that is valid.
 CALM, SHAKEN, BLIND = (0.01, 0.02, 0.05, 1.0), (0.01, 2.0, 0.05, 1.0), (0.01, 0.01, 0.01, 0.4)
@@ -121,3 +127,73 @@ def test_night_end_to_end() -> None:
     assert 8 <= found["fewest"] <= found["most"] <= 16
     for name in ("ra", "dec", "roll", "across"):
         assert 0 < found[name] < 0.02
+
+
+TELEMETRY = {"DetectionSummary": {"NumStarsDetected": 9}, "NumIdStars": {"numIdStars": 4}}
+
+
+@pytest.mark.parametrize(
+    ("judged", "valid", "status", "stars"),
+    [
+        (False, True, TaskStatus.CALCULATED, (7, 0)),
+        (False, False, TaskStatus.CALCULATION_FAILED, (0, 0)),
+        (True, True, TaskStatus.CALCULATED, (4, 2)),
+        (True, False, TaskStatus.CALCULATION_FAILED, (4, 2)),
+        (True, False, TaskStatus.IDENTIFICATION_FAILED, (0, 0)),
+    ],
+)
+def test_identities_are_judged_only_where_stars_are_identified(
+    monkeypatch: pytest.MonkeyPatch,
+    judged: bool,
+    valid: bool,
+    status: TaskStatus,
+    stars: tuple[int, int],
+) -> None:
+    truth = np.array([0.0, 0.0, 0.0, 1.0])
+    attitude = SimpleNamespace(
+        valid=valid, quaternion=truth, matched=7, mode=MatchMode.LOST_IN_SPACE
+    )
+    cubestar = SimpleNamespace(
+        capture_and_process=lambda: status,
+        attitude=lambda: attitude,
+        client=SimpleNamespace(telemetry=TELEMETRY.__getitem__),
+    )
+    device: Any = SimpleNamespace(client=cubestar, board=SimpleNamespace(truth=lambda: truth))
+    monkeypatch.setattr(measure, "count_wrong", lambda *_: 2)
+    shot = _shot(device, judged=judged)
+    assert (shot.valid, shot.right, shot.detected) == (valid, valid, 9)
+    assert (shot.matched, shot.wrong) == stars
+
+
+VOLTS = 3.3
+
+
+def measured(monkeypatch: pytest.MonkeyPatch, found: list[Found]) -> LayoutResult:
+    """The result of a loop that gave ``found``."""
+    table = SimpleNamespace(volts=VOLTS)
+    emulated: Any = SimpleNamespace(
+        board=SimpleNamespace(
+            engine=SimpleNamespace(violation_counts={}), power=SimpleNamespace(table=table)
+        ),
+        client=SimpleNamespace(
+            client=SimpleNamespace(command=lambda _name: None), phase_times=dict[str, float]
+        ),
+    )
+    monkeypatch.setattr(layouts, "attitudes_of_loop", lambda _board, _seconds: iter(found))
+    options = LayoutOptions(seconds=2)
+    return layouts._measure(Layout.COPIED, lambda *_, **__: nullcontext(emulated), options)
+
+
+def test_age_grows_until_the_next_attitude(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two attitudes per second with an age of 300 ms, at 100 mA."""
+    turns = [Found(n * 10**12 // 2, 50.0 * n, 300.0, right=True) for n in range(5)]
+    result = measured(monkeypatch, turns)
+    assert (result.attitudes, result.right, result.rate_hz) == (4, 4, 2.0)
+    assert (result.age_ms, result.oldest_ms) == (300.0, 800.0)
+    assert (result.power_mw, result.energy_mj) == (pytest.approx(330), pytest.approx(165))
+
+
+def test_one_attitude_has_no_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = measured(monkeypatch, [Found(10**12, 5.0, 300.0, right=None)])
+    assert (result.attitudes, result.right, result.rate_hz) == (0, None, None)
+    assert result.age_ms is result.oldest_ms is result.power_mw is result.energy_mj is None

@@ -1,5 +1,5 @@
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
@@ -14,12 +14,16 @@ from PIL import Image
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.host.clients.cubestar.client import Attitude
 from cubestack.host.devices.device import AnyDevice
-from cubestack.host.devices.registry import device
+from cubestack.host.devices.registry import device, device_names
+from cubestack.host.errors import PortClosedError, PortOpenError
 from cubestack.host.experiments.scene_truth import cameras_of
+from cubestack.host.studies import demo
 from cubestack.host.studies.cubesense import demo as cubesense
 from cubestack.host.studies.cubestar import demo as cubestar
 from cubestack.host.studies.demo import Demo, download
 from cubestack.host.targets import Target, open_target
+
+from ....conftest import Run
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler")
 
@@ -162,3 +166,77 @@ def test_download_calls_the_progress_function() -> None:
         return picture
 
     assert download("it", fetch) is picture
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of shown devices; all but the last find their target."""
+    seen = list[str]()
+
+    def show(one: Any, *_given: object) -> bool:
+        seen.append(one.name)
+        return one.name != device_names()[-1]
+
+    devices = [replace(device(name), studies={"demo": lambda: show}) for name in device_names()]
+    silent = SimpleNamespace(name="silent", studies={})
+    monkeypatch.setattr(demo, "devices", lambda: [*devices, silent])
+    return seen
+
+
+def test_demo_shows_all_devices_or_the_named_one(
+    run: Run, shown: list[str], tmp_path: Path
+) -> None:
+    first, *_, last = device_names()
+    assert run("demo", "--out", tmp_path).code == 1
+    assert shown == list(device_names())
+    for name, code in ((first, 0), (last, 1)):
+        shown.clear()
+        assert run("demo", name, "--out", tmp_path).code == code
+        assert shown == [name]
+    assert "silent" in run("demo", "silent", "--out", tmp_path).line
+
+
+LONG = "cubestack emulate: sky.toml: " + "a message that takes several lines of a terminal, " * 5
+SERVES = "CubeStar serves on out/ttyCUBESTAR at 57600 baud; Ctrl-C ends it"
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    lines: list[str] = []
+    monkeypatch.setattr(demo, "say", lines.append)
+    return lines
+
+
+def emulator(*lines: str, port: Path) -> Callable[[object], object]:
+    """An emulator that prints ``lines``; its port exists from `SERVES` on."""
+
+    @contextmanager
+    def emulating(_words: object) -> Iterator[Iterator[str]]:
+        def talk() -> Iterator[str]:
+            for line in lines:
+                if line == SERVES:
+                    port.touch()
+                yield line
+
+        yield talk()
+
+    return emulating
+
+
+def test_output_of_the_emulator_is_shown_in_full(
+    monkeypatch: pytest.MonkeyPatch, said: list[str], tmp_path: Path
+) -> None:
+    port = tmp_path / "tty"
+    monkeypatch.setattr(demo, "emulating", emulator("a warning", LONG, port=port))
+    with pytest.raises(PortOpenError), demo._served(["cubestar"], port):
+        pass
+    assert said == ["starting the emulator", "a warning", LONG]
+    said.clear()
+    monkeypatch.setattr(demo, "emulating", emulator("starting: 5 s", SERVES, "more", port=port))
+    with demo._served(["cubestar"], port) as served:
+        assert served == port
+    assert said == ["starting the emulator", "starting: 5 s", SERVES]
+    monkeypatch.setattr(demo, "emulating", emulator(SERVES, "latch-up", LONG, port=port))
+    with pytest.raises(PortClosedError), demo._served(["cubestar"], port):
+        raise PortClosedError
+    assert said[-1] == f"the emulator ended: {LONG}"

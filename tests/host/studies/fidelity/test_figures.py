@@ -1,5 +1,6 @@
 import re
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -7,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cubestack.emulator.camera.ov7620.fisheye import DISTORTION
 from cubestack.emulator.native.compiler import find_compiler
 from cubestack.emulator.scene.earth_sun import CameraTarget
 from cubestack.host.devices.registry import BUILT_IN
 from cubestack.host.studies.aramis import fidelity as aramis
 from cubestack.host.studies.cubesense import fidelity as cubesense
+from cubestack.host.studies.cubesense.fidelity import _lens
 from cubestack.host.studies.cubestar import fidelity as cubestar
 from cubestack.host.studies.cubestar.shots import Shot
 from cubestack.host.studies.fidelity import table as fidelity
@@ -270,3 +273,10 @@ def test_slow_slew_is_tracked_and_fast_slew_is_lost() -> None:
     assert slow["cross"] < 0.01
     fast = perform(Job("cubestar", "slew-8.0", "extended", 1, 1.0))
     assert fast["right"] == fast["off"] == 0
+
+
+def test_discriminant_matches_the_roots_of_the_polynomial() -> None:
+    nothing: Any = None
+    differences = [one - other for one, other in combinations(np.roots(DISTORTION), 2)]
+    expected = DISTORTION[0] ** 4 * np.prod(differences) ** 2
+    assert _lens(nothing, 0)["discriminant"] == pytest.approx(expected.real, rel=1e-10, abs=0)

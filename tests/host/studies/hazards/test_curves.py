@@ -1,8 +1,16 @@
+import json
+import re
+from pathlib import Path
+
 import pytest
+from PIL import Image
 from scipy.stats import binomtest
 
+from cubestack.host.cli.main import main
 from cubestack.host.devices.registry import device
+from cubestack.host.experiments.hazard_options import known
 from cubestack.host.experiments.rates import wilson
+from cubestack.host.studies.hazards.album import PAGE, PICTURES
 from cubestack.host.studies.hazards.curves import Job, devices_with_hazards, hazards_of, run
 
 
@@ -42,3 +50,75 @@ def test_dark_sky_is_refused_with_a_reason() -> None:
     (point,) = run([Job("cubestar", "extended", "defocus", 6.0, 2, 4)], 1)
     assert point.wrong == 0
     assert sum(point.reasons.values()) == point.refused
+
+
+DOCS = Path(__file__).parents[4] / "docs"
+
+
+@pytest.mark.parametrize("name", sorted(known()))
+def test_page_shows_each_hazard_for_each_device(name: str) -> None:
+    page = (DOCS / PAGE).read_text("utf-8")
+    (section,) = re.findall(rf"^## {name}\n(.*?)(?=^## |^<!--)", page, re.DOTALL | re.MULTILINE)
+    shown = [part.name for part in (DOCS / PICTURES).glob(f"{name}-*")]
+    takers = [taker for taker in devices_with_hazards() if name in hazards_of(device(taker))]
+    assert sorted(re.findall(r"hazards/([\w.-]+)\)", section)) == sorted(
+        [f"{name}-curve.png", *(f"{name}-{taker}.jpg" for taker in takers)]
+    )
+    assert set(re.findall(r"hazards/([\w.-]+)\)", section)) <= set(shown)
+
+
+def test_page_numbers_match_the_points() -> None:
+    page = (DOCS / PAGE).read_text("utf-8")
+    lines = (DOCS / PICTURES / "points.jsonl").read_text("utf-8").splitlines()
+    points = [json.loads(line) for line in lines]
+    assert {point["hazard"] for point in points} == set(known())
+    for point in points:
+        pictures = point["right"] + point["refused"] + point["wrong"]
+        row = (
+            f"| {device(point['device']).title} | {point['strength']:g} "
+            f"| {point['right']} of {pictures} | {point['refused']}"
+        )
+        assert row in page
+
+
+def test_out_writes_pictures_curves_and_points(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--hazard", "gradient", "--frames", "1", "--workers", "1", "--out", str(tmp_path)]
+    assert main(["hazards", "cubestar", *arguments, "--json"]) == 0
+    printed = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    pictures = tmp_path / "images" / "hazards"
+    lines = (pictures / "points.jsonl").read_text("utf-8").splitlines()
+    assert [json.loads(line) for line in lines] == printed
+    assert {point["strength"] for point in printed} >= {0, 60}
+    with Image.open(pictures / "gradient-cubestar.jpg") as sample:
+        assert sample.size == (480, 240)
+    with Image.open(pictures / "gradient-curve.png") as curve:
+        assert curve.width > 300
+    page = (tmp_path / "hazards.md").read_text("utf-8")
+    assert "## gradient" in page
+    assert "| CubeStar | 60 | " in page
+
+
+def test_rejects_a_page_without_markers_and_a_file_as_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "hazards.md").write_text("mine\n", "utf-8")
+    assert main(["hazards", "cubestar", "--out", str(tmp_path)]) == 2
+    assert "hazards.md has no lines <!-- hazards -->" in capsys.readouterr().err
+    assert main(["hazards", "cubestar", "--out", str(tmp_path / "hazards.md")]) == 2
+    assert "is a file; a folder would be right" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["cubestar", "--hazard", "rain"], "cubestar has no 'rain'; known: aberration"),
+        (["nobody"], "no device 'nobody'; known: cubestar"),
+    ],
+)
+def test_rejects_unknown_hazards_and_devices(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["hazards", *arguments]) == 2
+    assert message in capsys.readouterr().err

@@ -1,5 +1,6 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from cubestack.host.devices.registry import device
 from cubestack.host.experiments.opener import Opener
 from cubestack.host.studies.cubesense import upsets as cubesense
 from cubestack.host.studies.cubestar import upsets as cubestar
+from cubestack.host.studies.cubestar.upsets import _state
 from cubestack.host.studies.upsets import experiment
 from cubestack.host.studies.upsets.sample import UpsetResult
 from tests.tiers import quick
@@ -143,3 +145,25 @@ def test_upsets_of_firmware_memories() -> None:
     }
     assert {one.effect for one in results if one.memory} == {"left over"}
     assert sum(one.right for one in results) > len(results) / 2
+
+
+@pytest.mark.parametrize(
+    ("boards", "high", "state"),
+    [
+        (1, "", "idle"),
+        (1, "ENABLE", "storing"),
+        (1, "ENABLE RNW", "reading"),
+        (2, "BOARD1_RNW", "idle"),
+        (2, "BOARD1_ENABLE", "storing"),
+        (2, "BOARD1_ENABLE BOARD1_RNW BOARD2_ENABLE", "storing"),
+        (2, "BOARD1_RNW BOARD2_ENABLE BOARD2_RNW", "reading"),
+    ],
+)
+def test_state_is_storing_while_any_enabled_board_stores(
+    boards: int, high: str, state: str
+) -> None:
+    engine: Any = SimpleNamespace(
+        wiring=SimpleNamespace(acknowledges=("ACK",) * boards),
+        get_pin=lambda pin: pin in high.split(),
+    )
+    assert _state(engine) == state

@@ -11,7 +11,7 @@ from cubestack.host.emulation.process import emulating
 from cubestack.host.pictures.images import png, save_picture
 from cubestack.host.targets import connect
 
-from .browser import line, shown, station
+from ..browser import line, shown, station
 
 pytestmark = pytest.mark.xdist_group("other pages")
 

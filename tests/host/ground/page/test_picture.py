@@ -7,7 +7,7 @@ from PIL import Image
 
 from cubestack.host.pictures.images import save_picture
 
-from .browser import line, look
+from ..browser import line, look
 
 GREEN = (
     "() => { const c = document.querySelector('#overlay');"

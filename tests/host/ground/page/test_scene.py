@@ -8,9 +8,7 @@ import pytest
 from cubestack.host.targets import open_target
 from tests.tiers import quick
 
-from .browser import await_devices, look, shown, station
-from .hostile import HOSTILE, hostile
-from .layout_checks import COVERED, LOOKS, PALE
+from ..browser import COVERED, HOSTILE, LOOKS, PALE, await_devices, hostile, look, shown, station
 
 pytestmark = pytest.mark.xdist_group("other pages")
 

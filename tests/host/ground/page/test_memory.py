@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import pytest
 from websockets.sync.client import connect
 
-from .browser import shown
-from .conftest import SOON_S
+from ..browser import shown
+from ..conftest import SOON_S
 
 pytestmark = [pytest.mark.xdist_group("page hours"), pytest.mark.slow]
 
@@ -73,7 +73,7 @@ class Page(NamedTuple):
 @pytest.fixture
 def server() -> Iterator[Any]:
     call = [sys.executable, "-m", "tests.host.ground.fast_server"]
-    root, pipe = Path(__file__).parents[3], subprocess.PIPE
+    root, pipe = Path(__file__).parents[4], subprocess.PIPE
     with subprocess.Popen(call, cwd=root, stdin=pipe, stdout=pipe, text=True) as process:
         yield process
         assert process.stdin is not None

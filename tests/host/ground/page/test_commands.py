@@ -7,8 +7,7 @@ import pytest
 from cubestack.host.targets import open_target
 from tests.emulator.recording import vcd
 
-from .browser import line, look, shown, station
-from .hostile import HOSTILE
+from ..browser import HOSTILE, line, look, shown, station
 
 pytestmark = [pytest.mark.xdist_group("page acts"), pytest.mark.slow]
 

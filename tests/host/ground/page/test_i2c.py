@@ -8,7 +8,7 @@ import pytest
 from cubestack.host.devices.registry import device
 from cubestack.host.emulation.process import emulating
 
-from .browser import line, shown, station
+from ..browser import line, shown, station
 
 pytestmark = [pytest.mark.xdist_group("page i2c"), pytest.mark.slow]
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from .browser import line, shown, station
-from .cable import BAUD, cable, recorded_uart
+from ..browser import line, shown, station
+from ..cable import BAUD, cable, recorded_uart
 
 pytestmark = [
     pytest.mark.xdist_group("other pages"),

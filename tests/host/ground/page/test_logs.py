@@ -11,7 +11,7 @@ from cubestack.host.cli.main import main
 from cubestack.host.emulation.process import emulating
 from cubestack.host.recording.transcript import COLUMNS
 
-from .browser import line, shown, station
+from ..browser import line, shown, station
 
 pytestmark = [pytest.mark.xdist_group("page logs"), pytest.mark.slow]
 

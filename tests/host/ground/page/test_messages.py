@@ -12,7 +12,7 @@ from cubestack.host.conformance.values import values_to_try
 from cubestack.host.devices.registry import BUILT_IN, device
 from tests.examples.conftest import ROOT, installed
 
-from .browser import shown, station
+from ..browser import shown, station
 
 pytestmark = [pytest.mark.xdist_group("page messages"), pytest.mark.slow]
 

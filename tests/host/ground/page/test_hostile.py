@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from .browser import line, look, shown, station
-from .hostile import HOSTILE, hostile
+from ..browser import HOSTILE, hostile, line, look, shown, station
 
 pytestmark = [pytest.mark.xdist_group("page hostile"), pytest.mark.slow]
 

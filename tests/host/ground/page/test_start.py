@@ -5,8 +5,8 @@ import pytest
 
 from cubestack.firmware_model.reference.image import reference_image
 
-from .browser import STARTED_MS, await_devices, shown, station
-from .test_page_scene import fill
+from ..browser import STARTED_MS, await_devices, shown, station
+from .test_scene import fill
 
 pytestmark = pytest.mark.xdist_group("other pages")
 
