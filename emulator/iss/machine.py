@@ -30,7 +30,7 @@ INFORMATION_BYTES = 3 * 4096
 """User page, lock bits, device information."""
 
 ANALOG_INPUTS = 32
-"""Number of channels; efm32gg/analog/inputs.h lists them."""
+"""Number of channels; ``analog::Input`` in efm32gg/part/part.h lists them."""
 
 NEVER = (1 << 63) - 1
 """The latest time that can be represented."""

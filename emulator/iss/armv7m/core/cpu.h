@@ -14,7 +14,7 @@
 
 #pragma once
 
-#include "armv7m/decode/operation.h"
+#include "armv7m/decode/codes.h"
 #include "armv7m/memory/bus.h"
 
 #include <cstdint>
@@ -203,7 +203,7 @@ private:
     bool fetch_cost(uint32_t pc, uint32_t halves);
     void arrive();
 
-    // Execution (execute/loop.cpp, special_registers.cpp).
+    // Execution (execute/loop.cpp, cpu.cpp).
     template <int Mode> void loop();
     bool condition(uint32_t number) const;
     bool abandon(const Operation *op, Fault kind, uint32_t address);

@@ -9,17 +9,44 @@ namespace armv7m {
 
 class Itm {
 public:
-    void reset();
+    void reset() {
+        control = ports = privilege = 0;
+        unlocked = false;
+    }
+
     // Sets it up as a trace probe does: unlocked, on, all ports on. For programs that leave this to
     // the probe.
-    void enable_all();
+    void enable_all() {
+        control = 1;
+        ports = ~0u;
+        unlocked = true;
+    }
 
     // Whether writes to a port are forwarded.
     bool enabled(uint32_t port) const { return (control & 1) && (ports >> port & 1); }
     bool user_may_write(uint32_t port) const { return !(privilege >> (port / 8) & 1); }
 
-    uint32_t read(uint32_t offset) const;    // offset from 0xE0000000; stimulus ports included
-    void write(uint32_t offset, uint32_t value);    // stimulus ports not
+    // Offsets from 0xE0000000. Reads include the stimulus ports, writes do not.
+    uint32_t read(uint32_t offset) const {
+        if (offset < 0x80) return 1;    // FIFOREADY
+        switch (offset) {
+        case TER: return ports;
+        case TPR: return privilege;
+        case TCR: return control;
+        case LSR: return unlocked ? 1 : 3;
+        default: return 0;
+        }
+    }
+
+    void write(uint32_t offset, uint32_t value) {
+        if (offset == LAR) unlocked = value == 0xC5ACCE55;
+        if (!unlocked) return;
+        switch (offset) {
+        case TER: ports = value; break;
+        case TPR: privilege = value & 15; break;
+        case TCR: control = value & 0x007F0F1F; break;
+        }
+    }
 
 private:
     enum : uint32_t { TER = 0xE00, TPR = 0xE40, TCR = 0xE80, LAR = 0xFB0, LSR = 0xFB4 };

@@ -1,4 +1,4 @@
-// The handlers of decoded operations. Operation's fields by family:
+// Decoded operations and their handlers. Operation's fields by family:
 //   data processing   d = result, n = first operand, then value (I: constant; its carry, if any, is
 //                     bit 31 and `shift` is 1), m (R: register), m with a = type, shift = amount
 //                     (X: shifted by a constant) or a = register with the amount (LSL_V, ...)
@@ -59,5 +59,19 @@ enum Code : uint16_t {
 static_assert(CODE_COUNT <= 256, "Operation::in_it is a byte");
 
 constexpr uint16_t LAST_MARKER = C_REGION_END;
+
+// A decoded instruction in the cache of decoded code; all zero: not decoded yet.
+struct Operation {
+    uint16_t code;          // its handler
+    uint8_t in_it;          // its handler in an IT block: most 16-bit instructions set no flags
+    uint8_t stall;          // 1: the preceding instruction computes its address
+    uint8_t d, n, m, a;
+    uint32_t value;
+    uint8_t halves;         // its length in half-words
+    uint8_t shift;
+    uint16_t list;
+};
+
+static_assert(sizeof(Operation) == 16, "the loop computes addresses from it");
 
 }  // namespace armv7m

@@ -1,6 +1,5 @@
 // 16-bit instructions (ARMv7-M ARM A5.2).
 
-#include "armv7m/decode/codes.h"
 #include "armv7m/decode/decode.h"
 
 namespace armv7m {

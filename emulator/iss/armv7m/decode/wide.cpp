@@ -1,7 +1,6 @@
 // 32-bit instructions except loads and stores (ARMv7-M ARM A5.3).
 
-#include "armv7m/decode/codes.h"
-#include "armv7m/decode/wide.h"
+#include "armv7m/decode/decode.h"
 
 namespace armv7m {
 

@@ -1,6 +1,6 @@
 // 32-bit loads and stores (ARMv7-M ARM A5.3.5 to A5.3.10).
 
-#include "armv7m/decode/wide.h"
+#include "armv7m/decode/decode.h"
 
 namespace armv7m {
 

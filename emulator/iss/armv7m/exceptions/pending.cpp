@@ -4,7 +4,6 @@
 #include "armv7m/system/system.h"
 
 #include "armv7m/core/cpu.h"
-#include "armv7m/exceptions/fault_status.h"
 
 namespace armv7m {
 

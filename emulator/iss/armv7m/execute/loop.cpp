@@ -7,7 +7,6 @@
 // the MPU.
 
 #include "armv7m/core/cpu.h"
-#include "armv7m/decode/codes.h"
 #include "armv7m/decode/decode.h"
 #include "armv7m/execute/cycles.h"
 #include "armv7m/system/system.h"

@@ -2,7 +2,6 @@
 // watchpoints. Also the accesses of a debugger.
 
 #include "armv7m/core/cpu.h"
-#include "armv7m/decode/codes.h"
 #include "armv7m/system/system.h"
 
 #include <algorithm>

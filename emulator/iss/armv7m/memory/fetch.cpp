@@ -1,7 +1,6 @@
 // Finds and decodes code: in regions with decoded operations, or single instructions elsewhere.
 
 #include "armv7m/core/cpu.h"
-#include "armv7m/decode/codes.h"
 #include "armv7m/decode/decode.h"
 #include "armv7m/system/system.h"
 

@@ -1,10 +1,8 @@
 // ADC: single conversions and scans. EFM32GG Reference Manual, chapter 28.
 //
 // Conversions are ideal: no noise, offset or gain error. DAC outputs read 0 V.
-#include "efm32gg/analog/inputs.h"
 #include "efm32gg/memory/dma.h"
 #include "efm32gg/part/part.h"
-#include "efm32gg/part/units.h"
 #include "efm32gg/pins/prs.h"
 
 #include <algorithm>

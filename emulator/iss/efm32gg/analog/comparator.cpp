@@ -1,9 +1,7 @@
 // Comparators: ACMP of two voltages, VCMP of the supply. EFM32GG Reference Manual, chapters 26
 // and 27. They compare when an input or their registers change; the response time is not modelled.
 // Not modelled: capacitive sense; DAC outputs are 0 V.
-#include "efm32gg/analog/inputs.h"
 #include "efm32gg/part/part.h"
-#include "efm32gg/part/units.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/pins/prs.h"
 

@@ -1,7 +1,8 @@
 // Energy management unit: sleep modes. EFM32GG Reference Manual, chapter 10.
 #pragma once
 
-#include "efm32gg/part/part.h"
+#include "efm32gg/clocks/cmu.h"
+#include "efm32gg/clocks/rmu.h"
 
 namespace efm32gg {
 
@@ -9,20 +10,58 @@ class Emu : public Peripheral {
 public:
     using Peripheral::Peripheral;
 
-    void reset() override;
-    void write(uint32_t offset, uint32_t value) override;
+    void reset() override {
+        // EM4CONF survives all but a power-on reset once it is locked (10.5.5).
+        const uint32_t kept = reg(emu::EM4CONF);
+        Peripheral::reset();
+        if (kept & emu::EM4CONF_LOCKCONF && !(part.reset_cause & rmu::RSTCAUSE_PORST))
+            reg(emu::EM4CONF) = kept;
+        em4_steps = 0;
+    }
+
+    void write(uint32_t offset, uint32_t value) override {
+        if (offset == emu::LOCK) {
+            lock(emu::LOCK, value, UNLOCK);
+            return;
+        }
+        if (reg(emu::LOCK) && offset < emu::STATUS) return report_locked();
+        if (offset == emu::EM4CONF && reg(emu::EM4CONF) & emu::EM4CONF_LOCKCONF) return;
+        Peripheral::write(offset, value);
+        if (offset == emu::CTRL)
+            em4_written(field(value, emu::CTRL_EM4CTRL));
+        if (offset == emu::AUXCTRL && value & emu::AUXCTRL_HRCCLR)
+            part.rmu->clear_backup_causes();
+        if (offset == emu::MEMCTRL && value & emu::MEMCTRL_POWERDOWN)
+            part.log_once("EMU_MEMCTRL: RAM blocks are not powered down");
+    }
 
     // The mode that WFI and WFE enter. `deep`: the core's SLEEPDEEP bit. Without a low-frequency
     // oscillator EM2 is EM3 (10.3.4).
-    int sleeping_mode(bool deep) const;
+    int sleeping_mode(bool deep) const {
+        if (!deep || reg(emu::CTRL) & emu::CTRL_EM2BLOCK) return 1;
+        return part.cmu->low_frequency_on() ? 2 : 3;
+    }
 
     // Wakes the part from EM4 by a reset.
-    void wake_from_em4();
+    void wake_from_em4() {
+        if (part.mode == 4)
+            part.request_reset(rmu::RSTCAUSE_EM4RST | rmu::RSTCAUSE_EM4WURST);
+    }
 
 private:
+    static constexpr uint32_t UNLOCK = 0xADE8;
+    // Writes of 2 and 3 to EM4CTRL in turn, 2 first and last (10.3.3).
+    static constexpr int EM4_SEQUENCE = 9;
     int em4_steps = 0;
 
-    void em4_written(uint32_t value);
+    void em4_written(uint32_t value) {
+        const uint32_t expected = em4_steps % 2 ? 3 : 2;
+        em4_steps = value == expected ? em4_steps + 1 : value == 2;
+        if (em4_steps == EM4_SEQUENCE) {
+            em4_steps = 0;
+            part.enter_em4();
+        }
+    }
 };
 
 }  // namespace efm32gg

@@ -4,15 +4,52 @@
 
 #include "efm32gg/part/part.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace efm32gg {
 
 class LowEnergy : public Peripheral {
 public:
     using Peripheral::Peripheral;
 
-    void reset() override;
-    void write(uint32_t offset, uint32_t value) override;
-    void clocks_changed() override;
+    void reset() override {
+        Peripheral::reset();
+        part.cancel(synchronized);
+        count = 0;
+    }
+
+    void write(uint32_t offset, uint32_t value) override {
+        const Register *written = described(offset);
+        if (!written || !written->busy) {
+            const bool was_frozen = frozen();
+            Peripheral::write(offset, value);
+            if ((int32_t)offset == layout.freeze && was_frozen && !(value & 1))
+                start();
+            return;
+        }
+        reg((uint32_t)layout.syncbusy) |= written->busy;
+        const bool at_once = immediate() && !frozen();
+        Write *place = waiting;
+        while (place < waiting + count && place->offset != offset)
+            place++;
+        if (place == waiting + MOST) return;
+        if (place == waiting + count) {
+            *place = {offset, 0, false};
+            count++;
+        }
+        // A newer value replaces the older one; commands are merged.
+        const bool merges = (int32_t)offset == layout.cmd && !place->applied;
+        *place = {offset, merges ? merge_commands(place->value, value) : value, at_once};
+        if (at_once)
+            apply(offset, value);
+        start();
+    }
+
+    void clocks_changed() override {
+        part.cancel(synchronized);
+        start();
+    }
 
 protected:
     // A write takes effect.
@@ -37,8 +74,23 @@ private:
     Event synchronized = Event::of<&LowEnergy::on_synchronized>(this);
 
     bool frozen() const { return reg((uint32_t)layout.freeze) & 1; }
-    void start();
-    void on_synchronized(int64_t time);
+
+    // A write takes two to three clocks.
+    void start() {
+        const Rate rate = synchronizer();
+        if (count && !synchronized.pending() && !frozen() && rate.runs())
+            part.schedule(synchronized, rate.time(rate.edges(part.now()) + 3));
+    }
+
+    void on_synchronized(int64_t) {
+        Write done[MOST];
+        const int number = std::exchange(count, 0);
+        std::copy(waiting, waiting + number, done);
+        reg((uint32_t)layout.syncbusy) = 0;
+        for (int n = 0; n < number; n++)
+            if (!done[n].applied)
+                apply(done[n].offset, done[n].value);
+    }
 };
 
 // A counter of a low-energy unit, computed from the time when it is accessed. An event is scheduled
@@ -48,10 +100,25 @@ public:
     LowEnergyCounter(Part &part, const Instance &instance, uint32_t count_register)
         : LowEnergy(part, instance), count_register(count_register) {}
 
-    uint32_t read(uint32_t offset) override;
-    uint32_t peek(uint32_t offset) const override;
+    uint32_t read(uint32_t offset) override {
+        if (ticks()) {
+            fold();
+            plan();
+        }
+        return peek(offset);
+    }
+
+    uint32_t peek(uint32_t offset) const override {
+        return offset == count_register ? after(ticks()) : LowEnergy::peek(offset);
+    }
+
     void clocks_changing() override { fold(); }
-    void clocks_changed() override;
+
+    void clocks_changed() override {
+        LowEnergy::clocks_changed();
+        follow_clock();
+        plan();
+    }
 
 protected:
     static constexpr int64_t FAR = INT64_MAX;
@@ -65,13 +132,41 @@ protected:
     // Ticks until the next one with an effect; FAR for none.
     virtual int64_t next_effect() const = 0;
 
-    void clear_count();
+    void clear_count() {
+        part.cancel(due);
+        value = 0;
+        rate = Rate();
+        counted = 0;
+    }
+
     // Updates the counter to now.
-    void fold();
-    void plan();
-    void follow_clock();
+    void fold() {
+        const int64_t passed = ticks();
+        if (passed <= 0) return;
+        counted += passed;
+        pass(passed);
+    }
+
+    void plan() {
+        part.cancel(due);
+        if (!counts() || !rate.runs()) return;
+        const int64_t next = next_effect();
+        if (next != FAR)
+            part.schedule(due, rate.time(counted + next));
+    }
+
+    void follow_clock() {
+        const Rate wanted = clock();
+        if (wanted.runs() != rate.runs() || wanted.origin != rate.origin ||
+            !wanted.same_frequency(rate))
+            restart_clock();
+    }
+
     // Counts from now on, at the unit's clock.
-    void restart_clock();
+    void restart_clock() {
+        rate = clock();
+        counted = rate.edges(part.now());
+    }
 
     uint32_t value = 0;
 
@@ -81,8 +176,14 @@ private:
     int64_t counted = 0;    // edges of `rate` that `value` includes
     Event due = Event::of<&LowEnergyCounter::on_due>(this);
 
-    int64_t ticks() const;
-    void on_due(int64_t time);
+    int64_t ticks() const {
+        return counts() && rate.runs() ? rate.edges(part.now()) - counted : 0;
+    }
+
+    void on_due(int64_t) {
+        fold();
+        plan();
+    }
 };
 
 }  // namespace efm32gg

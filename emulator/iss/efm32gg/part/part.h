@@ -8,10 +8,8 @@
 
 #include "armv7m/memory/bus.h"
 #include "armv7m/system/system.h"
-#include "efm32gg/part/attached_circuit.h"
 #include "efm32gg/part/outbox.h"
 #include "efm32gg/part/peripheral.h"
-#include "efm32gg/part/schedule.h"
 
 #include <memory>
 #include <string>
@@ -36,12 +34,45 @@ enum class Clock { HFCORE, HFPER, HFCORELE, LFA, LFB, HFRCO, HFXO, AUXHFRCO, LFX
 constexpr int CLOCKS = 11;
 using Rates = Rate[CLOCKS];
 
+// Indices of the analog inputs: volts, and the temperature in degrees Celsius.
+namespace analog {
+enum Input {
+    ADC0_CH0 = 0,     // to CH7: port D, bits 0 to 7
+    TEMPERATURE = 8,
+    VDD = 9,
+    ACMP0_CH0 = 10,   // to CH7: port C, bits 0 to 7
+    ACMP1_CH0 = 18,   // to CH7: port C, bits 8 to 15
+    ADC0_REFERENCE = 26,  // at the pin for external references
+    COUNT = 32,
+};
+}  // namespace analog
+
 // The caller owns the buffers. `information` has three pages: user data, lock bits, and the device
 // information, which the part fills in; if it is null the part allocates its own.
 struct Memories {
     uint8_t *flash, *ram, *information, *external;
     uint32_t flash_size, ram_size, external_size;
-    const double *analog;  // volts and degrees Celsius; indices: analog/inputs.h
+    const double *analog;  // volts and degrees Celsius; indices: analog::Input
+};
+
+// The circuit at the part's pins and external bus, when it is simulated in C++ and called directly.
+class AttachedCircuit {
+public:
+    static constexpr int PORTS = 6;
+
+    virtual ~AttachedCircuit() = default;
+
+    // Pins that the circuit drives, and pins whose changes it receives in place of the outbox.
+    uint32_t part_inputs[PORTS] = {}, part_outputs[PORTS] = {};
+
+    // Levels of `port` at `now`; only bits in `part_inputs` count.
+    virtual uint32_t input_levels(int port, int64_t now) = 0;
+
+    // Outputs in `changed`, all in `part_outputs`, took `levels` at `now`.
+    virtual void outputs_changed(int port, uint32_t changed, uint32_t levels, int64_t now) = 0;
+
+    // Access to one byte of the external bus beyond the part's own arrays; false: no answer.
+    virtual bool bus_access(int bank, uint32_t address, uint8_t &value, bool write, int64_t now) = 0;
 };
 
 class Part : public armv7m::Bus, public armv7m::SystemListener {
@@ -193,5 +224,16 @@ private:
     int64_t bus_wait(const Peripheral &unit, bool write) const;
     void set_bus_waits();
 };
+
+// Add units that no other unit accesses; each is defined beside its unit.
+void add_watchdog(Part &part);
+// `source`: of DMA requests; `reflex`: of PRS signals; `signals`: of the TX pin (route::Signal), the
+// RX pin's follows. The order of the calls is that of the unit numbers.
+void add_usart(Part &part, const Instance &instance, int source, int reflex, int signals);
+void add_leuart(Part &part, const Instance &instance, int source, int signals);
+void add_low_energy_timers(Part &part);
+void add_pulse_counters(Part &part);
+void add_adc(Part &part);
+void add_comparators(Part &part);
 
 }  // namespace efm32gg

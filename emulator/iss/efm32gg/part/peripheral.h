@@ -1,7 +1,7 @@
 // Base of all peripherals: a register file that behaves as its register table specifies.
 #pragma once
 
-#include "efm32gg/part/rate.h"
+#include "efm32gg/part/time.h"
 #include "registers.h"  // generated from firmware_model/interface/efm32gg/
 
 #include <vector>

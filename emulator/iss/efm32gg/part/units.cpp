@@ -7,7 +7,6 @@
 #include "efm32gg/memory/ebi.h"
 #include "efm32gg/memory/msc.h"
 #include "efm32gg/part/part.h"
-#include "efm32gg/part/units.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/pins/prs.h"
 #include "efm32gg/serial/i2c.h"

@@ -2,7 +2,9 @@
 // Manual, chapter 13. Consumers are notified by Peripheral::prs_changed.
 #pragma once
 
-#include "efm32gg/part/part.h"
+#include "efm32gg/pins/gpio.h"
+
+#include <cstring>
 
 namespace efm32gg {
 
@@ -12,26 +14,98 @@ public:
 
     using Peripheral::Peripheral;
 
-    void reset() override;
-    void write(uint32_t offset, uint32_t value) override;
+    void reset() override {
+        Peripheral::reset();
+        std::memset(signals, 0, sizeof signals);
+        levels = 0;
+    }
+
+    void write(uint32_t offset, uint32_t value) override {
+        if (offset == prs::SWPULSE) {
+            for (int channel = 0; channel < CHANNELS; channel++)
+                if (value >> channel & 1)
+                    output_pulse(channel);
+            return;
+        }
+        uint32_t before = 0;
+        for (int channel = 0; channel < CHANNELS; channel++)
+            before |= (uint32_t)input(channel) << channel;
+        Peripheral::write(offset, value);
+        for (int channel = 0; channel < CHANNELS; channel++)
+            update(channel, before >> channel & 1);
+    }
 
     // Sets a producer's signal, or pulses it for one clock. Sources and signals have the numbers
     // of SOURCESEL and SIGSEL.
-    void set(int source, int signal, bool level);
-    void pulse(int source, int signal);
+    void set(int source, int signal, bool level) {
+        const bool was = signals[source] >> signal & 1;
+        if (was == level) return;
+        for (int channel = 0; channel < CHANNELS; channel++) {
+            if (!selects(channel, source, signal)) continue;
+            const bool before = input(channel);
+            signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
+            update(channel, before);
+            signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
+        }
+        signals[source] = (uint8_t)(signals[source] ^ 1 << signal);
+    }
+
+    void pulse(int source, int signal) {
+        for (int channel = 0; channel < CHANNELS; channel++)
+            if (selects(channel, source, signal))
+                output_pulse(channel);
+    }
+
     // Whether a channel selects that signal; units that count lazily schedule events for it.
-    bool listens(int source, int signal) const;
+    bool listens(int source, int signal) const {
+        for (int channel = 0; channel < CHANNELS; channel++)
+            if (selects(channel, source, signal)) return true;
+        return false;
+    }
+
     bool level(int channel) const { return levels >> channel & 1; }
 
 private:
     uint8_t signals[64] = {};    // levels by source, one bit per signal
     uint32_t levels = 0;
 
-    bool selects(int channel, int source, int signal) const;
-    bool input(int channel) const;
-    void update(int channel, bool was);
-    void output(int channel, bool level);
-    void output_pulse(int channel);
+    uint32_t control(int channel) const { return reg(prs::CH0_CTRL + 4 * (uint32_t)channel); }
+
+    bool selects(int channel, int source, int signal) const {
+        return (int)field(control(channel), prs::CH0_CTRL_SOURCESEL) == source &&
+               (int)field(control(channel), prs::CH0_CTRL_SIGSEL) == signal;
+    }
+
+    // The input of a channel's edge detector; SWLEVEL inverts it (13.3.2).
+    bool input(int channel) const {
+        const uint32_t source = field(control(channel), prs::CH0_CTRL_SOURCESEL);
+        const uint32_t number = field(control(channel), prs::CH0_CTRL_SIGSEL);
+        const bool signal = source && signals[source] >> number & 1;
+        return signal != (reg(prs::SWLEVEL) >> channel & 1);
+    }
+
+    void update(int channel, bool was) {
+        const bool is = input(channel);
+        if (is == was) return;
+        const uint32_t detect = field(control(channel), prs::CH0_CTRL_EDSEL);
+        if (detect == 0)
+            output(channel, is);
+        else if (detect & (is ? 1 : 2))
+            output_pulse(channel);
+    }
+
+    void output(int channel, bool level) {
+        set_bits(levels, 1u << channel, level);
+        const uint32_t location = field(reg(prs::ROUTE), prs::ROUTE_LOCATION);
+        if (channel < 4 && reg(prs::ROUTE) >> channel & 1)
+            part.gpio->function(ROUTES[route::PRS_CH0 + channel][location], this, true, level);
+        part.each([=](Peripheral &one) { one.prs_changed(channel, level); });
+    }
+
+    void output_pulse(int channel) {
+        output(channel, true);
+        output(channel, false);
+    }
 };
 
 }  // namespace efm32gg

@@ -1,6 +1,5 @@
 // LEUART, which works down to EM2. EFM32GG Reference Manual, chapter 19.
 #include "efm32gg/part/low_energy.h"
-#include "efm32gg/part/units.h"
 #include "efm32gg/serial/serial_port.h"
 
 namespace efm32gg {

@@ -4,10 +4,57 @@
 #include "efm32gg/memory/dma.h"
 #include "efm32gg/part/part.h"
 #include "efm32gg/pins/gpio.h"
-#include "efm32gg/serial/frame_queue.h"
-#include "efm32gg/serial/frame_timing.h"
 
 namespace efm32gg {
+
+// A buffer of N frames, the oldest first.
+template <int N> class FrameQueue {
+public:
+    bool empty() const { return !count; }
+    bool full() const { return count == N; }
+    int size() const { return count; }
+    uint32_t front(int index = 0) const { return index < count ? entries[index] : 0; }
+    void clear() { count = 0; }
+    void push(uint32_t entry) { entries[count++] = entry; }
+    // Replaces the newest entry.
+    void replace_last(uint32_t entry) { entries[count - 1] = entry; }
+
+    uint32_t pop() {
+        const uint32_t entry = front();
+        for (int n = 1; n < count; n++)
+            entries[n - 1] = entries[n];
+        count -= count > 0;
+        return entry;
+    }
+
+private:
+    uint32_t entries[N] = {};
+    int count = 0;
+};
+
+// Times of characters on the wire: back-to-back characters are timed from a common start, so that
+// rounding to picoseconds does not accumulate.
+class FrameTiming {
+public:
+    int64_t begin = 0, end = 0;  // of the latest frame
+
+    // Adds a frame of `units`, with `per_clock` units per period of `clock`. It begins at the end
+    // of the previous one if it `follows` that, else at the first edge at or after `now`.
+    void append(const Rate &clock, int64_t units, int64_t per_clock, bool follows, int64_t now) {
+        if (!follows || rate.origin != clock.origin || !rate.same_frequency(clock)) {
+            rate = clock;
+            start = clock.time(clock.edge_at_or_after(now));
+            passed = 0;
+        }
+        begin = start + rate.span(passed) / per_clock;
+        passed += units;
+        end = start + rate.span(passed) / per_clock;
+    }
+
+private:
+    Rate rate;
+    int64_t start = 0, passed = 0;
+};
 
 // The interface of both for characters from outside.
 class SerialReceiver {

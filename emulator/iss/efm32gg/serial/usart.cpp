@@ -3,7 +3,6 @@
 // A character is sent as one message with its duration, and received at the end of its stop bit. As
 // SPI master each word is sent likewise; the line from the slave is idle high, or the master's own
 // output with LOOPBK. Not modelled: SPI slave, I2S, IrDA, smart card mode, collisions.
-#include "efm32gg/part/units.h"
 #include "efm32gg/pins/prs.h"
 #include "efm32gg/serial/serial_port.h"
 

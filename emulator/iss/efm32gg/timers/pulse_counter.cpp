@@ -1,7 +1,6 @@
 // PCNT: counts edges at its first input, in the direction given by CTRL or by its second input.
 // EFM32GG Reference Manual, chapter 24. Not modelled: quadrature, filter, auxiliary counter.
 #include "efm32gg/part/low_energy.h"
-#include "efm32gg/part/units.h"
 #include "efm32gg/pins/gpio.h"
 #include "efm32gg/pins/prs.h"
 

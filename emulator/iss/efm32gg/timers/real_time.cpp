@@ -5,7 +5,6 @@
 #include "efm32gg/clocks/emu.h"
 #include "efm32gg/clocks/rmu.h"
 #include "efm32gg/part/low_energy.h"
-#include "efm32gg/part/units.h"
 #include "efm32gg/pins/prs.h"
 #include "efm32gg/timers/letimer.h"
 

@@ -1,6 +1,5 @@
 // Watchdog timer. EFM32GG Reference Manual, chapter 12.
 #include "efm32gg/part/part.h"
-#include "efm32gg/part/units.h"
 
 namespace efm32gg {
 
