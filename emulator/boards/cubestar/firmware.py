@@ -45,7 +45,7 @@ CAUSES: Mapping[int, int] = {
 
 TEMPERATURE, SUPPLY = 8, 9
 COMPARATOR = (10, 18)
-"""Analog inputs of the part besides the ADC's channels 0 to 7: see efm32gg/analog/inputs.h."""
+"""Analog inputs of the part besides the ADC's channels 0 to 7: see efm32gg/part/part.h."""
 
 _INPUTS = (pins.ACK, pins.DATA)
 _CONTROLS = (pins.ENABLE, pins.RNW, pins.BANK)

@@ -43,6 +43,11 @@ STOP, SLEEP, LOCKUP = 2, 4, 8
 """Bits of the result of a run."""
 
 
+def store(address: int, value: int) -> str:
+    """Instructions that store a constant; they use r0 and r1."""
+    return f"ldr r0, ={address}; ldr r1, ={value}; str r1, [r0]"
+
+
 class Entry(NamedTuple):
     """A value that the program wrote to the log."""
 
@@ -92,11 +97,14 @@ def _library() -> ctypes.CDLL:
 
 
 class Bench:
-    """A processor. Memory in ``code`` and ``ram``; items are registers of REGISTERS and SYSTEM."""
+    """A processor. Memory in ``code`` and ``ram``; items are registers of REGISTERS and SYSTEM.
+
+    ``labels`` are those of the program, a text as for thumb.py.
+    """
 
     def __init__(
         self,
-        image: bytes = b"",
+        program: str | Program = "",
         interrupts: int = 39,
         priority_bits: int = 3,
         semihosting: bool = False,
@@ -111,8 +119,10 @@ class Bench:
         memory = ctypes.c_uint8 * (1 << 16)
         self.code = memory.from_address(self._library.bench_code(self._bench))
         self.ram = memory.from_address(self._library.bench_ram(self._bench))
-        image = image or Program().finish()
-        self.code[: len(image)] = list(image)
+        if isinstance(program, str):
+            program = Program(program)
+        self.labels = program.labels
+        self.code[: len(program.image)] = list(program.image)
         self.reset()
 
     def __del__(self) -> None:

@@ -6,7 +6,6 @@ from tests.emulator.iss.cross_compiler import binary_of, compile_for_m3, needs_c
 
 from .bench import LOG, RAM, Bench
 from .cycle_sequences import SEQUENCES, Sequence
-from .thumb import Program
 
 DATA = RAM + 0x1000
 TOLERANCE = 0.1
@@ -18,14 +17,10 @@ def cycles(code: bytes) -> int:
     r0, r1, r3 point to memory and r10 to a pointer; r2 is a small offset; r4, r7 and r9 are small,
     r5 is large, r8 all ones, r12 zero; r11 and the word at r0 + 64 are the address after the code.
     """
-    program = Program()
-    program.nop(12)
-    for at in range(0, len(code), 2):
-        program.half(int.from_bytes(code[at : at + 2], "little"))
-    after = program.nop(8)
-    program.str(6, 6)
-    program.forever()
-    bench = Bench(program.finish())
+    halves = ", ".join(f"{half:#x}" for half in memoryview(code).cast("H"))
+    written = f".short {halves}" if code else ""
+    bench = Bench(f"nop #12; {written}; after: nop #8; str r6, [r6]; b .")
+    after = bench.labels["after"]
     registers = (DATA, DATA + 0x100, 4, DATA + 0x200, 5, 0x12345678, LOG, 3, 0xFFFFFFFF, 1)
     for number, value in enumerate((*registers, DATA + 0x50, after | 1, 0)):
         bench[f"r{number}"] = value

@@ -2,32 +2,17 @@
 
 import pytest
 
-from .bench import LINE_HIGH, LINES, LOG, NMI, PULSE, RAM, STOP, SYSTEM, Bench
-from .thumb import Program
+from .bench import LINE_HIGH, LINES, LOG, NMI, PULSE, RAM, STOP, SYSTEM, Bench, store
 
 TOP = 0x2000_8000
-MARK = 6
-"""Register that holds the log's address in these programs."""
-
-
-def program(*interrupts: int) -> Program:
-    """A main program of NOPs; the handlers of ``interrupts`` write to the log."""
-    code = Program()
-    code.load(MARK, LOG)
-    code.label("main")
-    code.nop(200)
-    code.b("main")
-    for number in interrupts:
-        code.handler(16 + number)
-        code.str(MARK, MARK)
-        code.nop(3)
-        code.bx()
-    return code
+LOGS = f"ldr r6, ={LOG}"
+"""r6 holds the log's address in these programs."""
 
 
 def start(*interrupts: int, priorities: dict[int, int] | None = None) -> Bench:
-    """A bench with that program at its first NOPs, interrupts enabled."""
-    bench = Bench(program(*interrupts).finish())
+    """A bench at NOPs with interrupts enabled, whose handlers write to the log."""
+    handlers = [f"@{16 + number}: str r6, [r6]; nop #3; bx lr" for number in interrupts]
+    bench = Bench("; ".join((LOGS, "main: nop #200; b main", *handlers)))
     for number in interrupts:
         bench.write(SYSTEM["ISER"] + number // 32 * 4, 1 << number % 32)
     for number, priority in (priorities or {}).items():
@@ -159,32 +144,17 @@ def test_masks_hold_back_exceptions_of_lower_priority():
 
 
 def test_exception_return_clears_faultmask():
-    code = Program()
-    code.load(MARK, LOG)
-    code.svc()
-    code.mrs(0, "faultmask")
-    code.forever()
-    code.handler(11)
-    code.cps(False, fault=True)
-    code.mrs(1, "faultmask")
-    code.str(1, MARK)
-    code.bx()
-    bench = Bench(code.finish())
+    handler = "@11: cpsid f; mrs r1, faultmask; str r1, [r6]; bx lr"
+    bench = Bench(f"{LOGS}; svc #0; mrs r0, faultmask; b .; {handler}")
     bench.run(100)
     assert (bench.log[0].value, bench["faultmask"], bench["r0"]) == (1, 0, 0)
 
 
 def test_svc_returns_to_the_next_instruction_and_pendsv_is_taken_before():
-    code = Program()
-    code.load(MARK, LOG)
-    code.poke(SYSTEM["ICSR"], 1 << 28, by=(0, 1))
-    code.svc(7)
-    after = code.forever()
-    for number in (11, 14):
-        code.handler(number)
-        code.str(0, MARK)
-        code.bx()
-    bench = Bench(code.finish())
+    handlers = "@11: str r0, [r6]; bx lr; @14: str r0, [r6]; bx lr"
+    pend = store(SYSTEM["ICSR"], 1 << 28)
+    bench = Bench(f"{LOGS}; {pend}; svc #7; after: b .; {handlers}")
+    after = bench.labels["after"]
     bench["primask"] = 0
     bench["SHPR3"] = 0xE0 << 16
     bench.run(200)
@@ -193,11 +163,7 @@ def test_svc_returns_to_the_next_instruction_and_pendsv_is_taken_before():
 
 
 def test_masked_svc_is_a_hard_fault():
-    code = Program()
-    code.svc()
-    code.handler(3)
-    code.forever()
-    bench = Bench(code.finish())
+    bench = Bench("svc #0; @3: b .")
     bench["SHPR2"] = 0x80 << 24
     bench["basepri"] = 0x80
     bench.run(100)
@@ -206,15 +172,7 @@ def test_masked_svc_is_a_hard_fault():
 
 
 def test_nmi_preempts_the_hard_fault_handler():
-    code = Program()
-    code.half(0xDE00)  # undefined
-    code.handler(3)
-    code.forever()
-    code.handler(2)
-    code.load(MARK, LOG)
-    code.str(MARK, MARK)
-    code.bx()
-    bench = Bench(code.finish())
+    bench = Bench(f"udf #0; @3: b .; @2: {LOGS}; str r6, [r6]; bx lr")
     bench.run(50)
     assert (bench.ipsr, bench["priority"]) == (3, 0xFFFF_FFFF)
     bench.at(bench.cycles, NMI)
@@ -237,28 +195,13 @@ def test_exception_of_an_unprivileged_thread_uses_the_main_stack():
 
 def test_pendsv_switches_tasks():
     """As an operating system does: the handler changes PSP and returns to another task."""
-    code = Program()
-    code.load(0, 0x2000_4000)
-    code.msr("psp", 0)
-    code.movs(0, 2)
-    code.msr("control", 0)
-    code.half(0xF3BF, 0x8F6F)  # ISB
-    code.load(MARK, LOG)
-    code.movs(0, 1)
-    code.poke(SYSTEM["ICSR"], 1 << 28, by=(1, 2))
-    code.label("first")
-    code.str(0, MARK)
-    code.b("first")
-    other = code.movs(0, 2)
-    code.label("second")
-    code.str(0, MARK)
-    code.b("second")
-    code.handler(14)
-    code.load(3, 0x2000_5000 - 32)
-    code.msr("psp", 3)
-    code.bx()
-    bench = Bench(code.finish())
-    for n, word in enumerate([0, 0, 0, 0, 0, 0xFFFF_FFFF, other, 1 << 24]):
+    stack = "ldr r0, =0x20004000; msr psp, r0; movs r0, #2; msr control, r0; isb"
+    pend = store(SYSTEM["ICSR"], 1 << 28)
+    first = f"{LOGS}; {pend}; movs r0, #1; first: str r0, [r6]; b first"
+    second = "other: movs r0, #2; second: str r0, [r6]; b second"
+    switch = f"@14: ldr r3, ={0x2000_5000 - 32}; msr psp, r3; bx lr"
+    bench = Bench(f"{stack}; {first}; {second}; {switch}")
+    for n, word in enumerate([0, 0, 0, 0, 0, 0xFFFF_FFFF, bench.labels["other"], 1 << 24]):
         at = 0x5000 - 32 + 4 * n
         bench.ram[at : at + 4] = list(word.to_bytes(4, "little"))
     bench["r6"] = LOG
@@ -277,21 +220,9 @@ def test_vector_table_moves():
 
 
 def test_level_interrupt_repeats_until_its_handler_clears_the_line():
-    code = Program()
-    code.load(MARK, LOG)
-    code.movs(4, 0)
-    code.forever()
-    code.handler(16 + 7)
-    code.adds(4, 1)
-    code.str(4, MARK)
-    code.half(0x2C03)  # CMP r4, #3
-    code.b("stay", 1)
-    code.load(0, LINES + 4 * 7)
-    code.movs(1, 0)
-    code.str(1, 0)
-    code.label("stay")
-    code.bx()
-    bench = Bench(code.finish())
+    count = "@23: adds r4, #1; str r4, [r6]; cmp r4, #3; bne stay"
+    clear = f"{store(LINES + 4 * 7, 0)}; stay: bx lr"
+    bench = Bench(f"{LOGS}; movs r4, #0; b .; {count}; {clear}")
     bench["ISER"] = 1 << 7
     bench.run(10)
     bench.at(bench.cycles, LINE_HIGH, 7)
@@ -315,10 +246,7 @@ def test_exception_counter_and_cycle_counter():
 
 @pytest.mark.parametrize("value", [0x05FA_0004, 0x05FA_0001])
 def test_reset_request_stops_the_run(value):
-    code = Program()
-    code.poke(SYSTEM["AIRCR"], value, by=(0, 1))
-    code.forever()
-    bench = Bench(code.finish())
+    bench = Bench(f"{store(SYSTEM['AIRCR'], value)}; b .")
     assert bench.run(100) & STOP
     assert bench["resets"] == 1
     bench["AIRCR"] = 0x0004

@@ -3,7 +3,6 @@
 import pytest
 
 from .bench import PULSE, SYSTEM, Bench
-from .thumb import Program
 
 TYPE, CTRL, RNR, RBAR, RASR = (SYSTEM["MPU"] + 4 * n for n in range(5))
 ENABLE, HFNMIENA, PRIVDEFENA = 1, 2, 4
@@ -25,27 +24,16 @@ def region(bench: Bench, number: int, base: int, value: int) -> None:
     bench.write(RASR, value)
 
 
-def accessing(address: int, store: bool, privileged: bool) -> Program:
+def accessing(address: int, store: bool, privileged: bool) -> str:
     """A program that makes one access, then sets r2 to 1."""
-    code = Program()
-    code.load(1, address)
-    if not privileged:
-        code.movs(0, 1)
-        code.msr("control", 0)
-    if store:
-        code.str(0, 1)
-    else:
-        code.ldr(0, 1)
-    code.movs(2, 1)
-    code.forever()
-    code.handler(4)
-    code.forever()
-    return code
+    level = "" if privileged else "movs r0, #1; msr control, r0"
+    access = "str r0, [r1]" if store else "ldr r0, [r1]"
+    return f"ldr r1, ={address}; {level}; {access}; movs r2, #1; b .; @4: b ."
 
 
-def guarded(code: Program, control: int = ENABLE) -> Bench:
+def guarded(program: str, control: int = ENABLE) -> Bench:
     """A bench with region 0 for the code and region 1 for the stack, both for all."""
-    bench = Bench(code.finish())
+    bench = Bench(program)
     region(bench, 0, 0, attributes(16, READ_ONLY))
     region(bench, 1, 0x2000_4000, attributes(14, FULL))
     bench.write(CTRL, control)
@@ -104,19 +92,12 @@ def test_highest_numbered_region_decides_except_in_its_disabled_parts(
     assert bench.ipsr == (4 if fault else 0)
 
 
-def in_ram() -> Program:
-    """A program that jumps to ``USER``."""
-    code = Program()
-    code.load(0, USER | 1)
-    code.bx(0)
-    code.handler(4)
-    code.forever()
-    return code
+JUMP = f"ldr r0, ={USER | 1}; bx r0; @4: b ."
 
 
 def test_execute_never():
     for never in (False, True):
-        bench = guarded(in_ram())
+        bench = guarded(JUMP)
         bench.ram[0x2000:0x2002] = [0xFE, 0xE7]
         region(bench, 2, USER, attributes(5, FULL, never=never))
         bench.run(100)
@@ -125,7 +106,7 @@ def test_execute_never():
 
 
 def test_execution_faults_at_the_end_of_its_region():
-    bench = guarded(in_ram())
+    bench = guarded(JUMP)
     bench.ram[0x2000:0x2100] = [0x00, 0xBF] * 128
     region(bench, 2, USER, attributes(5, FULL))
     bench.run(200)
@@ -134,11 +115,7 @@ def test_execution_faults_at_the_end_of_its_region():
 
 
 def test_stacking_is_checked_with_the_rights_of_the_interrupted_code():
-    code = Program()
-    code.nop(60)
-    code.handler(4)
-    code.forever()
-    bench = guarded(code)
+    bench = guarded("nop #60; @4: b .")
     bench["psp"] = 0x2000_3000
     bench["control"] = 3
     bench["control"] = 2
@@ -152,15 +129,8 @@ def test_stacking_is_checked_with_the_rights_of_the_interrupted_code():
 
 
 def test_unstacking_is_checked():
-    code = Program()
-    code.nop(60)
-    code.handler(16)
-    code.load(0, USER)  # outside all regions
-    code.msr("psp", 0)
-    code.bx()
-    code.handler(4)
-    code.forever()
-    bench = guarded(code, ENABLE)
+    outside = f"ldr r0, ={USER}; msr psp, r0"  # all regions
+    bench = guarded(f"nop #60; @16: {outside}; bx lr; @4: b .")
     bench["psp"] = 0x2000_7000
     bench["control"] = 2
     bench["ISER"] = 1
@@ -172,13 +142,8 @@ def test_unstacking_is_checked():
 
 @pytest.mark.parametrize("on", [False, True])
 def test_hfnmiena_enables_it_in_the_hard_fault_handler(on):
-    code = Program()
-    code.half(0xDE00)
-    code.handler(3)
-    code.load(1, USER)
-    code.ldr(0, 1)
-    code.forever()
-    bench = guarded(code, ENABLE | HFNMIENA * on)
+    program = f"udf #0; @3: ldr r1, ={USER}; ldr r0, [r1]; b ."
+    bench = guarded(program, ENABLE | HFNMIENA * on)
     bench.run(100)
     assert bench["locked"] == on
 

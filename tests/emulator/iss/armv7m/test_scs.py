@@ -3,7 +3,6 @@
 import pytest
 
 from .bench import SYSTEM, Bench
-from .thumb import Program
 
 AFTER_RESET_AND_ONES = {
     # address: (value after reset, value after ones were written)
@@ -99,18 +98,10 @@ def test_debug_registers_survive_a_system_reset():
 
 
 def test_enabled_stimulus_ports_forward_data():
-    code = Program()
-    code.load(0, SYSTEM["ITM"] + 4)
-    code.movs(1, ord("A"))
-    code.label("wait")
-    code.ldr(2, 0)
-    code.half(0x2A00)  # CMP r2, #0
-    code.b("wait", 0)
-    code.strb(1, 0)
-    code.str(1, 0)
-    code.forever()
+    port = f"ldr r0, ={SYSTEM['ITM'] + 4}; movs r1, #{ord('A')}"
+    wait = "wait: ldr r2, [r0]; cmp r2, #0; beq wait"
     for unlocked in (False, True):
-        bench = Bench(code.finish())
+        bench = Bench(f"{port}; {wait}; strb r1, [r0]; str r1, [r0]; b .")
         if unlocked:
             bench.write(SYSTEM["ITM"] + 0xFB0, 0xC5AC_CE55)
         bench.write(SYSTEM["ITM"] + 0xE00, 2)

@@ -5,7 +5,6 @@ import struct
 import pytest
 
 from .bench import RAM, STOP, Bench
-from .thumb import Program
 
 BLOCK = RAM + 0x100
 TEXT = RAM + 0x200
@@ -13,12 +12,8 @@ TEXT = RAM + 0x200
 
 def call(operation: int, parameter: int = BLOCK, words: tuple[int, ...] = (), text: bytes = b""):
     """One call; the bench after it."""
-    code = Program()
-    code.load(0, operation)
-    code.load(1, parameter)
-    code.bkpt(0xAB)
-    code.forever()
-    bench = Bench(code.finish(), semihosting=True)
+    program = f"ldr r0, ={operation}; ldr r1, ={parameter}; bkpt #0xAB; b ."
+    bench = Bench(program, semihosting=True)
     block = struct.pack(f"<{len(words)}I", *words)
     bench.ram[0x100 : 0x100 + len(block)] = list(block)
     bench.ram[0x200 : 0x200 + len(text)] = list(text)
@@ -67,10 +62,6 @@ def test_exit_stops_the_run(operation, parameter, words, code):
 
 
 def test_without_semihosting_it_is_a_fault():
-    code = Program()
-    code.bkpt(0xAB)
-    code.handler(3)
-    code.forever()
-    bench = Bench(code.finish())
+    bench = Bench("bkpt #0xAB; @3: b .")
     bench.run(50)
     assert bench.ipsr == 3

@@ -2,30 +2,14 @@
 
 import pytest
 
-from .bench import LOG, PULSE, SLEEP, SYSTEM, Bench
-from .thumb import Program
+from .bench import LOG, PULSE, SLEEP, SYSTEM, Bench, store
 
 WFI, WFE, ON_EXIT = 1, 2, 3
 
 
-def sleeping(instruction: str, masked: bool = False) -> Program:
-    """A program that sleeps, then writes to the log; so does the handler."""
-    code = Program()
-    code.load(6, LOG)
-    if masked:
-        code.cps(False)
-    getattr(code, instruction)()
-    code.str(6, 6)
-    code.forever()
-    code.handler(16)
-    code.str(6, 6)
-    code.bx()
-    return code
-
-
-def start(code: Program, enabled: bool = True) -> Bench:
-    """A sleeping bench."""
-    bench = Bench(code.finish())
+def sleeping(instruction: str, enabled: bool = True) -> Bench:
+    """A bench that sleeps, then writes to the log; so does the handler."""
+    bench = Bench(f"ldr r6, ={LOG}; {instruction}; str r6, [r6]; b .; @16: str r6, [r6]; bx lr")
     bench["ISER"] = 1 * enabled
     assert bench.run(50) & SLEEP
     return bench
@@ -33,7 +17,7 @@ def start(code: Program, enabled: bool = True) -> Bench:
 
 @pytest.mark.parametrize(("instruction", "state"), [("wfi", WFI), ("wfe", WFE)])
 def test_interrupt_wakes_and_is_taken(instruction, state):
-    bench = start(sleeping(instruction))
+    bench = sleeping(instruction)
     assert bench["sleep"] == state
     bench.run(1000)
     assert bench.log == []
@@ -45,14 +29,14 @@ def test_interrupt_wakes_and_is_taken(instruction, state):
 
 
 def test_interrupt_masked_by_primask_wakes_from_wfi():
-    bench = start(sleeping("wfi", masked=True))
+    bench = sleeping("cpsid i; wfi")
     bench.at(bench.cycles + 100, PULSE, 0)
     bench.run(200)
     assert [entry.exception for entry in bench.log] == [0]
 
 
 def test_interrupt_masked_by_basepri_does_not_wake_from_wfi():
-    bench = start(sleeping("wfi"))
+    bench = sleeping("wfi")
     bench["basepri"] = 0x20
     bench.write(0xE000E400, 0x40, 1)
     bench.at(bench.cycles + 10, PULSE, 0)
@@ -61,40 +45,23 @@ def test_interrupt_masked_by_basepri_does_not_wake_from_wfi():
 
 
 def test_wfi_continues_at_once_with_a_pending_interrupt():
-    code = Program()
-    code.cps(False)
-    code.load(0, SYSTEM["ISPR"])
-    code.movs(1, 1)
-    code.str(1, 0)
-    code.wfi()
-    where = code.forever()
-    bench = Bench(code.finish())
+    bench = Bench(f"cpsid i; {store(SYSTEM['ISPR'], 1)}; wfi; after: b .")
     bench["ISER"] = 1
     bench.run(40)
-    assert (bench["pc"], bench["sleep"]) == (where, 0)
+    assert (bench["pc"], bench["sleep"]) == (bench.labels["after"], 0)
 
 
 def test_wfe_consumes_events_of_sev_and_exceptions():
-    code = Program()
-    code.load(6, LOG)
-    code.sev()
-    code.wfe()
-    code.str(6, 6)
-    code.svc()
-    code.wfe()  # exception entry and return set the event
-    code.str(6, 6)
-    code.wfe()
-    code.str(6, 6)
-    code.handler(11)
-    code.bx()
-    bench = Bench(code.finish())
+    after_sev = f"ldr r6, ={LOG}; sev; wfe; str r6, [r6]"
+    after_svc = "svc #0; wfe; str r6, [r6]"  # exception entry and return set the event
+    bench = Bench(f"{after_sev}; {after_svc}; wfe; str r6, [r6]; @11: bx lr")
     bench.run(200)
     assert (len(bench.log), bench["sleep"]) == (2, WFE)
 
 
 @pytest.mark.parametrize("sev_on_pend", [False, True])
 def test_disabled_interrupt_wakes_from_wfe_with_sevonpend(sev_on_pend):
-    bench = start(sleeping("wfe", masked=True), enabled=False)
+    bench = sleeping("cpsid i; wfe", enabled=False)
     bench["SCR"] = 0x10 * sev_on_pend
     bench.at(bench.cycles + 100, PULSE, 0)
     bench.run(200)
@@ -102,13 +69,7 @@ def test_disabled_interrupt_wakes_from_wfe_with_sevonpend(sev_on_pend):
 
 
 def test_waking_event_is_consumed():
-    code = Program()
-    code.load(6, LOG)
-    code.cps(False)
-    for _ in range(2):
-        code.wfe()
-        code.str(6, 6)
-    bench = Bench(code.finish())
+    bench = Bench(f"ldr r6, ={LOG}; cpsid i; wfe; str r6, [r6]; wfe; str r6, [r6]")
     bench["SCR"] = 0x10
     bench.run(50)
     bench.at(bench.cycles + 10, PULSE, 0)
@@ -117,7 +78,7 @@ def test_waking_event_is_consumed():
 
 
 def test_sleep_on_exit_runs_only_handlers():
-    bench = start(sleeping("wfi"))
+    bench = sleeping("wfi")
     bench["SCR"] = 2
     for delay in (100, 300):
         bench.at(bench.cycles + delay, PULSE, 0)
@@ -131,7 +92,7 @@ def test_sleep_on_exit_runs_only_handlers():
 
 
 def test_systick_wakes_from_wfi():
-    bench = start(sleeping("wfi"))
+    bench = sleeping("wfi")
     bench.write(SYSTEM["SYSTICK"] + 4, 999)
     bench.write(SYSTEM["SYSTICK"] + 8, 0)
     bench["SYSTICK"] = 7
