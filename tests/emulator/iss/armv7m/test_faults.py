@@ -56,6 +56,8 @@ def with_trap(bit: int, instruction: str) -> str:
     return f"{store(SYSTEM['CCR'], 0x200 | bit)}; ldr r0, ={RAM + 1}; movs r1, #0; {instruction}"
 
 
+LDRD = ".short 0xE9D0, 0x1200"  # r1, r2, [r0]
+UNBUFFERED = store(SYSTEM["ACTLR"], 2)  # stores without the write buffer
 PRECISE = PRECISERR | BFARVALID
 CASES = {
     # name: (program, exception, CFSR, BFAR, stacked PC if not the instruction's)
@@ -64,25 +66,13 @@ CASES = {
     "coprocessor": ("here: .short 0xEE00, 0x0A10", USAGE_FAULT, NOCP, None, None),
     "divide by zero": (with_trap(16, "here: udiv r2, r0, r1"), USAGE_FAULT, DIVBYZERO, None, None),
     "unaligned word": (with_trap(8, "here: ldr r1, [r0]"), USAGE_FAULT, UNALIGNED, None, None),
-    "unaligned pair": (
-        with_trap(0, "here: .short 0xE9D0, 0x1200"),
-        USAGE_FAULT,
-        UNALIGNED,
-        None,
-        None,
-    ),
+    "unaligned pair": (with_trap(0, f"here: {LDRD}"), USAGE_FAULT, UNALIGNED, None, None),
     "jump into a peripheral": (jump(0x4000_0001), MEM_MANAGE, IACCVIOL, None, 0x4000_0000),
     "jump into the system": (jump(0xE000_E001), MEM_MANAGE, IACCVIOL, None, 0xE000_E000),
     "jump to no memory": (jump(NOWHERE | 1), BUS_FAULT, IBUSERR, None, NOWHERE),
     "load from no memory": (load_from(NOWHERE), BUS_FAULT, PRECISE, NOWHERE, None),
     "load from no peripheral": (load_from(0x4100_0004), BUS_FAULT, PRECISE, 0x4100_0004, None),
-    "precise store": (
-        f"{store(SYSTEM['ACTLR'], 2)}; {store_to(NOWHERE)}",
-        BUS_FAULT,
-        PRECISE,
-        NOWHERE,
-        None,
-    ),
+    "precise store": (f"{UNBUFFERED}; {store_to(NOWHERE)}", BUS_FAULT, PRECISE, NOWHERE, None),
 }
 
 
@@ -108,9 +98,8 @@ def test_fault(name, enabled):
 
 
 def test_without_traps_nothing_faults():
-    bench = Bench(
-        f"ldr r0, ={RAM + 1}; movs r1, #0; ldr r2, [r0]; udiv r3, r0, r1; b .; {HANDLERS}"
-    )
+    unaligned, division = "ldr r2, [r0]", "udiv r3, r0, r1"
+    bench = prepare(f"ldr r0, ={RAM + 1}; movs r1, #0; {unaligned}; {division}; b .")
     bench["r3"] = 99
     bench.run(100)
     assert (bench.ipsr, bench["r3"]) == (0, 0)

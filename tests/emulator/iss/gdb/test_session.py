@@ -1,13 +1,62 @@
-"""Packets of the remote protocol (GDB manual, appendix E), on a target without processor."""
+"""Packets of the remote protocol (GDB manual, appendix E), on a target without processor.
+
+A session continues whatever a client sends.
+"""
 
 from xml.etree import ElementTree
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from cubestack.emulator.iss.gdb.packets import escape, framed
+from cubestack.emulator.iss.gdb.packets import LARGEST, Deframer, escape, framed, unescape
 from cubestack.emulator.iss.gdb.target import REGISTERS, SIGSEGV, Stop
 
 from .fake_target import RAM, Talk
+
+
+def test_packet_is_framed_with_its_checksum() -> None:
+    assert framed(b"OK") == b"$OK#9a"
+
+
+@given(st.binary())
+def test_escaped_data_are_unescaped_unchanged(data: bytes) -> None:
+    escaped = escape(data)
+    assert not set(escaped) & set(b"$#*")
+    assert unescape(escaped) == data
+
+
+@given(st.lists(st.binary(max_size=20)), st.integers(1, 30))
+def test_packets_are_found_in_a_stream_cut_anywhere(bodies: list[bytes], step: int) -> None:
+    stream = b"+".join(framed(escape(body)) for body in bodies)
+    deframer = Deframer()
+    found: list[bytes | None] = []
+    for start in range(0, len(stream), step):
+        found += deframer.feed(stream[start : start + step])
+    assert [unescape(body) for body in found if body is not None] == bodies
+    assert deframer.replies == b"+" * len(bodies)
+
+
+def test_wrong_checksum_is_not_acknowledged() -> None:
+    deframer = Deframer()
+    assert list(deframer.feed(b"$g#00")) == []
+    assert deframer.replies == b"-"
+
+
+def test_checksum_is_ignored_without_acknowledgements() -> None:
+    deframer = Deframer(acknowledging=False)
+    assert list(deframer.feed(b"$g#00")) == [b"g"]
+    assert deframer.replies == b""
+
+
+def test_byte_03_is_an_interrupt_only_between_packets() -> None:
+    assert list(Deframer().feed(b"\x03" + framed(b"X0,1:\x03"))) == [None, b"X0,1:\x03"]
+
+
+def test_packet_without_end_is_dropped() -> None:
+    deframer = Deframer()
+    assert list(deframer.feed(b"$" + b"0" * (LARGEST + 8))) == []
+    assert list(deframer.feed(framed(b"?"))) == [b"?"]
 
 
 @pytest.fixture
@@ -160,3 +209,31 @@ def test_unknown_packet_has_an_empty_answer(talk: Talk, packet: str) -> None:
 @pytest.mark.parametrize("packet", ["p99", "mzz,1", "P0", "Z0", "Mx:", "vCont;r1", "qRcmd,x"])
 def test_invalid_packet_is_answered_with_an_error(talk: Talk, packet: str) -> None:
     assert talk.ask(packet) == b"E01"
+
+
+HEADS = "?gGpPmMXcCsSzZvqQHTkDR!"
+TAILS = st.text("0123456789abcdefF,;:=x.", max_size=24)
+WORDS = st.sampled_from(
+    ["", "Cont", "Cont;", "FlashErase:", "FlashWrite:", "FlashDone", "Xfer:features:read:",
+     "Rcmd,", "Supported:", "Run", "Attach", "Kill"]
+)  # fmt: skip
+
+
+@given(st.lists(st.tuples(st.sampled_from(HEADS), WORDS, TAILS), max_size=12))
+def test_session_answers_after_random_packets(packets: list[tuple[str, str, str]]) -> None:
+    talk = Talk()
+    for head, word, tail in packets:
+        talk.send(framed(f"{head}{word}{tail}".encode()))
+    if not talk.session.ended:
+        talk.target.halt()
+        talk.session.look()
+        talk.session.output.clear()
+        assert (talk.ask("?") or b"").startswith(b"T")
+
+
+@given(st.binary(max_size=200))
+def test_session_survives_random_bytes(data: bytes) -> None:
+    talk = Talk()
+    talk.send(data)
+    talk.session.close()
+    assert talk.target.halted is None

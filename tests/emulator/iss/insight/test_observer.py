@@ -7,10 +7,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from elftools.elf.elffile import ELFFile
 
 from cubestack.emulator.iss.image import load_image
 from cubestack.emulator.iss.insight.observer import Edge, History, Observer
-from cubestack.emulator.iss.insight.reports import write_callgrind, write_lcov
+from cubestack.emulator.iss.insight.reports import memory_use, write_callgrind, write_lcov
 from cubestack.emulator.iss.insight.symbols import Symbols
 from cubestack.emulator.iss.machine import RAM_BASE, Machine
 from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
@@ -18,6 +19,8 @@ from tests.emulator.iss.cross_compiler import compile_for_m3, needs_compiler
 PS_PER_MS = 10**9
 MOST_RUNS = 10_000
 RUN_PS = 20 * PS_PER_MS  # 200 ticks
+RAM_BYTES = 128 * 1024
+HEAP_BYTES = 100
 
 
 def run(machine: Machine, until_ps: int) -> None:
@@ -177,11 +180,9 @@ def test_history_has_functions_and_exceptions_with_their_times(
 def test_full_history_ends_a_run(machine: Machine, symbols: Symbols) -> None:
     observer = Observer(machine, symbols)
     history = History(observer, {})
-    for _ in range(MOST_RUNS):
+    while machine.now_ps < RUN_PS * 3:
         machine.run(RUN_PS * 10)
         list(machine.outbox())
-        if machine.now_ps >= RUN_PS * 3:
-            break
     full_ps = machine.now_ps
     for _ in range(10):  # the buffer is nearly full: each run is short
         machine.run(RUN_PS * 10)
@@ -218,3 +219,61 @@ def test_calls_of_each_task_are_counted_on_its_own_stack(tmp_path: Path) -> None
     counted = sum(int(code.cycles.sum()) for code in observer.codes)
     assert counted + observer.figures().idle_cycles == pytest.approx(machine.cycles, abs=50_000)
     machine.close()
+
+
+# -- memory use, compared with the ELF file and with bytes that the test changes --
+
+
+def write(observer: Observer, address: int) -> None:
+    observer.machine.ram[address - RAM_BASE] ^= 0x55
+
+
+def test_flash_and_static_data_are_those_of_the_elf_file(observer: Observer, program: Path) -> None:
+    elf = ELFFile(io.BytesIO(program.read_bytes()))
+    sections = [part for part in elf.iter_sections() if part["sh_flags"] & 2]  # SHF_ALLOC
+    in_ram = [part for part in sections if part["sh_addr"] >= RAM_BASE]
+    end = max(part["sh_addr"] + part["sh_size"] for part in in_ram)
+    in_flash = sum(part["sh_size"] for part in sections if part["sh_type"] == "SHT_PROGBITS")
+    use = memory_use(observer)
+    assert (use.flash_size, use.ram_size, use.flash) == (1 << 20, RAM_BYTES, in_flash)
+    assert use.static == end - RAM_BASE
+    main_sp = observer.figures().main_sp
+    assert main_sp is not None
+    assert use.stack == RAM_BASE + RAM_BYTES - main_sp
+    assert (use.heap, use.process_stack) == (0, None)
+    assert use.static + use.free + use.stack == RAM_BYTES
+    assert 0 < use.stack < 256
+
+
+def test_heap_ends_after_the_last_changed_byte(observer: Observer) -> None:
+    before = memory_use(observer)
+    assert before.static is not None
+    assert before.free is not None
+    for offset in (HEAP_BYTES - 1, 3):
+        write(observer, RAM_BASE + before.static + offset)
+    use = memory_use(observer)
+    assert (use.heap, use.free) == (HEAP_BYTES, before.free - HEAP_BYTES)
+    write(observer, RAM_BASE + before.static + before.free)  # the stack's lowest byte
+    assert memory_use(observer) == use
+    write(observer, RAM_BASE + before.static + before.free - 1)
+    assert memory_use(observer).free == 0
+
+
+def test_static_data_end_at_the_first_known_symbol(observer: Observer) -> None:
+    labels = observer.symbols.labels
+    before = labels.copy()
+    end = labels.pop("end")
+    try:
+        use = memory_use(observer)
+        assert (use.static, use.heap, use.free) == (None, None, None)
+        assert use.stack is not None
+        for inside, at in ((True, RAM_BASE), (True, RAM_BASE + RAM_BYTES), (False, RAM_BASE - 1)):
+            labels["_ebss"] = at
+            assert memory_use(observer).static == (at - RAM_BASE if inside else None)
+        labels["_ebss"] = RAM_BASE + RAM_BYTES + 1
+        assert memory_use(observer).static is None
+        labels["_end"] = end  # preferred
+        assert memory_use(observer).static == end - RAM_BASE
+    finally:
+        labels.clear()
+        labels |= before
