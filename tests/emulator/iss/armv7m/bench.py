@@ -43,11 +43,6 @@ STOP, SLEEP, LOCKUP = 2, 4, 8
 """Bits of the result of a run."""
 
 
-def store(address: int, value: int) -> str:
-    """Instructions that store a constant; they use r0 and r1."""
-    return f"ldr r0, ={address}; ldr r1, ={value}; str r1, [r0]"
-
-
 class Entry(NamedTuple):
     """A value that the program wrote to the log."""
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from .bench import LINE_HIGH, LINES, LOG, NMI, PULSE, RAM, STOP, SYSTEM, Bench, store
+from .bench import LINE_HIGH, LINES, LOG, NMI, PULSE, RAM, STOP, SYSTEM, Bench
+from .thumb import store
 
 TOP = 0x2000_8000
 LOGS = f"ldr r6, ={LOG}"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from .bench import LOCKUP, LOG, PULSE, RAM, STOP, SYSTEM, Bench, store
-from .thumb import Program
+from .bench import LOCKUP, LOG, PULSE, RAM, STOP, SYSTEM, Bench
+from .thumb import Program, store
 
 TOP = 0x2000_8000
 NOWHERE = 0x3000_0000
@@ -147,10 +147,7 @@ def test_nmi_ends_a_lock_up():
 
 
 def test_unusable_vector_table_locks_up():
-    code = Program()
-    code.vector(1, 0xFFFF_FFFF)
-    code.vector(3, 0xFFFF_FFFF)
-    bench = Bench(code)
+    bench = Bench(".org 4; .short 0xFFFF, 0xFFFF; .org 12; .short 0xFFFF, 0xFFFF")
     bench.run(1000)  # the start faults, then the handler
     assert bench["locked"]
 

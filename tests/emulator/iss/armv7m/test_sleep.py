@@ -2,7 +2,8 @@
 
 import pytest
 
-from .bench import LOG, PULSE, SLEEP, SYSTEM, Bench, store
+from .bench import LOG, PULSE, SLEEP, SYSTEM, Bench
+from .thumb import store
 
 WFI, WFE, ON_EXIT = 1, 2, 3
 

@@ -61,6 +61,11 @@ _FORMS = {
 """Encodings by form: R is a register, # and = are constants."""
 
 
+def store(address: int, value: int) -> str:
+    """Instructions that store a constant; they use r0 and r1."""
+    return f"ldr r0, ={address}; ldr r1, ={value}; str r1, [r0]"
+
+
 class Program:
     """A 64 kB memory at address 0: vectors, and the code from ``START`` on."""
 
@@ -70,8 +75,7 @@ class Program:
         self.labels: dict[str, int] = {}
         self._at = START
         self._branches: list[tuple[int, int, str]] = []
-        self.vector(0, stack)
-        self.vector(1, START | 1)
+        struct.pack_into("<2I", self.image, 0, stack, START | 1)
         for statement in text.split(";"):
             self._write(statement.strip())
         for address, condition, name in self._branches:
@@ -82,13 +86,10 @@ class Program:
                 half = 0xD000 | condition << 8 | offset & 0xFF
             struct.pack_into("<H", self.image, address, half)
 
-    def vector(self, exception: int, value: int) -> None:
-        struct.pack_into("<I", self.image, 4 * exception, value)
-
     def _write(self, statement: str) -> None:
-        if mark := re.match(r"(@?)(\w+):\s*", statement):
+        while mark := re.match(r"(@?)(\w+):\s*", statement):
             if mark[1]:
-                self.vector(int(mark[2]), self._at | 1)
+                struct.pack_into("<I", self.image, 4 * int(mark[2]), self._at | 1)
             else:
                 self.labels[mark[2]] = self._at
             statement = statement[mark.end() :]
